@@ -1,0 +1,216 @@
+/* Stepping and state of c_fmu.c. */
+
+static void integrate(State *s, double duration) {
+    long n = lround(ceil(duration / 1e-3 - 1e-9));
+    double h;
+    if (n < 1) n = 1;
+    h = duration / (double)n;
+    for (long i = 0; i < n; i++) {
+        double x = s->x, v = s->v;
+        double a1 = acceleration(s, x, v);
+        double v2 = v + 0.5 * h * a1, a2 = acceleration(s, x + 0.5 * h * v, v2);
+        double v3 = v + 0.5 * h * a2, a3 = acceleration(s, x + 0.5 * h * v2, v3);
+        double v4 = v + h * a3, a4 = acceleration(s, x + h * v3, v4);
+        s->x += h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4);
+        s->v += h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4);
+    }
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean no_set_state) {
+    Instance *self = c;
+    (void)no_set_state;
+#ifndef FAULT_step_before_init
+    if (self->phase != STEPPING) return refuse(self, "fmi2DoStep must come after initialisation");
+#endif
+#ifndef FAULT_negative_step
+    if (!(step > 0.0)) return refuse(self, "communicationStepSize must be positive");
+#else
+    if (step < 0.0) step = -step;
+#endif
+    if (fabs(time - self->s.time) > 1e-9 * (1.0 + fabs(time))) return refuse(self, "wrong communication point");
+#ifdef FAULT_crash_step
+    if (self->s.steps == 5) { volatile int *nowhere = NULL; *nowhere = 1; }
+#endif
+#ifdef FAULT_exit_step
+    if (self->s.steps == 5) exit(0);
+#endif
+#ifdef FAULT_hang_step
+    if (self->s.steps == 5) for (;;) usleep(1000);
+#endif
+#ifdef FAULT_spin_step
+    if (self->s.steps == 5) for (volatile long i = 0;; i++) { }
+#endif
+#ifdef FAULT_error_step
+    if (self->s.steps == 5) return refuse(self, "solver failed");
+#endif
+#ifdef FAULT_discard_step
+    if (self->s.steps == 5) return fmi2Discard;
+#endif
+#ifdef FAULT_fatal_step
+    if (self->s.steps == 5) return fmi2Fatal;
+#endif
+#ifdef FAULT_pending_step
+    return fmi2Pending;
+#endif
+#ifdef FAULT_illegal_status
+    return (fmi2Status)17;
+#endif
+#ifdef FAULT_step_leak
+    char *lost = malloc(1 << 16);
+    memset(lost, 1, 1 << 16);
+#endif
+#ifdef FAULT_eat_memory
+    for (int i = 0; i < 64; i++) {
+        char *lost = malloc(1 << 26);
+        if (!lost) abort();
+        memset(lost, 1, 1 << 26);
+    }
+#endif
+#ifdef FAULT_chatter
+    for (int i = 0; i < 100000; i++) puts("a slave that talks and talks and talks and talks and talks");
+#endif
+#ifdef FAULT_write_file
+    FILE *file = fopen("left_behind.txt", "w");
+    if (file) { fputs("a file nobody asked for\n", file); fclose(file); }
+#endif
+#ifdef FAULT_write_resources
+    char path[1100];
+    snprintf(path, sizeof path, "%s/left_behind.txt", self->resources);
+    FILE *file = fopen(path, "w");
+    if (file) { fputs("a file nobody asked for\n", file); fclose(file); }
+#endif
+#ifdef FAULT_orphan
+    if (self->s.steps == 0 && fork() == 0) { sleep(60); _exit(0); }
+#endif
+#ifdef FAULT_shared_state
+    self->s.force = shared;
+#endif
+#ifdef FAULT_hidden_state
+    self->hidden += step;
+    self->s.v += 0.5 * step * sin(7.0 * self->hidden);
+#endif
+#ifdef FAULT_variable_refused
+    if (fabs(step - 0.01) > 1e-9) return refuse(self, "only steps of 0.01 s");
+#endif
+#if defined(FAULT_slow_physics)
+    integrate(&self->s, 0.9 * step);
+#elif defined(FAULT_ignores_step)
+    integrate(&self->s, 0.01);
+#else
+    integrate(&self->s, step);
+#endif
+    self->s.time = time + (step > 0.0 ? step : 0.0);
+    self->s.steps++;
+    self->s.moving = fabs(self->s.v) > 1e-3;
+    return fmi2OK;
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(c, "fmi2CancelStep: no step is pending"); }
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
+    (void)kind; (void)value;
+    return refuse(c, "fmi2GetStatus: no step is pending") == fmi2Error ? fmi2Discard : fmi2Error;
+}
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    if (kind != fmi2LastSuccessfulTime) return fmi2Discard;
+    *value = ((Instance *)c)->s.time;
+    return fmi2OK;
+}
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value) {
+    (void)c; (void)kind; (void)value;
+    return fmi2Discard;
+}
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    (void)c; (void)kind; (void)value;
+    return fmi2Discard;
+}
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {
+    (void)c; (void)kind; (void)value;
+    return fmi2Discard;
+}
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+                                       const fmi2Real value[]) {
+    (void)vr; (void)n; (void)order; (void)value;
+    return refuse(c, "input derivatives are not supported");
+}
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+                                        fmi2Real value[]) {
+    (void)vr; (void)n; (void)order; (void)value;
+    return refuse(c, "output derivatives are not supported");
+}
+#ifndef FAULT_missing_function
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t nu,
+                                        const fmi2ValueReference known[], size_t nk, const fmi2Real dv[], fmi2Real dz[]) {
+    (void)unknown; (void)nu; (void)known; (void)nk; (void)dv; (void)dz;
+    return refuse(c, "directional derivatives are not supported");
+}
+#endif
+
+typedef struct { State s; Phase phase; double start; } Saved;
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    Instance *self = c;
+#ifdef FAULT_state_refused
+    return refuse(self, "states are not supported");
+#endif
+    Saved *saved = *state ? *state : malloc(sizeof(Saved));
+    memset(saved, 0, sizeof *saved);
+    saved->s = self->s;
+    saved->phase = self->phase;
+    saved->start = self->start;
+    *state = saved;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+    Instance *self = c;
+    const Saved *saved = state;
+#ifdef FAULT_state_not_restored
+    double v = self->s.v;
+#endif
+    self->s = saved->s;
+    self->phase = saved->phase;
+    self->start = saved->start;
+#ifdef FAULT_state_not_restored
+    self->s.v = v;
+#endif
+    return fmi2OK;
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    (void)c;
+    if (!state || !*state) return fmi2OK;
+#ifndef FAULT_state_not_nulled
+    free(*state);
+    *state = NULL;
+#endif
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
+    (void)c; (void)state;
+    *size = sizeof(Saved);
+#ifdef FAULT_serialised_empty
+    *size = 0;
+#endif
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
+    if (size < sizeof(Saved)) return refuse(c, "fmi2SerializeFMUstate: buffer too small");
+    memcpy(bytes, state, sizeof(Saved));
+#ifdef FAULT_serialised_incomplete
+    ((Saved *)bytes)->s.x = 0.0;
+#endif
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
+    if (size != sizeof(Saved)) return refuse(c, "fmi2DeSerializeFMUstate: wrong size");
+#ifdef FAULT_deserialise_error
+    return refuse(c, "cannot deserialise");
+#endif
+    Saved *saved = *state ? *state : malloc(sizeof(Saved));
+    memcpy(saved, bytes, sizeof *saved);
+    *state = saved;
+    return fmi2OK;
+}
