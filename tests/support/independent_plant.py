@@ -1,0 +1,298 @@
+"""An independent simulator that makes measured records, and shares no code or formulation with the library.
+
+Where the library locates events and uses signum friction and a dead zone, this one uses small fixed
+Runge-Kutta steps, LuGre friction, Hunt-Crossley contact and a tangent spring. Effects (all off by default), with
+the names used in ``truth``::
+
+    alpha                 half gap [rad]; Hunt-Crossley contact (``contact="dead_zone"``: sharp, exact twin)
+    Fc_m Fs_m vs          LuGre friction of the motor: sliding, extra breakaway [N.m], Stribeck speed [rad/s]
+    Fc_l Fs_l vs_l        the same at the load
+    delay                 of the torque request [s]
+    sat                   torque limit [N.m]
+    hard                  twist at which the tangent spring would become rigid [rad]
+    rip rip_n rip_ph      torque ripple at the motor [N.m, cycles per motor revolution, rad]
+    ecc ecc_n ecc_ph      ecc*sin(ecc_n*theta_m + ecc_ph) added to the twist [rad]
+    T0                    constant torque against the load [N.m]
+    grav grav_ph          grav*sin(theta_l + grav_ph) against the load [N.m, rad]
+    J3 w3 z3              third inertia [kg.m2], its frequency [rad/s] and damping ratio (0.02)
+    qd                    quadratic drag of the load [N.m.s2/rad2]
+    off_m off_l           encoder offsets [rad]
+  that no library is meant to hold:
+    jvar                  load inertia times 1 + jvar*cos(theta_l)
+    bw bw_x               Bouc-Wen hysteresis in the shaft [N.m], yield twist [rad]
+    late_Fc               motor friction [N.m] that starts half-way through the record
+    alpha_end             half gap at the end of the record, grown linearly from alpha
+    kspeed                stiffness times 1 + kspeed*|omega_l| (per rad/s)
+    knock                 torque pulses [N.m] on the load, 20 ms every 0.7 s, not in ``u``
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+NOMINAL = {"J_m": 0.4, "J_l": 5.6, "k": 3300.0, "c": 1.0, "b_m": 0.1, "b_l": 1.0, "i": 3.984, "tau": 1.0}
+MISMATCHED = ("J_m", "J_l", "k", "c", "b_m", "b_l", "tau")
+EFFECTS = {
+    "alpha": 0.0, "Fc_m": 0.0, "Fs_m": 0.0, "vs": 0.5, "Fc_l": 0.0, "Fs_l": 0.0, "vs_l": 0.2, "delay": 0.0,
+    "sat": 1e9,
+    "hard": 0.0, "rip": 0.0, "rip_n": 6.0, "rip_ph": 0.0, "ecc": 0.0, "ecc_n": 1.0, "ecc_ph": 0.0, "T0": 0.0,
+    "grav": 0.0, "grav_ph": 0.0, "J3": 0.0, "w3": 60.0, "z3": 0.02, "qd": 0.0, "off_m": 0.0, "off_l": 0.0,
+    "jvar": 0.0,
+    "bw": 0.0, "bw_x": 0.01, "late_Fc": 0.0, "alpha_end": -1.0, "kspeed": 0.0, "knock": 0.0,
+}  # fmt: skip
+LINEAR = tuple(NOMINAL)
+NAMES = (*LINEAR, *EFFECTS)
+COUNTS = (10_000, 20_000)
+NOISE = (3e-4, 1.5e-4)
+SUBSTEPS = 100  # per sample
+
+(
+    J_M, J_L, K, C, B_M, B_L, RATIO, TAU, ALPHA, FC_M, FS_M, VS_M, FC_L, FS_L, VS_L, DELAY, SAT, HARD,
+    RIP, RIP_N, RIP_PH, ECC, ECC_N,
+    ECC_PH, T0, GRAV, GRAV_PH, J3, W3, Z3, QD, OFF_M, OFF_L, JVAR, BW, BW_X, LATE, ALPHA_END, KSPEED, KNOCK,
+) = range(len(NAMES))  # fmt: skip
+SIGMA_M, SIGMA_L = 4000.0, 20000.0  # LuGre bristle stiffness [N.m/rad]
+
+
+@njit(cache=True)
+def _spring(d, w, v, alpha, sharp):
+    """Return the elastic-plus-damping torque of the mesh [N.m]."""
+    k, c = v[K], v[C]
+    if alpha <= 0.0:
+        gap, side = d, 0.0
+    elif d > alpha:
+        gap, side = d - alpha, 1.0
+    elif d < -alpha:
+        gap, side = d + alpha, -1.0
+    else:
+        return 0.0
+    if v[HARD] > 0.0:
+        reach = min(max(gap / v[HARD], -0.999), 0.999)
+        elastic = k * v[HARD] * 2.0 / np.pi * np.tan(0.5 * np.pi * reach)
+    else:
+        elastic = k * gap
+    if side == 0.0 or sharp:
+        return elastic + c * w
+    # Hunt-Crossley: damping in proportion to the penetration, never pulling; c is reached at 2 mrad.
+    torque = elastic + c * w * min(abs(gap) / 2e-3, 1.0)
+    return max(torque, 0.0) if side > 0.0 else min(torque, 0.0)
+
+
+@njit(cache=True)
+def _rates(t, x, v, torque_request, fm, fl, end, sharp):
+    """Return derivatives of (theta_m, omega_m, theta_l, omega_l, T_m, theta_3, omega_3, z_bw)."""
+    tm, wm, tl, wl, T, t3, w3, z = x
+    i = v[RATIO]
+    d = tm / i - tl + v[ECC] * np.sin(v[ECC_N] * tm + v[ECC_PH])
+    w = wm / i - wl + v[ECC] * v[ECC_N] * wm * np.cos(v[ECC_N] * tm + v[ECC_PH])
+    alpha = v[ALPHA]
+    if v[ALPHA_END] >= 0.0:
+        alpha += (v[ALPHA_END] - v[ALPHA]) * t / end
+    shaft = _spring(d, w, v, alpha, sharp) * (1.0 + v[KSPEED] * abs(wl)) + v[BW] * z
+    dz = 0.0
+    if v[BW] != 0.0:
+        dz = (w - 0.5 * abs(w) * z - 0.5 * w * abs(z)) / v[BW_X]
+    load = v[T0] + v[GRAV] * np.sin(tl + v[GRAV_PH]) + v[QD] * wl * abs(wl)
+    if v[KNOCK] != 0.0 and t % 0.7 < 0.02:
+        load += v[KNOCK]
+    a3 = 0.0
+    if v[J3] > 0.0:
+        link = v[J3] * v[W3] ** 2 * (tl - t3) + 2.0 * v[Z3] * v[W3] * v[J3] * (wl - w3)
+        load += link
+        a3 = link / v[J3]
+    ripple = v[RIP] * np.sin(v[RIP_N] * tm + v[RIP_PH])
+    am = (T + ripple - v[B_M] * wm - fm - shaft / i) / v[J_M]
+    inertia = v[J_L] * (1.0 + v[JVAR] * np.cos(tl))
+    al = (shaft - load - v[B_L] * wl - fl + 0.5 * v[J_L] * v[JVAR] * np.sin(tl) * wl * wl) / inertia
+    return np.array([wm, am, wl, al, (torque_request - T) / v[TAU], w3, a3, dz])
+
+
+@njit(cache=True)
+def _bristle(z, w, h, sigma, coulomb, extra, vs):
+    """Return the LuGre bristle after ``h`` at constant speed (exact) and the mean friction torque."""
+    level = coulomb + extra * np.exp(-((w / vs) ** 2))
+    if level <= 0.0:
+        return 0.0, 0.0
+    settle = level / sigma * (1.0 if w > 0.0 else -1.0)
+    new = settle + (z - settle) * np.exp(-sigma * abs(w) * h / level)
+    return new, sigma * 0.5 * (z + new) + 0.02 * np.sqrt(sigma) * (new - z) / h
+
+
+@njit(cache=True)
+def _control(state, measured, target, step, p, inertia, tau, limit):
+    """Return the torque of a third-order pole-placement position loop on the motor encoder."""
+    raw = (measured - state[0]) / step
+    state[0] = measured
+    state[1] += 0.3 * (raw - state[1])
+    u = state[2] * (1.0 - 3.0 * p * tau) - tau * inertia * p * p * (3.0 * state[1] + p * (measured - target))
+    u = min(max(u, -limit), limit)
+    state[2] += step / tau * (u - state[2])
+    return u
+
+
+@njit(cache=True)
+def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp):
+    """Return measured-before-rounding (n, 2), the true states (n, 8), and u as applied."""
+    n = u.size
+    h = step / substeps
+    end = n * step
+    x = x0.copy()
+    zm, zl = 0.0, 0.0
+    out = np.empty((n, 2))
+    states = np.empty((n, 8))
+    loop = np.zeros(3)
+    loop[0] = x0[0] + v[OFF_M]
+    applied = u.copy()
+    for n_k in range(n):
+        states[n_k] = x
+        out[n_k, 0] = x[0] + v[OFF_M] + noise_m[n_k]
+        out[n_k, 1] = x[2] + v[OFF_L] + noise_l[n_k]
+        if gain > 0.0:
+            ask = _control(loop, out[n_k, 0], target[n_k], step, gain, 0.753, 1.0, 300.0)
+            applied[n_k] = float(round(ask * 1e4)) / 1e4 + u[n_k]
+        for m in range(substeps):
+            t = (n_k * substeps + m) * h
+            back = int(np.floor((n_k * substeps + m + 0.5 - v[DELAY] / h) / substeps))
+            request = applied[back] if back >= 0 else 0.0
+            request = min(max(request, -v[SAT]), v[SAT])
+            coulomb = v[FC_M] + (v[LATE] if t > 0.5 * end else 0.0)
+            zm, fm = _bristle(zm, x[1], h, SIGMA_M, coulomb, v[FS_M], v[VS_M])
+            zl, fl = _bristle(zl, x[3], h, SIGMA_L, v[FC_L], v[FS_L], v[VS_L])
+            k1 = _rates(t, x, v, request, fm, fl, end, sharp)
+            k2 = _rates(t + 0.5 * h, x + 0.5 * h * k1, v, request, fm, fl, end, sharp)
+            k3 = _rates(t + 0.5 * h, x + 0.5 * h * k2, v, request, fm, fl, end, sharp)
+            k4 = _rates(t + h, x + h * k3, v, request, fm, fl, end, sharp)
+            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    return out, states, applied
+
+
+Array = np.ndarray
+
+
+def multisine(rng: np.random.Generator, n: int, step: float, std: float = 70.0, top: float = 9.0) -> Array:
+    """Return a random-phase multisine, 0.1 Hz to ``top`` Hz, rising with the motor's lag."""
+    frequency = np.fft.rfftfreq(n, step)
+    amplitude = np.sqrt(1.0 + (frequency / 1.33) ** 2) * np.where(frequency < 1.0, 1.8, 1.0)
+    amplitude[(frequency < 0.1) | (frequency > top)] = 0.0
+    u = np.fft.irfft(amplitude * np.exp(2j * np.pi * rng.random(frequency.size)), n)
+    return np.clip(u * std / u.std(), -3.7 * std, 3.7 * std)
+
+
+def levels(rng: np.random.Generator, n: int, step: float, std: float = 50.0, hold: float = 0.6) -> Array:
+    """Return random levels held for ``hold`` seconds plus a multisine, mean zero, their sum kept small."""
+    held = max(1, round(hold / step))
+    random = np.empty(n // held + 1)
+    total = 0.0
+    for m in range(random.size):
+        random[m] = std * (rng.uniform(-1.6, 1.6) - 0.8 * total)
+        total += random[m] / std
+    u = np.repeat(random, held)[:n] + multisine(rng, n, step, std)
+    return u - u.mean()
+
+
+def draw_parameters(rng: np.random.Generator, mismatch: float, names=MISMATCHED) -> dict[str, float]:
+    """Return the nominal parameters, each of ``names`` off by a uniform draw of up to ``mismatch``."""
+    drawn = dict(NOMINAL)
+    for name in names:
+        drawn[name] *= 1.0 + mismatch * rng.uniform(-1.0, 1.0)
+    return drawn
+
+
+def make_record(
+    effects: Mapping[str, float] | None = None,
+    seed: int = 0,
+    duration: float = 30.0,
+    rate: float = 200.0,
+    mismatch: float = 0.05,
+    excitation: str = "multisine",
+    noise: tuple[float, float] = NOISE,
+    counts: tuple[int, int] | None = COUNTS,
+    contact: str = "hunt_crossley",
+    u: np.ndarray | None = None,
+    torque: float = 1.0,
+    x0: Mapping[str, float] | None = None,
+    linear: Mapping[str, float] | None = None,
+    substeps: int = SUBSTEPS,
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Return one record (time, u, theta_m, theta_l) and the truth that made it.
+
+    Args:
+        effects: values of ``EFFECTS`` that are on; unknown names raise ``KeyError``.
+        seed: of mismatch, excitation and noise.
+        duration: [s].
+        rate: samples per second.
+        mismatch: each linear parameter but the gear ratio is off by a uniform draw of up to this share.
+        excitation: "multisine", "levels" or "closed_loop" (motor position loop on random steps).
+        noise: standard deviation before rounding [rad], motor and load.
+        counts: encoder counts per revolution, or None: not rounded.
+        contact: "hunt_crossley" or "dead_zone".
+        u: the torque request itself (n,), instead of an excitation.
+        torque: factor on the excitation.
+        x0: initial state by name (theta_m, omega_m, theta_l, omega_l, T_m).
+        linear: linear parameters to set outright, instead of the draw.
+        substeps: Runge-Kutta steps per sample.
+
+    Returns:
+        the columns, and truth: ``effects``, ``linear``, ``nominal``, ``states`` (n, 8), ``noise``, ...
+    """
+    rng = np.random.default_rng(seed)
+    drawn = draw_parameters(rng, mismatch) | dict(linear or {})
+    chosen = dict(EFFECTS)
+    for name, value in (effects or {}).items():
+        if name not in chosen:
+            raise KeyError(name)
+        chosen[name] = float(value)
+    step, n = 1.0 / rate, round(duration * rate)
+    target, gain = np.zeros(n), 0.0
+    if u is not None:
+        request = np.asarray(u, dtype=float)
+        n = request.size
+        target = np.zeros(n)
+    elif excitation == "closed_loop":
+        target = 1.5 * np.repeat(rng.uniform(-2.0, 2.0, n // round(1.5 * rate) + 1), round(1.5 * rate))[:n]
+        request, gain = multisine(rng, n, step, 10.0 * torque), 5.0
+    else:
+        request = {"multisine": multisine, "levels": levels}[excitation](rng, n, step) * torque
+    request = np.array([float(f"{value:.6g}") for value in request])
+    start = np.zeros(8)
+    for name, value in (x0 or {}).items():
+        start[("theta_m", "omega_m", "theta_l", "omega_l", "T_m").index(name)] = value
+    start[5], start[6] = start[2], start[3]
+    v = np.array([{**drawn, **chosen}[name] for name in NAMES])
+    disturbance = rng.standard_normal((2, n)) * np.array(noise)[:, None]
+    sharp = contact == "dead_zone"
+    raw, states, applied = _simulate(
+        v, request, step, substeps, start, target, gain, disturbance[0], disturbance[1], sharp
+    )
+    if counts is not None:
+        unit = 2.0 * np.pi / np.array(counts)
+        raw = np.round(raw / unit) * unit
+    columns = {
+        "time": np.arange(n) * step,
+        "u": applied,
+        "theta_m": raw[:, 0].copy(),
+        "theta_l": raw[:, 1].copy(),
+    }
+    truth = {
+        "effects": dict(effects or {}),
+        "linear": drawn,
+        "nominal": dict(NOMINAL),
+        "states": states,
+        "noise": noise,
+        "counts": counts,
+        "seed": seed,
+    }
+    return columns, truth
+
+
+def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Write the columns with the digits of the shared example records."""
+    names = list(columns)
+    lines = [",".join(names)]
+    for row in zip(*(columns[name] for name in names), strict=True):
+        cells = zip(names, row, strict=True)
+        lines.append(",".join(f"{value:.6g}" if name == "time" else f"{value:.9g}" for name, value in cells))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
