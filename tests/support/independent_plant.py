@@ -1,8 +1,8 @@
 """An independent simulator that makes measured records, and shares no code or formulation with the library.
 
 Where the library locates events and uses signum friction and a dead zone, this one uses small fixed
-Runge-Kutta steps, LuGre friction, Hunt-Crossley contact and a tangent spring. Effects (all off by default), with
-the names used in ``truth``::
+Runge-Kutta steps, LuGre friction, Hunt-Crossley contact and a tangent spring. Effects (all off by default),
+with the names used in ``truth``::
 
     alpha                 half gap [rad]; Hunt-Crossley contact (``contact="dead_zone"``: sharp, exact twin)
     Fc_m Fs_m vs          LuGre friction of the motor: sliding, extra breakaway [N.m], Stribeck speed [rad/s]
