@@ -16,9 +16,9 @@ A model file is TOML::
     name = "qm"                     # what the record calls the column
     unit = "deg"                    # s, ms, rad, deg, rev, m, mm, N, N.m
 
-A parameter that is not named keeps the FMU's default, without uncertainty when the file names any uncertainty at
-all. Without a file, the model is ``Drivetrain`` with the thesis's values, no backlash, and each linear parameter
-known to 5 %.
+A parameter that is not named keeps the FMU's default, without uncertainty when the file names any uncertainty
+at all. Without a file, the model is ``Drivetrain`` with the thesis's values, no backlash, and each linear
+parameter known to 5 %.
 """
 
 import importlib
@@ -131,8 +131,7 @@ def read_model(path: Path | None) -> Model:
     """Return the model of a TOML file, or the default model for None.
 
     Raises:
-        ScenarioError: the file is missing, is not TOML, or names something that does not exist; the message says
-            where.
+        ScenarioError: the file is missing, not TOML, or names what does not exist; the message says where.
     """
     if path is None:
         return default_model()
@@ -171,7 +170,7 @@ def _table(fmu: str, spread: float, where: str) -> dict[str, ModelParameter]:
     if fmu not in TABLES:
         raise ScenarioError(f"{where}: $.fmu must be one of {', '.join(TABLES)}, but is {fmu!r}")
     module = importlib.import_module(TABLES[fmu])
-    relative = {name: spread for name in LINEAR} if fmu == "Drivetrain" else {}
+    relative = dict.fromkeys(LINEAR, spread) if fmu == "Drivetrain" else {}
     return {
         p.name: ModelParameter(
             p.name, p.default, relative.get(p.name, 0.0) * abs(p.default), p.unit, p.minimum, p.maximum
