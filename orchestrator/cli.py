@@ -25,7 +25,9 @@ COMMANDS = {
 
 def build_parser(command: str | None) -> argparse.ArgumentParser:
     """Return the parser; only the module of ``command`` is imported, so that start-up stays quick."""
-    parser = argparse.ArgumentParser(prog="python -m orchestrator", description=importlib.import_module("orchestrator").__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m orchestrator", description=importlib.import_module("orchestrator").__doc__
+    )
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, summary in COMMANDS.items():
@@ -34,7 +36,13 @@ def build_parser(command: str | None) -> argparse.ArgumentParser:
             continue
         module = importlib.import_module(f"orchestrator.commands.{name}")
         module.add_arguments(sub)
-        sub.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR", help="where results go (default: %(default)s)")
+        sub.add_argument(
+            "--out",
+            type=Path,
+            default=Path("results") / name,
+            metavar="DIR",
+            help="where results go (default: %(default)s)",
+        )
         sub.set_defaults(run=module.run)
     return parser
 
