@@ -181,7 +181,7 @@ def first_root(series: list[float], end: float, tolerance: float) -> float:
     march converges to a simple root quadratically.
     """
     if series[0] <= 0.0:
-        if series[1] < 0.0 or (series[1] == 0.0 and series[2] < 0.0):
+        if series[1] < -tolerance:
             return 0.0
         series[0] = tolerance
     curvature = 0.0

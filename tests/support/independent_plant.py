@@ -58,9 +58,11 @@ SIGMA_M, SIGMA_L = 4000.0, 20000.0  # LuGre bristle stiffness [N.m/rad]
 
 
 @njit(cache=True)
-def _spring(d, w, v, alpha, sharp):
-    """Return the elastic-plus-damping torque of the mesh [N.m]."""
+def _spring(d, w, v, alpha, flank):
+    """Return the elastic-plus-damping torque of the mesh [N.m]; ``flank`` 9: Hunt-Crossley, else a sharp mode."""
     k, c = v[K], v[C]
+    if flank != 9:
+        return k * (d - flank * alpha) + c * w if flank != 0 else 0.0
     if alpha <= 0.0:
         gap, side = d, 0.0
     elif d > alpha:
@@ -74,7 +76,7 @@ def _spring(d, w, v, alpha, sharp):
         elastic = k * v[HARD] * 2.0 / np.pi * np.tan(0.5 * np.pi * reach)
     else:
         elastic = k * gap
-    if side == 0.0 or sharp:
+    if side == 0.0:
         return elastic + c * w
     # Hunt-Crossley: damping in proportion to the penetration, never pulling; c is reached at 2 mrad.
     torque = elastic + c * w * min(abs(gap) / 2e-3, 1.0)
@@ -82,7 +84,7 @@ def _spring(d, w, v, alpha, sharp):
 
 
 @njit(cache=True)
-def _rates(t, x, v, torque_request, fm, fl, end, sharp):
+def _rates(t, x, v, torque_request, fm, fl, end, flank):
     """Return derivatives of (theta_m, omega_m, theta_l, omega_l, T_m, theta_3, omega_3, z_bw)."""
     tm, wm, tl, wl, T, t3, w3, z = x
     i = v[RATIO]
@@ -91,7 +93,7 @@ def _rates(t, x, v, torque_request, fm, fl, end, sharp):
     alpha = v[ALPHA]
     if v[ALPHA_END] >= 0.0:
         alpha += (v[ALPHA_END] - v[ALPHA]) * t / end
-    shaft = _spring(d, w, v, alpha, sharp) * (1.0 + v[KSPEED] * abs(wl)) + v[BW] * z
+    shaft = _spring(d, w, v, alpha, flank) * (1.0 + v[KSPEED] * abs(wl)) + v[BW] * z
     dz = 0.0
     if v[BW] != 0.0:
         dz = (w - 0.5 * abs(w) * z - 0.5 * w * abs(z)) / v[BW_X]
@@ -108,6 +110,44 @@ def _rates(t, x, v, torque_request, fm, fl, end, sharp):
     inertia = v[J_L] * (1.0 + v[JVAR] * np.cos(tl))
     al = (shaft - load - v[B_L] * wl - fl + 0.5 * v[J_L] * v[JVAR] * np.sin(tl) * wl * wl) / inertia
     return np.array([wm, am, wl, al, (torque_request - T) / v[TAU], w3, a3, dz])
+
+
+@njit(cache=True)
+def _step(t, x, v, request, fm, fl, end, flank, h):
+    """Return the state after one Runge-Kutta step of 4th order."""
+    k1 = _rates(t, x, v, request, fm, fl, end, flank)
+    k2 = _rates(t + 0.5 * h, x + 0.5 * h * k1, v, request, fm, fl, end, flank)
+    k3 = _rates(t + 0.5 * h, x + 0.5 * h * k2, v, request, fm, fl, end, flank)
+    k4 = _rates(t + h, x + h * k3, v, request, fm, fl, end, flank)
+    return x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+
+@njit(cache=True)
+def _flank(x, v):
+    """Return the flank that a sharp dead zone touches; +1 without a gap."""
+    d = x[0] / v[RATIO] - x[2]
+    if v[ALPHA] <= 0.0 or d > v[ALPHA]:
+        return 1
+    return -1 if d < -v[ALPHA] else 0
+
+
+@njit(cache=True)
+def _sharp_step(t, x, v, request, fm, fl, end, h):
+    """Return the state after ``h`` with a sharp dead zone: the step is cut where the flank changes."""
+    before = _flank(x, v)
+    new = _step(t, x, v, request, fm, fl, end, before, h)
+    after = _flank(new, v)
+    if after == before or abs(after - before) > 1:
+        return new
+    edge = v[ALPHA] * (before + after)
+    low, high = 0.0, h
+    for _ in range(45):
+        cut = 0.5 * (low + high)
+        mid = _step(t, x, v, request, fm, fl, end, before, cut)
+        crossed = (mid[0] / v[RATIO] - mid[2] > edge) == (new[0] / v[RATIO] - new[2] > edge)
+        low, high = (low, cut) if crossed else (cut, high)
+    mid = _step(t, x, v, request, fm, fl, end, before, high)
+    return _step(t + high, mid, v, request, fm, fl, end, after, h - high)
 
 
 @njit(cache=True)
@@ -161,11 +201,10 @@ def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp):
             coulomb = v[FC_M] + (v[LATE] if t > 0.5 * end else 0.0)
             zm, fm = _bristle(zm, x[1], h, SIGMA_M, coulomb, v[FS_M], v[VS_M])
             zl, fl = _bristle(zl, x[3], h, SIGMA_L, v[FC_L], v[FS_L], v[VS_L])
-            k1 = _rates(t, x, v, request, fm, fl, end, sharp)
-            k2 = _rates(t + 0.5 * h, x + 0.5 * h * k1, v, request, fm, fl, end, sharp)
-            k3 = _rates(t + 0.5 * h, x + 0.5 * h * k2, v, request, fm, fl, end, sharp)
-            k4 = _rates(t + h, x + h * k3, v, request, fm, fl, end, sharp)
-            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            if sharp:
+                x = _sharp_step(t, x, v, request, fm, fl, end, h)
+            else:
+                x = _step(t, x, v, request, fm, fl, end, 9, h)
     return out, states, applied
 
 
