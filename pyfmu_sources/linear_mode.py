@@ -36,6 +36,8 @@ TERMS = 20
 GUARD_ROUNDINGS = 16.0
 EPSILON = 2.220446049250313e-16
 MAX_MARCH = 400
+# The march ends at this part of the tolerance, which it can only approach from above.
+REACHED = 0.01
 
 
 def law_of(contact: int, p: Parameters) -> Law:
@@ -180,7 +182,7 @@ def first_root(series: list[float], end: float, tolerance: float) -> float:
     curvature that is the positive root of ``v + s t - L t^2 / 2``. No root is stepped over, and the
     march converges to a simple root quadratically.
     """
-    if series[0] <= 0.0:
+    if series[0] <= REACHED * tolerance:
         if series[1] < -tolerance:
             return 0.0
         series[0] = tolerance
@@ -194,7 +196,7 @@ def first_root(series: list[float], end: float, tolerance: float) -> float:
         for n in range(TERMS - 1, -1, -1):
             slope = value + time * slope
             value = series[n] + time * value
-        if value <= 0.01 * tolerance:
+        if value <= REACHED * tolerance:
             return time
         root = sqrt(slope * slope + 2.0 * curvature * value)
         forward = root - slope
