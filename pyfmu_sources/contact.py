@@ -25,7 +25,7 @@ from .equations import (
 )
 
 # Below this speed [rad/s] two rigid teeth stay together instead of bouncing for ever (Zeno).
-RESTING_SPEED = 1e-9
+RESTING_SPEED = 1e-6
 MAX_BOUNCES = 200
 
 
