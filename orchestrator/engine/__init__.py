@@ -1,0 +1,33 @@
+"""Runs any number of cases on any number of processors, and never loses a finished one.
+
+See ``docs/sweeps.md``. The entry point is ``run_cases``.
+"""
+
+from orchestrator.engine.cases import Case, Cases, Column, Outcome, Progress, Row, Status
+from orchestrator.engine.grid import DesignCases, parse_design
+from orchestrator.engine.journal import JournalFullError
+from orchestrator.engine.pools import Limits, LocalProcesses
+from orchestrator.engine.run import Interrupted, Sweep, run_cases
+from orchestrator.engine.table import write_csv, write_parquet
+from orchestrator.engine.work import Work
+
+__all__ = [
+    "Case",
+    "Cases",
+    "Column",
+    "DesignCases",
+    "Interrupted",
+    "JournalFullError",
+    "Limits",
+    "LocalProcesses",
+    "Outcome",
+    "Progress",
+    "Row",
+    "Status",
+    "Sweep",
+    "Work",
+    "parse_design",
+    "run_cases",
+    "write_csv",
+    "write_parquet",
+]

@@ -1,0 +1,352 @@
+"""Designs: which values of which parameters a sweep visits.
+
+Every design computes its row ``i`` from ``i`` alone, so a sweep of any size needs no memory. Names are
+``instance.parameter`` (``plant.alpha``) or whatever the work function understands.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.stats import qmc
+
+from orchestrator.engine.cases import Case, Value
+from orchestrator.errors import ScenarioError
+
+SOBOL_BLOCK = 1024
+SOBOL_MAX_COUNT = 2**30
+
+
+class Design(Protocol):
+    """Rows of parameter values, computed on demand."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, one per value of a row."""
+
+    def __len__(self) -> int: ...
+
+    def row(self, index: int) -> tuple[Value, ...]:
+        """Return the values of row ``index``, ``0 <= index < len(self)``."""
+
+    def definition(self) -> Mapping[str, Any]:
+        """Return plain JSON data that determine every row."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """The given values of one parameter, in the given order."""
+
+    name: str
+    values: tuple[Value, ...]
+
+    def __post_init__(self) -> None:
+        if not self.values:
+            raise ScenarioError(f"`{self.name}` must have at least one value, but has none")
+        for value in self.values:
+            _finite(self.name, value)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The one name."""
+        return (self.name,)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def row(self, index: int) -> tuple[Value, ...]:
+        """Return the value at ``index``."""
+        return (self.values[index],)
+
+    def definition(self) -> Mapping[str, Any]:
+        """Return kind, name and values."""
+        return {"kind": "list", "name": self.name, "values": list(self.values)}
+
+
+@dataclass(frozen=True)
+class Ranged:
+    """``count`` values of one parameter from ``first`` to ``last``, both included, evenly or log-evenly spaced."""
+
+    name: str
+    first: float
+    last: float
+    count: int
+    logarithmic: bool = False
+
+    def __post_init__(self) -> None:
+        _finite(self.name, self.first)
+        _finite(self.name, self.last)
+        _positive_count(self.name, self.count)
+        if self.logarithmic and not (self.first > 0.0 and self.last > 0.0):
+            raise ScenarioError(
+                f"`{self.name}` must be positive for a logarithmic range, but is {self.first}:{self.last}"
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The one name."""
+        return (self.name,)
+
+    def __len__(self) -> int:
+        return self.count
+
+    def row(self, index: int) -> tuple[Value, ...]:
+        """Return the value at ``index``; the ends are exact."""
+        if index == 0:
+            return (self.first,)
+        if index == self.count - 1:
+            return (self.last,)
+        return (_between(self.first, self.last, index / (self.count - 1), self.logarithmic),)
+
+    def definition(self) -> Mapping[str, Any]:
+        """Return kind, name, ends, count and spacing."""
+        return {"kind": "range", "name": self.name, "first": self.first, "last": self.last, "count": self.count,
+                "logarithmic": self.logarithmic}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Interval from which a parameter is drawn, evenly or log-evenly."""
+
+    name: str
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    def __post_init__(self) -> None:
+        _finite(self.name, self.low)
+        _finite(self.name, self.high)
+        if not self.low < self.high:
+            raise ScenarioError(
+                f"`{self.name}` must have a lower bound below its upper one, but is {self.low}:{self.high}"
+            )
+        if self.logarithmic and not self.low > 0.0:
+            raise ScenarioError(f"`{self.name}` must be positive for a logarithmic draw, but is {self.low}:{self.high}")
+
+    def at(self, fraction: float) -> float:
+        """Map ``fraction`` in [0, 1) into the interval."""
+        return _between(self.low, self.high, fraction, self.logarithmic)
+
+    def definition(self) -> Mapping[str, Any]:
+        """Return name, bounds and spacing."""
+        return {"name": self.name, "low": self.low, "high": self.high, "logarithmic": self.logarithmic}
+
+
+@dataclass(frozen=True)
+class Randomised:
+    """``count`` independent uniform draws over all ``bounds`` together."""
+
+    bounds: tuple[Bounds, ...]
+    count: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        _positive_count("samples", self.count)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names in the order of the bounds."""
+        return tuple(b.name for b in self.bounds)
+
+    def __len__(self) -> int:
+        return self.count
+
+    def row(self, index: int) -> tuple[Value, ...]:
+        """Return draw ``index``, a function of (seed, index) only."""
+        draws = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(1, index))).random(len(self.bounds))
+        return tuple(b.at(float(f)) for b, f in zip(self.bounds, draws, strict=True))
+
+    def definition(self) -> Mapping[str, Any]:
+        """Return kind, bounds, count and seed."""
+        return {
+            "kind": "random",
+            "bounds": [b.definition() for b in self.bounds],
+            "count": self.count,
+            "seed": self.seed,
+        }
+
+
+@dataclass(frozen=True)
+class Sobol:
+    """``count`` points of a scrambled Sobol sequence over all ``bounds`` together (Owen scrambling from ``seed``)."""
+
+    bounds: tuple[Bounds, ...]
+    count: int
+    seed: int
+
+    def __post_init__(self) -> None:
+        _positive_count("samples", self.count)
+        if self.count > SOBOL_MAX_COUNT:
+            raise ScenarioError(
+                f"`samples` must be at most {SOBOL_MAX_COUNT} for a Sobol sequence, but is {self.count}"
+            )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names in the order of the bounds."""
+        return tuple(b.name for b in self.bounds)
+
+    def __len__(self) -> int:
+        return self.count
+
+    def row(self, index: int) -> tuple[Value, ...]:
+        """Return point ``index`` of the sequence."""
+        block, offset = divmod(index, SOBOL_BLOCK)
+        points = _sobol_block(len(self.bounds), self.seed, block)
+        return tuple(b.at(float(f)) for b, f in zip(self.bounds, points[offset], strict=True))
+
+    def definition(self) -> Mapping[str, Any]:
+        """Return kind, bounds, count and seed."""
+        return {
+            "kind": "sobol",
+            "bounds": [b.definition() for b in self.bounds],
+            "count": self.count,
+            "seed": self.seed,
+        }
+
+
+@dataclass(frozen=True)
+class Product:
+    """Every combination of the rows of several designs; the last design varies fastest."""
+
+    designs: tuple[Design, ...]
+
+    def __post_init__(self) -> None:
+        names = self.names
+        for name in names:
+            if names.count(name) > 1:
+                raise ScenarioError(f"`{name}` must be varied once, but is varied {names.count(name)} times")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all designs in order."""
+        return tuple(name for d in self.designs for name in d.names)
+
+    def __len__(self) -> int:
+        return math.prod(len(d) for d in self.designs)
+
+    def row(self, index: int) -> tuple[Value, ...]:
+        """Return combination ``index``."""
+        parts: list[tuple[Value, ...]] = []
+        for design in reversed(self.designs):
+            index, within = divmod(index, len(design))
+            parts.append(design.row(within))
+        return tuple(value for part in reversed(parts) for value in part)
+
+    def definition(self) -> Mapping[str, Any]:
+        """Return kind and the parts' definitions."""
+        return {"kind": "product", "designs": [d.definition() for d in self.designs]}
+
+
+@dataclass(frozen=True)
+class DesignCases:
+    """A design seen as the engine's cases."""
+
+    design: Design
+    seed: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the varied parameters."""
+        return self.design.names
+
+    def __len__(self) -> int:
+        return len(self.design)
+
+    def __getitem__(self, index: int) -> Case:
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        return Case(index, dict(zip(self.names, self.design.row(index), strict=True)), self.seed)
+
+    def definition(self) -> Mapping[str, Any]:
+        """Return the design's definition, the number of cases and the seed."""
+        return {"design": self.design.definition(), "cases": len(self), "seed": self.seed}
+
+
+@lru_cache(maxsize=4)
+def _sobol_block(dimension: int, seed: int, block: int) -> np.ndarray:
+    """Points ``block * SOBOL_BLOCK ...`` of the scrambled sequence, shape (SOBOL_BLOCK, dimension)."""
+    generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
+    engine = qmc.Sobol(dimension, scramble=True, seed=generator)
+    if block:
+        engine.fast_forward(block * SOBOL_BLOCK)
+    return np.asarray(engine.random(SOBOL_BLOCK))
+
+
+def _between(low: float, high: float, fraction: float, logarithmic: bool) -> float:
+    if logarithmic:
+        return low * math.exp(fraction * math.log(high / low))
+    return low + fraction * (high - low)
+
+
+def _finite(name: str, value: Value) -> None:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ScenarioError(f"`{name}` must be finite, but is {value}")
+
+
+def _positive_count(name: str, count: int) -> None:
+    if count < 1:
+        raise ScenarioError(f"`{name}` must have at least one value, but its count is {count}")
+
+
+def parse_design(specifications: Sequence[str], samples: int, seed: int) -> Design:
+    """Read a design from its text form, one ``NAME=SPECIFICATION`` per varied parameter.
+
+    ======================== ==========================================================
+    ``0.01,0.02,0.05``       these values (numbers or words)
+    ``range:LOW:HIGH:COUNT`` evenly spaced, ends included; ``logrange`` for log-evenly
+    ``random:LOW:HIGH``      drawn uniformly; ``lograndom`` for log-uniformly
+    ``sobol:LOW:HIGH``       low-discrepancy points; ``logsobol`` for log-evenly
+    ======================== ==========================================================
+
+    Lists and ranges make a full grid. All random parameters are drawn together, ``samples`` times, and so are
+    all Sobol ones; each grid point is combined with every draw.
+
+    Raises:
+        ScenarioError: a specification that cannot be read; the text names it.
+    """
+    axes: list[Design] = []
+    drawn: dict[str, list[Bounds]] = {"random": [], "sobol": []}
+    for text in specifications:
+        name, equals, body = text.partition("=")
+        if not (name and equals and body):
+            raise ScenarioError(f"`--vary` must be NAME=SPECIFICATION, but is {text!r}")
+        kind, _, rest = body.partition(":")
+        plain = kind.removeprefix("log")
+        if plain == "range":
+            low, high, count = _numbers(text, rest, 3)
+            axes.append(Ranged(name, low, high, int(count), kind != plain))
+        elif plain in drawn:
+            low, high = _numbers(text, rest, 2)
+            drawn[plain].append(Bounds(name, low, high, kind != plain))
+        else:
+            axes.append(Listed(name, tuple(_number_or_word(word) for word in body.split(","))))
+    if drawn["random"]:
+        axes.append(Randomised(tuple(drawn["random"]), samples, seed))
+    if drawn["sobol"]:
+        axes.append(Sobol(tuple(drawn["sobol"]), samples, seed))
+    if not axes:
+        raise ScenarioError("a sweep must vary at least one parameter, but none is given")
+    return Product(tuple(axes))
+
+
+def _numbers(text: str, body: str, count: int) -> list[float]:
+    words = body.split(":")
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or (count == 3 and not numbers[2].is_integer()):
+        wanted = "LOW:HIGH:COUNT" if count == 3 else "LOW:HIGH"
+        raise ScenarioError(f"`--vary` must have {wanted} after its kind, but is {text!r}")
+    return numbers
+
+
+def _number_or_word(word: str) -> Value:
+    try:
+        return float(word)
+    except ValueError:
+        return word.strip()

@@ -1,0 +1,229 @@
+"""The durable store of a running sweep: an append-only file of checksummed lines.
+
+A line is the CRC-32 of its text in eight hexadecimal digits, a space, JSON, and a newline. The first line holds the
+sweep's definition; every other one a finished case: ``[index, status, message, [values]]``. A case counts as
+finished when its line has been written and flushed to the disk (``fsync``), never before. Lines that a crash or
+a full disk has left torn are ignored, and their cases run again.
+"""
+
+import fcntl
+import json
+import os
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.engine.cases import Outcome, Status
+from orchestrator.errors import OutputError, ScenarioError
+
+FORMAT = "backlash-cosim journal 1"
+
+
+class JournalFullError(OutputError):
+    """The disk that holds the journal is full or failed; what was recorded before is kept."""
+
+
+class Journal:
+    """An open journal; use as a context manager.
+
+    Args:
+        path: the file; its directory is made when missing.
+        definition: plain JSON data that determine every row.
+        total: number of cases.
+        resume: go on with an existing file instead of refusing it.
+
+    Raises:
+        ScenarioError: the file belongs to another sweep, holds finished cases that nobody asked to go on with,
+            or is in use.
+        OutputError: the file cannot be written.
+    """
+
+    def __init__(self, path: Path, definition: Mapping[str, Any], total: int, resume: bool) -> None:
+        self.path = path
+        self.total = total
+        self.done = 0
+        self.failed = 0
+        self._bits = bytearray((total + 7) // 8)
+        self._made = _make_directories(path.parent)
+        try:
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            _remove_directories(self._made)
+            raise OutputError(f"cannot write {path}: {error.strerror}") from None
+        try:
+            self._lock()
+            self._end = self._read(definition, resume)
+        except BaseException:
+            os.close(self._descriptor)
+            raise
+
+    def __enter__(self) -> "Journal":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __contains__(self, index: int) -> bool:
+        return bool(self._bits[index >> 3] & (1 << (index & 7)))
+
+    def append(self, outcomes: Iterable[Outcome]) -> None:
+        """Record finished cases; they are on the disk when this returns.
+
+        Raises:
+            JournalFullError: they could not all be written; earlier ones are untouched.
+        """
+        fresh = [o for o in outcomes if o.index not in self]
+        if not fresh:
+            return
+        self._write("".join(_line([o.index, o.status.value, o.message, list(o.values)]) for o in fresh))
+        for outcome in fresh:
+            self._count(outcome.index, outcome.status)
+
+    def outcomes(self) -> Iterator[Outcome]:
+        """Yield the finished cases in case order, reading them one at a time.
+
+        Needs eight bytes per case for the offsets, in a temporary file beside the journal, and nothing else.
+        """
+        index_path = self.path.with_name(self.path.name + ".offsets")
+        offsets = np.memmap(index_path, dtype=np.uint64, mode="w+", shape=(max(self.total, 1),))
+        index_path.unlink()
+        for offset, line in self._lines():
+            entry = _entry(line)
+            if isinstance(entry, list) and offset and not offsets[entry[0]]:
+                offsets[entry[0]] = offset
+        with self.path.open("rb") as stream:
+            for offset in offsets[: self.total]:
+                if offset:
+                    stream.seek(int(offset))
+                    index, status, message, values = _entry(stream.readline())
+                    yield Outcome(index, Status(status), message, tuple(values))
+
+    def close(self) -> None:
+        """Close the file; remove it, and the directories made for it, when it holds no case."""
+        if self._descriptor < 0:
+            return
+        if not self.done:
+            self.path.unlink(missing_ok=True)
+            _remove_directories(self._made)
+        os.close(self._descriptor)
+        self._descriptor = -1
+
+    def discard(self) -> None:
+        """Remove the file: its content is in the published results now."""
+        self.path.unlink(missing_ok=True)
+        self.done = 0
+        self.close()
+
+    def _lock(self) -> None:
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise ScenarioError(f"{self.path} must belong to one sweep at a time, but another is running") from None
+
+    def _read(self, definition: Mapping[str, Any], resume: bool) -> int:
+        """Check the header, mark finished cases and return where the next line goes."""
+        wanted = json.loads(json.dumps(definition))
+        header: Any = None
+        end = 0
+        for offset, line in self._lines():
+            entry = _entry(line)
+            if offset == 0:
+                header = entry
+            elif isinstance(entry, list) and entry[0] not in self:
+                self._count(entry[0], Status(entry[1]))
+            end = offset + len(line)
+            if offset == 0 and not _is_header(header):
+                break
+        if end == 0 or (not resume and _is_header(header) and not self.done):
+            return self._begin(wanted)
+        self._check(header, wanted, resume)
+        os.ftruncate(self._descriptor, end)
+        return end
+
+    def _begin(self, definition: Mapping[str, Any]) -> int:
+        os.ftruncate(self._descriptor, 0)
+        self._end = 0
+        self._write(_line({"format": FORMAT, "definition": definition, "cases": self.total}))
+        return self._end
+
+    def _check(self, header: Any, wanted: Mapping[str, Any], resume: bool) -> None:
+        if not _is_header(header):
+            raise ScenarioError(f"{self.path} must be the journal of a sweep, but is not: remove it to start anew")
+        if not resume:
+            raise ScenarioError(
+                f"{self.path.parent} holds an unfinished sweep ({self.done} of {header['cases']} cases): "
+                f"go on with --resume, or remove {self.path} to start anew"
+            )
+        if header["definition"] != wanted or header["cases"] != self.total:
+            was = header["definition"]
+            keys = sorted(k for k in {*was, *wanted} if was.get(k) != wanted.get(k)) or ["cases"]
+            raise ScenarioError(
+                f"`--resume` must continue the sweep of {self.path}, but this one differs in: {', '.join(keys)}"
+            )
+
+    def _lines(self) -> Iterator[tuple[int, bytes]]:
+        """Yield every whole line with its offset; a torn last line is left out."""
+        offset = 0
+        with self.path.open("rb") as stream:
+            for line in stream:
+                if not line.endswith(b"\n"):
+                    return
+                yield offset, line
+                offset += len(line)
+
+    def _write(self, text: str) -> None:
+        data = text.encode()
+        try:
+            written = 0
+            while written < len(data):
+                written += os.pwrite(self._descriptor, data[written:], self._end + written)
+            os.fsync(self._descriptor)
+        except OSError as error:
+            os.ftruncate(self._descriptor, self._end)
+            raise JournalFullError(
+                f"cannot write {self.path}: {error.strerror}; {self.done} of {self.total} cases are kept: "
+                "make room and go on with --resume"
+            ) from None
+        self._end += len(data)
+
+    def _count(self, index: int, status: Status) -> None:
+        self._bits[index >> 3] |= 1 << (index & 7)
+        self.done += 1
+        self.failed += status is not Status.DONE
+
+
+def _line(entry: Any) -> str:
+    text = json.dumps(entry, separators=(",", ":"), ensure_ascii=True)
+    return f"{zlib.crc32(text.encode()):08x} {text}\n"
+
+
+def _entry(line: bytes) -> Any:
+    """Return a line's JSON, or ``None`` when its checksum does not hold."""
+    checksum, _, text = line.rstrip(b"\n").partition(b" ")
+    if checksum != b"%08x" % zlib.crc32(text):
+        return None
+    return json.loads(text)
+
+
+def _is_header(entry: Any) -> bool:
+    return isinstance(entry, dict) and entry.get("format") == FORMAT
+
+
+def _make_directories(directory: Path) -> list[Path]:
+    missing = [p for p in (directory, *directory.parents) if not p.exists()]
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"`--out` must be a writable directory, but {directory} is not: {error.strerror}") from None
+    return missing
+
+
+def _remove_directories(directories: list[Path]) -> None:
+    for path in directories:
+        try:
+            path.rmdir()
+        except OSError:
+            return

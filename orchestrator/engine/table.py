@@ -1,0 +1,69 @@
+"""The final table of a sweep, streamed from its rows to CSV or Parquet."""
+
+import csv
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from orchestrator.engine.cases import Column, Row, Value
+from orchestrator.errors import ScenarioError
+
+PARQUET_ROWS = 10_000
+
+
+def header(names: Sequence[str], columns: Sequence[Column]) -> list[str]:
+    """Return the names of the table's columns: case, varied parameters, status, results, message."""
+    return ["case", *names, "status", *(c.name for c in columns), "message"]
+
+
+def write_csv(path: Path, names: Sequence[str], columns: Sequence[Column], rows: Iterable[Row]) -> None:
+    """Write the table as CSV: floats with as many digits as they need to be read back exactly, missing ones empty."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(header(names, columns))
+        for row in rows:
+            writer.writerow(["" if value is None else value for value in _cells(row, names, columns)])
+
+
+def write_parquet(path: Path, names: Sequence[str], columns: Sequence[Column], rows: Iterable[Row]) -> None:
+    """Write the table as Parquet, ``PARQUET_ROWS`` rows at a time. A parameter's type is that of its first value.
+
+    Raises:
+        ScenarioError: the extra ``parquet`` is not installed.
+    """
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise ScenarioError("Parquet needs the extra [parquet]: pip install 'backlash-cosim[parquet]'") from None
+    arrow = {float: pyarrow.float64(), int: pyarrow.int64(), str: pyarrow.string()}
+    stream = iter(rows)
+    first = next(stream, None)
+    kinds: list[type] = [str] * len(names) if first is None else [type(first.case.parameters[n]) for n in names]
+    types = [int, *kinds, str, *(c.kind for c in columns), str]
+    schema = pyarrow.schema([(name, arrow[kind]) for name, kind in zip(header(names, columns), types, strict=True)])
+    with pyarrow.parquet.ParquetWriter(path, schema) as writer:
+        for batch in _batches(stream if first is None else _chain(first, stream)):
+            table = [_cells(row, names, columns) for row in batch]
+            arrays = [
+                pyarrow.array(column, field.type)
+                for column, field in zip(zip(*table, strict=True), schema, strict=True)
+            ]
+            writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))
+
+
+def _cells(row: Row, names: Sequence[str], columns: Sequence[Column]) -> list[Value]:
+    outcome = row.outcome
+    values: Sequence[Any] = outcome.values or (None,) * len(columns)
+    return [outcome.index, *(row.case.parameters[n] for n in names), outcome.status.value, *values, outcome.message]
+
+
+def _chain(first: Row, rest: Iterator[Row]) -> Iterator[Row]:
+    yield first
+    yield from rest
+
+
+def _batches(rows: Iterator[Row]) -> Iterator[list[Row]]:
+    while batch := list(islice(rows, PARQUET_ROWS)):
+        yield batch

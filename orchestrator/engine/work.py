@@ -1,0 +1,83 @@
+"""The work that is done for each case, and its evaluation inside a worker process."""
+
+import hashlib
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from orchestrator.engine.cases import Case, Column, Outcome, Status, Value
+from orchestrator.errors import FmuError
+
+MESSAGE_LENGTH = 300
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a worker process does.
+
+    ``prepare`` and ``run`` are module-level functions (they travel by name) and ``payload`` can be pickled.
+
+    Attributes:
+        prepare: ``(payload, files) -> prepared``; called once per worker process. ``files`` maps the names of
+            ``files`` below to local paths whose content is what they had on the machine that started the sweep.
+        run: ``(prepared, case) -> {column name: value}``; called once per case.
+        columns: the results' columns; ``run`` must return exactly these names. ``None`` is a missing value.
+        payload: anything else that ``prepare`` needs.
+        files: files that workers need (FMUs), by name; they travel by content hash, once per machine.
+        definition: plain JSON data that, with the cases and the files' hashes, determine every result.
+    """
+
+    prepare: Callable[[Any, Mapping[str, Path]], Any]
+    run: Callable[[Any, Case], Mapping[str, Value]]
+    columns: tuple[Column, ...]
+    payload: Any = None
+    files: Mapping[str, Path] = field(default_factory=dict)
+    definition: Mapping[str, Any] = field(default_factory=dict)
+
+
+def file_hash(path: Path) -> str:
+    """Return the sha256 of a file's content.
+
+    Raises:
+        FmuError: the file cannot be read.
+    """
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise FmuError(f"cannot read {path}: {error.strerror}") from None
+
+
+def evaluate(work: Work, prepared: Any, case: Case) -> Outcome:
+    """Run one case; whatever goes wrong in it becomes the outcome's status and message."""
+    try:
+        values = _in_column_order(work.columns, work.run(prepared, case))
+    except BaseException as error:  # a slave may even call sys.exit
+        return Outcome(case.index, Status.ERROR, one_line(error))
+    bad = [c.name for c, v in zip(work.columns, values, strict=True) if isinstance(v, float) and not math.isfinite(v)]
+    if bad:
+        message = f"not finite: {', '.join(bad)}"
+        return Outcome(case.index, Status.NON_FINITE, message[:MESSAGE_LENGTH])
+    return Outcome(case.index, Status.DONE, "", values)
+
+
+def _in_column_order(columns: tuple[Column, ...], result: Mapping[str, Value]) -> tuple[Value, ...]:
+    names = [c.name for c in columns]
+    if sorted(result) != sorted(names):
+        raise ValueError(f"the work must return the columns {names}, but returned {sorted(result)}")
+    return tuple(_plain(column, result[column.name]) for column in columns)
+
+
+def _plain(column: Column, value: Any) -> Value:
+    return None if value is None else column.kind(value)
+
+
+def one_line(error: BaseException) -> str:
+    """Return an exception as one line that is the same in every run (no memory addresses)."""
+    text = " ".join(str(error).split())
+    name = type(error).__name__
+    line = f"{name}: {text}" if text else name
+    return re.sub(r"0x[0-9a-fA-F]+", "0x…", line)[:MESSAGE_LENGTH]
