@@ -201,10 +201,8 @@ def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp):
             coulomb = v[FC_M] + (v[LATE] if t > 0.5 * end else 0.0)
             zm, fm = _bristle(zm, x[1], h, SIGMA_M, coulomb, v[FS_M], v[VS_M])
             zl, fl = _bristle(zl, x[3], h, SIGMA_L, v[FC_L], v[FS_L], v[VS_L])
-            if sharp:
-                x = _sharp_step(t, x, v, request, fm, fl, end, h)
-            else:
-                x = _step(t, x, v, request, fm, fl, end, 9, h)
+            cut = _sharp_step(t, x, v, request, fm, fl, end, h) if sharp else x
+            x = cut if sharp else _step(t, x, v, request, fm, fl, end, 9, h)
     return out, states, applied
 
 

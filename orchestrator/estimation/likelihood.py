@@ -1,0 +1,313 @@
+"""The joint likelihood of gap, plant parameters, initial state and noise, and its maximisation.
+
+The unknowns are one vector: the uncertain linear parameters (in prior standard deviations from nominal), alpha, the
+initial state, and the logarithms of the noise levels. Scores and the Fisher information come from finite differences
+of the innovations; steps are Fisher scoring with Levenberg's damping. See ``docs/estimation.md``.
+"""
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels, affine_model, innovations
+from orchestrator.model_file import Model
+from orchestrator.record import Record, quantisation_step
+from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
+
+STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
+NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
+TORQUE_NOISE = (1e-7, 30.0)  # range of the white torque noise [N.m.s^0.5]
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One unknown: its name, prior mean and standard deviation, and the scale in which steps are taken."""
+
+    name: str
+    mean: float
+    deviation: float
+    scale: float
+    lower: float = -math.inf
+    upper: float = math.inf
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A record and what is unknown about it.
+
+    Attributes:
+        record: the record.
+        base: parameter tuple of the model.
+        unknowns: every unknown, in the order of the vector; free or not is decided per fit.
+        outputs: (n, 1 or 2) measured angles [rad].
+        noise: nominal noise levels, for those that are not among the unknowns.
+    """
+
+    record: Record
+    base: tuple[float, ...]
+    unknowns: tuple[Unknown, ...]
+    outputs: Array
+    noise: NoiseLevels
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the unknowns, in order."""
+        return tuple(unknown.name for unknown in self.unknowns)
+
+    @property
+    def start(self) -> Array:
+        """Return the prior means."""
+        return np.array([unknown.mean for unknown in self.unknowns])
+
+    def index(self, name: str) -> int:
+        """Return the place of an unknown in the vector."""
+        return self.names.index(name)
+
+
+def make_problem(record: Record, model: Model) -> Problem:
+    """Return the estimation problem of a record under a model.
+
+    With the motor encoder alone only alpha times the gear ratio can be seen, so the ratio then counts as exact.
+    """
+    both = record.theta_l is not None
+    outputs = record.theta_m[:, None] if record.theta_l is None else np.column_stack([record.theta_m, record.theta_l])
+    unknowns = []
+    for parameter in model.uncertain:
+        if parameter.name == "alpha" or (parameter.name == "i" and not both):
+            continue
+        sd = parameter.standard_deviation
+        lower = max(parameter.minimum, parameter.value - 4.0 * sd) if parameter.value > 0 else parameter.minimum
+        unknowns.append(Unknown(parameter.name, parameter.value, sd, sd, lower, parameter.maximum))
+    ratio = model.parameters["i"].value
+    unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
+    unknowns += _initial_state(record, ratio)
+    levels, noises = [], []
+    for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
+        level = measurement_noise(record, model, column)
+        levels.append(level)
+        known = model.encoder(column).noise is not None and model.encoder(column).resolution is not None
+        spread = 0.02 if known else NOISE_SPREAD
+        noises.append(Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0))
+    low, high = (math.log(bound) for bound in TORQUE_NOISE)
+    noises += [Unknown(f"log_torque_{side}", -7.0, 5.0, 0.5, low, high) for side in ("motor", "load")]
+    if not both:
+        levels.append(levels[0])
+    return Problem(record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0)))
+
+
+def _initial_state(record: Record, ratio: float) -> list[Unknown]:
+    """Return unknowns for the initial state, centred on a straight line through the first rows."""
+    rows = min(8, record.size)
+    t = record.time[:rows] - record.time[0]
+    speed_m, angle_m = np.polyfit(t, record.theta_m[:rows], 1)
+    if record.theta_l is not None:
+        speed_l, angle_l = np.polyfit(t, record.theta_l[:rows], 1)
+        spread_l = 0.02
+    else:
+        speed_l, angle_l, spread_l = speed_m / ratio, angle_m / ratio, 0.1
+    means = (float(angle_m), float(speed_m), float(angle_l), float(speed_l), 0.0)
+    spreads = (0.02, 3.0, spread_l, 1.0, 30.0)
+    scales = (1e-4, 1e-2, 1e-4, 1e-2, 1e-1)
+    return [Unknown(*entry) for entry in zip(STATE_NAMES, means, spreads, scales, strict=True)]
+
+
+def measurement_noise(record: Record, model: Model, column: str) -> float:
+    """Return the standard deviation of an encoder [rad]: stated noise and rounding, else estimated from the record.
+
+    The estimate takes the third difference of the column, in which motion hardly shows (its gain on white noise
+    is sqrt(20)); rounding adds a twelfth of the squared count.
+    """
+    values = record.theta_m if column == "theta_m" else record.theta_l
+    assert values is not None
+    encoder = model.encoder(column)
+    count = quantisation_step(values) if encoder.resolution is None else encoder.resolution
+    if encoder.noise is not None:
+        level = math.sqrt(encoder.noise**2 + count**2 / 12.0)
+    else:
+        third = np.diff(values, 3)
+        level = 1.4826 * float(np.median(np.abs(third))) / math.sqrt(20.0)
+        level = max(level, count / math.sqrt(12.0))
+    return max(level, 1e-9)
+
+
+@dataclass(frozen=True)
+class Point:
+    """The likelihood at one vector of unknowns.
+
+    ``objective`` is twice the negative log posterior without constants (deviance plus prior).
+    """
+
+    theta: Array
+    objective: float
+    deviance: float
+    result: Innovations = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A maximum of the likelihood.
+
+    Attributes:
+        point: where it is.
+        free: (k,) indices of the unknowns that were fitted.
+        information: (k, k) Fisher information of the free unknowns, prior included.
+        covariance: (k, k) its inverse.
+        iterations: scoring steps taken.
+        converged: whether the last step changed the objective by less than the tolerance.
+    """
+
+    point: Point
+    free: NDArray[np.int64]
+    information: Array
+    covariance: Array
+    iterations: int
+    converged: bool
+
+
+class Likelihood:
+    """Evaluates a problem at vectors of unknowns; two threads share the runs of one derivative."""
+
+    def __init__(self, problem: Problem, threads: int = 1) -> None:
+        self.problem = problem
+        self._places = [(n, NAMES.index(u.name)) for n, u in enumerate(problem.unknowns) if u.name in NAMES]
+        self._state = [problem.index(name) for name in STATE_NAMES]
+        self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
+        self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._mean = problem.start
+        self._weight = np.array([u.deviation**-2 if math.isfinite(u.deviation) else 0.0 for u in problem.unknowns])
+
+    def parameters(self, theta: Array) -> tuple[float, ...]:
+        """Return the parameter tuple ``p`` of a vector."""
+        p = list(self.problem.base)
+        for place, name in self._places:
+            p[name] = float(theta[place])
+        return tuple(p)
+
+    def noise(self, theta: Array) -> NoiseLevels:
+        """Return the noise levels of a vector."""
+        measured = [math.exp(theta[n]) for n in self._noise]
+        return NoiseLevels(
+            (measured[0], measured[-1]), (math.exp(theta[self._torque[0]]), math.exp(theta[self._torque[1]]))
+        )
+
+    def run(self, theta: Array, keep: bool = False) -> Innovations:
+        """Return the innovations at ``theta``."""
+        record = self.problem.record
+        model = affine_model(self.parameters(theta))
+        return innovations(
+            model, record.u, self.problem.outputs, record.step, theta[self._state], self.noise(theta), keep
+        )
+
+    def at(self, theta: Array) -> Point:
+        """Return the likelihood at ``theta``; infinite where the filter diverges."""
+        result = self.run(theta)
+        deviance = result.deviance
+        if not math.isfinite(deviance):
+            deviance = math.inf
+        prior = float(np.sum(self._weight * (theta - self._mean) ** 2))
+        return Point(theta, deviance + prior, deviance, result)
+
+    def derivatives(self, point: Point, free: NDArray[np.int64], steps: Array) -> tuple[Array, Array]:
+        """Return the gradient (k,) of half the objective and the Fisher information (k, k) of the free unknowns."""
+        base = point.result
+
+        def run(n: int) -> tuple[Array, Array]:
+            moved = point.theta.copy()
+            moved[free[n]] += steps[n]
+            result = self.run(moved)
+            error = (result.errors - base.errors) / (steps[n] * np.sqrt(base.variances))
+            spread = (result.variances - base.variances) / (steps[n] * base.variances)
+            return error.ravel(), spread.ravel()
+
+        columns = list(self._pool.map(run, range(free.size)) if self._pool else map(run, range(free.size)))
+        error = np.array([column[0] for column in columns])
+        spread = np.array([column[1] for column in columns])
+        white = (base.errors / np.sqrt(base.variances)).ravel()
+        gradient = error @ white + 0.5 * spread @ (1.0 - white**2)
+        information = error @ error.T + 0.5 * spread @ spread.T
+        weight = self._weight[free]
+        gradient += weight * (point.theta - self._mean)[free]
+        return gradient, information + np.diag(weight)
+
+
+def fit(
+    likelihood: Likelihood,
+    start: Array,
+    free: Sequence[int],
+    iterations: int = 30,
+    tolerance: float = 1e-2,
+) -> Fit:
+    """Return the maximum of the likelihood reached from ``start`` over the ``free`` unknowns.
+
+    Steps are damped until the objective falls; an unknown at its bound stays there while the score points outward.
+    """
+    unknowns = likelihood.problem.unknowns
+    places = np.array(list(free), dtype=np.int64)
+    lower = np.array([unknowns[n].lower for n in places])
+    upper = np.array([unknowns[n].upper for n in places])
+    scale = np.array([unknowns[n].scale for n in places])
+    point = likelihood.at(start)
+    steps = 1e-3 * scale
+    damping, converged, done = 1e-3, False, 0
+    information = np.eye(places.size)
+    for done in range(1, iterations + 1):
+        value = point.theta[places]
+        gradient, information = likelihood.derivatives(point, places, np.where(value + steps > upper, -steps, steps))
+        held = ((value <= lower) & (gradient > 0.0)) | ((value >= upper) & (gradient < 0.0))
+        before = point.objective
+        point, damping = _step(likelihood, point, places, gradient, information, held, (lower, upper), damping)
+        variance = np.diag(_inverse(information))
+        steps = np.clip(1e-3 * np.sqrt(np.maximum(variance, 0.0)), 1e-7 * scale, 1e-1 * scale)
+        if before - point.objective < tolerance:
+            converged = True
+            break
+    return Fit(point, places, information, _inverse(information), done, converged)
+
+
+def _step(
+    likelihood: Likelihood,
+    point: Point,
+    places: NDArray[np.int64],
+    gradient: Array,
+    information: Array,
+    held: NDArray[np.bool_],
+    bounds: tuple[Array, Array],
+    damping: float,
+) -> tuple[Point, float]:
+    """Return the next point and damping; the same point when no step lowers the objective."""
+    open_ = np.flatnonzero(~held)
+    diagonal = np.sqrt(np.diag(information)[open_])
+    scaled = information[np.ix_(open_, open_)] / np.outer(diagonal, diagonal)
+    for _ in range(12):
+        move = np.linalg.solve(scaled + damping * np.eye(open_.size), -gradient[open_] / diagonal) / diagonal
+        theta = point.theta.copy()
+        theta[places[open_]] += move
+        theta[places] = np.clip(theta[places], *bounds)
+        new = likelihood.at(theta)
+        if new.objective < point.objective:
+            return new, max(damping * 0.1, 1e-9)
+        damping = max(damping * 8.0, 1e-6)
+        if damping > 1e6:
+            break
+    return point, damping
+
+
+def _inverse(information: Array) -> Array:
+    """Return the inverse of an information matrix, scaled first because units differ by many powers of ten."""
+    diagonal = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaled = information / np.outer(diagonal, diagonal)
+    return np.linalg.pinv(scaled, hermitian=True) / np.outer(diagonal, diagonal)
+
+
+def with_value(problem: Problem, **means: float) -> Problem:
+    """Return the problem with other prior means, by name."""
+    changed = tuple(replace(u, mean=means[u.name]) if u.name in means else u for u in problem.unknowns)
+    return replace(problem, unknowns=changed)
+
+
+ALPHA = NAMES[P_ALPHA]
