@@ -1,0 +1,1 @@
+"""FMUs: building ours, loading anybody's."""

@@ -1,0 +1,398 @@
+/* The Linux binary of our FMUs: gives a host without Python a Python, then hands every FMI call on to PythonFMU's library.
+ *
+ * PythonFMU's library leaves Python's symbols undefined, so that it loads in Python hosts only. To name libpython
+ * as a needed library would tie the FMU to one version and load a second copy into Python hosts. So this library, which
+ * needs nothing but libc, looks first: where the process has Python's symbols already, they are used, else a libpython
+ * is opened with RTLD_GLOBAL (extension modules of the standard library resolve against it). Only then is
+ * PythonFMU's library opened, from the folder in which this one lies.
+ *
+ * A Python that was started here is never finalised: other FMUs may still use it, and hosts that unload in their own
+ * order crash otherwise. Signal handlers stay the host's.
+ *
+ * On the way it mends what that library cannot do: it refuses a wrong GUID, never enters an instance again after
+ * fmi2Fatal, and returns the worst status that a call has logged, so that what our slaves refuse is seen as refused. */
+
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <limits.h>
+#include <pthread.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#ifndef PYTHON_LIBRARY
+#define PYTHON_LIBRARY ""
+#endif
+#ifndef PYTHON_PROGRAM
+#define PYTHON_PROGRAM L""
+#endif
+#define WRAPPER "libpythonfmu-export.so"
+#define OVERRIDE "FMU_LIBPYTHON"
+#define EXPORT __attribute__((visibility("default")))
+
+/* FMI 2.0 types, as in fmi2TypesPlatform.h and fmi2FunctionTypes.h. */
+typedef void *Component;
+typedef void *State;
+typedef unsigned int Reference;
+typedef int Boolean;
+typedef enum { OK, WARNING, DISCARD, ERROR, FATAL, PENDING } Status;
+typedef void (*Logger)(void *environment, const char *instance, Status status, const char *category, const char *message, ...);
+typedef struct {
+    Logger logger;
+    void *(*allocate)(size_t, size_t);
+    void (*release)(void *);
+    void (*finished)(void *, Status);
+    void *environment;
+} Callbacks;
+
+#define FORWARDED(X) \
+    X(fmi2SetupExperiment, (Component c, Boolean a, double b, double d, Boolean e, double f), (s->inner, a, b, d, e, f)) \
+    X(fmi2EnterInitializationMode, (Component c), (s->inner)) \
+    X(fmi2ExitInitializationMode, (Component c), (s->inner)) \
+    X(fmi2Terminate, (Component c), (s->inner)) \
+    X(fmi2Reset, (Component c), (s->inner)) \
+    X(fmi2GetReal, (Component c, const Reference r[], size_t n, double v[]), (s->inner, r, n, v)) \
+    X(fmi2GetInteger, (Component c, const Reference r[], size_t n, int v[]), (s->inner, r, n, v)) \
+    X(fmi2GetBoolean, (Component c, const Reference r[], size_t n, Boolean v[]), (s->inner, r, n, v)) \
+    X(fmi2GetString, (Component c, const Reference r[], size_t n, const char *v[]), (s->inner, r, n, v)) \
+    X(fmi2SetReal, (Component c, const Reference r[], size_t n, const double v[]), (s->inner, r, n, v)) \
+    X(fmi2SetInteger, (Component c, const Reference r[], size_t n, const int v[]), (s->inner, r, n, v)) \
+    X(fmi2SetBoolean, (Component c, const Reference r[], size_t n, const Boolean v[]), (s->inner, r, n, v)) \
+    X(fmi2SetString, (Component c, const Reference r[], size_t n, const char *const v[]), (s->inner, r, n, v)) \
+    X(fmi2GetFMUstate, (Component c, State *x), (s->inner, x)) \
+    X(fmi2SetFMUstate, (Component c, State x), (s->inner, x)) \
+    X(fmi2SerializedFMUstateSize, (Component c, State x, size_t *n), (s->inner, x, n)) \
+    X(fmi2SerializeFMUstate, (Component c, State x, char b[], size_t n), (s->inner, x, b, n)) \
+    X(fmi2DeSerializeFMUstate, (Component c, const char b[], size_t n, State *x), (s->inner, b, n, x)) \
+    X(fmi2GetDirectionalDerivative, \
+      (Component c, const Reference u[], size_t n, const Reference k[], size_t m, const double dk[], double du[]), \
+      (s->inner, u, n, k, m, dk, du)) \
+    X(fmi2SetRealInputDerivatives, (Component c, const Reference r[], size_t n, const int o[], const double v[]), \
+      (s->inner, r, n, o, v)) \
+    X(fmi2GetRealOutputDerivatives, (Component c, const Reference r[], size_t n, const int o[], double v[]), \
+      (s->inner, r, n, o, v)) \
+    X(fmi2DoStep, (Component c, double t, double h, Boolean p), (s->inner, t, h, p)) \
+    X(fmi2CancelStep, (Component c), (s->inner)) \
+    X(fmi2GetStatus, (Component c, int k, Status *v), (s->inner, k, v)) \
+    X(fmi2GetRealStatus, (Component c, int k, double *v), (s->inner, k, v)) \
+    X(fmi2GetIntegerStatus, (Component c, int k, int *v), (s->inner, k, v)) \
+    X(fmi2GetStringStatus, (Component c, int k, const char **v), (s->inner, k, v))
+
+#define TABLE_ENTRY(name, parameters, arguments) Status(*name) parameters;
+static struct {
+    FORWARDED(TABLE_ENTRY)
+    Component (*fmi2Instantiate)(const char *, int, const char *, const char *, const Callbacks *, Boolean, Boolean);
+    void (*fmi2FreeInstance)(Component);
+    Status (*fmi2FreeFMUstate)(Component, State *);
+} wrapper;
+
+typedef struct {
+    Component inner;
+    Callbacks host;
+    Callbacks ours;
+    Status worst;
+    int dead;
+    int logging;
+    size_t category_count;
+    char **categories;
+    char *name;
+} Shell;
+
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+static char problem[PATH_MAX + 512];
+static int owns_python;
+static pthread_key_t thread_key;
+static int (*gil_ensure)(void);
+static void (*gil_release)(int);
+static void *(*save_thread)(void);
+static void (*restore_thread)(void *);
+static void *(*this_thread)(void);
+
+/* --- Python ------------------------------------------------------------------------------------------------------ */
+
+static void *open_python(void) {
+    static const char *const names[] = {
+        "libpython3.13.so.1.0", "libpython3.12.so.1.0", "libpython3.11.so.1.0",
+        "libpython3.10.so.1.0", "libpython3.9.so.1.0",  "libpython3.14.so.1.0",
+    };
+    const char *override = getenv(OVERRIDE);
+    if (override && *override)
+        return dlopen(override, RTLD_NOW | RTLD_GLOBAL);
+    void *library = *PYTHON_LIBRARY ? dlopen(PYTHON_LIBRARY, RTLD_NOW | RTLD_GLOBAL) : NULL;
+    if (library) {
+        /* By the program's place this Python finds its own standard library, whatever PATH says. */
+        void (*set_program)(const wchar_t *) = (void (*)(const wchar_t *))dlsym(library, "Py_SetProgramName");
+        if (set_program && *PYTHON_PROGRAM)
+            set_program(PYTHON_PROGRAM);
+    }
+    for (size_t n = 0; !library && n < sizeof names / sizeof *names; n++)
+        library = dlopen(names[n], RTLD_NOW | RTLD_GLOBAL);
+    return library;
+}
+
+/* A thread of the host keeps its Python thread state for good: making one anew at every call is what costs most. */
+static void leave_thread(void *state) {
+    if (state) {
+        restore_thread(state);
+        gil_release(1);
+    }
+}
+
+static void enter_thread(void) {
+    if (owns_python && !this_thread()) {
+        gil_ensure();
+        pthread_setspecific(thread_key, save_thread());
+    }
+}
+
+static int start_python(void) {
+    if (!dlsym(RTLD_DEFAULT, "_Py_NoneStruct") && !open_python()) {
+        const char *reason = dlerror();
+        snprintf(problem, sizeof problem,
+                 "no Python 3 was found in this process or on this machine (%s): set the environment variable " OVERRIDE
+                 " to the path of a libpython3.so, or preload one", reason ? reason : "no libpython");
+        return 0;
+    }
+    int (*is_initialized)(void) = (int (*)(void))dlsym(RTLD_DEFAULT, "Py_IsInitialized");
+    void (*initialize)(int) = (void (*)(int))dlsym(RTLD_DEFAULT, "Py_InitializeEx");
+    gil_ensure = (int (*)(void))dlsym(RTLD_DEFAULT, "PyGILState_Ensure");
+    gil_release = (void (*)(int))dlsym(RTLD_DEFAULT, "PyGILState_Release");
+    save_thread = (void *(*)(void))dlsym(RTLD_DEFAULT, "PyEval_SaveThread");
+    restore_thread = (void (*)(void *))dlsym(RTLD_DEFAULT, "PyEval_RestoreThread");
+    this_thread = (void *(*)(void))dlsym(RTLD_DEFAULT, "PyGILState_GetThisThreadState");
+    if (!is_initialized || !initialize || !gil_ensure || !gil_release || !save_thread || !restore_thread || !this_thread) {
+        snprintf(problem, sizeof problem, "the Python in this process lacks the functions of Python 3");
+        return 0;
+    }
+    if (!is_initialized()) {
+        pthread_key_create(&thread_key, leave_thread);
+        initialize(0);
+        owns_python = 1;
+        save_thread();
+    }
+    return 1;
+}
+
+static void load(void) {
+    Dl_info here;
+    char path[PATH_MAX];
+    if (!start_python())
+        return;
+    if (!dladdr((void *)load, &here) || strlen(here.dli_fname) + sizeof WRAPPER >= sizeof path) {
+        snprintf(problem, sizeof problem, "the folder of the FMU's binary was not found");
+        return;
+    }
+    strcpy(path, here.dli_fname);
+    char *slash = strrchr(path, '/');
+    strcpy(slash ? slash + 1 : path, WRAPPER);
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (!library) {
+        snprintf(problem, sizeof problem, "%s", dlerror());
+        return;
+    }
+#define TABLE_LOOKUP(name, parameters, arguments) *(void **)&wrapper.name = dlsym(library, #name);
+    FORWARDED(TABLE_LOOKUP)
+    TABLE_LOOKUP(fmi2FreeInstance, , )
+    TABLE_LOOKUP(fmi2FreeFMUstate, , )
+    TABLE_LOOKUP(fmi2Instantiate, , )
+    if (!wrapper.fmi2Instantiate)
+        snprintf(problem, sizeof problem, "%s is not PythonFMU's library", path);
+}
+
+/* --- Messages ---------------------------------------------------------------------------------------------------- */
+
+static int wanted(const Shell *s, Status status, const char *category) {
+    if (status != OK)
+        return 1; /* refusals and warnings are for everyone */
+    if (!s->logging)
+        return 0;
+    for (size_t n = 0; n < s->category_count; n++)
+        if (category && strcmp(category, s->categories[n]) == 0)
+            return 1;
+    return s->category_count == 0;
+}
+
+/* Messages come ready: PythonFMU never passes further arguments. */
+static void relay(void *environment, const char *instance, Status status, const char *category, const char *message, ...) {
+    Shell *s = environment;
+    (void)instance;
+    if (status > s->worst && status <= FATAL)
+        s->worst = status;
+    if (s->host.logger && wanted(s, status, category))
+        s->host.logger(s->host.environment, s->name, status, category ? category : "", message);
+}
+
+static void report(const Callbacks *host, const char *name, const char *message) {
+    if (host && host->logger)
+        host->logger(host->environment, name, ERROR, "logStatusError", "%s", message);
+    else
+        fprintf(stderr, "%s: %s\n", name, message);
+}
+
+/* --- Instances --------------------------------------------------------------------------------------------------- */
+
+static int hex(char c) {
+    if (c >= '0' && c <= '9')
+        return c - '0';
+    c |= 0x20;
+    return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+}
+
+/* file:///a%20b, file:/a%20b and file://localhost/a%20b are all /a b. */
+static void path_of(const char *uri, char path[PATH_MAX]) {
+    size_t n = 0;
+    const int encoded = strncmp(uri, "file:", 5) == 0;
+    if (encoded) {
+        uri += 5;
+        if (strncmp(uri, "//", 2) == 0) {
+            const char *root = strchr(uri + 2, '/');
+            uri = root ? root : uri + 2;
+        }
+    }
+    for (; *uri && n + 1 < PATH_MAX; uri++) {
+        if (encoded && *uri == '%' && hex(uri[1]) >= 0 && hex(uri[2]) >= 0) {
+            path[n++] = (char)(hex(uri[1]) * 16 + hex(uri[2]));
+            uri += 2;
+        } else {
+            path[n++] = *uri;
+        }
+    }
+    while (n > 1 && path[n - 1] == '/')
+        n--;
+    path[n] = '\0';
+}
+
+static const char *refusal(const char *name, int type, const char *guid, const char *uri, char path[PATH_MAX]) {
+    static char message[256];
+    char file[PATH_MAX + 16], expected[64] = "";
+    if (!name || !*name)
+        return "instanceName must not be empty";
+    if (type != 1)
+        return "fmuType must be fmi2CoSimulation: this FMU has no model exchange";
+    if (!uri || !guid)
+        return "fmuGUID and fmuResourceLocation must not be null";
+    pthread_once(&once, load);
+    if (*problem)
+        return problem;
+    path_of(uri, path);
+    snprintf(file, sizeof file, "%s/guid.txt", path);
+    FILE *stream = fopen(file, "r");
+    if (!stream)
+        return "fmuResourceLocation must be the URI of the FMU's resources folder, but that folder lacks guid.txt";
+    const int found = fscanf(stream, "%63s", expected);
+    fclose(stream);
+    if (found != 1 || strcmp(expected, guid) != 0) {
+        snprintf(message, sizeof message, "fmuGUID must be %s, but is %.64s", expected, guid);
+        return message;
+    }
+    return NULL;
+}
+
+EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
+EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
+EXPORT void fmi2FreeInstance(Component c);
+
+EXPORT Component fmi2Instantiate(const char *name, int type, const char *guid, const char *uri, const Callbacks *host,
+                                 Boolean visible, Boolean logging) {
+    char path[PATH_MAX];
+    const char *message = refusal(name, type, guid, uri, path);
+    if (message) {
+        report(host, name ? name : "", message);
+        return NULL;
+    }
+    Shell *s = calloc(1, sizeof *s);
+    if (!s)
+        return NULL;
+    if (host)
+        s->host = *host;
+    s->ours = s->host;
+    s->ours.logger = relay;
+    s->ours.environment = s;
+    s->logging = logging;
+    s->name = strdup(name);
+    enter_thread();
+    s->inner = wrapper.fmi2Instantiate(name, type, guid, path, &s->ours, visible, 1);
+    if (s->inner)
+        return s;
+    s->dead = 1;
+    fmi2FreeInstance(s);
+    return NULL;
+}
+
+static void forget_categories(Shell *s) {
+    for (size_t n = 0; n < s->category_count; n++)
+        free(s->categories[n]);
+    free(s->categories);
+    s->categories = NULL;
+    s->category_count = 0;
+}
+
+EXPORT void fmi2FreeInstance(Component c) {
+    Shell *s = c;
+    if (!s)
+        return;
+    if (!s->dead) {
+        enter_thread();
+        wrapper.fmi2FreeInstance(s->inner);
+    }
+    forget_categories(s);
+    free(s->name);
+    free(s);
+}
+
+EXPORT Status fmi2SetDebugLogging(Component c, Boolean on, size_t n, const char *const categories[]) {
+    Shell *s = c;
+    if (!s)
+        return ERROR;
+    forget_categories(s);
+    s->logging = on;
+    s->categories = n ? calloc(n, sizeof *s->categories) : NULL;
+    for (size_t k = 0; s->categories && k < n; k++)
+        s->categories[s->category_count++] = strdup(categories[k]);
+    return OK;
+}
+
+/* Of the statuses returned and logged, the worse; fmi2Fatal is the last thing that an instance says. */
+static Status concluded(Shell *s, Status status) {
+    if (s->worst > status)
+        status = s->worst;
+    if (status == FATAL)
+        s->dead = 1;
+    return status;
+}
+
+#define FORWARD(name, parameters, arguments) \
+    EXPORT Status name parameters { \
+        Shell *s = c; \
+        if (!s) \
+            return ERROR; \
+        if (s->dead) \
+            return FATAL; \
+        s->worst = OK; \
+        enter_thread(); \
+        return concluded(s, wrapper.name arguments); \
+    }
+FORWARDED(FORWARD)
+
+EXPORT Status fmi2FreeFMUstate(Component c, State *x) {
+    Shell *s = c;
+    if (!s)
+        return ERROR;
+    if (!x || !*x)
+        return OK;
+    enter_thread();
+    Status status = s->dead ? FATAL : wrapper.fmi2FreeFMUstate(s->inner, x);
+    *x = NULL;
+    return status;
+}
+
+/* A refused step is no wish to end the simulation, as which PythonFMU's library takes it. */
+EXPORT Status fmi2GetBooleanStatus(Component c, int kind, Boolean *value) {
+    enum { TERMINATED = 3 };
+    Shell *s = c;
+    if (!s || kind != TERMINATED || !value)
+        return DISCARD;
+    *value = 0;
+    return OK;
+}

@@ -1,0 +1,152 @@
+"""Builds one FMU with PythonFMU; run as a process of its own, because PythonFMU imports the sources by name.
+
+Reads a recipe as JSON from standard input and writes the FMU to the path in it.
+"""
+
+import json
+import sys
+import tempfile
+import uuid
+from importlib.metadata import distribution
+from pathlib import Path
+from xml.etree import ElementTree
+
+from orchestrator.errors import OrchestratorError
+from orchestrator.fmi.archive import read_archive, write_archive
+from orchestrator.fmi.launcher import compile_launcher, find_toolchain
+from orchestrator.fmi.sources import Recipe, closure, digest
+from orchestrator.fmi.starts import default_starts
+
+RUNTIME = ("_version", "default_experiment", "enums", "fmi2slave", "logmsg", "variables")
+LINUX = "binaries/linux64"
+WRAPPER = f"{LINUX}/libpythonfmu-export.so"
+
+ENTRY = '''"""The class that PythonFMU instantiates, with the name and the start values of this FMU."""
+
+import os
+import sys
+
+from .{module} import {class_name} as Model
+
+Model.customise({name!r}, {build!r}, {starts!r})
+_resources = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+_dictionaries = []
+
+
+def keep(dictionary):
+    """Undo what PythonFMU does once too often for every instance.
+
+    It gives back a reference to the loading module's dictionary that it does not own, so that module would be gone
+    after a few instances, and it puts the resources on the import path, which would grow for ever.
+    """
+    _dictionaries.append(dictionary)
+    if sys.path and os.path.abspath(sys.path[0]) == _resources:
+        del sys.path[0]
+'''
+LOADED = '''"""Loaded by PythonFMU, which runs this file again for every instance."""
+
+from {package}.entry import Model as {name}
+from {package}.entry import keep
+
+keep(globals())
+'''
+
+
+def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
+    """Build ``recipe`` into ``target``."""
+    starts = default_starts(recipe.class_name) | dict(recipe.starts)
+    runtime = _runtime()
+    sources = {path.name: path.read_bytes() for path in closure(recipe.module)}
+    content = [part for name in sorted(sources) for part in (name.encode(), sources[name])]
+    options = json.dumps([recipe.name, sorted(starts.items())]).encode()
+    identity = digest([options, *runtime.values(), *content])
+    package = f"pyfmu_{identity[:16]}"
+    entry = ENTRY.format(
+        module=recipe.module, class_name=recipe.class_name, name=recipe.name, build=identity[:16], starts=starts
+    )
+    sources |= {"entry.py": entry.encode(), "__init__.py": b'"""The sources of one FMU."""\n'}
+    loaded = LOADED.format(package=package, name=recipe.class_name)
+    with tempfile.TemporaryDirectory() as folder:
+        members = _built_by_pythonfmu(Path(folder), package, sources, loaded, recipe.name)
+    write_archive(target, _completed(members, package, runtime, fingerprint, recipe))
+
+
+def _runtime() -> dict[str, bytes]:
+    """Return the files of PythonFMU that a slave needs when it runs."""
+    import pythonfmu
+
+    folder = Path(pythonfmu.__file__).parent
+    return {"__init__.py": b'"""PythonFMU."""\n'} | {f"{m}.py": (folder / f"{m}.py").read_bytes() for m in RUNTIME}
+
+
+def _built_by_pythonfmu(
+    folder: Path, package: str, sources: dict[str, bytes], loaded: str, name: str
+) -> dict[str, bytes]:
+    from pythonfmu import FmuBuilder
+
+    (folder / package).mkdir()
+    for file, content in sources.items():
+        (folder / package / file).write_bytes(content)
+    script = folder / f"{name}_{package}.py"
+    script.write_text(loaded, encoding="utf-8")
+    built = FmuBuilder.build_FMU(script, dest=folder / "out.fmu", project_files=[folder / package])
+    return read_archive(Path(built))
+
+
+def _completed(
+    members: dict[str, bytes], package: str, runtime: dict[str, bytes], fingerprint: str, recipe: Recipe
+) -> dict[str, bytes]:
+    """Return the members with PythonFMU put into the package, the launcher, all documents and the GUID."""
+    from orchestrator.fmi.documentation import documentation
+    from orchestrator.fmi.reference_files import reference_files
+
+    kept = {name: data for name, data in members.items() if not name.startswith("resources/pythonfmu/")}
+    kept |= {f"resources/{package}/pythonfmu/{name}": data for name, data in runtime.items()}
+    toolchain = find_toolchain()
+    library = f"{LINUX}/{recipe.name}.so"
+    if toolchain.compiler is not None and library in kept:
+        kept[WRAPPER] = kept[library]
+        kept[library] = compile_launcher(toolchain)
+    description = ElementTree.fromstring(kept.pop("modelDescription.xml"))
+    kept |= documentation(description)
+    kept |= reference_files(recipe.class_name, description)
+    kept["documentation/licenses/PythonFMU.txt"] = _pythonfmu_license()
+    annotations = ElementTree.Element("VendorAnnotations")
+    tool = ElementTree.SubElement(annotations, "Tool", {"name": "backlash-cosim"})
+    ElementTree.SubElement(tool, "Build", {"fingerprint": fingerprint})
+    before = [child.tag for child in description].index("ModelVariables")
+    description.insert(before, annotations)
+    content = [part for name in sorted(kept) for part in (name.encode(), kept[name])]
+    guid = "{" + str(uuid.UUID(digest([ElementTree.tostring(description), *content])[:32])) + "}"
+    description.set("guid", guid)
+    _indent(description)
+    xml = b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(description) + b"\n"
+    return kept | {"modelDescription.xml": xml, "resources/guid.txt": guid.encode() + b"\n"}
+
+
+def _indent(description: ElementTree.Element) -> None:
+    for element in description.iter():
+        element.text = element.tail = None
+    ElementTree.indent(description)
+
+
+def _pythonfmu_license() -> bytes:
+    files = distribution("pythonfmu").files or []
+    path = next((file for file in files if file.name.upper().startswith("LICENSE")), None)
+    return path.read_binary() if path is not None else b"PythonFMU is distributed under the MIT license.\n"
+
+
+def main() -> int:
+    """Read the recipe from standard input; return 0, or 2 with one line on standard error."""
+    request = json.load(sys.stdin)
+    recipe = Recipe(request["name"], request["module"], request["class_name"], request["starts"])
+    try:
+        build(recipe, Path(request["target"]), request["fingerprint"])
+    except (OrchestratorError, ValueError, OSError) as error:
+        sys.stderr.write(f"{error}\n")
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,133 @@
+"""The FMU ``KalmanEstimator``: adapter from FMI to :mod:`kalman`."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from . import kalman
+from .fmu_variables import Variable
+from .sampled_slave import SampledSlave
+
+U, THETA_M, THETA_L, FIRST_ESTIMATE = range(4)
+INNOVATION_M, INNOVATION_L, INNOVATION_SQUARED, SAMPLE_TIME = range(FIRST_ESTIMATE + 6, FIRST_ESTIMATE + 10)
+FIRST_START = SAMPLE_TIME + 1
+FIRST_A = FIRST_START + 6
+FIRST_B = FIRST_A + 36
+FIRST_K = FIRST_B + 6
+FIRST_S = FIRST_K + 12
+
+_STATES = (
+    ("theta_m_hat", "rad", "motor angle"),
+    ("omega_m_hat", "rad/s", "motor speed"),
+    ("theta_l_hat", "rad", "load angle"),
+    ("omega_l_hat", "rad/s", "load speed"),
+    ("T_l_hat", "N.m", "load torque"),
+    ("T_m_hat", "N.m", "motor torque"),
+)
+_QUOTIENTS = {
+    ("rad", "rad/s"): "s",
+    ("rad", "N.m"): "rad/(N.m)",
+    ("rad/s", "rad"): "1/s",
+    ("rad/s", "N.m"): "rad/(N.m.s)",
+    ("N.m", "rad"): "N.m/rad",
+    ("N.m", "rad/s"): "N.m.s/rad",
+}
+_MEASURED = ("theta_m", "theta_l")
+
+
+def _quotient(above: str, below: str) -> str:
+    return "1" if above == below else _QUOTIENTS[(above, below)]
+
+
+def _matrices() -> list[Variable]:
+    rows = range(6)
+    units = [unit for _, unit, _ in _STATES]
+    entries = [
+        (f"A_d[{r + 1},{c + 1}]", _quotient(units[r], units[c]), "Discrete state matrix") for r in rows for c in rows
+    ]
+    entries += [(f"B_d[{r + 1}]", _quotient(units[r], "N.m"), "Discrete input vector of u") for r in rows]
+    entries += [(f"K_f[{r + 1},{c + 1}]", _quotient(units[r], "rad"), "Estimator gain") for r in rows for c in (0, 1)]
+    entries += [(f"S_inv[{rc}]", "1/rad2", "Inverse covariance of the innovation") for rc in ("1,1", "1,2", "2,2")]
+    return [Variable(name, "parameter", unit, 0.0, text) for name, unit, text in entries]
+
+
+class KalmanEstimator(SampledSlave):
+    """Sampled-data stationary Kalman filter of the drivetrain's state and load torque."""
+
+    title = "Sampled-data Kalman filter of the drivetrain's state and of its load torque"
+    sample_time_reference = SAMPLE_TIME
+    table: ClassVar[tuple[Variable, ...]] = (
+        Variable("u", "input", "N.m", 0.0, "Requested motor torque, held since the last sample", nominal=100.0),
+        Variable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
+        Variable("theta_l", "input", "rad", 0.0, "Measured load angle"),
+        *(
+            Variable(
+                name,
+                "output",
+                unit,
+                None,
+                f"Estimated {text}",
+                variability="discrete",
+                depends_on=_MEASURED,
+                starts_from=(f"{name}_start",),
+            )
+            for name, unit, text in _STATES
+        ),
+        *(
+            Variable(name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED)
+            for name, unit, text in (
+                ("innovation_m", "rad", "Motor angle measured minus predicted"),
+                ("innovation_l", "rad", "Load angle measured minus predicted"),
+                ("innovation_squared", "1", "Normalised innovation squared"),
+            )
+        ),
+        Variable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
+        *(
+            Variable(f"{name}_start", "parameter", unit, 0.0, f"Initially estimated {text}")
+            for name, unit, text in _STATES
+        ),
+        *_matrices(),
+    )
+
+    def take_parameters(self) -> None:
+        """Collect the model and the gain."""
+        values = self.real
+        self._A: Any = tuple(tuple(values[FIRST_A + 6 * r + c] for c in range(6)) for r in range(6))
+        self._B: Any = tuple(values[FIRST_B + r] for r in range(6))
+        self._K: Any = tuple((values[FIRST_K + 2 * r], values[FIRST_K + 2 * r + 1]) for r in range(6))
+        self._weight = (values[FIRST_S], values[FIRST_S + 1], values[FIRST_S + 2])
+
+    def begin(self) -> None:
+        """Report the initial estimate; the first measurement counts at the end of the first sample period."""
+        start: Any = tuple(self.real[FIRST_START + n] for n in range(6))
+        self._predicted = start
+        self._report(start, 0.0, 0.0, 0.0)
+
+    def predict(self) -> None:
+        """Predict with the torque request that was held over the sample period."""
+        self._predicted = kalman.predict(self._estimate, self.real[U], self._A, self._B)
+
+    def correct(self) -> None:
+        """Correct the prediction with the measurement."""
+        real = self.real
+        self._report(*kalman.correct(self._predicted, real[THETA_M], real[THETA_L], self._K, self._weight))
+
+    def _report(self, estimate: Any, innovation_m: float, innovation_l: float, squared: float) -> None:
+        real = self.real
+        self._estimate = estimate
+        for n in range(6):
+            real[FIRST_ESTIMATE + n] = estimate[n]
+        real[INNOVATION_M] = innovation_m
+        real[INNOVATION_L] = innovation_l
+        real[INNOVATION_SQUARED] = squared
+
+    def saved(self) -> Any:
+        """Return the clock, the estimate and the prediction that the present sample corrects."""
+        return [super().saved(), self._estimate, self._predicted]
+
+    def restore(self, saved: Any) -> None:
+        """Take over a saved state."""
+        clock, estimate, predicted = saved
+        super().restore(clock)
+        self._estimate = tuple(estimate)
+        self._predicted = tuple(predicted)

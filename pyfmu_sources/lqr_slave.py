@@ -1,0 +1,76 @@
+"""The FMU ``LqrController``: adapter from FMI to :mod:`lqr`."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from .fmu_variables import Variable
+from .lqr import control
+from .sampled_slave import SampledSlave
+
+REFERENCE, REFERENCE_SPEED, FIRST_ESTIMATE = range(3)
+U = FIRST_ESTIMATE + 6
+FIRST_GAIN = U + 1
+I, COMPLIANCE, U_MAX, SAMPLE_TIME = range(FIRST_GAIN + 5, FIRST_GAIN + 9)
+
+_INPUTS = (
+    ("reference", "rad", "Wanted load angle"),
+    ("reference_speed", "rad/s", "Wanted load speed"),
+    ("theta_m_hat", "rad", "Estimated motor angle"),
+    ("omega_m_hat", "rad/s", "Estimated motor speed"),
+    ("theta_l_hat", "rad", "Estimated load angle"),
+    ("omega_l_hat", "rad/s", "Estimated load speed"),
+    ("T_l_hat", "N.m", "Estimated load torque"),
+    ("T_m_hat", "N.m", "Estimated motor torque"),
+)
+_GAINS = (
+    ("K[1]", "N.m/rad", "Gain of the motor angle"),
+    ("K[2]", "N.m.s/rad", "Gain of the motor speed"),
+    ("K[3]", "N.m/rad", "Gain of the load angle"),
+    ("K[4]", "N.m.s/rad", "Gain of the load speed"),
+    ("K[5]", "1", "Gain of the motor torque"),
+)
+_INPUT_NAMES = tuple(name for name, _, _ in _INPUTS)
+_PARAMETER_NAMES = (*(name for name, _, _ in _GAINS), "i", "compliance", "u_max")
+
+
+class LqrController(SampledSlave):
+    """Sampled-data state feedback with the load torque fed forward and the torque limited."""
+
+    title = "Sampled-data linear-quadratic regulator of the drivetrain, load torque fed forward"
+    sample_time_reference = SAMPLE_TIME
+    table: ClassVar[tuple[Variable, ...]] = (
+        *(Variable(name, "input", unit, 0.0, text) for name, unit, text in _INPUTS),
+        Variable(
+            "u",
+            "output",
+            "N.m",
+            None,
+            "Requested motor torque",
+            nominal=100.0,
+            variability="discrete",
+            depends_on=_INPUT_NAMES,
+            starts_from=(*_INPUT_NAMES, *_PARAMETER_NAMES),
+        ),
+        *(Variable(name, "parameter", unit, 0.0, text) for name, unit, text in _GAINS),
+        Variable("i", "parameter", "1", 3.984, "Gear ratio: motor angle over load angle", 1e-9, 1e12),
+        Variable("compliance", "parameter", "rad/(N.m)", 1.0 / 3300.0, "Compliance of the shaft", 0.0, 1e12),
+        Variable("u_max", "parameter", "N.m", 1e4, "Torque limit", 0.0, 1e12),
+        Variable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
+    )
+
+    def take_parameters(self) -> None:
+        """Collect gains, gear ratio, compliance and limit."""
+        real = self.real
+        self._gains: Any = tuple(real[FIRST_GAIN + n] for n in range(5))
+        self._rest = (real[I], real[COMPLIANCE], real[U_MAX])
+
+    def begin(self) -> None:
+        """Compute the first torque request."""
+        self.correct()
+
+    def correct(self) -> None:
+        """Compute the torque request of this sample."""
+        real = self.real
+        estimate: Any = tuple(real[FIRST_ESTIMATE + n] for n in range(6))
+        real[U] = control(real[REFERENCE], real[REFERENCE_SPEED], estimate, self._gains, *self._rest)
