@@ -95,7 +95,7 @@ def fmu_files(behaviour: str = "good") -> dict[str, bytes]:
         "modelDescription.xml": model_description().encode(),
         LIBRARY: compile_library(behaviour),
         "resources/readme.txt": b"nothing is needed here\n",
-        "documentation/index.html": b"<!DOCTYPE html><title>MassSpring</title><p>A mass on a spring with a damper.</p>\n",
+        "documentation/index.html": b"<!DOCTYPE html><title>MassSpring</title><p>A mass on a spring.</p>\n",
         f"{REFERENCE}/fmi-ls-manifest.xml": MANIFEST.encode(),
         f"{REFERENCE}/MassSpring_out.csv": reference_trajectory().encode(),
     }

@@ -1,0 +1,1 @@
+"""Checks of FMUs: archive, modelDescription, binaries, and the behaviour of the running slave."""

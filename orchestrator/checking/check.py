@@ -1,0 +1,45 @@
+"""The check of one FMU: static first, then, if that found no error, dynamic."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestrator.checking.archive import ArchiveLimits
+from orchestrator.checking.dynamic import can_run, check_dynamic
+from orchestrator.checking.findings import Report, has_errors, ordered
+from orchestrator.checking.sandbox import Limits
+from orchestrator.checking.static import check_static
+
+
+@dataclass(frozen=True)
+class CheckOptions:
+    """How to check.
+
+    Attributes:
+        static: execute nothing.
+        archive, limits: what the archive and the running FMU may use.
+    """
+
+    static: bool = False
+    archive: ArchiveLimits = field(default_factory=ArchiveLimits)
+    limits: Limits = field(default_factory=Limits)
+
+
+def check_fmu(path: Path, options: CheckOptions | None = None) -> Report:
+    """Check an FMU file or an unpacked FMU.
+
+    Args:
+        path: an existing file or folder.
+        options: default limits when None.
+
+    Returns:
+        All findings; nothing of the FMU has been executed unless ``executed`` is set.
+    """
+    options = options or CheckOptions()
+    result = check_static(path, options.archive)
+    findings = list(result.findings)
+    executed = False
+    d, files = result.description, result.files
+    if not options.static and d is not None and files is not None and not has_errors(findings) and can_run(d, files):
+        findings += check_dynamic(d, files, result.references, options.limits)
+        executed = True
+    return Report(str(path), ordered(findings), executed, result.facts)

@@ -1,0 +1,251 @@
+"""Probes of one running slave: life cycle, inputs, reference result, memory.
+
+A probe returns whether the ones after it make sense.
+"""
+
+import gc
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from orchestrator.checking.child.binding import Library, Slave, StatusError, TerminatedError, finite
+from orchestrator.checking.child.trajectory import Bench, Variable, excitation
+
+_LEAK_PER_INSTANCE = 256 * 1024
+_LEAK_PER_STEP = 8 * 1024
+_LEAK_AT_LEAST = 1 << 20
+
+
+@dataclass
+class Context:
+    """What the probes share.
+
+    Attributes:
+        report: called with rule, message and path.
+        trace: outputs of the undisturbed run, [step][output], once there is one.
+    """
+
+    bench: Bench
+    report: Callable[..., None]
+    trace: list[list[Any]] | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the recorded variables."""
+        return [v.name for v in self.bench.job.outputs()]
+
+
+Probe = Callable[[Context], bool]
+
+
+def load(library: Library, report: Callable[..., None]) -> None:
+    """Version and platform of the library."""
+    version = library.text("fmi2GetVersion")
+    if version != "2.0":
+        report("load.version", f"fmi2GetVersion must return 2.0, but returns {version!r}")
+    platform = library.text("fmi2GetTypesPlatform")
+    if platform != "default":
+        report("load.platform", f"fmi2GetTypesPlatform must return default, but returns {platform!r}")
+
+
+def life_cycle(context: Context) -> bool:
+    """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value."""
+    bench, job = context.bench, context.bench.job
+    outputs = job.outputs()
+    with bench.instance(initialised=False) as slave:
+        slave.setup(job.start, job.stop, job.tolerance)
+        slave.call("fmi2EnterInitializationMode")
+        _start_values(context, slave)
+        slave.call("fmi2ExitInitializationMode")
+        complaints: set[str] = set()
+        _look(context, outputs, bench.read(slave, outputs, "after initialisation"), "after initialisation", complaints)
+        clock = beat = time.monotonic()
+        for n in range(job.steps):
+            t = job.start + n * job.step
+            try:
+                slave.step(t, job.step, f"at t = {t:g} (step {n + 1})")
+            except TerminatedError:
+                bench.job = replace(job, steps=max(n, 1))
+                break
+            when = f"at t = {t + job.step:g}"
+            _look(context, outputs, bench.read(slave, outputs, when), when, complaints)
+            if time.monotonic() - beat > 0.5:
+                beat = time.monotonic()
+                bench.beat()
+            if time.monotonic() - clock > job.budget:
+                bench.job = replace(job, steps=n + 1)
+                break
+        slave.call("fmi2Terminate")
+    return True
+
+
+def _start_values(context: Context, slave: Slave) -> None:
+    fixed = [
+        v
+        for v in context.bench.job.variables
+        if v.start is not None and (v.causality in ("parameter", "input") or v.initial == "exact")
+    ]
+    for v, read in zip(fixed, context.bench.read(slave, fixed, "in initialisation mode"), strict=True):
+        _string(context, v, read)
+        value = read.decode("utf-8", "replace") if isinstance(read, bytes) else read
+        if value is not None and not _close(value, v.start):
+            message = f"`{v.name}` must start at {v.start!r} as the XML says, but starts at {value!r}"
+            context.report("value.start", message, v.name)
+
+
+def _close(a: Any, b: Any) -> bool:
+    if isinstance(a, float):
+        return abs(a - b) <= 1e-12 * max(abs(a), abs(b))
+    return bool(a == b)
+
+
+def _string(context: Context, v: Variable, value: Any) -> None:
+    if v.base == "String" and value is None:
+        context.report("value.string", f"the string `{v.name}` must not be null, but is", v.name)
+
+
+def _look(context: Context, outputs: list[Variable], values: list[Any], when: str, complaints: set[str]) -> None:
+    """Complain once about each output that is not finite or not in its range."""
+    for v, value in zip(outputs, values, strict=True):
+        if v.name in complaints:
+            continue
+        if not finite(value):
+            complaints.add(v.name)
+            context.report("value.not-finite", f"`{v.name}` must be finite, but is {value} {when}", v.name)
+        elif v.base in ("Real", "Integer"):
+            slack = 1e-9 * max(abs(value), 1.0)
+            low = v.minimum is not None and value < v.minimum - slack
+            if low or (v.maximum is not None and value > v.maximum + slack):
+                complaints.add(v.name)
+                message = f"`{v.name}` must lie in [{v.minimum}, {v.maximum}], but is {value} {when}"
+                context.report("value.out-of-range", message, v.name)
+        _string(context, v, value)
+
+
+def inputs(context: Context) -> bool:
+    """Run with moving inputs; what is recorded is what the later probes compare with."""
+    bench = context.bench
+    refused = None
+    with bench.instance() as slave:
+        for v in bench.job.inputs():
+            try:
+                slave.set("Real", [v.reference], [excitation(v, 0.0, bench.duration)])
+            except StatusError as error:
+                refused = f"{error} for `{v.name}`, which was set within its bounds"
+                break
+    if refused is not None:
+        context.report("run.input-refused", refused)
+        return False
+    with bench.instance() as slave:
+        context.trace = bench.run(slave)
+    return True
+
+
+def reference(context: Context) -> bool:
+    """Simulate what the reference result shows and compare."""
+    job = context.bench.job
+    if job.reference is None:
+        return True
+    names, rows, path = job.reference["names"], job.reference["rows"], job.reference["path"]
+    by_name = {v.name: v for v in job.variables}
+    missing = [v.name for v in job.variables if v.causality == "input" and v.name not in names and v.start is None]
+    if missing:
+        context.report("reference.not-run", f"the result must have the input `{missing[0]}`, but has not", path)
+        return True
+    shown = [by_name[n] for n in names]
+    driven = [(i, v) for i, v in enumerate(shown) if v.causality == "input" and v.base != "String"]
+    compared = [
+        (i, v) for i, v in enumerate(shown) if v.causality not in ("input", "independent") and v.base != "String"
+    ]
+    scale = [_scale([r[i + 1] for r in rows], v) for i, v in compared]
+    worst: tuple[float, str] = (0.0, "")
+    outside = 0
+    deadline = time.monotonic() + 20.0 * job.budget
+    with context.bench.instance(initialised=False) as slave:
+        _drive(slave, driven, rows[0])
+        slave.setup(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]), job.tolerance)
+        slave.call("fmi2EnterInitializationMode")
+        slave.call("fmi2ExitInitializationMode")
+        beat = time.monotonic()
+        for row, following in zip(rows, [*rows[1:], None], strict=True):
+            values = context.bench.read(slave, [v for _, v in compared], f"at t = {row[0]:g}")
+            off = [abs(float(x) - row[i + 1]) / s for x, (i, _), s in zip(values, compared, scale, strict=True)]
+            outside += bool(off) and max(off) > 1.0
+            if off and max(off) > worst[0]:
+                at = off.index(max(off))
+                i, v = compared[at]
+                worst = (max(off), f"`{v.name}` is {values[at]:.6g} instead of {row[i + 1]:.6g} at t = {row[0]:g}")
+            if following is None:
+                break
+            _drive(slave, driven, row)
+            if following[0] > row[0]:
+                try:
+                    slave.step(row[0], following[0] - row[0], f"at t = {row[0]:g}")
+                except TerminatedError:
+                    break
+            if time.monotonic() > deadline:
+                context.report("reference.not-run", "the reference result takes too long to be reproduced", path)
+                return True
+            if time.monotonic() - beat > 0.5:
+                beat = time.monotonic()
+                context.bench.beat()
+    if outside > 0.02 * len(rows):
+        where = f"{outside} of {len(rows)} points are outside the tube: {worst[1]}"
+        message = f"the reference result must be reproduced, but {where}"
+        context.report("reference.result", message, path)
+    return True
+
+
+def _drive(slave: Slave, driven: list[tuple[int, Variable]], row: list[float]) -> None:
+    for i, v in driven:
+        slave.set(v.base, [v.reference], [row[i + 1] if v.base == "Real" else int(row[i + 1])], f"at t = {row[0]:g}")
+
+
+def _scale(column: list[float], v: Variable) -> float:
+    """Half the width of the tube: 2 % of the range of the signal, and at least a millionth of its size."""
+    spread = max(column) - min(column)
+    return max(0.02 * spread, 1e-6 * max(map(abs, column)), 1e-9 * (v.nominal or 1.0))
+
+
+def memory(context: Context) -> bool:
+    """Resident memory over instances and over steps."""
+    bench, job = context.bench, context.bench.job
+    if _resident() is None:
+        return True
+    clock = time.monotonic()
+    cycles, before = 0, None
+    for n in range(30):
+        with bench.instance():
+            pass
+        bench.beat()
+        if n == 9:
+            gc.collect()
+            before = _resident()
+        cycles += before is not None
+        if time.monotonic() - clock > job.budget:
+            break
+    growth = ((_resident() or 0) - (before or 0)) / max(cycles - 1, 1)
+    if before is not None and cycles > 5 and growth > _LEAK_PER_INSTANCE:
+        context.report(
+            "resources.instance-leak", f"an instance must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
+        )
+    with bench.instance() as slave:
+        quarter = max(job.steps // 4, 1)
+        bench.run(slave, 0, quarter, excited=False)
+        before = _resident() or 0
+        bench.run(slave, quarter, excited=False)
+        growth = (_resident() or 0) - before
+    if growth > _LEAK_AT_LEAST and growth / max(job.steps - quarter, 1) > _LEAK_PER_STEP:
+        per_step = growth / max(job.steps - quarter, 1) / 1024
+        context.report("resources.step-leak", f"memory must not grow with steps, but grows by {per_step:.0f} KiB each")
+    return True
+
+
+def _resident() -> int | None:
+    """Resident memory in bytes, where the system tells."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:
+            return int(file.read().split()[1]) * 4096
+    except OSError:
+        return None

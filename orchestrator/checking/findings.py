@@ -1,0 +1,94 @@
+"""What the checks report: one flat list of findings per FMU."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from orchestrator.checking.rules import RULES
+
+SEVERITIES = ("error", "warning", "info")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One violated rule at one place.
+
+    Attributes:
+        rule: key of ``RULES``.
+        path: file inside the FMU, and an XPath after a colon where there is one.
+        message: what was expected and what was found, one sentence.
+    """
+
+    rule: str
+    path: str
+    message: str
+
+    def __post_init__(self) -> None:
+        if self.rule not in RULES:
+            raise KeyError(f"`rule` must be one of RULES, but is {self.rule!r}")
+
+    @property
+    def severity(self) -> str:
+        """One of "error", "warning" and "info"."""
+        return RULES[self.rule].severity
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return RULES[self.rule].advice
+
+    def as_dict(self) -> dict[str, str]:
+        """The finding for a JSON document."""
+        return {
+            "severity": self.severity,
+            "rule": self.rule,
+            "path": self.path,
+            "message": self.message,
+            "advice": self.advice,
+        }
+
+
+@dataclass(frozen=True)
+class Report:
+    """All that was found about one FMU.
+
+    Attributes:
+        fmu: path as the user gave it.
+        findings: sorted by severity, then in the order found.
+        executed: whether the FMU's binary was run.
+        facts: what is known about the FMU (name, version, platforms, …), for the reader.
+    """
+
+    fmu: str
+    findings: tuple[Finding, ...]
+    executed: bool = False
+    facts: dict[str, object] = field(default_factory=dict)
+
+    def count(self, severity: str) -> int:
+        """Number of findings of one severity."""
+        return sum(f.severity == severity for f in self.findings)
+
+    @property
+    def ok(self) -> bool:
+        """No finding of severity "error"."""
+        return self.count("error") == 0
+
+    def as_dict(self) -> dict[str, object]:
+        """The report for a JSON document."""
+        return {
+            "fmu": self.fmu,
+            "ok": self.ok,
+            "executed": self.executed,
+            "counts": {s: self.count(s) for s in SEVERITIES},
+            "facts": self.facts,
+            "findings": [f.as_dict() for f in self.findings],
+        }
+
+
+def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Errors first, each kept in the order found, repeats removed."""
+    return tuple(sorted(dict.fromkeys(findings), key=lambda f: SEVERITIES.index(f.severity)))
+
+
+def has_errors(findings: Iterable[Finding]) -> bool:
+    """Whether any finding is an error."""
+    return any(f.severity == "error" for f in findings)

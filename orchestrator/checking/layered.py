@@ -1,0 +1,124 @@
+"""Other files of an FMU: documentation, icon, and the related files of the layered standard FMI-LS-REF."""
+
+import csv
+import io
+import math
+import posixpath
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from orchestrator.checking import xml_reading
+from orchestrator.checking.archive import FmuFiles
+from orchestrator.checking.description import Description
+from orchestrator.checking.findings import Finding
+
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
+_NAMESPACE = "{http://fmi-standard.org/fmi-ls-manifest}"
+_ROLE = re.compile(
+    r"document|requirement|specification|model|parameter|system|testcase"
+    r"|experiment(/(smoke-test|validation|uncertainty-analysis))?|result|method|rationale|report|request|delivery"
+    r"|configuration|signature|serialized-state(/.*)?|meta-data|other"
+)
+_MAXIMUM_CSV = 64 << 20
+
+
+@dataclass(frozen=True)
+class ReferenceResult:
+    """A reference result that is fit to be compared with.
+
+    Attributes:
+        path: CSV file in the FMU.
+        names: columns after the time.
+        rows: rows of time and values.
+    """
+
+    path: str
+    names: tuple[str, ...]
+    rows: tuple[tuple[float, ...], ...]
+
+
+def check_files(files: FmuFiles) -> Iterator[Finding]:
+    """Findings about the documentation and the icon."""
+    names = set(files.names())
+    documents = any(re.fullmatch(r"documentation/(?!licenses/|diagrams?/).+", n) for n in names)
+    entries = ("documentation/index.html", "documentation/_main.html")
+    if documents and not names & set(entries):
+        yield Finding(
+            "file.documentation", "documentation", f"documentation/ must have the entry {entries[0]}, but has not"
+        )
+    if "model.png" in names and files.read("model.png", 1 << 26)[:8] != b"\x89PNG\r\n\x1a\n":
+        yield Finding("file.icon", "model.png", "the icon must be a PNG image, but is not")
+
+
+def check_layered(d: Description, files: FmuFiles) -> tuple[list[ReferenceResult], list[Finding]]:
+    """Check every manifest of a layered standard, and read the reference results of FMI-LS-REF."""
+    findings: list[Finding] = []
+    results: list[ReferenceResult] = []
+    names = set(files.names())
+    for path in sorted(n for n in names if re.fullmatch(r"extra/[^/]+/fmi-ls-manifest\.xml", n)):
+        root, problems = xml_reading.parse(files.read(path, xml_reading.MAXIMUM_BYTES), path)
+        findings += problems
+        if root is None:
+            continue
+        folder = path.split("/")[1]
+        for attribute in ("fmi-ls-name", "fmi-ls-version"):
+            if not root.get(_NAMESPACE + attribute):
+                findings.append(Finding("layered.manifest", path, f"the manifest must have {attribute}, but has not"))
+        name = root.get(_NAMESPACE + "fmi-ls-name")
+        if name and name != folder:
+            findings.append(Finding("layered.manifest", path, f"the folder must be called `{name}`, but is `{folder}`"))
+        if path == MANIFEST:
+            read, problems = _references(d, root, files, names)
+            results += read
+            findings += problems
+    return results, findings
+
+
+def _references(
+    d: Description, root: "xml_reading.etree._Element", files: FmuFiles, names: set[str]
+) -> tuple[list[ReferenceResult], list[Finding]]:
+    findings: list[Finding] = []
+    results: list[ReferenceResult] = []
+    for related in root.findall("Related"):
+        where = xml_reading.xpath(related, name=MANIFEST)
+        source, role = related.get("source", ""), related.get("role", "")
+        if not _ROLE.fullmatch(role):
+            findings.append(Finding("layered.role", where, f"role must be one of the standard's, but is {role!r}"))
+        if re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", source):
+            continue  # an absolute URI: nothing is fetched
+        path = posixpath.normpath(posixpath.join(FOLDER, source))
+        if path not in names:
+            findings.append(Finding("layered.missing", where, f"a related file must be in the FMU, but {path} is not"))
+        elif role == "result" and related.get("type") == "text/csv":
+            try:
+                results.append(_read_csv(path, files.read(path, _MAXIMUM_CSV), {v.name for v in d.variables}))
+            except ValueError as error:
+                findings.append(Finding("layered.result", path, str(error)))
+    return results, findings
+
+
+def _read_csv(path: str, data: bytes, known: set[str]) -> ReferenceResult:
+    if len(data) > _MAXIMUM_CSV:
+        raise ValueError(f"a reference result must have at most {_MAXIMUM_CSV} bytes, but has more")
+    rows = [r for r in csv.reader(io.StringIO(data.decode("utf-8-sig"))) if r]
+    if len(rows) < 3 or len(rows[0]) < 2:
+        raise ValueError("a reference result must have a header, a column beside time, and two rows, but has not")
+    header = [h.strip() for h in rows[0]]
+    unknown = [h for h in header[1:] if h not in known]
+    if unknown:
+        raise ValueError(f"the columns must be variables of the FMU, but {unknown[0]!r} is none")
+    if header[0] != "time" or len(set(header)) < len(header):
+        raise ValueError("the first column must be `time` and no name may come twice, but it is not so")
+    values = []
+    for number, row in enumerate(rows[1:], 2):
+        try:
+            values.append(tuple(float(c) for c in row))
+        except ValueError:
+            raise ValueError(f"line {number} must have numbers only, but has not") from None
+        if len(row) != len(header) or not all(map(math.isfinite, values[-1])):
+            raise ValueError(f"line {number} must have {len(header)} finite numbers, but has not")
+        if len(values) > 1 and values[-1][0] < values[-2][0]:
+            raise ValueError(f"time must not decrease, but does in line {number}")
+    return ReferenceResult(path, tuple(header[1:]), tuple(values))

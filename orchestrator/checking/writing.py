@@ -1,0 +1,68 @@
+"""Findings as text, JSON and JUnit XML."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+from xml.sax.saxutils import escape, quoteattr
+
+from orchestrator.checking.findings import SEVERITIES, Report
+
+# XML 1.0 cannot hold these, not even escaped; names in a hostile archive can.
+_FORBIDDEN = dict.fromkeys((*range(9), 11, 12, *range(14, 32), *range(0xD800, 0xE000), 0xFFFE, 0xFFFF), "?")
+
+
+def summary(report: Report) -> str:
+    """The line of one FMU."""
+    how = "" if report.executed else " (not executed)"
+    if not report.findings:
+        return f"{report.fmu}: no findings{how}"
+    counts = [f"{report.count(s)} {s}{'s' * (report.count(s) > 1)}" for s in SEVERITIES if report.count(s)]
+    return f"{report.fmu}: {', '.join(counts)}{how}"
+
+
+def as_lines(report: Report) -> list[str]:
+    """The report for a terminal: the summary, then three lines for each finding."""
+    lines = [summary(report)]
+    for f in report.findings:
+        lines += [f"  {f.severity:7} {f.rule}  {f.path}", f"          {f.message}", f"          -> {f.advice}"]
+    return [line.translate(_FORBIDDEN) for line in lines]
+
+
+def as_results(reports: Sequence[Report]) -> dict[str, Any]:
+    """The results for a JSON document."""
+    return {
+        "ok": all(r.ok for r in reports),
+        "counts": {s: sum(r.count(s) for r in reports) for s in SEVERITIES},
+        "fmus": [r.as_dict() for r in reports],
+    }
+
+
+def as_junit(reports: Sequence[Report]) -> str:
+    """JUnit XML: one suite per FMU, one case per finding: errors fail, the others are skipped so that a CI shows them and goes on."""
+    suites = [_suite(r) for r in reports]
+    return '<?xml version="1.0" encoding="UTF-8"?>\n<testsuites>\n' + "\n".join(suites) + "\n</testsuites>\n"
+
+
+def _suite(report: Report) -> str:
+    cases = list(_cases(report))
+    failures = report.count("error")
+    skipped = len(report.findings) - failures
+    counts = f'tests="{len(cases)}" failures="{failures}" errors="0" skipped="{skipped}"'
+    head = f"<testsuite name={_attribute(report.fmu)} {counts}>"
+    return "\n".join([head, *cases, "</testsuite>"])
+
+
+def _cases(report: Report) -> Iterable[str]:
+    if not report.findings:
+        yield f'<testcase classname={_attribute(report.fmu)} name="no findings"/>'
+    for f in report.findings:
+        tag = "failure" if f.severity == "error" else "skipped"
+        kind = f" type={_attribute(f.severity)}" if tag == "failure" else ""
+        body = escape(f"{f.path}\n{f.advice}".translate(_FORBIDDEN)) if tag == "failure" else ""
+        yield (
+            f"<testcase classname={_attribute(report.fmu)} name={_attribute(f'{f.rule} {f.path}')}>"
+            f"<{tag}{kind} message={_attribute(f.message)}>{body}</{tag}></testcase>"
+        )
+
+
+def _attribute(text: str) -> str:
+    return quoteattr(text.translate(_FORBIDDEN))
