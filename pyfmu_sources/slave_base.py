@@ -12,6 +12,7 @@ cannot be taken. Refused with ``fmi2Error``: what the standard forbids whatever 
 from __future__ import annotations
 
 import json
+import sys
 from typing import Any, ClassVar
 
 try:  # inside an FMU: its own copy, so that FMUs made with other versions of PythonFMU do not get in the way
@@ -88,6 +89,8 @@ class SlaveBase(Fmi2Slave):
         # Not super().__init__: it draws a random GUID for every instance, which costs more than all of this.
         self.instance_name = kwargs.get("instance_name", "")
         self.resources = kwargs.get("resources")
+        if "logger" in kwargs and sys.path and sys.path[0] == self.resources:
+            del sys.path[0]  # PythonFMU's library puts it there for every instance; all is imported by now
         self.visible = kwargs.get("visible", False)
         self.log_queue: list[LogMsg] = []
         self.modelName = self.model_name or type(self).__name__

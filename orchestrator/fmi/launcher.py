@@ -58,8 +58,12 @@ def find_toolchain() -> Toolchain:
     return Toolchain(compiler, libpython if shared else None, os.path.realpath(program))
 
 
-def compile_launcher(toolchain: Toolchain) -> bytes:
+def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
     """Return the shared library, the same bytes wherever it is compiled.
+
+    Args:
+        toolchain: what to compile with.
+        wrapper: file name of PythonFMU's library, which the launcher opens.
 
     Raises:
         FmuError: the compiler fails.
@@ -71,6 +75,7 @@ def compile_launcher(toolchain: Toolchain) -> bytes:
         command = [
             toolchain.compiler,
             *("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden", "-Wl,--build-id=none"),
+            f'-DWRAPPER="{wrapper}"',
             f"-DPYTHON_LIBRARY={_quoted(library)}",
             f"-DPYTHON_PROGRAM=L{_quoted(toolchain.program if library else '')}",
             *("-o", "launcher.so", SOURCE.name, "-ldl", "-lpthread"),

@@ -19,29 +19,18 @@ from orchestrator.fmi.starts import default_starts
 
 RUNTIME = ("_version", "default_experiment", "enums", "fmi2slave", "logmsg", "variables")
 LINUX = "binaries/linux64"
-WRAPPER = f"{LINUX}/libpythonfmu-export.so"
 
 ENTRY = '''"""The class that PythonFMU instantiates, with the name and the start values of this FMU."""
-
-import os
-import sys
 
 from .{module} import {class_name} as Model
 
 Model.customise({name!r}, {build!r}, {starts!r})
-_resources = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 _dictionaries = []
 
 
 def keep(dictionary):
-    """Undo what PythonFMU does once too often for every instance.
-
-    It gives back a reference to the loading module's dictionary that it does not own, so that module would be gone
-    after a few instances, and it puts the resources on the import path, which would grow for ever.
-    """
+    """Own one more reference to the loading module: PythonFMU gives back one too many for every instance."""
     _dictionaries.append(dictionary)
-    if sys.path and os.path.abspath(sys.path[0]) == _resources:
-        del sys.path[0]
 '''
 LOADED = '''"""Loaded by PythonFMU, which runs this file again for every instance."""
 
@@ -105,8 +94,9 @@ def _completed(
     toolchain = find_toolchain()
     library = f"{LINUX}/{recipe.name}.so"
     if toolchain.compiler is not None and library in kept:
-        kept[WRAPPER] = kept[library]
-        kept[library] = compile_launcher(toolchain)
+        wrapper = f"libpythonfmu-export-{digest([kept[library]])[:16]}.so"
+        kept[f"{LINUX}/{wrapper}"] = kept[library]
+        kept[library] = compile_launcher(toolchain, wrapper)
     description = ElementTree.fromstring(kept.pop("modelDescription.xml"))
     kept |= documentation(description)
     kept |= reference_files(recipe.class_name, description)

@@ -7,7 +7,8 @@
  * PythonFMU's library opened, from the folder in which this one lies.
  *
  * A Python that was started here is never finalised: other FMUs may still use it, and hosts that unload in their own
- * order crash otherwise. Signal handlers stay the host's.
+ * order crash otherwise. Signal handlers stay the host's. PythonFMU's library cannot be unloaded either (its C++ has
+ * unique symbols), so all FMUs in a process that bring the same one (its name carries its hash) share it.
  *
  * On the way it mends what that library cannot do: it refuses a wrong GUID, never enters an instance again after
  * fmi2Fatal, and returns the worst status that a call has logged, so that what our slaves refuse is seen as refused. */
@@ -15,6 +16,7 @@
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <limits.h>
+#include <link.h>
 #include <pthread.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -27,7 +29,9 @@
 #ifndef PYTHON_PROGRAM
 #define PYTHON_PROGRAM L""
 #endif
+#ifndef WRAPPER
 #define WRAPPER "libpythonfmu-export.so"
+#endif
 #define OVERRIDE "FMU_LIBPYTHON"
 #define EXPORT __attribute__((visibility("default")))
 
@@ -174,6 +178,15 @@ static int start_python(void) {
     return 1;
 }
 
+static int is_wrapper(struct dl_phdr_info *info, size_t size, void *found) {
+    (void)size;
+    const char *slash = info->dlpi_name ? strrchr(info->dlpi_name, '/') : NULL;
+    if (!slash || strcmp(slash + 1, WRAPPER) != 0 || strlen(info->dlpi_name) >= PATH_MAX)
+        return 0;
+    strcpy(found, info->dlpi_name);
+    return 1;
+}
+
 static void load(void) {
     Dl_info here;
     char path[PATH_MAX];
@@ -183,9 +196,13 @@ static void load(void) {
         snprintf(problem, sizeof problem, "the folder of the FMU's binary was not found");
         return;
     }
-    strcpy(path, here.dli_fname);
-    char *slash = strrchr(path, '/');
-    strcpy(slash ? slash + 1 : path, WRAPPER);
+    if (owns_python)
+        dlopen(here.dli_fname, RTLD_NOW | RTLD_NOLOAD | RTLD_NODELETE); /* threads call leave_thread when they end */
+    if (!dl_iterate_phdr(is_wrapper, path)) {
+        strcpy(path, here.dli_fname);
+        char *slash = strrchr(path, '/');
+        strcpy(slash ? slash + 1 : path, WRAPPER);
+    }
     void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!library) {
         snprintf(problem, sizeof problem, "%s", dlerror());
