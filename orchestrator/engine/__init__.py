@@ -6,7 +6,7 @@ See ``docs/sweeps.md``. The entry point is ``run_cases``.
 from orchestrator.engine.cases import Case, Cases, Column, Outcome, Progress, Row, Status
 from orchestrator.engine.grid import DesignCases, parse_design
 from orchestrator.engine.journal import JournalFullError
-from orchestrator.engine.pools import Limits, LocalProcesses
+from orchestrator.engine.pools import Limits, LocalProcesses, OpenPool, choose_pool
 from orchestrator.engine.run import Interrupted, Sweep, run_cases
 from orchestrator.engine.table import write_csv, write_parquet
 from orchestrator.engine.work import Work
@@ -20,12 +20,14 @@ __all__ = [
     "JournalFullError",
     "Limits",
     "LocalProcesses",
+    "OpenPool",
     "Outcome",
     "Progress",
     "Row",
     "Status",
     "Sweep",
     "Work",
+    "choose_pool",
     "parse_design",
     "run_cases",
     "write_csv",

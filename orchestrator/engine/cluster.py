@@ -96,7 +96,7 @@ class ClusterPool:
         """Cancel what is queued, end the lanes and leave the cluster."""
         try:
             if self._client.status == "running":
-                self._executor.shutdown(wait=False, cancel_futures=True)
+                self._executor.shutdown(wait=False)
                 self._client.unregister_worker_plugin(self._plugin)
         finally:
             self._client.close(timeout=1)

@@ -11,7 +11,6 @@ from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.stats import qmc
 
 from orchestrator.engine.cases import Case, Value
 from orchestrator.errors import ScenarioError
@@ -269,6 +268,8 @@ class DesignCases:
 @lru_cache(maxsize=4)
 def _sobol_block(dimension: int, seed: int, block: int) -> np.ndarray:
     """Points ``block * SOBOL_BLOCK ...`` of the scrambled sequence, shape (SOBOL_BLOCK, dimension)."""
+    from scipy.stats import qmc  # takes a second to import, which every worker process would pay
+
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(2,)))
     engine = qmc.Sobol(dimension, scramble=True, seed=generator)
     if block:

@@ -9,10 +9,11 @@ a full disk has left torn are ignored, and their cases run again.
 import fcntl
 import json
 import os
+import tempfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -87,15 +88,13 @@ class Journal:
 
         Needs eight bytes per case for the offsets, in a temporary file beside the journal, and nothing else.
         """
-        index_path = self.path.with_name(self.path.name + ".offsets")
-        offsets = np.memmap(index_path, dtype=np.uint64, mode="w+", shape=(max(self.total, 1),))
-        index_path.unlink()
-        for offset, line in self._lines():
-            entry = _entry(line)
-            if isinstance(entry, list) and offset and not offsets[entry[0]]:
-                offsets[entry[0]] = offset
-        with self.path.open("rb") as stream:
-            for offset in offsets[: self.total]:
+        with self._offset_table() as table, self.path.open("rb") as stream:
+            offsets = np.memmap(table, dtype=np.uint64, mode="r+", shape=(self.total,))
+            for offset, line in self._lines():
+                entry = _entry(line)
+                if isinstance(entry, list) and not offsets[entry[0]]:
+                    offsets[entry[0]] = offset
+            for offset in offsets:
                 if offset:
                     stream.seek(int(offset))
                     index, status, message, values = _entry(stream.readline())
@@ -116,6 +115,18 @@ class Journal:
         self.path.unlink(missing_ok=True)
         self.done = 0
         self.close()
+
+    def _offset_table(self) -> IO[bytes]:
+        """Return a nameless file of zeros, eight bytes per case."""
+        try:
+            table = tempfile.TemporaryFile(dir=self.path.parent)  # noqa: SIM115 - the caller closes it
+            os.posix_fallocate(table.fileno(), 0, 8 * self.total)  # else a full disk is a SIGBUS later
+        except OSError as error:
+            raise OutputError(f"cannot write in {self.path.parent}: {error.strerror}; {self._advice()}") from None
+        return table
+
+    def _advice(self) -> str:
+        return f"{self.done} of {self.total} cases are kept: make room and go on with --resume"
 
     def _lock(self) -> None:
         try:
@@ -183,10 +194,7 @@ class Journal:
             os.fsync(self._descriptor)
         except OSError as error:
             os.ftruncate(self._descriptor, self._end)
-            raise JournalFullError(
-                f"cannot write {self.path}: {error.strerror}; {self.done} of {self.total} cases are kept: "
-                "make room and go on with --resume"
-            ) from None
+            raise JournalFullError(f"cannot write {self.path}: {error.strerror}; {self._advice()}") from None
         self._end += len(data)
 
     def _count(self, index: int, status: Status) -> None:

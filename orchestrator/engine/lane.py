@@ -17,7 +17,7 @@ from typing import IO
 
 from orchestrator.engine.cases import Case, Outcome, Status
 from orchestrator.engine.worker import READY, Answer, Assignment
-from orchestrator.errors import OrchestratorError, SimulationError
+from orchestrator.errors import SimulationError
 
 ATTEMPTS = 2
 PREPARATION_LIMIT = 600.0
@@ -35,16 +35,17 @@ class LaneClosedError(Exception):
 class Lane:
     """Runs cases one at a time in a worker process of its own.
 
-    ``run`` is called by one thread; ``close`` may be called by any, and makes a running ``run`` raise ``LaneClosedError``.
+    ``run`` is called by one thread; ``close`` may be called by any, and a ``run`` under way then raises
+    ``LaneClosedError``.
     """
 
     def __init__(self, assignment: Assignment) -> None:
         self._assignment = assignment
         self._lock = threading.Lock()
         self._closed = False
+        self._busy = False
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
-        self._messages: IO[bytes] | None = None
 
     def run(self, case: Case) -> Outcome:
         """Run one case to its outcome.
@@ -56,12 +57,19 @@ class Lane:
             LaneClosedError: the lane was closed.
             OrchestratorError: no worker process can be prepared.
         """
-        for _ in range(ATTEMPTS):
-            connection = self._ready_connection()
-            outcome = self._exchange(connection, case)
-            if outcome is not None:
-                return outcome
-        return Outcome(case.index, Status.CRASH, "the worker process died")
+        with self._lock:
+            self._busy = True
+        try:
+            for _ in range(ATTEMPTS):
+                outcome = self._exchange(self._ready_connection(), case)
+                if outcome is not None:
+                    return outcome
+            return Outcome(case.index, Status.CRASH, "the worker process died")
+        finally:
+            with self._lock:
+                self._busy = False
+                if self._closed:
+                    self._end()
 
     def close(self) -> None:
         """Kill the process at once."""
@@ -69,6 +77,8 @@ class Lane:
             self._closed = True
             if self._process is not None:
                 self._process.kill()
+            if not self._busy:
+                self._end()
 
     def _exchange(self, connection: Connection, case: Case) -> Outcome | None:
         """Return the outcome, or ``None`` when the process died."""
@@ -88,49 +98,58 @@ class Lane:
         return answer.outcome
 
     def _ready_connection(self) -> Connection:
+        said = ""
         for _ in range(ATTEMPTS):
             if self._connection is not None:
                 return self._connection
-            self._start()
+            with tempfile.TemporaryFile() as messages:
+                self._connection = self._start(messages)
+                said = "" if self._connection else _last_line(messages)
         if self._connection is None:
-            raise SimulationError(f"a worker process died while it was prepared{self._last_message()}")
+            raise SimulationError(f"a worker process died while it was prepared{said}")
         return self._connection
 
-    def _start(self) -> None:
-        """Start a process and hand it its assignment; leaves no connection when the process died over it."""
+    def _start(self, messages: IO[bytes]) -> Connection | None:
+        """Start a process and hand it its assignment; return ``None`` when the process died over it."""
         ours, theirs = Pipe()
+        with theirs:
+            self._launch(theirs.fileno(), messages)
+        try:
+            ours.send(self._assignment)
+            answer = ours.recv() if ours.poll(PREPARATION_LIMIT) else SimulationError("preparing took too long")
+        except (EOFError, OSError):
+            answer = None
+        if answer == READY:
+            return ours
+        ours.close()
+        self._discard()
+        if answer is not None:
+            raise answer
+        return None
+
+    def _launch(self, descriptor: int, messages: IO[bytes]) -> None:
         environment = dict.fromkeys(_ONE_THREAD, "1") | dict(os.environ)
-        self._messages = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
-        command = [sys.executable, "-c", _BOOTSTRAP, str(theirs.fileno()), json.dumps(sys.path)]
+        command = [sys.executable, "-c", _BOOTSTRAP, str(descriptor), json.dumps(sys.path)]
         with self._lock:
             if self._closed:
                 raise LaneClosedError
             self._process = subprocess.Popen(
                 command,
-                pass_fds=[theirs.fileno()],
+                pass_fds=[descriptor],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                stderr=self._messages,
+                stderr=messages,
                 env=environment,
                 start_new_session=True,  # a terminal's Ctrl-C is for the process that owns the lane
             )
-        theirs.close()
-        try:
-            ours.send(self._assignment)
-            answer = ours.recv() if ours.poll(PREPARATION_LIMIT) else SimulationError("preparing took too long")
-        except (EOFError, OSError):
-            self._discard()
-            ours.close()
-            return
-        if isinstance(answer, OrchestratorError):
-            self._discard()
-            ours.close()
-            raise answer
-        assert answer == READY
-        self._connection = ours
 
     def _discard(self) -> None:
-        """End the process; raise ``LaneClosedError`` when that is what ended it."""
+        """End the process; raise ``LaneClosedError`` when closing the lane is what ended it."""
+        self._end()
+        if self._closed:
+            raise LaneClosedError
+
+    def _end(self) -> None:
         if self._connection is not None:
             self._connection.close()
             self._connection = None
@@ -138,12 +157,9 @@ class Lane:
             self._process.kill()
             self._process.wait()
             self._process = None
-        if self._closed:
-            raise LaneClosedError
 
-    def _last_message(self) -> str:
-        if self._messages is None:
-            return ""
-        self._messages.seek(0)
-        lines = self._messages.read().decode(errors="replace").strip().splitlines()
-        return f": {lines[-1][:300]}" if lines else ""
+
+def _last_line(messages: IO[bytes]) -> str:
+    messages.seek(0)
+    lines = messages.read().decode(errors="replace").strip().splitlines()
+    return f": {lines[-1][:300]}" if lines else ""

@@ -76,6 +76,23 @@ class LocalProcesses:
         return LocalPool(count, Assignment(pickled(work), paths, limits.time, limits.memory))
 
 
+def choose_pool(workers: int | None, scheduler: str | None) -> OpenPool:
+    """Return where to run: the Dask cluster at ``scheduler`` when given, else processes of this machine.
+
+    Raises:
+        ScenarioError: both are given, a bad number of workers, or the extra ``dask`` is not installed.
+    """
+    if scheduler is None:
+        return LocalProcesses(workers)
+    if workers is not None:
+        raise ScenarioError("`--workers` must not be given with `--scheduler`: the cluster has its own workers")
+    try:
+        from orchestrator.engine.cluster import DaskCluster
+    except ImportError:
+        raise ScenarioError("`--scheduler` needs the extra [dask]: pip install 'backlash-cosim[dask]'") from None
+    return DaskCluster(scheduler)
+
+
 class LocalPool:
     """Threads of this process, each with one worker process."""
 

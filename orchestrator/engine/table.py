@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.engine.cases import Column, Row, Value
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import OutputError, ScenarioError
 
 PARQUET_ROWS = 10_000
 
@@ -18,12 +18,19 @@ def header(names: Sequence[str], columns: Sequence[Column]) -> list[str]:
 
 
 def write_csv(path: Path, names: Sequence[str], columns: Sequence[Column], rows: Iterable[Row]) -> None:
-    """Write the table as CSV: floats with as many digits as they need to be read back exactly, missing ones empty."""
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(header(names, columns))
-        for row in rows:
-            writer.writerow(["" if value is None else value for value in _cells(row, names, columns)])
+    """Write the table as CSV: floats with as many digits as they need to be read back exactly, missing ones empty.
+
+    Raises:
+        OutputError: the file cannot be written, as when the disk is full.
+    """
+    try:
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow(header(names, columns))
+            for row in rows:
+                writer.writerow(["" if value is None else value for value in _cells(row, names, columns)])
+    except OSError as error:
+        raise OutputError(f"cannot write {path.name}: {error.strerror}; --resume writes it from what is kept") from None
 
 
 def write_parquet(path: Path, names: Sequence[str], columns: Sequence[Column], rows: Iterable[Row]) -> None:

@@ -90,3 +90,12 @@ def run_killed_once(prepared: dict[str, Any], case: Case) -> dict[str, Any]:
 def work(function: Any = run, **payload: Any) -> Work:
     """Return a ``Work`` around one of the functions above."""
     return Work(prepare, function, COLUMNS, payload, definition={"function": function.__name__})
+
+
+_hoard: list[bytearray] = []
+
+
+def run_hoarding(prepared: dict[str, Any], case: Case) -> dict[str, Any]:
+    """Leak 40 MB per case; ``count`` is the process id."""
+    _hoard.append(bytearray(40_000_000))
+    return run(prepared, case) | {"count": os.getpid()}
