@@ -18,8 +18,6 @@ from pyfmu_sources.equations import rates
 
 Array = NDArray[np.float64]
 STATES = 5
-TERMS = 12
-MAX_EVENTS = 20
 
 
 @dataclass(frozen=True)
@@ -110,11 +108,7 @@ def innovations(
         noise: measurement and process noise.
         keep: whether to return the states.
     """
-    phi = np.empty((3, STATES, STATES))
-    gain_u = np.empty((3, STATES))
-    gain_1 = np.empty((3, STATES))
-    for m in range(3):
-        _transition(model.matrices[m], model.inputs, model.constants[m], step, phi[m], gain_u[m], gain_1[m])
+    phi, gain_u, gain_1 = _discrete(model, step)
     intensity = (np.array(noise.torque) * model.mobility) ** 2
     variance = np.array(noise.measured[: y.shape[1]]) ** 2
     n = y.shape[0]
@@ -128,6 +122,27 @@ def innovations(
     return Innovations(errors, variances, states, contacts)
 
 
+def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:
+    """Return the states (n, 5) of the plant that is fed ``u`` (n,) from ``x0`` (5,), without any measurement."""
+    phi, gain_u, gain_1 = _discrete(model, step)
+    states = np.empty((u.size, STATES))
+    _simulate(
+        model.matrices, model.inputs, model.constants, model.normal, model.alpha, phi, gain_u, gain_1, step, u, x0,
+        states,
+    )  # fmt: skip
+    return states
+
+
+def _discrete(model: AffineModel, step: float) -> tuple[Array, Array, Array]:
+    """Return the transition matrices (3, 5, 5) and input gains (3, 5) of the three modes over a whole sample."""
+    phi = np.empty((3, STATES, STATES))
+    gain_u = np.empty((3, STATES))
+    gain_1 = np.empty((3, STATES))
+    for m in range(3):
+        _transition(model.matrices[m], model.inputs, model.constants[m], step, phi[m], gain_u[m], gain_1[m])
+    return phi, gain_u, gain_1
+
+
 @njit(cache=True, nogil=True)
 def _transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped-def]
     """Fill the exact transition over ``h`` of ``x' = a x + b_u u + b_1`` from its Taylor series."""
@@ -137,14 +152,9 @@ def _transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped
         gain_u[r] = 0.0
         gain_1[r] = 0.0
     power = np.eye(5)
+    # Terms of a Taylor series: a sample is short beside the plant's fastest rate.
     integral_u = b_u * h
     integral_1 = b_1 * h
-    fastest = 0.0
-    for r in range(5):
-        total = 0.0
-        for c in range(5):
-            total += abs(a[r, c])
-        fastest = max(fastest, total)
     for n in range(1, 200):
         power = power @ a * (h / n)
         gain_u += integral_u
@@ -194,15 +204,12 @@ def _root(v0, s0, v1, s1, h):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x, total):  # type: ignore[no-untyped-def]
-    """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``."""
+def _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x, total, end):  # type: ignore[no-untyped-def]
+    """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch."""
     d = normal[0] * x[0] + normal[2] * x[2]
     flank = 2
     if alpha > 0.0:
         flank = 2 if d > alpha else (0 if d < -alpha else 1)
-    end = np.empty(5)
-    speed0 = np.empty(5)
-    speed1 = np.empty(5)
     f = phi[flank]
     g_u = gain_u[flank]
     g_1 = gain_1[flank]
@@ -273,6 +280,8 @@ def _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x, tota
             total[:, :] = part @ total
         first = False
         after = (2 if side > 0.0 else 0) if flank == 1 else 1
+        speed0 = np.empty(5)
+        speed1 = np.empty(5)
         _drift(mats[flank], b_u, b_1[flank], y, u, speed0)
         _drift(mats[after], b_u, b_1[after], y, u, speed1)
         rate = normal[0] * y[1] + normal[2] * y[3]
@@ -291,6 +300,17 @@ def _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x, tota
         g_u = np.empty(5)
         g_1 = np.empty(5)
         _transition(mats[flank], b_u, b_1[flank], left, f, g_u, g_1)
+
+
+@njit(cache=True, nogil=True)
+def _simulate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x0, states):  # type: ignore[no-untyped-def]
+    x = x0.copy()
+    total = np.empty((5, 5))
+    end = np.empty(5)
+    for k in range(u.size):
+        for r in range(5):
+            states[k, r] = x[r]
+        _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u[k], x, total, end)
 
 
 @njit(cache=True, nogil=True)
@@ -326,7 +346,7 @@ def _filter(  # type: ignore[no-untyped-def]
             contacts[k] = 1 if d > alpha else (-1 if d < -alpha else 0)
             for r in range(5):
                 states[k, r] = x[r]
-        _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u[k], x, total)
+        _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u[k], x, total, gain)
         for r in range(5):
             for c in range(5):
                 acc = 0.0

@@ -19,6 +19,8 @@ from orchestrator.record import Record, quantisation_step
 from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
+OFFSET = "effects.sensor_offset.load.offset"
+OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
 TORQUE_NOISE = (1e-7, 30.0)  # range of the white torque noise [N.m.s^0.5]
 
@@ -84,6 +86,8 @@ def make_problem(record: Record, model: Model) -> Problem:
         unknowns.append(Unknown(parameter.name, parameter.value, sd, sd, lower, parameter.maximum))
     ratio = model.parameters["i"].value
     unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
+    if both:
+        unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
     unknowns += _initial_state(record, ratio)
     levels, noises = [], []
     for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
@@ -173,7 +177,9 @@ class Likelihood:
 
     def __init__(self, problem: Problem, threads: int = 1) -> None:
         self.problem = problem
-        self._places = [(n, NAMES.index(u.name)) for n, u in enumerate(problem.unknowns) if u.name in NAMES]
+        names = problem.names
+        self._offset = names.index(OFFSET) if OFFSET in names else None
+        self._places = [(n, NAMES.index(name)) for n, name in enumerate(names) if name in NAMES and name != OFFSET]
         self._state = [problem.index(name) for name in STATE_NAMES]
         self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
         self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
@@ -199,9 +205,12 @@ class Likelihood:
         """Return the innovations at ``theta``."""
         record = self.problem.record
         model = affine_model(self.parameters(theta))
-        return innovations(
-            model, record.u, self.problem.outputs, record.step, theta[self._state], self.noise(theta), keep
-        )
+        outputs, x0 = self.problem.outputs, theta[self._state]
+        if self._offset is not None:
+            shift = theta[self._offset]
+            outputs = outputs - np.array([0.0, shift])
+            x0 = x0 - np.array([0.0, 0.0, shift, 0.0, 0.0])
+        return innovations(model, record.u, outputs, record.step, x0, self.noise(theta), keep)
 
     def at(self, theta: Array) -> Point:
         """Return the likelihood at ``theta``; infinite where the filter diverges."""
@@ -235,7 +244,7 @@ class Likelihood:
         return gradient, information + np.diag(weight)
 
 
-def fit(
+def maximise(
     likelihood: Likelihood,
     start: Array,
     free: Sequence[int],
@@ -261,12 +270,12 @@ def fit(
         held = ((value <= lower) & (gradient > 0.0)) | ((value >= upper) & (gradient < 0.0))
         before = point.objective
         point, damping = _step(likelihood, point, places, gradient, information, held, (lower, upper), damping)
-        variance = np.diag(_inverse(information))
+        variance = np.diag(inverse(information))
         steps = np.clip(1e-3 * np.sqrt(np.maximum(variance, 0.0)), 1e-7 * scale, 1e-1 * scale)
         if before - point.objective < tolerance:
             converged = True
             break
-    return Fit(point, places, information, _inverse(information), done, converged)
+    return Fit(point, places, information, inverse(information), done, converged)
 
 
 def _step(
@@ -297,7 +306,7 @@ def _step(
     return point, damping
 
 
-def _inverse(information: Array) -> Array:
+def inverse(information: Array) -> Array:
     """Return the inverse of an information matrix, scaled first because units differ by many powers of ten."""
     diagonal = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / np.outer(diagonal, diagonal)

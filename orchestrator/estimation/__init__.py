@@ -1,0 +1,1 @@
+"""Estimators of the half-gap from a measured record, one file per method."""

@@ -1,0 +1,67 @@
+"""The Cramer-Rao bound of a record: how well any unbiased estimator could measure the gap from it."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.likelihood import ALPHA, STATE_NAMES, Fit, Likelihood, Problem, inverse
+
+NOISE_PREFIXES = ("log_noise_", "log_torque_")
+
+
+def bound_of_fit(likelihood: Likelihood, fit: Fit) -> float:
+    """Return the bound [rad] on alpha at a fit, noise levels and process noise as fitted.
+
+    The Fisher information of the innovations form: for Gaussian one-step errors e with variance s,
+    ``sum(e' e'^T / s) + sum(s' s'^T / s^2) / 2``, plus that of the priors. Where the fit found no process noise this
+    is the information of the deterministic plant.
+    """
+    column = list(fit.free).index(likelihood.problem.index(ALPHA))
+    return math.sqrt(fit.covariance[column, column])
+
+
+def bound(
+    problem: Problem, values: Mapping[str, float], noise: tuple[float, float], torque: float = 1e-8, threads: int = 1
+) -> float:
+    """Return the bound [rad] on alpha at known true ``values`` of the unknowns, for a deterministic plant.
+
+    Args:
+        problem: record and unknowns; its measured angles play no part beyond the linearisation.
+        values: true value of each parameter, ``alpha`` and initial state by name; others stay at their prior means.
+        noise: true standard deviation [rad] of each encoder, rounding included.
+        torque: process noise, next to none.
+        threads: that share the work.
+    """
+    likelihood = Likelihood(problem, threads)
+    theta = problem.start
+    for name, value in values.items():
+        if name in problem.names:
+            theta[problem.index(name)] = value
+    for n, name in enumerate(problem.names):
+        if name.startswith("log_torque_"):
+            theta[n] = math.log(torque)
+        elif name.startswith("log_noise_"):
+            theta[n] = math.log(noise[0] if name.endswith("theta_m") else noise[1])
+    free = np.array([n for n, name in enumerate(problem.names) if not name.startswith(NOISE_PREFIXES)])
+    information = refined_information(likelihood, theta, free)
+    column = list(free).index(problem.index(ALPHA))
+    return math.sqrt(inverse(information)[column, column])
+
+
+def refined_information(likelihood: Likelihood, theta: Array, free: Array) -> Array:
+    """Return the Fisher information with difference steps matched to the standard errors that it implies."""
+    point = likelihood.at(theta)
+    scale = np.array([likelihood.problem.unknowns[n].scale for n in free])
+    steps = 1e-4 * scale
+    information = np.eye(free.size)
+    for _ in range(3):
+        _, information = likelihood.derivatives(point, free, steps)
+        steps = np.clip(1e-2 * np.sqrt(np.diag(inverse(information))), 1e-8 * scale, 1e-1 * scale)
+    return information
+
+
+def truth_values(linear: Mapping[str, float], alpha: float, state: Array) -> dict[str, float]:
+    """Return true values by the names of the unknowns: linear parameters, alpha and initial state (5,)."""
+    return {**linear, ALPHA: alpha, **dict(zip(STATE_NAMES, map(float, state), strict=True))}

@@ -1,0 +1,71 @@
+"""What every estimator takes and gives.
+
+Call order: :func:`orchestrator.record.read_record`, :func:`orchestrator.model_file.read_model`, then any estimator of
+:data:`METHODS` by :func:`estimator`.
+"""
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from orchestrator.errors import OrchestratorError
+from orchestrator.model_file import Model
+from orchestrator.record import Record
+
+METHODS = {
+    "maximum_likelihood": "joint fit of gap, parameters, initial state and noise; profile-likelihood interval",
+    "ekf": "online estimator (Gaussian sum of extended Kalman filters), as in the FMU BacklashEstimator",
+    "paired_sum": "the thesis's sum of differences to a twin without backlash",
+    "speed_difference": "integral of the speed difference over a traversal of the gap",
+    "torque_pulse": "torque pulses, or the quasi-stationary twist against torque",
+    "operating_data": "width of the twist's hysteresis in normal closed-loop data",
+}
+LEVEL = 0.95
+
+
+class NotApplicableError(OrchestratorError):
+    """The record lacks what a method needs; the text says what. Not the user's mistake."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A half-gap with everything that is said about it.
+
+    Attributes:
+        method: key of ``METHODS``.
+        alpha: half gap, load side [rad].
+        standard_error: [rad]; infinite when the record says nothing about the gap.
+        interval: 95 % interval [rad]; its lower end is 0.0 when no gap is compatible with the record.
+        visible: whether the record shows a gap at all.
+        message: one sentence for the user; empty when there is nothing to add.
+        diagnostics: numbers and short texts for ``estimate.json``.
+        curves: arrays for the plots, by name.
+    """
+
+    method: str
+    alpha: float
+    standard_error: float
+    interval: tuple[float, float]
+    visible: bool = True
+    message: str = ""
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+    curves: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+
+class Estimator(Protocol):
+    """An estimator: a function of a record and a model.
+
+    Raises:
+        NotApplicableError: the record lacks what the method needs.
+    """
+
+    def __call__(self, record: Record, model: Model) -> Estimate:
+        """Return the estimate."""
+
+
+def estimator(name: str) -> Estimator:
+    """Return the estimator called ``name``, a key of ``METHODS``; only its module is imported."""
+    module = importlib.import_module(f"orchestrator.estimation.{name}")
+    function: Estimator = module.estimate
+    return function
