@@ -1,0 +1,90 @@
+"""The engine on a Dask cluster over TCP: the same bytes, whoever dies."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from orchestrator.engine import DesignCases, Limits, LocalProcesses, choose_pool, run_cases, write_csv
+from orchestrator.engine.grid import Listed, Product, Ranged
+from orchestrator.errors import ScenarioError, SimulationError
+from tests.support import engine_work
+from tests.support.dask_cluster import DaskProcesses
+
+pytest.importorskip("distributed", reason="the extra [dask] is not installed")
+
+CASES = DesignCases(Ranged("size", 0.0, 2.0, 150), seed=3)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    with DaskProcesses(tmp_path_factory.mktemp("dask"), workers=2) as processes:
+        yield processes
+
+
+def work_with_file():
+    return replace(engine_work.work(wait=0.01), files={"blob": Path(__file__)})
+
+
+def table(directory, open_pool, cases=CASES, work=None, **options):
+    with run_cases(cases, work or work_with_file(), directory / "j", open_pool=open_pool, **options) as sweep:
+        write_csv(directory / "t.csv", cases.names, sweep.columns, sweep.rows())
+        sweep.discard_journal()
+    return (directory / "t.csv").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def local_bytes(tmp_path_factory):
+    return table(tmp_path_factory.mktemp("local"), LocalProcesses(2))
+
+
+def test_a_cluster_returns_the_same_bytes_as_this_machine(tmp_path, cluster, local_bytes):
+    assert table(tmp_path, choose_pool(None, cluster.address)) == local_bytes
+
+
+def test_a_dask_worker_that_is_killed_in_the_middle_changes_nothing(tmp_path, cluster, local_bytes):
+    killed = []
+
+    def kill(progress):
+        if progress.done > 30 and not killed:
+            killed.append(progress.done)
+            cluster.kill_worker(0)
+
+    assert table(tmp_path, choose_pool(None, cluster.address), on_progress=kill) == local_bytes
+    assert killed
+    assert killed[0] < len(CASES)
+
+
+def test_faults_become_rows_on_a_cluster_too(tmp_path, cluster):
+    cases = DesignCases(Product((Listed("fault", ("hangs", "crashes", "nan", "none")), Listed("size", (1.0,)))), seed=1)
+    work = engine_work.work(engine_work.run_faulty)
+    text = table(tmp_path, choose_pool(None, cluster.address), cases, work, limits=Limits(time=1.0)).decode()
+    assert [line.split(",")[3] for line in text.splitlines()[1:]] == ["time_limit", "crash", "non_finite", "done"]
+
+
+def test_a_dead_scheduler_keeps_what_is_done(tmp_path, local_bytes):
+    with DaskProcesses(tmp_path, workers=1) as cluster:
+
+        def kill(progress):
+            if progress.done > 30:
+                cluster.kill_scheduler()
+
+        with pytest.raises(SimulationError, match=r"of 150 cases are kept: go on with --resume"):
+            table(tmp_path, choose_pool(None, cluster.address), on_progress=kill)
+    resumed = []
+    assert table(tmp_path, LocalProcesses(2), resume=True, on_progress=resumed.append) == local_bytes
+    assert resumed[0].resumed > 30
+
+
+def test_a_scheduler_that_is_not_there_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("orchestrator.engine.cluster.CONNECT_LIMIT", 1.0)
+    with pytest.raises(ScenarioError, match=r"`--scheduler` must be a Dask scheduler, but tcp://127\.0\.0\.1:9 is not"):
+        table(tmp_path, choose_pool(None, "tcp://127.0.0.1:9"))
+    with pytest.raises(ScenarioError, match="but nonsense is not"):
+        table(tmp_path, choose_pool(None, "nonsense"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_workers_and_scheduler_exclude_each_other():
+    with pytest.raises(ScenarioError, match="must not be given with"):
+        choose_pool(2, "tcp://127.0.0.1:9")
