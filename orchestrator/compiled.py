@@ -3,16 +3,15 @@
 The functions of ``pyfmu_sources`` are plain Python on floats and tuples. Here each is compiled in a private copy of
 its module, whose names lead to the compiled functions, so that the FMU and the orchestrator share one source.
 
-The copies lie in the user's cache directory, in a folder named by a hash of all the sources: numba keeps its machine
+The copies lie in the user's cache directory, each in a folder named by a hash of what it needs: numba keeps its machine
 code beside them, and a changed source can never meet machine code made from an older one.
 """
 
 import hashlib
 import importlib.util
 import inspect
-import os
+import re
 import sys
-import tempfile
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -20,6 +19,8 @@ from types import ModuleType
 import numba
 
 import pyfmu_sources
+from orchestrator.cache import cache_directory
+from orchestrator.output import write_text
 
 _PACKAGE = pyfmu_sources.__name__
 _SOURCES = Path(pyfmu_sources.__file__).parent
@@ -34,9 +35,9 @@ def compiled(name: str) -> ModuleType:
     """
     full_name = f"_compiled_{name}"
     original = f"{_PACKAGE}.{name}"
-    path = _copied_sources() / f"{name}.py"
-    if not path.exists():
+    if not (_SOURCES / f"{name}.py").exists():
         raise ModuleNotFoundError(original)
+    path = _copied_source(name)
     spec = importlib.util.spec_from_file_location(original, path)
     assert spec is not None
     assert spec.loader is not None
@@ -57,27 +58,25 @@ def compiled(name: str) -> ModuleType:
 
 
 @cache
-def _copied_sources() -> Path:
-    sources = sorted(_SOURCES.glob("*.py"))
+def _copied_source(name: str) -> Path:
+    """Return the copy of a source in a folder named by a hash of it and of all that it imports."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sources:
-        digest.update(source.name.encode() + source.read_bytes())
-    folder = _cache_root() / digest.hexdigest()[:20]
+    for module in sorted(_closure(name)):
+        digest.update((_SOURCES / f"{module}.py").read_bytes())
+    folder = cache_directory("numba") / digest.hexdigest()[:20]
     folder.mkdir(exist_ok=True)
-    for source in sources:
-        target = folder / source.name
-        if not target.exists():
-            with tempfile.NamedTemporaryFile(dir=folder, delete=False) as part:
-                part.write(source.read_bytes())
-            os.replace(part.name, target)
-    return folder
+    target = folder / f"{name}.py"
+    if not target.exists():
+        write_text(target, (_SOURCES / f"{name}.py").read_text(encoding="utf-8"))
+    return target
 
 
-def _cache_root() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    root = Path(base) / "backlash-cosim" / "numba"
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return Path(tempfile.mkdtemp(prefix="backlash-cosim-"))
-    return root
+def _closure(name: str) -> set[str]:
+    found: set[str] = set()
+    waiting = {name}
+    while waiting:
+        module = waiting.pop()
+        found.add(module)
+        text = (_SOURCES / f"{module}.py").read_text(encoding="utf-8")
+        waiting |= set(re.findall(r"^from \.(\w+) import", text, re.MULTILINE)) - found
+    return found

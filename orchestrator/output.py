@@ -45,6 +45,13 @@ def staged(directory: Path) -> Iterator[Path]:
         _remove_empty(made)
 
 
+def write_text(path: Path, text: str) -> None:
+    """Write ``text`` to ``path`` so that no reader ever sees a part of it."""
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as part:
+        part.write(text)
+    os.replace(part.name, path)
+
+
 def _publish(staging: Path, directory: Path) -> None:
     for source in sorted(staging.rglob("*")):
         target = directory / source.relative_to(staging)

@@ -1,0 +1,95 @@
+"""One closed loop in machine code: the same plant, filter and control law as in the FMUs, in the same order.
+
+Calibration needs thousands of runs. A test holds this loop to the co-simulated one.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.compiled import compiled
+from orchestrator.paired.experiment import Experiment
+from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters
+
+Array = NDArray[np.float64]
+COLUMNS = ("theta_m", "theta_l", "theta_l_hat", "u", "contact", "T_m", "T_l_hat")
+
+
+@dataclass(frozen=True)
+class CompiledLoop:
+    """The parts of a run that do not depend on size or seed."""
+
+    experiment: Experiment
+    reference: Array
+    reference_speed: Array
+    gains: tuple[float, ...]
+    estimator: tuple[Any, ...]
+
+    def run(self, alpha: float, errors: tuple[Array, Array]) -> Array:
+        """Return the signals ``COLUMNS``, shape (steps + 1, 7), of a loop whose half-gap is ``alpha`` [rad].
+
+        Args:
+            alpha: half-gap [rad].
+            errors: errors [rad] of both encoders, each of shape (steps + 1,).
+        """
+        e = self.experiment
+        p = plant_parameters(e, alpha)
+        drivetrain = compiled("drivetrain")
+        x = drivetrain.consistent_start((0.0,) * 8, p)
+        table = drivetrain.prepare(p, e.sample_time)
+        mode = drivetrain.initial_mode(x, p)
+        limits = (e.values.i, 1.0 / e.values.k, e.torque_limit)
+        out = np.empty((len(self.reference), len(COLUMNS)))
+        compiled("closed_loop").run_loop(
+            (x, mode, p, table, e.sample_time),
+            self.reference,
+            self.reference_speed,
+            *errors,
+            self.gains,
+            self.estimator,
+            limits,
+            out,
+        )
+        return out
+
+
+def plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]:
+    """Return the plant's flat parameter tuple for a half-gap ``alpha`` [rad]."""
+    v = experiment.values
+    return parameters(
+        J_m=v.J_m,
+        J_l=v.J_l,
+        k=v.k,
+        c=v.c,
+        b_m=v.b_m,
+        b_l=v.b_l,
+        i=v.i,
+        tau=v.tau,
+        alpha=alpha,
+        backlash_model=float(BACKLASH_MODELS.index(experiment.backlash_model)) if alpha else 0.0,
+    )
+
+
+def compiled_loop(experiment: Experiment) -> CompiledLoop:
+    """Return the loop of ``experiment``, designed and ready to run."""
+    estimator = experiment.estimator()
+    S = estimator.S_inverse
+    reference, speed = experiment.reference()
+    return CompiledLoop(
+        experiment,
+        reference,
+        speed,
+        experiment.regulator().gains,
+        (
+            _nested(estimator.A),
+            tuple(float(b) for b in estimator.B),
+            _nested(estimator.L),
+            (float(S[0, 0]), float(S[0, 1]), float(S[1, 1])),
+        ),
+    )
+
+
+def _nested(matrix: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(v) for v in row) for row in matrix)
