@@ -129,7 +129,8 @@ def _gear_ratio() -> Erratum:
         "twist theta_m - theta_l; third branch with theta_m' + theta_l'",
         "twist theta_m/i - theta_l and its derivative in every branch",
         f"with the gear turned as one piece by 1 rad the spring as printed pulls with {printed:.0f} N.m, mended with "
-        f"{mended:.0f}; at 1 rad/s the damper as printed with {damper_printed:.3f} N.m, mended {damper_mended:.0f}",
+        f"{mended:.0f}; at 1 rad/s the damper as printed with {damper_printed:.3f} N.m, mended "
+        f"with {damper_mended:.0f}",
     )
 
 
