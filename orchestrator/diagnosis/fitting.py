@@ -102,9 +102,13 @@ def fit(
     for _ in range(iterations):
         root = _whitening(z[part])
         residual = (z[part] @ root.T).ravel()
+        if not np.all(np.isfinite(root)):
+            break
         J = (root @ jacobian(likelihood, p, q, free, z, part)).reshape(residual.size, len(free))
         pull = np.array([(p[f.place] - f.prior[0]) / f.prior[1] if f.prior else 0.0 for f in free])
         weight = np.array([f.scale / f.prior[1] if f.prior else 0.0 for f in free])
+        if not np.all(np.isfinite(J)):
+            break
         hessian = J.T @ J + np.diag(weight**2)
         gradient = J.T @ residual + weight * pull
         cost = 0.5 * residual @ residual - log_prior(p, free)
@@ -122,6 +126,8 @@ def fit(
             damping = max(damping * 10.0, 1e-4)
         if gain < enough:
             break
+    if not np.all(np.isfinite(z)):
+        return Fit(p, q, z, tuple(free), np.zeros((len(free), len(free))), -np.inf, -np.inf)
     covariance = np.linalg.pinv(hessian) * np.outer(scales, scales)
     fitted = likelihood.log_likelihood(z, q, part) + log_prior(p, free)
     return Fit(p, q, z, tuple(free), covariance, fitted, likelihood.log_likelihood(z, q, parts.validated))
@@ -154,6 +160,8 @@ def anneal(
 
 def _whitening(e: Array) -> Array:
     covariance = e.T @ e / len(e)
+    if not np.all(np.isfinite(covariance)):
+        return np.full_like(covariance, np.nan)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 

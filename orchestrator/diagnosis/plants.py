@@ -1,19 +1,22 @@
 """What diagnosis must know of a plant beside its equations: which parameters are linear, which states are measured."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.predictor import stage_of
+from orchestrator.diagnosis.predictor import NUISANCES, stage_of
 from orchestrator.errors import ScenarioError
 from orchestrator.model_file import Model
 from pyfmu_sources import drivetrain_parameters as dt
 from pyfmu_sources import servo_axis as sa
 
 Array = NDArray[np.float64]
+
+PRESLIDING = dt.Parameter("presliding", "1", math.log(1e-5), math.log(1e-9), 0.0, "Logarithm of friction's build-up distance")
 
 
 @dataclass(frozen=True)
@@ -44,12 +47,20 @@ class Plant:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the parameters' names in table order."""
-        return tuple(entry.name for entry in self.table)
+        """Return the parameters' names in table order, then the predictor's nuisance parameters."""
+        return (*(entry.name for entry in self.table), *NUISANCES)
+
+    def entry(self, place: int) -> dt.Parameter:
+        """Return the table row of a parameter."""
+        return self.table[place] if place < len(self.table) else PRESLIDING
 
     def index(self, name: str) -> int:
         """Return the place of a parameter in the flat tuple."""
         return self.names.index(name)
+
+    def extended(self, values: Sequence[float]) -> Array:
+        """Return the plant's values followed by the nuisance parameters at their defaults."""
+        return np.array([*values, *[PRESLIDING.default] * len(NUISANCES)])
 
     def transition(self, p: Array, h: float) -> Array:
         """Return the discrete transition matrix of the linear plant (every effect off) for a step ``h`` [s]."""
@@ -57,8 +68,8 @@ class Plant:
 
     def jacobian(self, p: Array) -> Array:
         """Return the matrix of the linear plant, by differences of its own (linear) rates."""
-        _, stage = stage_of(self.name)
-        plain = np.array([entry.default for entry in self.table])
+        _, stage, _ = stage_of(self.name)
+        plain = self.extended([entry.default for entry in self.table])
         for name in self.linear:
             plain[self.index(name)] = p[self.index(name)]
         flat = tuple(plain.tolist())

@@ -1,8 +1,10 @@
 """The one-step predictor: the plant's own equations, corrected by fixed gains at every sample.
 
 The predictor is in innovation form: ``e = y - C x``, ``x+ = f(x + K e)``. It is compiled once per plant from the
-same source that runs inside the FMU (:mod:`orchestrator.compiled`), with friction's direction smoothed by ``tanh``
-so that the innovations are differentiable in the parameters, and integrated by classical Runge-Kutta steps.
+same source that runs inside the FMU (:mod:`orchestrator.compiled`) and integrated by classical Runge-Kutta steps.
+The direction of dry friction, which that source takes as an argument, builds up over a short distance here (Dahl's
+bristle, Canudas de Wit et al., IEEE Trans. Automatic Control 40(3), 1995): real friction does, innovations become
+differentiable in the parameters, and as the distance goes to zero it is the signum that the FMU uses.
 """
 
 import math
@@ -20,65 +22,61 @@ from pyfmu_sources import servo_axis as sa
 
 Array = NDArray[np.float64]
 
-# Width of the smoothed friction as a share of the speed that friction removes within one step: small enough to be
-# sharp, large enough for the Runge-Kutta step to be stable.
-SMOOTHING = 0.6
-LEAST_WIDTH_M, LEAST_WIDTH_L = 1e-3, 3e-4
+FINER = 8  # times more Runge-Kutta steps in a sample in which dry friction may turn round
+NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
+
+# Nuisance parameters, appended to the plant's own: logarithm of the distance over which dry friction builds up.
+NUISANCES = ("presliding.motor", "presliding.load")
 
 
-def _drivetrain_stage() -> tuple[Any, Any]:
+def _drivetrain_stage() -> tuple[Any, Any, Any]:
     source = compiled("equations")
-    rates, twist, contact_of = source.rates, source.twist, source.contact_of
-    alpha_at, j_m, j_l = dt.P_ALPHA, dt.P_J_M, dt.P_J_L
-    c_m, c_l = dt.P_COULOMB_M, dt.P_COULOMB_L
-    s_m, s_l, b_m, b_l = dt.P_STRIBECK_M, dt.P_STRIBECK_L, dt.P_BREAKAWAY_M, dt.P_BREAKAWAY_L
+    rates, twist, contact_of, level = source.rates, source.twist, source.contact_of, source.sliding_friction
+    alpha_at, end = dt.P_ALPHA, dt.COUNT
+    m = (dt.P_COULOMB_M, dt.P_STRIBECK_M, dt.P_BREAKAWAY_M, dt.P_STRIBECK_SPEED_M)
+    n = (dt.P_COULOMB_L, dt.P_STRIBECK_L, dt.P_BREAKAWAY_L, dt.P_STRIBECK_SPEED_L)
 
     @njit(error_model="numpy")
-    def widths(p: Any, h: float) -> Any:
-        friction_m = abs(p[c_m]) + max(abs(p[s_m]), abs(p[b_m]))
-        friction_l = abs(p[c_l]) + max(abs(p[s_l]), abs(p[b_l]))
-        width_m = max(LEAST_WIDTH_M, SMOOTHING * friction_m * h / p[j_m]) if friction_m > 0.0 else 0.0
-        width_l = max(LEAST_WIDTH_L, SMOOTHING * friction_l * h / p[j_l]) if friction_l > 0.0 else 0.0
-        return width_m, width_l
+    def friction(x: Any, p: Any) -> Any:
+        return level(x[1], p[m[0]], p[m[1]], p[m[2]], p[m[3]]), level(x[3], p[n[0]], p[n[1]], p[n[2]], p[n[3]])
 
     @njit(error_model="numpy")
-    def stage(x: Any, width: Any, p: Any, u: float) -> Any:
-        sign_m = math.tanh(x[1] / width[0]) if width[0] > 0.0 else 0.0
-        sign_l = math.tanh(x[3] / width[1]) if width[1] > 0.0 else 0.0
+    def stage(x: Any, signs: Any, p: Any, u: float) -> Any:
         contact = contact_of(twist(x, p), p[alpha_at]) if p[alpha_at] > 0.0 else 1
-        return rates(x, contact, sign_m, sign_l, p, u, 0.0)
+        return rates(x, contact, signs[0], signs[1], p, u, 0.0)
 
-    return widths, stage
+    return friction, stage, (end, end + 1)
 
 
-def _servo_axis_stage() -> tuple[Any, Any]:
-    rates = compiled("servo_axis").rates
-    inertia, coulomb, sliding, breakaway = sa.P_J, sa.P_COULOMB, sa.P_STRIBECK, sa.P_BREAKAWAY
-
-    @njit(error_model="numpy")
-    def widths(p: Any, h: float) -> Any:
-        friction = abs(p[coulomb]) + max(abs(p[sliding]), abs(p[breakaway]))
-        width = max(1e-9, SMOOTHING * friction * h / p[inertia]) if friction > 0.0 else 0.0
-        return width, 0.0
+def _servo_axis_stage() -> tuple[Any, Any, Any]:
+    source = compiled("servo_axis")
+    rates, level = source.rates, source.friction
+    end = sa.COUNT
 
     @njit(error_model="numpy")
-    def stage(x: Any, width: Any, p: Any, u: float) -> Any:
-        sign = math.tanh(x[1] / width[0]) if width[0] > 0.0 else 0.0
-        speed, acceleration, lag = rates((x[0], x[1], x[4]), sign, p, u, 0.0)
+    def friction(x: Any, p: Any) -> Any:
+        return level((x[0], x[1], x[4]), p), 0.0
+
+    @njit(error_model="numpy")
+    def stage(x: Any, signs: Any, p: Any, u: float) -> Any:
+        speed, acceleration, lag = rates((x[0], x[1], x[4]), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
 
-    return widths, stage
+    return friction, stage, (end, end)
 
 
-_STAGES: dict[str, Callable[[], tuple[Any, Any]]] = {
+_STAGES: dict[str, Callable[[], tuple[Any, Any, Any]]] = {
     "Drivetrain": _drivetrain_stage,
     "ServoAxis": _servo_axis_stage,
 }
 
 
 @cache
-def stage_of(plant: str) -> tuple[Any, Any]:
-    """Return the compiled ``widths(p, h)`` and ``stage(x, width, p, u) -> rates`` of a plant."""
+def stage_of(plant: str) -> tuple[Any, Any, Any]:
+    """Return the compiled ``friction(x, p)`` (motor, load) and ``stage(x, signs, p, u) -> rates`` of a plant.
+
+    The third item holds the places of the two nuisance parameters in the extended parameter tuple.
+    """
     return _STAGES[plant]()
 
 
@@ -87,9 +85,24 @@ def predictor_of(plant: str) -> Any:
     """Return ``predict(y, u, p, h, substeps, gains, offsets, start, innovations, states)`` of a plant, compiled.
 
     Shapes: y (n, 2), u (n,), gains (n, 8, 2), offsets (2,), start (8,), innovations (n, 2) out, states (n, 8) out:
-    the corrected states.
+    the corrected states. ``p`` is the plant's tuple followed by ``NUISANCES``.
     """
-    widths, stage = stage_of(plant)
+    friction, stage, nuisance = stage_of(plant)
+    at_m, at_l = nuisance
+
+    @njit(error_model="numpy")
+    def turned(bristle: float, speed: float, level: float, rest: float, distance: float, h: float) -> Any:
+        """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre)."""
+        if level <= 1e-9 * rest or rest == 0.0:
+            return 0.0, 0.0
+        reach = distance * level / rest
+        settled = reach if speed > 0.0 else -reach
+        new = settled + (bristle - settled) * math.exp(-abs(speed) * h / reach)
+        return new, 0.5 * (bristle + new) / reach
+
+    @njit(error_model="numpy")
+    def near_rest(speed: float, acceleration: float, distance: float, h: float) -> Any:
+        return abs(speed) * h < 1.5 * h * h * abs(acceleration) + NEAR * distance
 
     @njit(error_model="numpy")
     def along(x: Any, rate: Any, h: float) -> Any:
@@ -109,9 +122,13 @@ def predictor_of(plant: str) -> Any:
         y: Array, u: Array, p: Any, h: float, substeps: int, gains: Array, offsets: Any, start: Any,
         innovations: Array, states: Array,
     ) -> None:  # fmt: skip
-        step = h / substeps
-        width = widths(p, step)
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
+        at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
+        sliding = friction((0.0, 1e6, 0.0, 1e6, 0.0, 0.0, 0.0, 0.0), p)
+        rest = (max(at_rest[0], sliding[0]), max(at_rest[1], sliding[1]))
+        reach_m, reach_l = math.exp(p[at_m]), math.exp(p[at_l])
+        bristle_m, bristle_l = 0.0, 0.0
+        signs = (0.0, 0.0)
         for n in range(u.size):
             a = y[n, 0] - x[0] - offsets[0]
             b = y[n, 1] - x[2] - offsets[1]
@@ -130,11 +147,24 @@ def predictor_of(plant: str) -> Any:
             )
             for j in range(8):
                 states[n, j] = x[j]
-            for _ in range(substeps):
-                k1 = stage(x, width, p, u[n])
-                k2 = stage(along(x, k1, 0.5 * step), width, p, u[n])
-                k3 = stage(along(x, k2, 0.5 * step), width, p, u[n])
-                k4 = stage(along(x, k3, step), width, p, u[n])
+            steps = substeps
+            if rest[0] > 0.0 or rest[1] > 0.0:
+                rate = stage(x, signs, p, u[n])
+                turning_m = rest[0] > 0.0 and near_rest(x[1], rate[1], reach_m, h)
+                turning_l = rest[1] > 0.0 and near_rest(x[3], rate[3], reach_l, h)
+                if turning_m or turning_l:
+                    steps = substeps * FINER
+            step = h / steps
+            for _ in range(steps):
+                if rest[0] > 0.0 or rest[1] > 0.0:
+                    level = friction(x, p)
+                    bristle_m, sign_m = turned(bristle_m, x[1], level[0], rest[0], reach_m, step)
+                    bristle_l, sign_l = turned(bristle_l, x[3], level[1], rest[1], reach_l, step)
+                    signs = (sign_m, sign_l)
+                k1 = stage(x, signs, p, u[n])
+                k2 = stage(along(x, k1, 0.5 * step), signs, p, u[n])
+                k3 = stage(along(x, k2, 0.5 * step), signs, p, u[n])
+                k4 = stage(along(x, k3, step), signs, p, u[n])
                 x = along(along(along(along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
 
     return predict
