@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, Interface
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.rules_model import C_NAME
 from orchestrator.checking.xml_reading import xpath
 
 MAXIMUM_BYTES = 512 << 20
@@ -101,7 +102,7 @@ def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
 def _check_library(
     d: Description, interface: Interface, folder: str, files: FmuFiles, names: set[str]
 ) -> Iterator[Finding]:
-    if interface.identifier is None:
+    if interface.identifier is None or not C_NAME.fullmatch(interface.identifier):
         return
     path = library_name(interface.identifier, folder)
     if path not in names:

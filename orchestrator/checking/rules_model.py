@@ -12,7 +12,7 @@ from orchestrator.checking.units import dimension_of
 from orchestrator.checking.xml_reading import xpath
 
 _DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])T([01]\d|2[0-3]):[0-5]\d:([0-5]\d|60)Z")
-_C_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+C_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _C_KEYWORD = re.compile(
     r"auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|long"
     r"|register|restrict|return|short|signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile|while"
@@ -40,7 +40,7 @@ def _head(d: Description) -> Iterator[Finding]:
     yield from _unique(root.findall("VendorAnnotations/Tool"), "model.vendor-annotation", "vendor annotation")
     for interface in d.interfaces:
         name = interface.identifier
-        if name is not None and (not _C_NAME.fullmatch(name) or _C_KEYWORD.fullmatch(name)):
+        if name is not None and (not C_NAME.fullmatch(name) or _C_KEYWORD.fullmatch(name)):
             message = f"modelIdentifier must be a C identifier, but is {name!r}"
             yield Finding("model.identifier", xpath(interface.element, "modelIdentifier"), message)
         if interface.flag("canSerializeFMUstate") and not interface.flag("canGetAndSetFMUstate"):
@@ -215,8 +215,10 @@ def _dependencies(d: Description, u: Unknown, initial: bool) -> Iterator[Finding
         if known is None:
             message = f"a dependency must be an index from 1 to {len(d.variables)}, but is {index}"
             yield Finding("structure.dependencies", xpath(u.element, "dependencies"), message)
-        elif initial and known.causality not in ("input", "independent") and known.initial != "exact":
-            message = f"a dependency must be an input or have initial exact, but `{known.name}` is neither"
+        elif initial and known.causality in ("output", "local", "calculatedParameter") and known.initial != "exact":
+            message = (
+                f"a dependency must be an input, a parameter or have initial exact, but `{known.name}` is none of these"
+            )
             yield Finding("structure.dependencies", xpath(u.element, "dependencies"), message)
     listed = u.dependencies or ()
     if any(a >= b for a, b in pairwise(listed)):

@@ -91,6 +91,8 @@ def _start(v: Variable) -> Iterator[Finding]:
 def _bounds(v: Variable) -> Iterator[Finding]:
     low, high, start = v.number("min"), v.number("max"), v.number("start")
     if low is not None and high is not None and low > high:
+        if not {"min", "max"} & set(v.own):
+            return  # the declared type is at fault
         message = f"min of `{v.name}` must be at most max, but {low:g} > {high:g}"
         yield Finding("variable.bounds", v.path("min"), message)
     elif start is not None and not (_or(low, -math.inf) <= start <= _or(high, math.inf)):
@@ -178,17 +180,19 @@ def _alias_group(base: str, reference: int, group: list[Variable]) -> Iterator[F
     if len(settable) > 1:
         message = f"at most one of {what} must be settable, but {len(settable)} are"
         yield Finding("variable.alias-settable", settable[1].path("valueReference"), message)
-    elif settable and any(v.causality == "independent" for v in group):
+        return  # most likely they are not meant to be aliases
+    if settable and any(v.causality == "independent" for v in group):
         message = f"{what} must not be settable, because one is the independent variable"
         yield Finding("variable.alias-settable", settable[0].path("valueReference"), message)
     varying = [v for v in group if v.variability != "constant"]
     constant = [v for v in group if v.variability == "constant"]
+    started = [v for v in varying if v.start is not None]
     if varying and constant:
         message = f"all or none of {what} must be constant"
         yield Finding("variable.alias-constant", constant[0].path("variability"), message)
-    elif len(settable) <= 1 and len([v for v in varying if v.start is not None]) > 1:
+    elif len(started) > 1:
         message = f"at most one of {what} must have a start value"
-        yield Finding("variable.alias-start", varying[1].path("start"), message)
+        yield Finding("variable.alias-start", started[1].path("start"), message)
     elif len({v.start for v in constant}) > 1:
         message = f"{what} are constant and must have the same start value"
         yield Finding("variable.alias-start", constant[1].path("start"), message)

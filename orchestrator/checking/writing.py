@@ -37,7 +37,7 @@ def as_results(reports: Sequence[Report]) -> dict[str, Any]:
 
 
 def as_junit(reports: Sequence[Report]) -> str:
-    """JUnit XML: one suite per FMU, one case per finding: errors fail, the others are skipped so that a CI shows them and goes on."""
+    """JUnit XML: a suite per FMU, a case per finding; errors fail, the others are skipped, so that a CI shows them."""
     suites = [_suite(r) for r in reports]
     return '<?xml version="1.0" encoding="UTF-8"?>\n<testsuites>\n' + "\n".join(suites) + "\n</testsuites>\n"
 

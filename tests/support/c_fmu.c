@@ -39,6 +39,7 @@ typedef struct {
 } Instance;
 
 static int instances = 0;
+static char *volatile hoard = NULL; /* volatile, or the compiler removes the leaks */
 #ifdef FAULT_shared_state
 static double shared = 0.0;
 #endif
@@ -46,7 +47,7 @@ static double shared = 0.0;
 static State initial_state(void) {
     State s = {0.0, 40.0, 0.8, 1.0, 0.1, 0.0, 0.0, 0, 1, 2, 0, 1, "mass on a spring"};
 #ifdef FAULT_default_mismatch
-    s.stiffness = 41.0;
+    s.gain = 3;
 #endif
     return s;
 }
@@ -101,8 +102,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         snprintf(self->resources, sizeof self->resources, "%s", resources + 7);
     instances++;
 #ifdef FAULT_instance_leak
-    char *lost = malloc(1 << 20);
-    memset(lost, 1, 1 << 20);
+    hoard = malloc(1 << 20);
+    memset(hoard, 1, 1 << 20);
 #endif
     return self;
 }
@@ -160,6 +161,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
     fresh.v = self->s.v;
 #endif
     self->s = fresh;
+    self->hidden = 0.0;
     self->phase = INSTANTIATED;
     return fmi2OK;
 }
@@ -194,6 +196,9 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 #endif
     for (size_t i = 0; i < n; i++) {
         value[i] = real_value(self, vr[i], &known);
+#ifdef FAULT_crash_unknown_reference
+        if (!known) abort();
+#endif
 #ifndef FAULT_unknown_reference
         if (!known) return refuse(self, "fmi2GetReal: unknown value reference");
 #endif

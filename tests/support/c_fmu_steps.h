@@ -56,37 +56,37 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
     return (fmi2Status)17;
 #endif
 #ifdef FAULT_step_leak
-    char *lost = malloc(1 << 16);
-    memset(lost, 1, 1 << 16);
+    hoard = malloc(1 << 16);
+    memset(hoard, 1, 1 << 16);
 #endif
 #ifdef FAULT_eat_memory
     for (int i = 0; i < 64; i++) {
-        char *lost = malloc(1 << 26);
-        if (!lost) abort();
-        memset(lost, 1, 1 << 26);
+        hoard = malloc(1 << 26);
+        if (!hoard) abort();
+        memset(hoard, 1, 1 << 26);
     }
 #endif
 #ifdef FAULT_chatter
-    for (int i = 0; i < 100000; i++) puts("a slave that talks and talks and talks and talks and talks");
+    for (int i = 0; self->s.steps == 0 && i < 20000; i++) puts("a slave that talks and talks and talks and talks and talks");
 #endif
 #ifdef FAULT_write_file
-    FILE *file = fopen("left_behind.txt", "w");
+    FILE *file = self->s.steps ? NULL : fopen("left_behind.txt", "w");
     if (file) { fputs("a file nobody asked for\n", file); fclose(file); }
 #endif
 #ifdef FAULT_write_resources
     char path[1100];
     snprintf(path, sizeof path, "%s/left_behind.txt", self->resources);
-    FILE *file = fopen(path, "w");
+    FILE *file = self->s.steps ? NULL : fopen(path, "w");
     if (file) { fputs("a file nobody asked for\n", file); fclose(file); }
 #endif
 #ifdef FAULT_orphan
     if (self->s.steps == 0 && fork() == 0) { sleep(60); _exit(0); }
 #endif
 #ifdef FAULT_shared_state
-    self->s.force = shared;
+    if (self->s.force != 0.0) self->s.force = shared;
 #endif
 #ifdef FAULT_hidden_state
-    self->hidden += step;
+    if (self->s.force != 0.0) self->hidden += step;
     self->s.v += 0.5 * step * sin(7.0 * self->hidden);
 #endif
 #ifdef FAULT_variable_refused
@@ -100,6 +100,14 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
     integrate(&self->s, step);
 #endif
     self->s.time = time + (step > 0.0 ? step : 0.0);
+#ifdef FAULT_undefined_symbol
+    extern int nowhere_to_be_found(void);
+    self->s.steps += nowhere_to_be_found();
+#endif
+#ifdef FAULT_python_symbols
+    extern int Py_IsInitialized(void);
+    if (step < 0.0) self->s.steps += Py_IsInitialized();
+#endif
     self->s.steps++;
     self->s.moving = fabs(self->s.v) > 1e-3;
     return fmi2OK;

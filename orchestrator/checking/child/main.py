@@ -59,7 +59,8 @@ def main() -> None:
         channel.send(done=True)
         return
     probes.load(library, report)
-    context = probes.Context(Bench(job, library, lambda: channel.send(beat=True)), report)
+    bench = Bench(job, library, lambda: channel.send(beat=True))
+    context = probes.Context(bench, report, single="canBeInstantiatedOnlyOncePerProcess" in job.flags)
     for name in wanted:
         channel.send(probe=name)
         try:

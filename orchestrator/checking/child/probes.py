@@ -23,12 +23,15 @@ class Context:
 
     Attributes:
         report: called with rule, message and path.
-        trace: outputs of the undisturbed run, [step][output], once there is one.
+        trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
+            cannot be repeated, so that nothing can be compared with it.
+        single: whether a second instance is known not to work.
     """
 
     bench: Bench
     report: Callable[..., None]
     trace: list[list[Any]] | None = None
+    single: bool = False
 
     @property
     def names(self) -> list[str]:
@@ -136,7 +139,7 @@ def inputs(context: Context) -> bool:
                 break
     if refused is not None:
         context.report("run.input-refused", refused)
-        return False
+        bench.excited = False
     with bench.instance() as slave:
         context.trace = bench.run(slave)
     return True
