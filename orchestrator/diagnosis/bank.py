@@ -28,6 +28,7 @@ class Scene:
         inertia: of the load [kg.m2].
         stiffness: of the shaft [N.m/rad].
         ratio: gear ratio.
+        turns: travel of the motor in revolutions.
         cycles: name of a periodic effect -> cycles per revolution at the peaks of its frequency scan.
     """
 
@@ -40,6 +41,7 @@ class Scene:
     inertia: float
     stiffness: float
     ratio: float
+    turns: float
     cycles: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
 
@@ -61,7 +63,10 @@ class Effect:
         phase: short name of a phase; amplitude and phase are then found together from sine and cosine.
         scales: scene -> scale of the other parameters.
         family: effects with the same family look alike when the experiment is poor.
-        needs: name of an effect that this one contains; it is tried only when that one pays.
+        needs: label of an effect that this one contains; it is tried only when that one pays, from
+        refine: (values of that one, scene) -> starting values.
+        plausible: values -> False when the fit has left what the effect means.
+        bounds: scene -> short name -> (least, largest), narrower than the table's.
         nuisances: parameters of the predictor alone that are fitted with the effect, and not reported as its own.
         priors: scene -> short name -> (mean, standard deviation).
         both_encoders: True if it can be seen only with an encoder on either side.
@@ -78,6 +83,9 @@ class Effect:
     scales: Callable[[Scene], dict[str, float]] = lambda scene: {}
     family: str = ""
     needs: str = ""
+    refine: Callable[[dict[str, float], Scene], tuple[dict[str, float], ...]] = lambda values, scene: ()
+    plausible: Callable[[dict[str, float]], bool] = lambda values: True
+    bounds: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
     both_encoders: bool = False
     nuisances: dict[str, str] = field(default_factory=dict)
     priors: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
@@ -111,8 +119,13 @@ def _friction(site: str) -> tuple[Effect, Effect]:
     def start(scene: Scene) -> Start:
         return {"presliding": (build_up(scene)[0],)}
 
-    def speeds(scene: Scene) -> Start:
-        return {"stribeck_speed": tuple(f * rms(scene) for f in (0.03, 0.1, 0.3))} | start(scene)
+    def refine(values: dict[str, float], scene: Scene) -> tuple[dict[str, float], ...]:
+        level = values["torque"]
+        common = {"coulomb": 0.9 * level, "breakaway": 1.7 * level, "presliding": values["presliding"]}
+        return tuple(common | {"stribeck_speed": f * rms(scene)} for f in (0.03, 0.12, 0.4))
+
+    def falls(values: dict[str, float]) -> bool:
+        return values["breakaway"] > 1.02 * values["coulomb"] > 0.0
 
     shared = {"nuisances": {"presliding": f"presliding.{site}"}, "priors": lambda s: {"presliding": build_up(s)}}
     names = (f"{site}.coulomb", f"{site}.breakaway", f"{site}.stribeck_speed")
@@ -121,8 +134,8 @@ def _friction(site: str) -> tuple[Effect, Effect]:
         amplitudes=("torque",), scales=lambda s: {"presliding": 0.2}, family=f"dry friction of the {site}", **shared,
     )  # fmt: skip
     stribeck = Effect(
-        "stribeck_friction", site, _group("stribeck_friction", *names), "coulomb", unit, speeds,
-        amplitudes=("coulomb", "breakaway"), scales=lambda s: {"stribeck_speed": 0.02 * rms(s), "presliding": 0.2},
+        "stribeck_friction", site, _group("stribeck_friction", *names), "coulomb", unit,
+        refine=refine, plausible=falls, scales=lambda s: {"stribeck_speed": 0.02 * rms(s), "presliding": 0.2},
         family=f"dry friction of the {site}", needs=f"coulomb_friction@{site}", **shared,
     )  # fmt: skip
     return coulomb, stribeck
@@ -149,7 +162,8 @@ def _periodic(name: str, site: str, unit: Callable[[Scene], float]) -> Effect:
     return Effect(
         name, site, _group(name, "amplitude", "cycles_per_rev", "phase"), "amplitude", unit,
         lambda scene: {"cycles_per_rev": scene.cycles.get(name, ())}, amplitudes=("amplitude",), phase="phase",
-        scales=lambda scene: {"cycles_per_rev": 1e-3, "phase": 0.05}, family=f"periodic, {site}",
+        scales=lambda scene: {"cycles_per_rev": 1e-3, "phase": 0.05},
+        bounds=lambda scene: {"cycles_per_rev": (0.7 / max(scene.turns, 1e-3), 1e9)}, family=f"periodic, {site}",
     )  # fmt: skip
 
 

@@ -1,7 +1,7 @@
 """Prediction-error fit of a set of parameters: Levenberg-Marquardt on whitened innovations with Gaussian priors."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,7 +155,22 @@ def anneal(
             best = tried
         if place != at + direction:
             break
-    return best
+    return replace(best, validated=decided(likelihood, best, parts, levels))
+
+
+def decided(likelihood: Likelihood, best: Fit, parts: Parts, levels: Sequence[float]) -> float:
+    """Return the log-likelihood of the deciding part, its process noise raised as long as that helps.
+
+    A model that is nearly right may deserve more process noise on a part that it was not fitted to.
+    """
+    value = best.validated
+    for level in reversed(levels[: list(levels).index(best.q)]):
+        z = likelihood.whitened(best.p, level)
+        raised = likelihood.log_likelihood(z, level, parts.validated)
+        if not raised > value:
+            break
+        value = raised
+    return value
 
 
 def _whitening(e: Array) -> Array:

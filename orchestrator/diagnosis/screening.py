@@ -112,15 +112,16 @@ def scene_of(likelihood: Likelihood, plant: Plant, model: Fit) -> Scene:
     signals = likelihood.signals
     _, states = likelihood.innovations(model.p, model.q)
     x = states[20:]
+    turns = float(np.ptp(x[:, 0])) / (2.0 * np.pi)
     speed_m = float(np.sqrt(np.mean(x[:, 1] ** 2)))
     if "k" not in plant.names:
         inertia = float(model.p[plant.index("J")])
-        return Scene(signals.h, signals.torque, signals.u, speed_m, speed_m, 1.0, inertia, 1.0, 1.0)
+        return Scene(signals.h, signals.torque, signals.u, speed_m, speed_m, 1.0, inertia, 1.0, 1.0, turns)
     ratio = float(model.p[plant.index("i")])
     twist = float(np.quantile(np.abs(x[:, 0] / ratio - x[:, 2]), 0.995))
     speed_l = float(np.sqrt(np.mean(x[:, 3] ** 2)))
     inertia, stiffness = float(likelihood.nominal[plant.index("J_l")]), float(likelihood.nominal[plant.index("k")])
-    return Scene(signals.h, signals.torque, signals.u, speed_m, speed_l, twist, inertia, stiffness, ratio)
+    return Scene(signals.h, signals.torque, signals.u, speed_m, speed_l, twist, inertia, stiffness, ratio, turns)
 
 
 def with_cycles(scene: Scene, likelihood: Likelihood, plant: Plant, model: Fit, parts: Parts) -> Scene:

@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 LEVELS = tuple(float(f) for f in np.geomspace(3.0, 1e-5, 23))  # process noise, as a share of the drive's torque
 FIRST_LEVEL = LEVELS[10]
 PENALTY = 5.0  # log-likelihood that each further parameter must earn
-PAYS = 12.0  # gain that an effect must bring, on the deciding part and in all
+PAYS = 22.0  # least gain that an effect must bring in all
+LEAST_DECIDED = 6.0  # and on the deciding part alone
+SHARE = 0.03  # and as a share of what earlier effects have gained
 MOST_EFFECTS = 4
 SHORTLIST = 6
 WORTH = 0.03  # a candidate is fitted only when it promises at least this share of the best promise
@@ -39,18 +41,27 @@ class Candidate:
     @property
     def score(self) -> float:
         """Return the penalised log-likelihood of both parts of the record that were looked at."""
-        parameters = sum(len(effect.parameters) for effect in self.effects)
-        return self.fit.fitted + self.fit.validated - PENALTY * parameters
+        return self.fit.fitted + self.fit.validated - PENALTY * parameter_count(self)
 
     def gain_over(self, other: "Candidate") -> float:
         """Return the penalised gain over another model."""
         return self.score - other.score
 
-    def pays_over(self, other: "Candidate") -> bool:
-        """Tell whether this model, which has one more effect, earns it in all and on the deciding part."""
-        more = PENALTY * (len(self.fit.free) - len(other.fit.free))
-        decided = self.fit.validated - other.fit.validated
-        return self.gain_over(other) > PAYS and decided > max(4.0, 0.25 * more)
+    def pays_over(self, other: "Candidate", base: "Candidate") -> bool:
+        """Tell whether this model, which has more effects than ``other``, earns them on both parts.
+
+        The gain must also be a fair share of what the effects before have gained over ``base``: no law of friction or
+        contact is exact, and what is left of a large effect must not pass for a small one.
+        """
+        more = PENALTY * max(parameter_count(self) - parameter_count(other), 1)
+        fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
+        least = max(PAYS, SHARE * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
+        return self.gain_over(other) > least and fitted > more and decided > LEAST_DECIDED
+
+
+def parameter_count(candidate: Candidate) -> int:
+    """Return the number of parameters of a candidate's effects."""
+    return sum(len(effect.parameters) for effect in candidate.effects)
 
 
 @dataclass(frozen=True)
@@ -84,11 +95,11 @@ class Search:
         base = self.base()
         current = base
         while len(current.effects) < MOST_EFFECTS:
-            step = self.step(current)
+            step = self.step(current, base)
             self.steps.append(step)
             if not step.accepted:
                 break
-            current = self.prune(step.candidates[0], step.before)
+            current = self.prune(step.candidates[0], base)
         return base, current
 
     def base(self) -> Candidate:
@@ -98,14 +109,13 @@ class Search:
         self._tick("parameters")
         return Candidate((), fitted)
 
-    def step(self, current: Candidate) -> Step:
+    def step(self, current: Candidate, base: Candidate) -> Step:
         """Fit the shortlist of effects on top of ``current``."""
         scene, guesses = self.screen(current)
-        shortlist = self.shortlist(guesses)
-        found = [self.extend(current, effect, guess, scene) for effect, guess in shortlist]
-        found += [self.extend(current, effect, guess, scene) for effect, guess in self.second_wave(found, current, guesses)]
+        found = [self.extend(current, effect, guess, scene) for effect, guess in self.shortlist(guesses)]
+        found += self.refined(found, current, base, scene)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
-        accepted = bool(found) and found[0].pays_over(current)
+        accepted = bool(found) and found[0].pays_over(current, base)
         return Step(current, tuple(found), accepted)
 
     def screen(self, current: Candidate) -> tuple[Scene, dict[str, tuple[Effect, Guess]]]:
@@ -125,40 +135,58 @@ class Search:
         present = {effect.label for effect in current.effects}
         replaced = {effect.needs for effect in current.effects}
         for effect in BANKS[self.plant.name]:
+            if effect.needs:
+                continue
             blind = effect.both_encoders and self.likelihood.signals.channels < 2
             if effect.label not in present | replaced and not blind:
                 yield effect
 
     def shortlist(self, guesses: dict[str, tuple[Effect, Guess]]) -> list[tuple[Effect, Guess]]:
         """Return the effects worth a fit, most promising first."""
-        own = [pair for pair in guesses.values() if not pair[0].needs]
-        own.sort(key=lambda pair: pair[1].gain, reverse=True)
+        own = sorted(guesses.values(), key=lambda pair: pair[1].gain, reverse=True)
         if not own:
             return []
         least = max(3.0, WORTH * own[0][1].gain)
         return [pair for n, pair in enumerate(own) if n < SHORTLIST and pair[1].gain > least] or own[:1]
 
-    def second_wave(
-        self, found: Sequence[Candidate], current: Candidate, guesses: dict[str, tuple[Effect, Guess]]
-    ) -> list[tuple[Effect, Guess]]:
-        """Return effects that contain one which did pay (Stribeck's friction contains Coulomb's)."""
-        paying = {c.effects[-1].label for c in found if c.pays_over(current)}
-        paying |= {effect.label for effect in current.effects}
-        return [(effect, guess) for effect, guess in guesses.values() if effect.needs in paying]
+    def refined(
+        self, found: Sequence[Candidate], current: Candidate, base: Candidate, scene: Scene
+    ) -> list[Candidate]:
+        """Return candidates whose effect contains one that pays (Stribeck's friction contains Coulomb's)."""
+        refined = []
+        for source in [c for c in (*found, current) if c is current or c.pays_over(current, base)]:
+            for effect in BANKS[self.plant.name]:
+                simpler = next((e for e in source.effects if e.label == effect.needs), None)
+                if simpler is not None and (source is current or simpler is source.effects[-1]):
+                    refined.append(self.refine(source, simpler, effect, scene))
+        return [candidate for candidate in refined if candidate is not None]
+
+    def refine(self, source: Candidate, simpler: Effect, effect: Effect, scene: Scene) -> Candidate | None:
+        """Return the best fit of ``effect`` in the place of ``simpler``, from several starts; None: not plausible."""
+        effects = tuple(effect if e is simpler else e for e in source.effects)
+        values = {short: float(source.fit.p[place]) for short, place in simpler.places(self.plant).items()}
+        bare = self.without(source.fit.p, simpler.label)
+        best: Fit | None = None
+        for start in effect.refine(values, scene):
+            p = self.placed(bare, effect, start)
+            fitted = anneal(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, LEVELS)
+            if best is None or fitted.fitted > best.fitted:
+                best = fitted
+        self._tick(effect.label)
+        if best is None:
+            return None
+        final = {short: float(best.p[place]) for short, place in effect.places(self.plant).items()}
+        return Candidate(effects, best) if effect.plausible(final) else None
 
     def extend(self, current: Candidate, effect: Effect, guess: Guess, scene: Scene) -> Candidate:
         """Return ``current`` with one more effect, fitted from the guess."""
-        kept = tuple(e for e in current.effects if e.label != effect.needs)
-        effects = (*kept, effect)
-        p = current.fit.p.copy()
-        if len(kept) < len(current.effects):
-            p = self.without(p, effect.needs)
-        p = self.placed(p, effect, guess.values)
+        effects = (*current.effects, effect)
+        p = self.placed(current.fit.p, effect, guess.values)
         fitted = anneal(self.likelihood, p, current.fit.q, self.free(effects, scene), self.parts, LEVELS)
         self._tick(effect.label)
         return Candidate(effects, fitted)
 
-    def prune(self, current: Candidate, before: Candidate) -> Candidate:
+    def prune(self, current: Candidate, base: Candidate) -> Candidate:
         """Take out earlier effects that the last one has made superfluous."""
         scene = scene_of(self.likelihood, self.plant, current.fit)
         while len(current.effects) > 1:
@@ -170,7 +198,7 @@ class Search:
                 self._tick(f"without {effect.label}")
                 reduced.append(Candidate(kept, fitted))
             best = max(reduced, key=lambda candidate: candidate.score)
-            if current.pays_over(best):
+            if current.pays_over(best, base):
                 break
             current = best
         return current
@@ -193,7 +221,9 @@ class Search:
             for short, place in effect.places(self.plant).items():
                 if place not in taken:
                     entry = self.plant.entry(place)
-                    free.append(Free(place, scales.get(short, unit), entry.minimum, entry.maximum, effect.priors(scene).get(short)))
+                    low, high = effect.bounds(scene).get(short, (entry.minimum, entry.maximum))
+                    prior = effect.priors(scene).get(short)
+                    free.append(Free(place, scales.get(short, unit), low, high, prior))
         return tuple(free)
 
     def placed(self, p: Array, effect: Effect, values: dict[str, float]) -> Array:
