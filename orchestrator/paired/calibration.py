@@ -27,7 +27,7 @@ from orchestrator.paired.metric import difference_sum
 Array = NDArray[np.float64]
 
 # Seeds of calibration and of tests come from different branches of one tree, so that none is ever shared.
-CALIBRATION_BRANCH = 1
+CALIBRATION_BRANCH = 7
 CLEAN_SIZES = 241
 NOISY_SIZES = 121
 SEEDS_PER_SIZE = 24

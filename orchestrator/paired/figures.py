@@ -1,0 +1,141 @@
+"""Figures of paired runs and sweeps, drawn with matplotlib's object interface (no global state, no display)."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from orchestrator.paired.cosimulation import LoopRun
+
+Array = NDArray[np.float64]
+BLUE, ORANGE, GREY = "#2166ac", "#d6604d", "#555555"
+SHADE = "#f4d58d"
+DPI = 150
+
+
+def draw_pair(path: Path, with_gap: LoopRun, without_gap: LoopRun, reference: Array, title: str) -> None:
+    """Draw both load positions against time, their difference and the torques, with the time in the gap shaded."""
+    figure, axes = _figure(3, (8.0, 7.5))
+    time = with_gap.time
+    axes[0].plot(time, reference, color=GREY, linewidth=1.0, linestyle=":", label="reference")
+    axes[0].plot(time, without_gap["theta_l"], color=BLUE, label="without backlash")
+    axes[0].plot(time, with_gap["theta_l"], color=ORANGE, linestyle="--", label="with backlash")
+    axes[0].set_ylabel("load angle [rad]")
+    axes[0].set_title(title)
+    difference = with_gap["theta_l_hat"] - without_gap["theta_l_hat"]
+    axes[1].plot(time, 1e3 * difference, color="black", label="estimated load angles, with minus without")
+    axes[1].fill_between(time, 0.0, 1e3 * difference, color="black", alpha=0.12, linewidth=0.0)
+    axes[1].set_ylabel("difference [mrad]")
+    axes[2].plot(time, without_gap["u"], color=BLUE, linewidth=0.9, label="request without backlash")
+    axes[2].plot(time, with_gap["u"], color=ORANGE, linewidth=0.9, linestyle="--", label="request with backlash")
+    axes[2].plot(time, with_gap["T_shaft"], color=GREY, linewidth=0.9, label="shaft torque with backlash")
+    axes[2].set_ylabel("torque [N.m]")
+    axes[2].set_xlabel("time [s]")
+    for axis in axes:
+        shade_gap(axis, time, with_gap["contact"])
+        axis.legend(loc="best", fontsize=8, framealpha=0.9)
+        axis.margins(x=0.0)
+        axis.grid(alpha=0.25)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def shade_gap(axis: Axes, time: Array, contact: Array) -> None:
+    """Shade the spans of time in which no teeth touch."""
+    free = np.concatenate([[False], contact == 0, [False]])
+    edges = np.flatnonzero(free[1:] != free[:-1])
+    label: str | None = "in the gap"
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        axis.axvspan(time[first], time[min(last, len(time) - 1)], color=SHADE, alpha=0.6, linewidth=0.0, label=label)
+        label = None
+
+
+def draw_estimates(
+    path: Path, actual: Array, estimated: Array, lower: Array, upper: Array, noise: Array, title: str
+) -> None:
+    """Draw estimated against actual half-gap, with intervals, one colour for each noise level."""
+    figure, (axis,) = _figure(1, (6.0, 5.6))
+    ends = np.array([actual.min(), actual.max()])
+    axis.plot(ends, ends, color=GREY, linewidth=0.8, label="estimated = actual")
+    for colour, level, chosen in _by_noise(noise):
+        below, above = estimated[chosen] - lower[chosen], upper[chosen] - estimated[chosen]
+        axis.errorbar(
+            actual[chosen],
+            estimated[chosen],
+            np.maximum(np.array([below, above]), 0.0),
+            fmt="o",
+            markersize=3.0,
+            linewidth=0.9,
+            capsize=2.0,
+            color=colour,
+            label=_noise_label(level),
+        )
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xlabel("actual half-gap [rad]")
+    axis.set_ylabel("estimated half-gap [rad]")
+    axis.set_title(title)
+    _finish(figure, axis, path)
+
+
+def draw_errors(path: Path, actual: Array, estimated: Array, noise: Array, title: str) -> None:
+    """Draw the error in percent against the actual half-gap, one colour for each noise level."""
+    figure, (axis,) = _figure(1, (7.0, 4.2))
+    percent = 100.0 * np.abs(estimated - actual) / actual
+    floor = 1e-7
+    for colour, level, chosen in _by_noise(noise):
+        axis.plot(
+            actual[chosen],
+            np.maximum(percent[chosen], floor),
+            "o",
+            markersize=3.5,
+            color=colour,
+            label=_noise_label(level),
+        )
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xlabel("actual half-gap [rad]")
+    axis.set_ylabel("error of the estimate [%]")
+    axis.set_title(title)
+    _finish(figure, axis, path)
+
+
+def _finish(figure: Figure, axis: Axes, path: Path) -> None:
+    axis.grid(alpha=0.25, which="both")
+    axis.legend(fontsize=8)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def _figure(rows: int, size: tuple[float, float]) -> tuple[Figure, Sequence[Axes]]:
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(rows, 1, sharex=rows > 1, squeeze=False)[:, 0]
+    return figure, list(axes)
+
+
+def _by_noise(noise: Array) -> list[tuple[str, float, NDArray[np.bool_]]]:
+    colours = (BLUE, ORANGE, "#4d9221", "#762a83", "#8c510a")
+    return [(colours[k % len(colours)], float(level), noise == level) for k, level in enumerate(np.unique(noise))]
+
+
+def _noise_label(level: float) -> str:
+    return f"encoder noise {level:g} rad" if level else "no noise"
+
+
+def draw_signals(path: Path, time: Array, signals: Mapping[str, Array], units: Mapping[str, str]) -> None:
+    """Draw signals against time, those of one unit in one panel."""
+    names = list(dict.fromkeys(units[name] for name in signals))
+    figure, axes = _figure(len(names), (8.0, 1.2 + 2.2 * len(names)))
+    for axis, unit in zip(axes, names, strict=True):
+        for name, values in signals.items():
+            if units[name] == unit:
+                axis.plot(time, values, linewidth=1.0, label=name)
+        axis.set_ylabel(f"[{unit}]" if unit else "")
+        axis.grid(alpha=0.25)
+        axis.legend(fontsize=8)
+        axis.margins(x=0.0)
+    axes[-1].set_xlabel("time [s]")
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})

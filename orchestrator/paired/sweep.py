@@ -1,0 +1,190 @@
+"""The sweep: sizes x noise levels x repetitions through the engine, each case one co-simulated loop and one estimate.
+
+The twin without a gap has no noise and is the same for every case, so each worker process runs it once.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.engine import Case, Column, DesignCases, Row, Status, Work, parse_design
+from orchestrator.engine.cases import Value
+from orchestrator.errors import ScenarioError
+from orchestrator.paired.calibration import Calibration, estimate_gap, load_or_calibrate
+from orchestrator.paired.cosimulation import LoopSession
+from orchestrator.paired.experiment import Experiment
+from orchestrator.paired.metric import ErrorStatistics, difference_sum, error_statistics
+from orchestrator.paired.pair import with_settings
+
+Array = NDArray[np.float64]
+COLUMNS = (
+    Column("S", "rad"),
+    Column("estimate", "rad"),
+    Column("lower", "rad"),
+    Column("upper", "rad"),
+    Column("error", "rad"),
+    Column("error_percent", "%"),
+)
+THESIS_RANGE = (1.2, 4.8)
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """What a sweep varies.
+
+    Attributes:
+        experiment: what all cases share; its encoder noise is replaced by each of ``noise``.
+        sizes: ``0.01,0.02``, ``range:LOW:HIGH:N``, ``logrange:LOW:HIGH:N`` or ``random:N``.
+        noise: encoder noise levels [rad].
+        repetitions: runs of each size and noise level, each with noise of its own.
+        seed: of random sizes and of all noise.
+        vary: further parameters, ``NAME=SPECIFICATION`` as the engine reads them.
+    """
+
+    experiment: Experiment
+    sizes: str = "random:20"
+    noise: tuple[float, ...] = (0.0,)
+    repetitions: int = 1
+    seed: int = 0
+    vary: tuple[str, ...] = ()
+
+    def cases(self) -> DesignCases:
+        """Return the cases, checked against the range that the experiment claims.
+
+        Raises:
+            ScenarioError: a specification that cannot be read, or a count below 1.
+            CalibrationError: a size outside the calibrated range.
+        """
+        if self.repetitions < 1:
+            raise ScenarioError(f"`--seeds` must be at least 1, but is {self.repetitions}")
+        for level in self.noise:
+            if not (np.isfinite(level) and level >= 0.0):
+                raise ScenarioError(f"`--noise` must be finite and not negative, but is {level}")
+        sizes, samples = self._sizes()
+        specifications = [
+            f"alpha={sizes}",
+            "noise=" + ",".join(repr(level) for level in self.noise),
+            f"repetition=range:1:{self.repetitions}:{self.repetitions}",
+            *self.vary,
+        ]
+        cases = DesignCases(parse_design(specifications, samples, self.seed), self.seed)
+        if not sizes.startswith(("random", "lograndom")):
+            for index in range(len(cases)):
+                self._require(cases[index].parameters["alpha"])
+        return cases
+
+    def _require(self, alpha: Value) -> None:
+        if not isinstance(alpha, float) or not np.isfinite(alpha) or alpha <= 0.0:
+            raise ScenarioError(f"`--sizes` must be finite positive numbers, but one is {alpha}")
+        self.experiment.require_size(alpha)
+
+    def _sizes(self) -> tuple[str, int]:
+        kind, _, rest = self.sizes.partition(":")
+        if kind != "random":
+            return self.sizes, 1
+        try:
+            count = int(rest)
+        except ValueError:
+            raise ScenarioError(f"`--sizes` must be random:COUNT, but is {self.sizes!r}") from None
+        if self.experiment.name == "thesis":
+            return "random:{}:{}".format(*THESIS_RANGE), count
+        return f"lograndom:{self.experiment.smallest}:{self.experiment.largest}", count
+
+    def calibrations(self) -> dict[float, Calibration]:
+        """Return the calibration of each noise level.
+
+        Raises:
+            CalibrationError: S is not monotone for this experiment.
+        """
+        return {level: load_or_calibrate(with_settings(self.experiment, noise=level)) for level in self.noise}
+
+
+def sweep_work(plan: SweepPlan, fmus: Mapping[str, Path], calibrations: Mapping[float, Calibration]) -> Work:
+    """Return what a worker process does for each case."""
+    return Work(
+        prepare=_prepare,
+        run=_run,
+        columns=COLUMNS,
+        payload=(plan.experiment, dict(calibrations)),
+        files=dict(fmus),
+        definition={
+            "experiment": asdict(plan.experiment),
+            "calibrations": {repr(level): c.digest for level, c in calibrations.items()},
+        },
+    )
+
+
+@dataclass(frozen=True)
+class _Prepared:
+    session: LoopSession
+    twin: Array
+    experiment: Experiment
+    calibrations: Mapping[float, Calibration]
+
+
+def _prepare(payload: tuple[Experiment, dict[float, Calibration]], files: Mapping[str, Path]) -> _Prepared:
+    experiment, calibrations = payload
+    session = LoopSession(experiment, files, ("theta_l_hat",))
+    return _Prepared(session, session.run(0.0)["theta_l_hat"].copy(), experiment, calibrations)
+
+
+def _run(prepared: _Prepared, case: Case) -> dict[str, Value]:
+    values = dict(case.parameters)
+    alpha, noise = float(values.pop("alpha") or 0.0), float(values.pop("noise") or 0.0)
+    values.pop("repetition")
+    shape = prepared.experiment.steps + 1
+    draws = case.generator().normal(0.0, noise, (2, shape)) if noise else np.zeros((2, shape))
+    start = {name: value for name, value in values.items() if value is not None}
+    loop = prepared.session.run(alpha, (draws[0], draws[1]), start)
+    total = difference_sum(loop["theta_l_hat"], prepared.twin)
+    if not np.isfinite(total):
+        return dict.fromkeys((c.name for c in COLUMNS), total)
+    gap = estimate_gap(prepared.calibrations[noise], total)
+    error = abs(gap.alpha - alpha)
+    return {
+        "S": total,
+        "estimate": gap.alpha,
+        "lower": gap.lower,
+        "upper": gap.upper,
+        "error": error,
+        "error_percent": 100.0 * error / alpha,
+    }
+
+
+@dataclass(frozen=True)
+class SweepArrays:
+    """The finished cases of a sweep as columns, all of one shape."""
+
+    actual: Array
+    noise: Array
+    estimate: Array
+    lower: Array
+    upper: Array
+
+    def statistics(self) -> dict[float, ErrorStatistics]:
+        """Return the statistics of each noise level."""
+        found = {}
+        for level in np.unique(self.noise):
+            chosen = self.noise == level
+            found[float(level)] = error_statistics(
+                self.actual[chosen], self.estimate[chosen], self.lower[chosen], self.upper[chosen]
+            )
+        return found
+
+
+def gather(rows: Iterable[Row]) -> SweepArrays:
+    """Return the columns of all rows that are done."""
+    collected: list[tuple[float, ...]] = []
+    for row in rows:
+        if row.outcome.status is Status.DONE:
+            values: dict[str, Any] = dict(zip((c.name for c in COLUMNS), row.outcome.values, strict=True))
+            parameters: Mapping[str, Any] = row.case.parameters
+            collected.append(
+                (parameters["alpha"], parameters["noise"], values["estimate"], values["lower"], values["upper"])
+            )
+    table = np.array(collected, dtype=float).reshape(-1, 5)
+    return SweepArrays(*table.T)
