@@ -16,9 +16,10 @@ from uuid import uuid4
 from distributed import Client, KilledWorker, Worker, WorkerPlugin
 
 from orchestrator import __version__
+from orchestrator.cache import cache_directory
 from orchestrator.engine.blobs import BlobStore
 from orchestrator.engine.cases import Case, Outcome, Status
-from orchestrator.engine.pools import LaneOfThread, Limits, cache_directory, pickled
+from orchestrator.engine.pools import LaneOfThread, Limits, pickled
 from orchestrator.engine.work import Work
 from orchestrator.engine.worker import Assignment
 from orchestrator.errors import ScenarioError, SimulationError
@@ -128,7 +129,7 @@ class _Supply(WorkerPlugin):
             raise ScenarioError(
                 f"the Dask workers must run version {self._version}, but {worker.address} has {__version__}"
             )
-        store = BlobStore(cache_directory() / "blobs")
+        store = BlobStore(cache_directory("blobs"))
         paths = {name: store.path(store.put(content)) for name, content in self._blobs.items()}
         _tasks[self._key] = LaneOfThread(Assignment(self._work, paths, self._limits.time, self._limits.memory))
 

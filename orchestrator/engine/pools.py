@@ -5,7 +5,6 @@ Both are used through the ``concurrent.futures`` executor interface and run the 
 
 import os
 import pickle
-import tempfile
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -13,12 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
+from orchestrator.cache import cache_directory
 from orchestrator.engine.blobs import BlobStore
 from orchestrator.engine.cases import Case, Outcome
 from orchestrator.engine.lane import Lane
 from orchestrator.engine.work import Work, file_hash
 from orchestrator.engine.worker import Assignment
-from orchestrator.errors import OutputError, ScenarioError
+from orchestrator.errors import ScenarioError
 
 DEFAULT_TIME_LIMIT = 300.0
 DEFAULT_MEMORY = 2 * 1024**3
@@ -70,7 +70,7 @@ class LocalProcesses:
     def __call__(self, work: Work, limits: Limits) -> "LocalPool":
         """Open the pool; processes start with their first case."""
         count = self.workers or len(os.sched_getaffinity(0))
-        store = BlobStore(cache_directory() / "blobs")
+        store = BlobStore(cache_directory("blobs"))
         digests = {name: store.put(Path(path).read_bytes()) for name, path in work.files.items() if file_hash(path)}
         paths = {name: store.path(digest) for name, digest in digests.items()}
         return LocalPool(count, Assignment(pickled(work), paths, limits.time, limits.memory))
@@ -159,19 +159,3 @@ def pickled(work: Work) -> bytes:
         return pickle.dumps(replace(work, files={}))
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise ScenarioError(f"the work of a sweep must be module-level functions and plain data: {error}") from None
-
-
-def cache_directory() -> Path:
-    """Return the project's cache directory: below ``XDG_CACHE_HOME`` or ``~/.cache``, else a temporary one."""
-    base = os.environ.get("XDG_CACHE_HOME")
-    directory = (Path(base) if base else Path.home() / ".cache") / "backlash-cosim"
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-        if os.access(directory, os.W_OK):
-            return directory
-    except OSError:
-        pass
-    try:
-        return Path(tempfile.mkdtemp(prefix="backlash-cosim-"))
-    except OSError as error:
-        raise OutputError(f"no directory for temporary files can be written: {error.strerror}") from None

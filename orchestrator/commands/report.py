@@ -1,0 +1,18 @@
+"""``report``: the page of a result directory, rebuilt from its JSON and CSV files."""
+
+import argparse
+from pathlib import Path
+
+from orchestrator.reporting import write_report
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument("directory", type=Path, metavar="DIR", help="where a command left its results")
+    parser.add_argument("--command", dest="of", metavar="COMMAND", help="whose results, where DIR holds several")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write ``DIR/report.html`` and print its path."""
+    print(write_report(args.directory, args.of))
+    return 0

@@ -1,0 +1,55 @@
+"""From a result directory to its page."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from orchestrator.errors import OutputError, ScenarioError
+from orchestrator.reporting.model import Report
+from orchestrator.reporting.page import render
+from orchestrator.reporting.pages import check, generic
+from orchestrator.reporting.source import Source, load
+
+PAGE = "report.html"
+COMMANDS = ("build", "check", "simulate", "sweep", "estimate", "diagnose", "thesis", "ssp", "bench")
+_BUILDERS: dict[str, Callable[[Source], Report]] = {"check": check.build}
+
+
+def report_from_directory(directory: Path, command: str | None = None) -> Report:
+    """Return the report of a result directory, from its ``COMMAND.json`` and the CSV files beside it.
+
+    Args:
+        directory: where a command left its results.
+        command: which command's results; needed only where there are several.
+
+    Raises:
+        ScenarioError: there are no results, or several and ``command`` is not given, or they are damaged.
+    """
+    found = [name for name in COMMANDS if (directory / f"{name}.json").is_file()]
+    if command is None and len(found) != 1:
+        what = f"has those of {', '.join(found)}: choose with --command" if found else "has none"
+        raise ScenarioError(f"{directory} must hold the results of one command, but {what}")
+    source = load(directory, command or found[0])
+    try:
+        return _BUILDERS.get(source.command, generic.build)(source)
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise ScenarioError(f"{directory / source.command}.json must hold results of this version ({reason})") from None
+
+
+def write_report(directory: Path, command: str | None = None) -> Path:
+    """Write ``report.html`` into a result directory, whole or not at all, and return its path.
+
+    Raises:
+        ScenarioError: as ``report_from_directory``.
+        OutputError: the directory cannot be written.
+    """
+    page = render(report_from_directory(directory, command))
+    path = directory / PAGE
+    partial = directory / f".{PAGE}.partial"
+    try:
+        partial.write_text(page, encoding="utf-8", errors="replace")  # names in hostile archives
+        partial.replace(path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise OutputError(f"cannot write {path}: {error.strerror}") from None
+    return path

@@ -1,0 +1,143 @@
+"""What a report consists of: small immutable parts that know nothing of HTML."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+Cell = float | int | str | bool | None
+Numbers = Sequence[float | None]
+Badge = Literal["good", "bad", "neutral"]
+
+ROW_LIMIT = 500
+POINT_LIMIT = 4000
+
+
+@dataclass(frozen=True)
+class Text:
+    """Paragraphs."""
+
+    title: str
+    paragraphs: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Named values, shown as a list of pairs."""
+
+    title: str
+    items: tuple[tuple[str, Cell], ...]
+
+
+@dataclass(frozen=True)
+class Column:
+    """A table's column; ``digits`` are significant ones, of numbers."""
+
+    name: str
+    unit: str = ""
+    digits: int = 4
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table that the reader can sort. Only the first ``limit`` rows are shown, and the table says so."""
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+    limit: int = ROW_LIMIT
+
+
+@dataclass(frozen=True)
+class Series:
+    """One curve or cloud of a plot; ``None`` leaves a gap.
+
+    Attributes:
+        name: as in the legend.
+        x, y: same length.
+        kind: "line", "steps" (each value held to the next x), "points", or "bars" from zero.
+        low, high: ends of an interval around each y; both or neither.
+        labels: words for each point, shown when the reader hovers over it.
+    """
+
+    name: str
+    x: Numbers
+    y: Numbers
+    kind: Literal["line", "steps", "points", "bars"] = "line"
+    low: Numbers | None = None
+    high: Numbers | None = None
+    labels: Sequence[str] | None = None
+
+
+@dataclass(frozen=True)
+class Span:
+    """A shaded range of x."""
+
+    start: float
+    end: float
+    name: str
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot in which the reader can hover and zoom.
+
+    Attributes:
+        diagonal: draw the line y = x.
+        categories: names of x = 0, 1, 2, ... for an axis of named things.
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[Series, ...]
+    spans: tuple[Span, ...] = ()
+    diagonal: bool = False
+    log_x: bool = False
+    log_y: bool = False
+    categories: tuple[str, ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One problem or remark."""
+
+    severity: Literal["error", "warning", "info"]
+    where: str
+    text: str
+    advice: str = ""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Problems and remarks, worst first as given."""
+
+    title: str
+    items: tuple[Finding, ...]
+    empty: str = "Nothing was found."
+
+
+Section = Text | Facts | Table | Plot | Findings
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page.
+
+    Attributes:
+        title: the page's heading.
+        summary: the answer, in a sentence or two.
+        badge: the answer's colour and its word, such as ("good", "3 of 3 FMUs comply").
+        sections: in the order of the page.
+        origin: what was run and with what (command, version, seed, arguments).
+        downloads: files to hand on with the page; small ones are embedded, others linked beside it.
+    """
+
+    title: str
+    summary: str
+    sections: tuple[Section, ...]
+    badge: tuple[Badge, str] | None = None
+    origin: tuple[tuple[str, Cell], ...] = ()
+    downloads: tuple[Path, ...] = field(default=())

@@ -1,0 +1,112 @@
+"""A report as one HTML page that needs nothing but a browser."""
+
+import base64
+import json
+import mimetypes
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from orchestrator.reporting.model import (
+    POINT_LIMIT,
+    Cell,
+    Facts,
+    Findings,
+    Plot,
+    Report,
+    Section,
+    Series,
+    Table,
+    Text,
+)
+from orchestrator.reporting.numbers import in_words, thinned
+
+EMBED_LIMIT = 1_000_000
+SCRIPTS = ("scale.js", "svg.js", "plot.js", "page.js")
+_KINDS = {Text: "text", Facts: "facts", Table: "table", Plot: "plot", Findings: "findings"}
+
+
+def render(report: Report) -> str:
+    """Return the page. It depends on the report and the files named in ``downloads`` only, never on the date.
+
+    Raises:
+        OSError: a file of ``downloads`` cannot be read.
+    """
+    return (
+        _environment()
+        .get_template("page.html")
+        .render(
+            report=report,
+            downloads=[_download(path) for path in report.downloads],
+            style=Markup(_asset("page.css")),
+            script=Markup("\n".join(_asset(name) for name in SCRIPTS)),
+        )
+    )
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("orchestrator.reporting"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"words": in_words, "plot_data": _plot_data, "sort_key": _sort_key}
+    environment.globals["kind"] = _kind
+    return environment
+
+
+def _asset(name: str) -> str:
+    return files("orchestrator.reporting").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def _kind(section: Section) -> str:
+    return _KINDS[type(section)]
+
+
+def _sort_key(value: Cell) -> str:
+    """Return what the browser sorts by: a number at full precision, or the text."""
+    if value is None:
+        return ""
+    return repr(float(value)) if isinstance(value, (int, float)) else value
+
+
+def _plot_data(plot: Plot) -> Markup:
+    """Return a plot as JSON that is safe inside a script element."""
+    data = {
+        "title": plot.title,
+        "xLabel": plot.x_label,
+        "yLabel": plot.y_label,
+        "logX": plot.log_x,
+        "logY": plot.log_y,
+        "diagonal": plot.diagonal,
+        "categories": list(plot.categories),
+        "spans": [{"start": s.start, "end": s.end, "name": s.name} for s in plot.spans],
+        "series": [_series_data(thinned(s, POINT_LIMIT)) for s in plot.series],
+    }
+    text = json.dumps(data, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
+    return Markup(text.replace("<", "\\u003c").replace("&", "\\u0026"))
+
+
+def _series_data(series: Series) -> dict[str, Any]:
+    data: dict[str, Any] = {"name": series.name, "kind": series.kind, "x": list(series.x), "y": list(series.y)}
+    if series.low is not None and series.high is not None:
+        data |= {"low": list(series.low), "high": list(series.high)}
+    if series.labels is not None:
+        data["labels"] = list(series.labels)
+    return data
+
+
+def _download(path: Path) -> dict[str, str]:
+    content = path.read_bytes()
+    size = f"{len(content) / 1000:.1f} kB" if len(content) < 1_000_000 else f"{len(content) / 1e6:.1f} MB"
+    if len(content) > EMBED_LIMIT:
+        return {"name": path.name, "size": f"{size}, beside this page", "href": path.name}
+    kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
+    return {"name": path.name, "size": size, "href": f"data:{kind};base64,{base64.b64encode(content).decode()}"}

@@ -1,0 +1,51 @@
+"""The page of any command that has none of its own: facts and tables, as the JSON has them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from orchestrator.reporting.model import Facts, Report, Section
+from orchestrator.reporting.source import Source, plain, table_of
+
+
+def build(source: Source) -> Report:
+    """Return the page."""
+    return Report(
+        title=source.command.capitalize(),
+        summary=f"Results of `{source.command}`.",
+        sections=tuple(sections_of("Results", source.results)),
+        origin=source.origin(),
+        downloads=source.downloads(),
+    )
+
+
+def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
+    """Return an object's plain values as facts, its lists of objects as tables, its objects as further sections."""
+    facts: list[tuple[str, Any]] = []
+    further: list[Section] = []
+    for name, item in value.items():
+        words = name.replace("_", " ")
+        if _is_records(item):
+            further.append(table_of(words.capitalize(), item))
+        elif _is_keyed_records(item):
+            further.append(table_of(words.capitalize(), [{"name": key, **inner} for key, inner in item.items()]))
+        elif isinstance(item, Mapping):
+            further += sections_of(words.capitalize(), item)
+        elif not (isinstance(item, Sequence) and not isinstance(item, str) and len(item) > 12):
+            facts.append((words, plain(item)))
+    return [*([Facts(title, tuple(facts))] if facts else []), *further]
+
+
+def _is_records(item: Any) -> bool:
+    return isinstance(item, list) and bool(item) and all(isinstance(entry, Mapping) for entry in item)
+
+
+def _is_keyed_records(item: Any) -> bool:
+    """Whether an object's values are all objects of plain values."""
+    return (
+        isinstance(item, Mapping)
+        and bool(item)
+        and all(
+            isinstance(v, Mapping) and not any(isinstance(w, (Mapping, list)) for w in v.values())
+            for v in item.values()
+        )
+    )

@@ -1,0 +1,120 @@
+"""A result directory as its page builder sees it: the JSON document, and CSV files by column."""
+
+import csv
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import ScenarioError
+from orchestrator.reporting.model import Cell, Column, Table
+
+DATA_SUFFIXES = (".csv", ".json", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")
+
+
+@dataclass(frozen=True)
+class Source:
+    """One command's result: ``document`` is ``COMMAND.json`` of ``directory``."""
+
+    directory: Path
+    command: str
+    document: Mapping[str, Any]
+
+    @property
+    def results(self) -> Mapping[str, Any]:
+        """The document's results."""
+        results = self.document.get("results")
+        return results if isinstance(results, Mapping) else {}
+
+    def columns(self, name: str) -> dict[str, list[Cell]]:
+        """Return a CSV file of the directory by column, empty when there is no such file.
+
+        Numbers become floats, what is empty or not finite becomes ``None``.
+
+        Raises:
+            ScenarioError: the file is not CSV with a heading and equally long rows.
+        """
+        path = self.directory / name
+        if not path.is_file():
+            return {}
+        try:
+            with path.open(encoding="utf-8", newline="") as stream:
+                rows = csv.reader(stream)
+                header = next(rows, [])
+                columns: list[list[Cell]] = [[] for _ in header]
+                for row in rows:
+                    for column, text in zip(columns, row, strict=True):
+                        column.append(_cell(text))
+        except (ValueError, csv.Error) as error:
+            raise ScenarioError(f"{path} must be a CSV table, but is not: {error}") from None
+        return dict(zip(header, columns, strict=True))
+
+    def origin(self) -> tuple[tuple[str, Cell], ...]:
+        """Return what was run and with what."""
+        arguments = self.document.get("arguments") or {}
+        given = {name: plain(value) for name, value in arguments.items() if value not in (None, False, [], {})}
+        head = {"command": self.command, "version": self.document.get("version"), "seed": self.document.get("seed")}
+        return tuple((name, value) for name, value in (head | given).items() if value is not None)
+
+    def downloads(self) -> tuple[Path, ...]:
+        """Return the data files of the directory, by name."""
+        return tuple(
+            path
+            for path in sorted(self.directory.iterdir())
+            if path.suffix in DATA_SUFFIXES and path.is_file() and not path.name.startswith(".")
+        )
+
+
+def load(directory: Path, command: str) -> Source:
+    """Read ``COMMAND.json`` of a result directory.
+
+    Raises:
+        ScenarioError: it is not there, or not what a command of this project writes.
+    """
+    path = directory / f"{command}.json"
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"cannot read {path}: {error.strerror}") from None
+    except ValueError as error:
+        raise ScenarioError(f"{path} must be JSON, but is not: {error}") from None
+    if not isinstance(document, dict) or document.get("command") != command or "results" not in document:
+        raise ScenarioError(f'{path} must be the result of `{command}` (with "command" and "results"), but is not')
+    return Source(directory, command, document)
+
+
+def _cell(text: str) -> Cell:
+    try:
+        value = float(text)
+    except ValueError:
+        return text or None
+    return value if math.isfinite(value) else None
+
+
+def plain(value: Any) -> Cell:
+    """Return any JSON value as one cell."""
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    if isinstance(value, Mapping):
+        return ", ".join(f"{k}: {_short(plain(v))}" for k, v in value.items())
+    return ", ".join(_short(plain(v)) for v in value)
+
+
+def _short(value: Cell) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def numbers(values: Sequence[Any]) -> list[float | None]:
+    """Return a column's numbers, ``None`` for everything else."""
+    return [float(v) if isinstance(v, (int, float)) and not isinstance(v, bool) else None for v in values]
+
+
+def table_of(
+    title: str, items: Sequence[Mapping[str, Any]], *, units: Mapping[str, str] | None = None, note: str = ""
+) -> Table:
+    """Return a table of equally shaped JSON objects, one column per key in order of first appearance."""
+    names = list(dict.fromkeys(name for item in items for name in item))
+    columns = tuple(Column(name.replace("_", " "), (units or {}).get(name, "")) for name in names)
+    return Table(title, columns, tuple(tuple(plain(item.get(name)) for name in names) for item in items), note)

@@ -1,0 +1,73 @@
+// Tables that sort: a button in every heading.
+function sortable(table) {
+  const body = table.tBodies[0];
+  const headings = [...table.tHead.rows[0].cells];
+  headings.forEach((heading, column) => {
+    const cells = [...body.rows].map((row) => row.cells[column]);
+    if (cells.length && cells.every((cell) => cell.classList.contains("number") || cell.dataset.key === "")) {
+      heading.classList.add("number");
+      cells.forEach((cell) => cell.classList.add("number"));
+    }
+    const button = element("button", { type: "button" });
+    button.append(...heading.childNodes);
+    heading.append(button);
+    button.addEventListener("click", () => {
+      const down = heading.getAttribute("aria-sort") === "ascending";
+      headings.forEach((other) => other.removeAttribute("aria-sort"));
+      heading.setAttribute("aria-sort", down ? "descending" : "ascending");
+      sortRows(body, column, down ? -1 : 1);
+    });
+  });
+}
+
+// Missing values go last in either direction.
+function sortRows(body, column, sign) {
+  const key = (row) => row.cells[column].dataset.key;
+  const numeric = [...body.rows].every((row) => key(row) === "" || !Number.isNaN(Number(key(row))));
+  const compare = (a, b) => {
+    const [first, second] = [key(a), key(b)];
+    if (first === "" || second === "") return (first === "") - (second === "");
+    return sign * (numeric ? first - second : first.localeCompare(second));
+  };
+  body.append(...[...body.rows].sort(compare));
+}
+
+// Light, dark, or as the system says; remembered where the browser lets us.
+function themeButton(button) {
+  const root = document.documentElement;
+  const modes = ["system", "light", "dark"];
+  let mode = remembered() ?? "system";
+  const apply = () => {
+    if (mode === "system") delete root.dataset.theme;
+    else root.dataset.theme = mode;
+    button.textContent = `Theme: ${mode}`;
+  };
+  button.hidden = false;
+  button.addEventListener("click", () => {
+    mode = modes[(modes.indexOf(mode) + 1) % modes.length];
+    remember(mode);
+    apply();
+  });
+  apply();
+}
+
+function remembered() {
+  try {
+    const mode = localStorage.getItem("report-theme");
+    return ["light", "dark"].includes(mode) ? mode : null;
+  } catch {
+    return null;
+  }
+}
+
+function remember(mode) {
+  try {
+    localStorage.setItem("report-theme", mode);
+  } catch {
+    // a page opened from a mail has no storage: the choice lasts as long as the page
+  }
+}
+
+themeButton(document.getElementById("theme"));
+document.querySelectorAll("table.sortable").forEach(sortable);
+document.querySelectorAll("figure.plot").forEach((figure) => new Plot(figure));

@@ -1,0 +1,204 @@
+"""Pages in a real browser: no console message, no request, sorting, hovering, zooming, keys, themes, paper."""
+
+import base64
+import json
+
+import pytest
+
+from orchestrator.reporting import render
+from tests.support import browser as browsers
+from tests.support.report import example
+
+pytestmark = pytest.mark.skipif(bool(browsers.missing()), reason=browsers.missing() or "never")
+
+
+@pytest.fixture(scope="module")
+def driver():
+    with browsers.browser() as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("page")
+    path = directory / "report.html"
+    path.write_text(render(example(directory)))
+    return path
+
+
+@pytest.fixture
+def opened(driver, page):
+    """The page, freshly opened at desktop width; whatever it logs fails the test."""
+    driver.get_log("browser")
+    driver.get_log("performance")
+    browsers.set_screen(driver, 1280, 900, "light")
+    driver.get(page.as_uri())
+    yield driver
+    assert driver.get_log("browser") == []
+
+
+def keys(driver, selector, *presses):
+    from selenium.webdriver.common.by import By
+
+    driver.find_element(By.CSS_SELECTOR, selector).send_keys(*presses)
+
+
+def test_nothing_is_asked_of_the_network(opened, page):
+    messages = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
+    asked = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
+    assert [url for url in asked if not url.startswith("data:")] == [page.as_uri()]
+
+
+@pytest.mark.parametrize("width", [1280, 390, 320])
+def test_the_page_is_never_wider_than_the_screen(opened, width):
+    browsers.set_screen(opened, width, 800, "light")
+    assert opened.execute_script("return document.documentElement.scrollWidth") <= width
+    for selector in (".plot svg", ".tools", "h1"):
+        edges = f"[...document.querySelectorAll('{selector}')].map(e => e.getBoundingClientRect().right)"
+        script = f"return Math.max(...{edges})"
+        assert opened.execute_script(script) <= width
+
+
+def test_every_plot_draws_its_marks_inside_its_frame(opened):
+    script = """
+    return [...document.querySelectorAll("figure.plot svg")].map(svg => {
+      const paths = [...svg.querySelectorAll("path")];
+      const values = [...svg.querySelectorAll("*")].flatMap(e => [...e.attributes].map(a => a.value));
+      const broken = values.some(value => /NaN|Infinity|undefined/.test(value));
+      return [paths.length, broken, svg.querySelectorAll("text").length];
+    });
+    """
+    for marks, broken, texts in opened.execute_script(script):
+        assert marks > 0
+        assert not broken
+        assert texts > 6
+
+
+def test_tables_sort_by_number_and_by_word_with_keys_only(opened):
+    column = "return [...document.querySelectorAll('tbody tr')].map(r => r.cells[{}].dataset.key)"
+    keys(opened, "th:nth-child(2) button", "\n")
+    values = [float(v) for v in opened.execute_script(column.format(1))]
+    assert values == sorted(values)
+    assert opened.execute_script("return document.querySelectorAll('th')[1].getAttribute('aria-sort')") == "ascending"
+    keys(opened, "th:nth-child(2) button", "\n")
+    assert [float(v) for v in opened.execute_script(column.format(1))] == sorted(values, reverse=True)
+    keys(opened, "th:nth-child(3) button", " ")
+    words = opened.execute_script(column.format(2))
+    assert words == sorted(words)
+    assert opened.execute_script("return document.querySelectorAll('th[aria-sort]').length") == 1
+
+
+def test_arrow_keys_read_the_points_and_change_the_series(opened):
+    from selenium.webdriver.common.keys import Keys
+
+    plot = "#section-4 figure"
+    keys(opened, f"{plot} svg", Keys.ARROW_RIGHT, Keys.ARROW_RIGHT)
+    said = opened.execute_script(f"return document.querySelector('{plot} [aria-live]').textContent")
+    assert said.startswith("time [s]: 0.01, with backlash: 0.0099")
+    keys(opened, f"{plot} svg", Keys.ARROW_DOWN)
+    assert opened.execute_script(f"return !document.querySelector('{plot} .tip').hidden")
+    keys(opened, f"{plot} svg", Keys.ARROW_LEFT, Keys.ARROW_LEFT)
+    said = opened.execute_script(f"return document.querySelector('{plot} [aria-live]').textContent")
+    assert said.startswith("time [s]: 20,")
+
+
+def ticks(driver, plot):
+    return driver.execute_script(f"return [...document.querySelectorAll('{plot} svg text')].map(t => t.textContent)")
+
+
+def test_plus_zooms_and_zero_shows_everything_again(opened):
+    plot = "#section-4 figure"
+    before = ticks(opened, plot)
+    keys(opened, f"{plot} svg", "+", "+")
+    assert ticks(opened, plot) != before
+    keys(opened, f"{plot} svg", "0")
+    assert ticks(opened, plot) == before
+
+
+def test_the_mouse_reads_values_zooms_and_resets(opened):
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.by import By
+
+    svg = opened.find_element(By.CSS_SELECTOR, "#section-3 figure svg")
+    before = ticks(opened, "#section-3")
+    chain = ActionChains(opened)
+    chain.move_to_element(svg).perform()
+    tip = opened.find_element(By.CSS_SELECTOR, "#section-3 .tip")
+    assert "estimate:" in tip.text
+    assert "case " in tip.text
+    chain.move_to_element_with_offset(svg, -100, 0).click_and_hold().move_by_offset(150, 60).release().perform()
+    assert ticks(opened, "#section-3") != before
+    chain.double_click(svg).perform()
+    assert ticks(opened, "#section-3") == before
+
+
+def test_the_legend_hides_a_curve(opened):
+    count = "return document.querySelectorAll('#section-4 svg path.curve').length"
+    assert opened.execute_script(count) == 3
+    keys(opened, "#section-4 .legend button", " ")
+    assert opened.execute_script(count) == 2
+    assert opened.execute_script("return document.querySelector('#section-4 .legend button').ariaPressed") == "false"
+
+
+def test_the_theme_follows_the_system_until_it_is_chosen(opened):
+    paper = "return getComputedStyle(document.body).backgroundColor"
+    light, dark = "rgb(255, 255, 255)", "rgb(20, 24, 29)"
+    assert opened.execute_script(paper) == light
+    browsers.set_screen(opened, 1280, 900, "dark")
+    assert opened.execute_script(paper) == dark
+    keys(opened, "#theme", "\n")
+    assert opened.execute_script(paper) == light
+    keys(opened, "#theme", "\n")
+    browsers.set_screen(opened, 1280, 900, "light")
+    assert opened.execute_script(paper) == dark
+    keys(opened, "#theme", "\n")
+    assert opened.execute_script("return document.getElementById('theme').textContent") == "Theme: system"
+
+
+CONTRAST = """
+const rgb = (text) => text.match(/[\\d.]+/g).slice(0, 3).map(Number);
+const light = (c) => rgb(c).map(v => v / 255).map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+  .reduce((sum, v, n) => sum + v * [0.2126, 0.7152, 0.0722][n], 0);
+const behind = (e) => { for (; e; e = e.parentElement) {
+  const c = getComputedStyle(e).backgroundColor; if (!/, 0\\)$|transparent/.test(c)) return c; }
+  return "rgb(255,255,255)"; };
+const poor = [];
+for (const e of document.querySelectorAll("h1,h2,p,a,button,td,th,dt,dd,li,small,strong,code,text")) {
+  if (!e.textContent.trim() || e.classList.contains("skip")) continue;
+  const style = getComputedStyle(e);
+  const [a, b] = [light(e.tagName === "text" ? style.fill : style.color), light(behind(e))].sort((m, n) => n - m);
+  if ((a + 0.05) / (b + 0.05) < 4.5) poor.push(`${e.tagName} ${e.textContent.slice(0, 20)} ${(a + 0.05) / (b + 0.05)}`);
+}
+return poor;
+"""
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_all_text_stands_out_from_what_is_behind_it(opened, scheme):
+    browsers.set_screen(opened, 1280, 900, scheme)
+    assert opened.execute_script(CONTRAST) == []
+
+
+def test_every_control_can_be_reached_by_tab_and_has_a_name(opened):
+    script = """
+    return [...document.querySelectorAll("button, a[href], [tabindex]")]
+      .filter(e => e.tabIndex < 0 || !(e.textContent.trim() || e.getAttribute("aria-label"))).map(e => e.outerHTML);
+    """
+    assert opened.execute_script(script) == []
+
+
+def test_the_data_can_be_downloaded_from_the_page_alone(opened):
+    href = opened.execute_script("return document.querySelector('.downloads a').href")
+    assert base64.b64decode(href.partition("base64,")[2]) == b"time,u\n0.0,1.5\n"
+
+
+def test_it_prints_in_light_on_white_without_buttons(opened):
+    browsers.set_screen(opened, 1280, 900, "dark")
+    opened.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    try:
+        assert opened.execute_script("return getComputedStyle(document.querySelector('nav')).display") == "none"
+        assert opened.execute_script("return getComputedStyle(document.body).color") == "rgb(27, 31, 36)"
+        pdf = opened.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})["data"]
+        assert base64.b64decode(pdf).startswith(b"%PDF")
+    finally:
+        opened.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
