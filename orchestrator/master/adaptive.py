@@ -1,0 +1,288 @@
+"""Continuous loops to a tolerance: windows of iterated waveforms, with rollback and error control.
+
+A window of time is cut into three cells. Each sweep restores all slaves to the start of the window and steps them one
+after the other through it; the outputs read at the four nodes give, by cubic interpolation, the inputs of the slaves
+that take them, as constant pieces with the right moments (``pieces``). The first sweep starts from extrapolated
+outputs; two sweeps leave an error of order five in the window's length, so that smooth loops converge with order four.
+
+The error is estimated by step doubling: the window once as a whole, then in two halves, for which the whole is so good
+a guess that two sweeps do. The halves are kept. A jump or a kink inside a window, such as a tooth that makes contact,
+shows as a large difference: the window is undone and shortened until the event's effect is below the tolerance, then
+windows grow again. They end where a source jumps.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import ConvergenceError, ScenarioError
+from orchestrator.master.algorithms import Adaptive
+from orchestrator.master.layout import Layout
+from orchestrator.master.pieces import CELLS, NODES, dense_matrix, piece_times, piece_weights
+from orchestrator.master.protocol import Signals, StepDiscardedError
+from orchestrator.master.result import Statistics
+from orchestrator.master.signals import Signal
+from orchestrator.master.wiring import Stage, Wiring
+
+Array = NDArray[np.float64]
+
+WHOLE_SWEEPS, HALF_SWEEPS = 2, 2
+SAFETY, SHRINK, GROW = 0.9, 0.1, 4.0
+ORDER = 5
+"""Order, in a smooth window's length, of the error after it."""
+
+
+@dataclass
+class _Waveform:
+    """Outputs over a window as cubics; predicts the next window and fills in the recorded points between nodes."""
+
+    start: float
+    end: float
+    nodes: Array
+    coefficients: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.coefficients = dense_matrix() @ self.nodes
+
+    def at(self, times: Signals) -> Array:
+        s = (times - self.start) / (self.end - self.start)
+        return np.vander(s, NODES, increasing=True) @ self.coefficients
+
+
+@dataclass
+class _Counts:
+    accepted: int = 0
+    rejected: int = 0
+    sweeps: int = 0
+
+
+def run_adaptive(
+    wiring: Wiring,
+    signals: Mapping[int, Signal],
+    start: float,
+    stop: float,
+    settings: Adaptive,
+    rows: Array,
+    record: NDArray[np.int64],
+) -> Statistics:
+    """Run from ``start`` to ``stop`` [s]; ``rows`` has shape (grid points, recorded) with row 0 already there.
+
+    Raises:
+        ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.
+        ConvergenceError: the tolerance cannot be met with the smallest step allowed.
+    """
+    _check(wiring.layout)
+    return _Run(wiring, signals, start, stop, settings, rows, record).run()
+
+
+def _check(layout: Layout) -> None:
+    for instance in layout.system.instances:
+        model = instance.model
+        if not (model.can_save_state and model.can_vary_step):
+            lack = "save its state" if model.can_vary_step else "vary its step"
+            raise ScenarioError(
+                f"$.master.algorithm: must not be 'adaptive', but is, and {instance.name} cannot {lack}"
+            )
+    for k, connection in enumerate(layout.system.connections):
+        if connection.quantum > 0.0:
+            raise ScenarioError(
+                f"$.connections[{k}].quantum: must be 0 under 'adaptive', but is {connection.quantum!r}"
+            )
+
+
+class _Run:
+    """One run: the windows, their lengths and the recorded points."""
+
+    def __init__(
+        self,
+        wiring: Wiring,
+        signals: Mapping[int, Signal],
+        start: float,
+        stop: float,
+        settings: Adaptive,
+        rows: Array,
+        record: NDArray[np.int64],
+    ) -> None:
+        self.wiring, self.settings, self.rows, self.record = wiring, settings, rows, record
+        self.start, self.stop = start, stop
+        system = wiring.layout.system
+        self.signals = [signals.get(k, source.signal) for k, source in enumerate(system.sources)]
+        self.breaks = sorted({t for s in self.signals for t in s.breaks(start, stop)} | {stop})
+        self.held = np.array([self._is_held(address) for address in wiring.layout.slots], dtype=bool)
+        self.outputs = np.array(
+            [b.first_output + j for b in wiring.layout.blocks for j in range(len(b.outputs))], dtype=np.int64
+        )
+        self.outputs = self.outputs[~self.held[self.outputs]]
+        self.closing = {b.name: self._feeds_through(b.name) for b in wiring.layout.blocks}
+        self.counts = _Counts()
+        self.calls = dict.fromkeys((b.name for b in wiring.layout.blocks), 0)
+
+    def _is_held(self, address: str) -> bool:
+        variable = self.wiring.layout.system.variable(address)
+        return variable is not None and (variable.type != "Real" or variable.variability == "discrete")
+
+    def _feeds_through(self, name: str) -> bool:
+        block = next(b for b in self.wiring.layout.blocks if b.name == name)
+        instance = self.wiring.layout.system.instance(name)
+        assert instance is not None
+        outputs = [o for o in block.outputs if instance.model.variables[o].causality == "output"]
+        return any(i in instance.model.depends_on(o) for o in outputs for i in block.inputs)
+
+    def run(self) -> Statistics:
+        time, length = self.start, min(self.settings.first, self.settings.largest)
+        row = 1
+        for target in self.breaks:
+            guess: _Waveform | None = None
+            while time < target:
+                end = self._window_end(time, length, target)
+                halves, guess, error = self._attempt(time, end, guess)
+                length = self._next_length(end - time, error)
+                if halves:
+                    for waveform in halves:
+                        row = self._write(waveform, row)
+                    self.counts.accepted += 1
+                    time = end
+                else:
+                    self.counts.rejected += 1
+                    self._give_up(time, length)
+        return Statistics(self.counts.accepted, self.counts.rejected, self.calls, self.counts.sweeps)
+
+    def _window_end(self, time: float, length: float, target: float) -> float:
+        left = target - time
+        if left <= 1.01 * length:
+            return target
+        return time + min(length, 0.5 * left) if left < 2.0 * length else time + length
+
+    def _next_length(self, length: float, error: float) -> float:
+        factor = SHRINK if not math.isfinite(error) else SAFETY * max(error, 1e-12) ** (-1.0 / ORDER)
+        return min(length * min(max(factor, SHRINK), GROW), self.settings.largest)
+
+    def _give_up(self, time: float, length: float) -> None:
+        if length < self.settings.smallest:
+            raise ConvergenceError(
+                f"t = {time:.9g} s: a tolerance of {self.settings.tolerance:g} would take a step below "
+                f"{self.settings.smallest:g} s; use a larger tolerance, or algorithm 'iterated' for an algebraic loop"
+            )
+
+    @contextmanager
+    def _saved(self) -> Iterator[Callable[[], None]]:
+        """Yield a call that takes all slaves and signals back to now."""
+        states: list[tuple[Stage, Any]] = []
+        values = self.wiring.values.copy()
+
+        def restore() -> None:
+            for stage, state in states:
+                stage.slave.set_state(state)
+            self.wiring.values[:] = values
+
+        try:
+            for stage in self.wiring.stages:
+                states.append((stage, stage.slave.get_state()))
+            yield restore
+        finally:
+            for stage, state in states:
+                stage.slave.free_state(state)
+
+    def _attempt(
+        self, start: float, end: float, guess: _Waveform | None
+    ) -> tuple[tuple[_Waveform, ...], _Waveform | None, float]:
+        """Try one window; return its halves (none: undone), a guess for the next, the error over the tolerance."""
+        middle = 0.5 * (start + end)
+        with self._saved() as restore:
+            try:
+                whole = self._sweep(start, end, guess, WHOLE_SWEEPS)
+                restore()
+                first = self._sweep(start, middle, whole, HALF_SWEEPS)
+                second = self._sweep(middle, end, whole, HALF_SWEEPS)
+            except StepDiscardedError:
+                restore()
+                return (), None, math.inf
+            found, estimate = second.nodes[-1][self.outputs], whole.nodes[-1][self.outputs]
+            scale = self.settings.tolerance * np.maximum(1.0, np.abs(found))
+            error = float(np.max(np.abs(found - estimate) / scale, initial=0.0))
+            if error <= 1.0:
+                return (first, second), second, error
+            restore()
+            return (), whole if math.isfinite(error) else None, error
+
+    def _sweep(self, start: float, end: float, guess: _Waveform | None, sweeps: int) -> _Waveform:
+        """Step all slaves from ``start`` to ``end`` [s], ``sweeps`` times over, and return the outputs in between."""
+        times = start + (end - start) * np.arange(NODES) / CELLS
+        initial = self.wiring.values.copy()
+        nodes = np.tile(initial, (NODES, 1))
+        if guess is not None:
+            guessed = guess.at(times)[:, self.outputs]
+            nodes[1:, self.outputs] = guessed[1:] + (initial[self.outputs] - guessed[0])
+        feeds = self._signal_nodes(times)
+        with self._saved() as restore:
+            for sweep in range(sweeps):
+                if sweep:
+                    restore()
+                self.counts.sweeps += 1
+                for stage in self.wiring.stages:
+                    self._advance(stage, start, end, nodes, feeds)
+        return _Waveform(start, end, nodes)
+
+    def _signal_nodes(self, times: Array) -> Array:
+        """Return what the sources add at the nodes, shape (rows, nodes): left limits at a window's end."""
+        inside = times.copy()
+        if times[-1] in self.breaks:
+            inside[-1] -= 1e-6 * (times[-1] - times[0])
+        table = np.zeros((len(self.wiring.layout.signals), NODES))
+        for k, parts in enumerate(self.wiring.layout.signals):
+            for index, factor, offset, _ in parts:
+                table[k] += factor * self.signals[index].sample(inside) + offset
+        return table
+
+    def _advance(self, stage: Stage, start: float, end: float, nodes: Array, feeds: Array) -> None:
+        """Step one slave through the window and read its outputs at the nodes."""
+        block, values = stage.block, self.wiring.values
+        closing = self.closing[block.name]
+        inputs = slice(block.first_input, block.first_input + len(block.inputs))
+        outputs = slice(block.first_output, block.first_output + len(block.outputs))
+        constants = piece_weights(closing) @ self._input_nodes(stage, nodes, feeds)
+        times, at_node = piece_times(start, end, closing)
+        node = 1
+        for k, ends_cell in enumerate(at_node):
+            if block.inputs:
+                values[inputs] = constants[k]
+                stage.send()
+            stage.do_step(times[k], times[k + 1] - times[k])
+            self.calls[block.name] += 1
+            if ends_cell:
+                stage.receive()
+                nodes[node, outputs] = values[outputs]
+                nodes[node, inputs] = values[inputs]
+                node += 1
+
+    def _input_nodes(self, stage: Stage, nodes: Array, feeds: Array) -> Array:
+        columns = np.empty((NODES, len(stage.block.feeds)))
+        for k, feed in enumerate(stage.block.feeds):
+            column = np.full(NODES, feed.offset)
+            if feed.source >= 0:
+                source = nodes[:, feed.source]
+                column += feed.factor * (source[0] if self.held[feed.source] else source)
+            if feed.signal >= 0:
+                column += feeds[feed.signal]
+            columns[:, k] = column
+        return columns
+
+    def _write(self, waveform: _Waveform, row: int) -> int:
+        """Fill in the recorded points up to the end of the window; return the next one's number."""
+        step, last = self.settings.step, len(self.rows) - 1
+        slack = 1e-9 * step
+        first = row
+        while row <= last and self.start + row * step <= waveform.end + slack:
+            row += 1
+        if row > first:
+            times = np.minimum(self.start + step * np.arange(first, row), waveform.end)
+            block = waveform.at(times)
+            node = np.floor((times - waveform.start) / (waveform.end - waveform.start) * CELLS + 1e-9).astype(np.int64)
+            block[:, self.held] = waveform.nodes[node][:, self.held]
+            self.rows[first:row] = block[:, self.record]
+        return row

@@ -1,0 +1,92 @@
+"""Which master algorithm runs a system, with its settings."""
+
+import math
+from dataclasses import dataclass
+
+from orchestrator.errors import ScenarioError
+
+
+@dataclass(frozen=True, slots=True)
+class GaussSeidel:
+    """Instances one after the other in execution order, each with the newest values there are. Fixed step [s].
+
+    Attributes:
+        step: communication step [s].
+        compiled: run the loop in machine code where all slaves allow it.
+    """
+
+    step: float
+    compiled: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Jacobi:
+    """All instances side by side, with the values of the start of the step. Fixed step [s]; ``compiled`` as above."""
+
+    step: float
+    compiled: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Iterated:
+    """Gauss-Seidel, each step repeated with rollback until the values that the instances of a loop exchange settle.
+
+    Attributes:
+        step: communication step [s].
+        tolerance: largest change of an exchanged value, relative to ``max(1, |value|)``.
+        iterations: most passes per step.
+    """
+
+    step: float
+    tolerance: float = 1e-10
+    iterations: int = 50
+
+
+@dataclass(frozen=True, slots=True)
+class Adaptive:
+    """Error-controlled communication step with rollback, for continuous loops; see ``adaptive``.
+
+    Attributes:
+        step: distance of the recorded points [s].
+        tolerance: largest error of an exchanged value per communication step, relative to ``max(1, |value|)``.
+        first: first communication step tried [s].
+        smallest: below this step [s] the run is given up.
+        largest: largest communication step [s].
+    """
+
+    step: float
+    tolerance: float = 1e-9
+    first: float = 1e-4
+    smallest: float = 1e-11
+    largest: float = 0.02
+
+
+Algorithm = GaussSeidel | Jacobi | Iterated | Adaptive
+
+ALGORITHMS: dict[str, type[Algorithm]] = {
+    "gauss_seidel": GaussSeidel,
+    "jacobi": Jacobi,
+    "iterated": Iterated,
+    "adaptive": Adaptive,
+}
+
+MAXIMUM_STEPS = 100_000_000
+
+
+def step_count(start: float, stop: float, step: float) -> int:
+    """Return the number of steps of the communication grid ``start + n * step``.
+
+    Raises:
+        ScenarioError: the times are not finite, not in order, or no whole number of steps fits.
+    """
+    if not (math.isfinite(step) and step > 0.0):
+        raise ScenarioError(f"`step` must be finite and positive, but is {step!r}")
+    if not (math.isfinite(start) and math.isfinite(stop) and stop > start):
+        raise ScenarioError(f"`stop` must be finite and after `start`, but they are {stop!r} and {start!r}")
+    ratio = (stop - start) / step
+    if ratio > MAXIMUM_STEPS:
+        raise ScenarioError(f"`step` must leave at most {MAXIMUM_STEPS:,} steps, but {step!r} leaves {ratio:.3g}")
+    count = round(ratio)
+    if count < 1 or abs(ratio - count) > 1e-6:
+        raise ScenarioError(f"`stop` must be a whole number of steps after `start`, but is {ratio!r} steps after it")
+    return count

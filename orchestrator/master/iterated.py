@@ -1,0 +1,140 @@
+"""Algebraic loops: values that depend on one another at the same instant, solved by repeating with rollback."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import ScenarioError
+from orchestrator.master.algorithms import Iterated
+from orchestrator.master.fixed_point import fixed_point
+from orchestrator.master.layout import Layout
+from orchestrator.master.wiring import Stage, View, Wiring, gather
+
+Array = NDArray[np.float64]
+Slots = NDArray[np.int64]
+
+
+def backward_slots(layout: Layout, names: tuple[str, ...]) -> NDArray[np.int64]:
+    """Return the output slots that an instance of ``names`` takes from itself or from one that is stepped later.
+
+    Fixing their values fixes what one pass over the instances computes: they are the unknowns of the loop.
+    """
+    position = {block.name: k for k, block in enumerate(layout.blocks)}
+    owner = {block.first_output + j: block.name for block in layout.blocks for j in range(len(block.outputs))}
+    cut = {
+        feed.source
+        for block in layout.blocks
+        for feed in block.feeds
+        if feed.source >= 0 and block.name in names and owner[feed.source] in names
+        if position[owner[feed.source]] >= position[block.name]
+    }
+    return np.array(sorted(cut), dtype=np.int64)
+
+
+def initialise(wiring: Wiring, table: Array, tolerance: float, iterations: int) -> int:
+    """Make inputs and outputs agree while all slaves are in initialisation; return the number of passes.
+
+    Raises:
+        ConvergenceError: the initial values of a loop do not settle.
+    """
+    values, view = wiring.values, wiring.view
+    cut = backward_slots(wiring.layout, tuple(block.name for block in wiring.layout.blocks))
+    for stage in wiring.stages:
+        stage.receive()
+
+    def sweep(point: Array) -> Array:
+        values[cut] = point
+        for stage in wiring.stages:
+            gather(stage, view, table, 0)
+            stage.send()
+            stage.receive()
+        return values[cut]
+
+    return fixed_point(sweep, values[cut], tolerance, iterations, "initialisation")
+
+
+def run_iterated(
+    wiring: Wiring, table: Array, start: float, settings: Iterated, steps: int, rows: Array, record: Slots
+) -> int:
+    """Run on the grid; the instances of each algebraic loop are stepped until what they exchange settles.
+
+    Returns the number of passes over loops. Arguments as for ``fixed_step.run_sequential``.
+
+    Raises:
+        ScenarioError: an instance of a loop cannot save its state.
+        ConvergenceError: a loop does not settle.
+    """
+    groups = _groups(wiring)
+    passes = 0
+    for n in range(steps):
+        time = start + n * settings.step
+        for stages, cut in groups:
+            if len(cut) == 0:
+                _pass(stages, wiring.view, table, n + 1, time, settings.step)
+                passes += 1
+            else:
+                passes += _solve(stages, cut, wiring, table, n + 1, time, settings)
+        np.take(wiring.values, record, out=rows[n + 1], mode="clip")
+    return passes
+
+
+def _groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], NDArray[np.int64]]]:
+    loops = wiring.layout.system.loops()
+    groups: list[tuple[tuple[Stage, ...], NDArray[np.int64]]] = []
+    done: set[str] = set()
+    for stage in wiring.stages:
+        name = stage.block.name
+        if name in done:
+            continue
+        loop = next((g for g in loops if name in g), (name,))
+        stages = tuple(s for s in wiring.stages if s.block.name in loop)
+        cut = backward_slots(wiring.layout, loop) if loop in loops else np.zeros(0, dtype=np.int64)
+        for member in stages if len(cut) else ():
+            if not member.slave.model.can_save_state:
+                raise ScenarioError(
+                    f"$.master.algorithm: must not be 'iterated', but is, and {member.block.name} of the loop "
+                    f"{', '.join(loop)} cannot save its state"
+                )
+        groups.append((stages, cut))
+        done.update(s.block.name for s in stages)
+    return groups
+
+
+def _pass(stages: tuple[Stage, ...], view: View, table: Array, column: int, time: float, step: float) -> None:
+    for stage in stages:
+        gather(stage, view, table, column)
+        stage.send()
+        stage.do_step(time, step)
+        stage.receive()
+
+
+def _solve(
+    stages: tuple[Stage, ...],
+    cut: NDArray[np.int64],
+    wiring: Wiring,
+    table: Array,
+    column: int,
+    time: float,
+    settings: Iterated,
+) -> int:
+    values = wiring.values
+    saved: list[tuple[Stage, Any]] = [(stage, stage.slave.get_state()) for stage in stages]
+    first = True
+
+    def sweep(point: Array) -> Array:
+        nonlocal first
+        if not first:
+            for stage, state in saved:
+                stage.slave.set_state(state)
+        first = False
+        values[cut] = point
+        _pass(stages, wiring.view, table, column, time, settings.step)
+        return values[cut]
+
+    try:
+        what = f"{', '.join(s.block.name for s in stages)} at t = {time:g} s"
+        return fixed_point(sweep, values[cut], settings.tolerance, settings.iterations, what)
+    finally:
+        for stage, state in saved:
+            stage.slave.free_state(state)

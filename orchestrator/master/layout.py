@@ -1,0 +1,196 @@
+"""Where every signal of a run lies in one flat array, and what feeds every input.
+
+The outputs that somebody needs and the inputs that somebody feeds have one slot each. An instance's outputs are
+neighbours, and so are its inputs: a slave reads and writes its slots in place, and a connection is a copy from slot
+to slot within one array.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.master import units
+from orchestrator.master.protocol import Signals, Variable
+from orchestrator.master.signals import Signal
+from orchestrator.master.system import System, split
+
+_TYPE_ORDER = {"Real": 0, "Integer": 1, "Enumeration": 1, "Boolean": 2}
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """What an input slot gets before a step: ``round_to(quantum, factor * slots[source] + offset + signal)``.
+
+    Attributes:
+        slot: the input's slot.
+        source: the output's slot, or -1.
+        factor: of the source, unit conversion included.
+        offset: in the input's unit.
+        quantum: resolution, 0 for none.
+        signal: row of the table of signals, or -1.
+    """
+
+    slot: int
+    source: int
+    factor: float
+    offset: float
+    quantum: float
+    signal: int
+
+    @property
+    def plain(self) -> bool:
+        """Whether the input is a mere copy of the source."""
+        return self.source >= 0 and self.signal < 0 and (self.factor, self.offset, self.quantum) == (1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One instance's part of the array.
+
+    Attributes:
+        name: the instance's name.
+        inputs: names of the fed inputs, in the order of their slots.
+        outputs: names of the needed outputs, in the order of their slots.
+        first_input: slot of the first input.
+        first_output: slot of the first output.
+        feeds: one per fed input, in the order of slots.
+    """
+
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    first_input: int
+    first_output: int
+    feeds: tuple[Feed, ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The plan of one run's signals.
+
+    Attributes:
+        blocks: one per instance, in execution order.
+        size: number of slots.
+        slots: slot by ``instance.variable``.
+        recorded: slots of the recorded signals, in the order asked for.
+        signals: for each row of the table of signals, the sources (index into ``System.sources``, factor and offset
+            of the unit conversion, whether the value at the end of the step counts) that are added up in it.
+        system: what was laid out.
+    """
+
+    blocks: tuple[Block, ...]
+    size: int
+    slots: Mapping[str, int]
+    recorded: tuple[int, ...]
+    signals: tuple[tuple[tuple[int, float, float, bool], ...], ...]
+    system: System
+
+    def signal_table(self, times: Signals, replaced: Mapping[int, Signal]) -> NDArray[np.float64]:
+        """Return what the sources add to inputs: column 0 for initialisation, column ``n + 1`` for step ``n``.
+
+        Args:
+            times: communication points [s], shape (steps + 1,).
+            replaced: signals that stand in for those of ``System.sources``, by index.
+        """
+        table = np.zeros((len(self.signals), len(times)))
+        for row, parts in zip(table, self.signals, strict=True):
+            for index, factor, offset, at_end in parts:
+                signal = replaced.get(index, self.system.sources[index].signal)
+                values = factor * signal.sample(times) + offset
+                row[0] += values[0]
+                row[1:] += values[1:] if at_end else values[:-1]
+        return table
+
+
+def lay_out(system: System, record: Sequence[str], simultaneous: bool) -> Layout:
+    """Plan the signals of a sound system.
+
+    Args:
+        system: without problems.
+        record: signals to be recorded, ``instance.variable``.
+        simultaneous: all instances take their inputs at the start of a step (Jacobi).
+    """
+    needed = _needed(system, record)
+    fed = _fed(system)
+    slots: dict[str, int] = {}
+    order = system.execution_order()
+    for name in order:
+        for variable in (*needed[name], *fed[name]):
+            slots.setdefault(f"{name}.{variable}", len(slots))
+    signals: list[tuple[tuple[int, float, float, bool], ...]] = []
+    blocks = []
+    for name in order:
+        feeds = tuple(_feed(system, f"{name}.{v}", slots, order, simultaneous, signals) for v in fed[name])
+        first_output = slots[f"{name}.{needed[name][0]}"] if needed[name] else 0
+        first_input = slots[f"{name}.{fed[name][0]}"] if fed[name] else 0
+        blocks.append(Block(name, fed[name], needed[name], first_input, first_output, feeds))
+    recorded = tuple(slots[address] for address in record)
+    return Layout(tuple(blocks), len(slots), slots, recorded, tuple(signals), system)
+
+
+def _needed(system: System, record: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    fed = _fed(system)
+    wanted: dict[str, dict[str, Variable]] = {i.name: {} for i in system.instances}
+    for address in [c.source for c in system.connections] + list(record):
+        name, variable = split(address)
+        found = system.variable(address)
+        assert found is not None
+        if variable not in fed[name]:
+            wanted[name][variable] = found
+    return {name: _by_type(variables) for name, variables in wanted.items()}
+
+
+def _fed(system: System) -> dict[str, tuple[str, ...]]:
+    targets: dict[str, dict[str, Variable]] = {i.name: {} for i in system.instances}
+    for address in [c.target for c in system.connections] + [s.target for s in system.sources]:
+        name, variable = split(address)
+        found = system.variable(address)
+        assert found is not None
+        targets[name][variable] = found
+    return {name: _by_type(variables) for name, variables in targets.items()}
+
+
+def _by_type(variables: Mapping[str, Variable]) -> tuple[str, ...]:
+    return tuple(sorted(variables, key=lambda name: _TYPE_ORDER[variables[name].type]))
+
+
+def _feed(
+    system: System,
+    target: str,
+    slots: Mapping[str, int],
+    order: tuple[str, ...],
+    simultaneous: bool,
+    signals: list[tuple[tuple[int, float, float, bool], ...]],
+) -> Feed:
+    connection = next((c for c in system.connections if c.target == target), None)
+    factor, offset, quantum, source = 1.0, 0.0, 0.0, -1
+    newer = system.fed_through(target)
+    if connection is not None:
+        ratio = units.conversion(system.unit(connection.source), system.unit(target))
+        assert ratio is not None
+        factor, offset = connection.factor * ratio[0], connection.factor * ratio[1] + connection.offset
+        quantum, source = connection.quantum, slots[connection.source]
+        newer = order.index(split(connection.source)[0]) < order.index(split(target)[0])
+    parts = []
+    for index, signal in enumerate(system.sources):
+        if signal.target == target:
+            ratio = _signal_ratio(system, target, signal.unit)
+            at_end = (newer and not simultaneous) if signal.at is None else signal.at == "end"
+            parts.append((index, *ratio, at_end))
+    row = -1
+    if parts:
+        row = len(signals)
+        signals.append(tuple(parts))
+    return Feed(slots[target], source, factor, offset, quantum, row)
+
+
+def _signal_ratio(system: System, target: str, unit: str | None) -> tuple[float, float]:
+    if unit is None:
+        return 1.0, 0.0
+    instance = system.instance(split(target)[0])
+    assert instance is not None
+    ratio = units.conversion(units.resolve(unit, instance.model.units), system.unit(target))
+    assert ratio is not None
+    return ratio

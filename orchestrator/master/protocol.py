@@ -1,0 +1,169 @@
+"""What the master algorithms know of a slave: its variables and a handful of calls. Nothing here speaks of FMI."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import SlaveError
+
+Value = float | int | bool | str
+Transfer = Callable[[], None]
+Signals = NDArray[np.float64]
+
+SETTABLE = frozenset({"parameter", "input"})
+READABLE = frozenset({"output", "local", "input", "parameter", "calculatedParameter", "independent"})
+NUMERIC = frozenset({"Real", "Integer", "Boolean", "Enumeration"})
+
+
+class StepDiscardedError(SlaveError):
+    """A slave could not complete a step, but is well: it may be restored, reset, or asked for a shorter step."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit by its relation to SI: ``base value = factor * value + offset``.
+
+    Attributes:
+        name: as it is written beside a value.
+        exponents: of kg, m, s, A, K, mol, cd, rad; ``None`` when the unit is a mere name.
+        factor: see above.
+        offset: see above.
+    """
+
+    name: str
+    exponents: tuple[int, ...] | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One scalar variable of a slave.
+
+    Attributes:
+        name: unique within the slave.
+        causality: ``input``, ``output``, ``parameter``, ``calculatedParameter``, ``local`` or ``independent``.
+        type: ``Real``, ``Integer``, ``Boolean``, ``Enumeration`` or ``String``.
+        unit: name of the unit of a ``Real``, a key of ``Model.units``; ``None`` when none is declared.
+        variability: ``continuous``, ``discrete``, ``tunable``, ``fixed`` or ``constant``.
+        start: start value; ``None`` when none is declared.
+        minimum: smallest value allowed; ``None`` when none is declared.
+        maximum: largest value allowed; ``None`` when none is declared.
+        items: an ``Enumeration``'s literals with their values.
+        description: one line.
+        reference: the slave's own handle.
+    """
+
+    name: str
+    causality: str
+    type: str = "Real"
+    unit: str | None = None
+    variability: str = "continuous"
+    start: Value | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    items: tuple[tuple[str, int], ...] = ()
+    description: str = ""
+    reference: int = 0
+
+
+@dataclass(frozen=True)
+class Model:
+    """The interface that all slaves made from one model share.
+
+    Attributes:
+        name: the model's name.
+        variables: by name, in the order of declaration.
+        units: the declared units by name.
+        feedthrough: for each output, the inputs on which it depends at the same instant; an output that is
+            missing here depends on every input, for all that is known.
+        can_save_state: ``get_state``, ``set_state`` and ``free_state`` work.
+        can_vary_step: ``do_step`` takes steps of any length.
+    """
+
+    name: str
+    variables: Mapping[str, Variable]
+    units: Mapping[str, Unit] = field(default_factory=dict)
+    feedthrough: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    can_save_state: bool = True
+    can_vary_step: bool = True
+
+    def named(self, causality: str) -> tuple[str, ...]:
+        """Return the names of the variables with this causality, in the order of declaration."""
+        return tuple(v.name for v in self.variables.values() if v.causality == causality)
+
+    def depends_on(self, output: str) -> frozenset[str]:
+        """Return the inputs on which ``output`` depends at the same instant (all of them when it is not declared)."""
+        declared = self.feedthrough.get(output)
+        return frozenset(self.named("input")) if declared is None else declared
+
+
+class Slave(Protocol):
+    """One simulated unit.
+
+    Signals travel in flat arrays of float64: Integer and Enumeration values are exact in them, Boolean is 0 or 1.
+    ``sends`` and ``receives`` bind a buffer once; the callables that they return move all its values in one go.
+
+    Call order::
+
+        set*                                    parameters and start values
+        begin(start, stop, tolerance)           enters initialisation
+        (set | send | receive)*                 initial inputs and outputs
+        start()                                 ends initialisation
+        (send* do_step receive*)*               time goes on; get_state and set_state at any point between
+        terminate()                             the run is over, outputs can still be read
+        reset()                                 as new: parameters at their defaults, bindings stay valid
+        close()                                 for good
+
+    Every call raises ``SlaveError`` with the instance's name and the slave's own message when it fails. After that
+    only ``close`` may be called, save for ``StepDiscardedError`` after which ``set_state`` and ``reset`` may be too.
+    """
+
+    name: str
+    model: Model
+
+    def set(self, values: Mapping[str, Value]) -> None:
+        """Set variables of any type by name."""
+
+    def get(self, names: Sequence[str]) -> list[Value]:
+        """Return variables of any type by name."""
+
+    def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that sets the numeric variables ``names`` from ``buffer``; shape (len(names),)."""
+
+    def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that reads the numeric variables ``names`` into ``buffer``; shape (len(names),)."""
+
+    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
+        """Enter initialisation for a run from ``start`` to ``stop`` [s]."""
+
+    def start(self) -> None:
+        """End initialisation."""
+
+    def do_step(self, time: float, step: float) -> None:
+        """Advance from ``time`` to ``time + step`` [s], inputs held.
+
+        Raises:
+            StepDiscardedError: the step was not done; the slave is well.
+        """
+
+    def get_state(self) -> Any:
+        """Return a handle of a copy of the whole state."""
+
+    def set_state(self, state: Any) -> None:
+        """Return to a state; the handle stays valid."""
+
+    def free_state(self, state: Any) -> None:
+        """Give a handle back."""
+
+    def terminate(self) -> None:
+        """End the run."""
+
+    def reset(self) -> None:
+        """Return to the condition of a new slave."""
+
+    def close(self) -> None:
+        """Release everything. May be called at any time and more than once; never raises."""

@@ -1,0 +1,163 @@
+"""Slaves that are made once and run as often as needed."""
+
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.master.adaptive import run_adaptive
+from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
+from orchestrator.master.fixed_step import run_sequential, run_simultaneous
+from orchestrator.master.iterated import initialise, run_iterated
+from orchestrator.master.layout import Layout, lay_out
+from orchestrator.master.protocol import Slave, Value
+from orchestrator.master.result import Result, Statistics
+from orchestrator.master.signals import Signal
+from orchestrator.master.system import Problem, Quantity, System, raise_problems, split
+from orchestrator.master.wiring import Wiring, wire
+
+Array = NDArray[np.float64]
+
+INITIAL_TOLERANCE = 1e-12
+INITIAL_PASSES = 100
+
+
+class Session:
+    """Runs one system again and again: slaves are made once and reset between runs.
+
+    Use as a context manager, or call ``close``. A slave that failed is dropped, and made anew by the next run.
+
+    Args:
+        system: what to run.
+        record: signals to record, ``instance.variable``.
+        algorithm: master algorithm with its settings.
+        stop: end of a run [s].
+        start: beginning of a run [s].
+
+    Raises:
+        ScenarioError: the system, the record list or the times are wrong; all problems in one message.
+        ConnectionMismatchError: there is nothing wrong but connections.
+    """
+
+    def __init__(
+        self, system: System, record: Sequence[str], algorithm: Algorithm, stop: float, start: float = 0.0
+    ) -> None:
+        names = tuple(record)
+        raise_problems(system.problems() + system.record_problems(names))
+        self.system, self.record, self.algorithm = system, names, algorithm
+        self.start, self.stop = start, stop
+        self.steps = step_count(start, stop, algorithm.step)
+        self.layout: Layout = lay_out(system, names, simultaneous=isinstance(algorithm, Jacobi))
+        self._slaves: dict[str, Slave] = {}
+        self._wiring: Wiring | None = None
+        self._used: set[str] = set()
+
+    def __enter__(self) -> "Session":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release all slaves."""
+        for slave in self._slaves.values():
+            slave.close()
+        self._slaves.clear()
+        self._wiring = None
+
+    def run(
+        self, start: Mapping[str, Value | Quantity] | None = None, signals: Mapping[int, Signal] | None = None
+    ) -> Result:
+        """Run once.
+
+        Args:
+            start: parameters and start values by ``instance.variable``, over those of the system.
+            signals: signals in place of those of ``System.sources``, by index.
+
+        Raises:
+            ScenarioError: a start value is wrong.
+            SlaveError: a slave refused or failed a call.
+            ConvergenceError: a loop did not settle.
+        """
+        values = self._start_values(start or {})
+        wiring = self._ready()
+        times: Array = self.start + self.algorithm.step * np.arange(self.steps + 1, dtype=np.float64)
+        table = self.layout.signal_table(times, signals or {})
+        rows = np.empty((self.steps + 1, len(self.record)))
+        try:
+            self._initialise(wiring, values, table)
+            self._used.update(self._slaves)
+            statistics = self._go(wiring, table, rows, signals or {})
+            for stage in wiring.stages:
+                stage.slave.terminate()
+        except SimulationError:
+            self.close()
+            raise
+        units = {name: getattr(self.system.unit(name), "name", None) for name in self.record}
+        return Result(times, rows.T, self.record, units, statistics)
+
+    def _ready(self) -> Wiring:
+        if self._wiring is None:
+            self._used.clear()
+            try:
+                for instance in self.system.instances:
+                    self._slaves[instance.name] = instance.create(instance.name)
+                self._wiring = wire(self.layout, self._slaves)
+            except BaseException:
+                self.close()
+                raise
+        return self._wiring
+
+    def _start_values(self, extra: Mapping[str, Value | Quantity]) -> dict[str, dict[str, Value]]:
+        given: dict[str, Value | Quantity] = {
+            f"{i.name}.{variable}": value for i in self.system.instances for variable, value in i.start.items()
+        }
+        given.update(extra)
+        values: dict[str, dict[str, Value]] = {i.name: {} for i in self.system.instances}
+        problems = []
+        for address, raw in given.items():
+            value, text = self.system.start_value(address, raw)
+            if value is None:
+                problems.append(Problem(f"$.{address}", text or ""))
+            else:
+                name, variable = split(address)
+                values[name][variable] = value
+        raise_problems(problems)
+        return values
+
+    def _initialise(self, wiring: Wiring, values: Mapping[str, Mapping[str, Value]], table: Array) -> None:
+        for stage in wiring.stages:
+            slave, name = stage.slave, stage.block.name
+            if name in self._used:
+                slave.reset()
+            if values[name]:
+                slave.set(values[name])
+            slave.begin(self.start, self.stop, None)
+        initialise(wiring, table, INITIAL_TOLERANCE, INITIAL_PASSES)
+        for stage in wiring.stages:
+            stage.slave.start()
+        for stage in wiring.stages:
+            stage.receive()
+
+    def _go(self, wiring: Wiring, table: Array, rows: Array, signals: Mapping[int, Signal]) -> Statistics:
+        algorithm, steps = self.algorithm, self.steps
+        record = np.array(self.layout.recorded, dtype=np.int64)
+        np.take(wiring.values, record, out=rows[0], mode="clip")
+        match algorithm:
+            case GaussSeidel():
+                run_sequential(wiring, table, self.start, algorithm.step, steps, rows, record)
+                sweeps = steps
+            case Jacobi():
+                run_simultaneous(wiring, table, self.start, algorithm.step, steps, rows, record)
+                sweeps = steps
+            case Iterated():
+                sweeps = run_iterated(wiring, table, self.start, algorithm, steps, rows, record)
+            case Adaptive():
+                return run_adaptive(wiring, signals, self.start, self.stop, algorithm, rows, record)
+            case _:
+                raise ScenarioError(f"`algorithm` must be a master algorithm, but is {algorithm!r}")
+        return Statistics(steps, 0, dict.fromkeys(self.system.execution_order(), steps), sweeps)

@@ -1,0 +1,201 @@
+"""Signals that the master itself feeds into inputs, as functions of time.
+
+Every signal has ``sample(times)``, which returns its values right-continuously, and ``breaks(start, stop)``, the
+instants in between at which it jumps or bends: an error-controlled master ends its steps there.
+"""
+
+import csv
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import ScenarioError
+
+Array = NDArray[np.float64]
+
+GRID_SLACK = 1e-9
+"""A time that misses an instant of change by less than this fraction of the distance between such instants is on it."""
+
+
+class Signal(Protocol):
+    """See the module."""
+
+    def sample(self, times: Array) -> Array:
+        """Return the values at ``times`` [s]; both of shape (n,)."""
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        """Return the instants strictly between ``start`` and ``stop`` [s] at which the signal is not smooth."""
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """``value`` at all times."""
+
+    value: float
+
+    def sample(self, times: Array) -> Array:
+        return np.full(times.shape, self.value)
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        return []
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """``before`` until ``time`` [s], ``after`` from then on."""
+
+    time: float
+    after: float
+    before: float = 0.0
+
+    def sample(self, times: Array) -> Array:
+        return np.where(times >= self.time - GRID_SLACK * max(1.0, abs(self.time)), self.after, self.before)
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        return [self.time] if start < self.time < stop else []
+
+
+@dataclass(frozen=True, slots=True)
+class Sine:
+    """``offset + amplitude sin(2 pi frequency t + phase)``; frequency in Hz, phase in rad."""
+
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+    offset: float = 0.0
+
+    def sample(self, times: Array) -> Array:
+        return self.offset + self.amplitude * np.sin(2.0 * math.pi * self.frequency * times + self.phase)
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        return []
+
+
+@dataclass(frozen=True, slots=True)
+class Square:
+    """``offset + amplitude`` in the first half of every ``period`` [s] after ``delay`` [s], then minus it."""
+
+    amplitude: float
+    period: float
+    offset: float = 0.0
+    delay: float = 0.0
+
+    def sample(self, times: Array) -> Array:
+        half = np.floor((times - self.delay) / (0.5 * self.period) + GRID_SLACK)
+        return self.offset + np.where(half % 2 == 0, self.amplitude, -self.amplitude)
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        half = 0.5 * self.period
+        first = math.floor((start - self.delay) / half) + 1
+        last = math.ceil((stop - self.delay) / half)
+        found = (self.delay + k * half for k in range(first, last))
+        return [t for t in found if start < t < stop]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Values at given times [s], straight lines (or, with ``hold``, steps) in between, constant outside."""
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+    hold: bool = False
+
+    def sample(self, times: Array) -> Array:
+        if not self.hold:
+            return np.interp(times, self.times, self.values)
+        knots = np.asarray(self.times)
+        slack = GRID_SLACK * (np.diff(knots).min() if len(knots) > 1 else 1.0)
+        index = np.searchsorted(knots, times + slack, side="right") - 1
+        return np.asarray(self.values)[np.clip(index, 0, None)]
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        return [t for t in self.times if start < t < stop]
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """An array of values, one per period [s] from ``start`` on, each held until the next; the last one stays."""
+
+    values: Sequence[float] | Array
+    period: float
+    start: float = 0.0
+
+    def sample(self, times: Array) -> Array:
+        index = np.floor((times - self.start) / self.period + GRID_SLACK).astype(np.int64)
+        return np.asarray(self.values, dtype=np.float64)[np.clip(index, 0, len(self.values) - 1)]
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        first = math.floor((start - self.start) / self.period) + 1
+        found = (self.start + k * self.period for k in range(max(first, 1), len(self.values)))
+        within = []
+        for t in found:
+            if t >= stop:
+                break
+            if t > start:
+                within.append(t)
+        return within
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """White Gaussian noise of standard deviation ``deviation``, one value per ``period`` [s] from ``start`` on, held.
+
+    The value of a period depends on the seed and the number of the period only, not on the length of the run.
+    """
+
+    deviation: float
+    seed: int
+    period: float
+    start: float = 0.0
+
+    def sample(self, times: Array) -> Array:
+        index = np.floor((times - self.start) / self.period + GRID_SLACK).astype(np.int64)
+        count = int(index.max(initial=0)) + 1
+        values = self.deviation * np.random.default_rng(self.seed).standard_normal(count)
+        return values[np.clip(index, 0, None)]
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        last = math.ceil((stop - self.start) / self.period)
+        return Samples(np.zeros(max(last, 1)), self.period, self.start).breaks(start, stop)
+
+
+def read_table(path: Path, column: str, time: str = "time", hold: bool = False) -> Table:
+    """Read a ``Table`` from two named columns of a CSV file with a header.
+
+    Raises:
+        ScenarioError: the file cannot be read, lacks a column, holds what is no number, or its times do not rise.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or "it is no UTF-8 CSV file"
+        raise ScenarioError(f"`file` must be a readable CSV file, but {path} is not: {reason}") from None
+    if not rows:
+        raise ScenarioError(f"`file` must hold a header and at least one row, but {path} does not")
+    columns = []
+    for name in (time, column):
+        if name not in rows[0]:
+            raise ScenarioError(f"`file` must have a column {name!r}, but {path} has {', '.join(map(str, rows[0]))}")
+        columns.append([_number(row[name], path, line, name) for line, row in enumerate(rows, start=2)])
+    times = columns[0]
+    for line, (earlier, later) in enumerate(itertools.pairwise(times), start=3):
+        if not later > earlier:
+            raise ScenarioError(f"column {time!r} must rise, but {path} line {line} has {later!r} after {earlier!r}")
+    return Table(tuple(times), tuple(columns[1]), hold)
+
+
+def _number(text: str | None, path: Path, line: int, column: str) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ScenarioError(f"column {column!r} must hold finite numbers, but {path} line {line} has {text!r}")
+    return value

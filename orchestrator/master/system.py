@@ -1,0 +1,391 @@
+"""A system of instances and connections: structure only. Running it is the business of ``session``."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from orchestrator.errors import ConnectionMismatchError, ScenarioError
+from orchestrator.master import units
+from orchestrator.master.graph import components
+from orchestrator.master.protocol import NUMERIC, READABLE, Model, Slave, Unit, Value, Variable
+from orchestrator.master.signals import Signal
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number with the unit in which it is given."""
+
+    value: float
+    unit: str
+
+
+Start = Mapping[str, Value | Quantity]
+
+
+@dataclass(frozen=True)
+class Instance:
+    """One slave to be.
+
+    Attributes:
+        name: without a dot, unique in the system.
+        model: its interface.
+        create: makes the slave, given the instance's name.
+        start: parameters and start values by variable name.
+    """
+
+    name: str
+    model: Model
+    create: Callable[[str], Slave]
+    start: Start = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """``target = round_to(quantum, factor * source + offset)``, after the conversion of units.
+
+    Attributes:
+        source: ``instance.variable`` of an output.
+        target: ``instance.variable`` of an input.
+        factor: see above.
+        offset: in the target's unit.
+        quantum: resolution of the target's sensor in the target's unit; 0 for none. Sources that feed the same
+            target are added before rounding.
+        unit: unit that the source must have; ``None`` leaves it unchecked.
+    """
+
+    source: str
+    target: str
+    factor: float = 1.0
+    offset: float = 0.0
+    quantum: float = 0.0
+    unit: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A signal that the master feeds into an input, added to what is connected to it.
+
+    Attributes:
+        target: ``instance.variable`` of an input.
+        signal: its values over time.
+        unit: unit of the signal; ``None`` for the target's own.
+        at: ``start`` or ``end`` of a communication step: which instant's value an instance gets for the step. ``None``:
+            with a connection, the instant of the connected value; else ``end`` where an output is declared to
+            depend on the input at once (a sampled-data block), ``start`` elsewhere (an input that is held).
+    """
+
+    target: str
+    signal: Signal
+    unit: str | None = None
+    at: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What is wrong with a scenario, and where.
+
+    Attributes:
+        path: such as ``$.connections[2].to``.
+        text: "`x` must ..., but is ...".
+        mismatch: two variables cannot be connected.
+    """
+
+    path: str
+    text: str
+    mismatch: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.text}"
+
+
+def raise_problems(problems: list[Problem], origin: str = "") -> None:
+    """Raise one error that names all ``problems``; none, no error.
+
+    Raises:
+        ConnectionMismatchError: all of them are connections that cannot be made.
+        ScenarioError: otherwise.
+    """
+    if not problems:
+        return
+    text = (f"{origin}: " if origin else "") + "; ".join(str(p) for p in problems)
+    raise ConnectionMismatchError(text) if all(p.mismatch for p in problems) else ScenarioError(text)
+
+
+def split(address: str) -> tuple[str, str]:
+    """Return instance and variable of ``instance.variable``; only the variable's name may contain dots."""
+    instance, _, variable = address.partition(".")
+    return instance, variable
+
+
+@dataclass(frozen=True)
+class System:
+    """Instances, connections, sources and, when it shall not be derived, the order of execution.
+
+    Attributes:
+        instances: in the order in which ties of the execution order are broken.
+        connections: from outputs to inputs.
+        sources: signals fed into inputs.
+        order: instance names; empty to derive the order from direct feedthrough.
+    """
+
+    instances: tuple[Instance, ...]
+    connections: tuple[Connection, ...] = ()
+    sources: tuple[Source, ...] = ()
+    order: tuple[str, ...] = ()
+
+    def instance(self, name: str) -> Instance | None:
+        """Return the instance called ``name``, if there is one."""
+        return next((i for i in self.instances if i.name == name), None)
+
+    def variable(self, address: str) -> Variable | None:
+        """Return the variable at ``instance.variable``, if there is one."""
+        name, variable = split(address)
+        instance = self.instance(name)
+        return None if instance is None else instance.model.variables.get(variable)
+
+    def unit(self, address: str) -> Unit | None:
+        """Return the unit of the variable at ``address``, if it has one."""
+        variable = self.variable(address)
+        instance = self.instance(split(address)[0])
+        if variable is None or variable.unit is None or instance is None:
+            return None
+        return units.resolve(variable.unit, instance.model.units)
+
+    def loops(self) -> list[tuple[str, ...]]:
+        """Return the algebraic loops: groups of instances whose outputs depend on one another at the same instant."""
+        edges = self._feedthrough_edges()
+        groups = components([i.name for i in self.instances], edges)
+        return [g for g in groups if len(g) > 1 or g[0] in edges.get(g[0], ())]
+
+    def execution_order(self) -> tuple[str, ...]:
+        """Return the instance names so that what is computed first is what others depend on at the same instant.
+
+        A connection orders two instances only if an output of the receiver depends on the input directly. An input
+        that is held over a step, such as a plant's torque, orders nothing: plant, estimator, controller.
+        """
+        if self.order:
+            return self.order
+        groups = components([i.name for i in self.instances], self._feedthrough_edges())
+        return tuple(name for group in groups for name in group)
+
+    def fed_through(self, address: str) -> bool:
+        """Return whether the model declares that an output depends on this input at the same instant."""
+        name, variable = split(address)
+        instance = self.instance(name)
+        return instance is not None and any(variable in inputs for inputs in instance.model.feedthrough.values())
+
+    def _feedthrough_edges(self) -> dict[str, set[str]]:
+        edges: dict[str, set[str]] = {i.name: set() for i in self.instances}
+        for connection in self.connections:
+            source, target = split(connection.source)[0], split(connection.target)
+            instance = self.instance(target[0])
+            if source in edges and instance is not None:
+                outputs = instance.model.named("output")
+                if any(target[1] in instance.model.depends_on(output) for output in outputs):
+                    edges[source].add(target[0])
+        return edges
+
+    def problems(self) -> list[Problem]:
+        """Return everything that is wrong with names, causalities, types, units, values and order; empty when sound."""
+        found = self._instance_problems()
+        driven: dict[str, int] = {}
+        for k, connection in enumerate(self.connections):
+            found += self._connection_problems(k, connection)
+            if connection.target in driven:
+                text = f"must be fed once, but {connection.target} is fed by connection {driven[connection.target]} too"
+                found.append(Problem(f"$.connections[{k}].to", text, mismatch=True))
+            driven.setdefault(connection.target, k)
+        for k, source in enumerate(self.sources):
+            found += self._source_problems(k, source)
+        return found + self._order_problems()
+
+    def check(self, origin: str = "") -> None:
+        """Raise what ``problems`` finds, see ``raise_problems``."""
+        raise_problems(self.problems(), origin)
+
+    def start_value(self, address: str, value: Value | Quantity) -> tuple[Value | None, str | None]:
+        """Return ``value`` as the variable at ``address`` takes it, or ``None`` and what is wrong with it."""
+        variable = self.variable(address)
+        if variable is None:
+            return None, self._unknown(address)
+        if variable.causality not in {"parameter", "input"} and (
+            variable.start is None or variable.variability == "constant"
+        ):
+            return None, f"must name a parameter or a start value, but {address} is of causality {variable.causality}"
+        if isinstance(value, Quantity):
+            converted = self._converted(address, value)
+            if converted is None:
+                own = variable.unit or "no unit"
+                return None, f"must be given in a unit that measures what {own} does, but is in {value.unit!r}"
+            value = converted
+        return typed_value(variable, value)
+
+    def _converted(self, address: str, value: Quantity) -> float | None:
+        instance = self.instance(split(address)[0])
+        own = self.unit(address)
+        if instance is None or own is None:
+            return None
+        ratio = units.conversion(units.resolve(value.unit, instance.model.units), own)
+        return None if ratio is None else ratio[0] * value.value + ratio[1]
+
+    def _instance_problems(self) -> list[Problem]:
+        found = []
+        if not self.instances:
+            found.append(Problem("$.instances", "must name at least one instance, but is empty"))
+        names = [i.name for i in self.instances]
+        for instance in self.instances:
+            path = f"$.instances.{instance.name}"
+            if not instance.name or "." in instance.name or names.count(instance.name) > 1:
+                found.append(
+                    Problem(path, f"name must be unique, not empty and without a dot, but is {instance.name!r}")
+                )
+            for variable, value in instance.start.items():
+                text = self.start_value(f"{instance.name}.{variable}", value)[1]
+                if text is not None:
+                    found.append(Problem(f"{path}.parameters.{variable}", text))
+        return found
+
+    def _connection_problems(self, k: int, connection: Connection) -> list[Problem]:
+        path = f"$.connections[{k}]"
+        found = self._end_problems(f"{path}.from", connection.source, "output")
+        found += self._end_problems(f"{path}.to", connection.target, "input")
+        for name in ("factor", "offset", "quantum"):
+            value = getattr(connection, name)
+            if not math.isfinite(value) or (name == "quantum" and value < 0.0):
+                least = "finite and not negative" if name == "quantum" else "finite"
+                found.append(Problem(f"{path}.{name}", f"must be {least}, but is {value!r}"))
+        if found:
+            return found
+        source, target = self.variable(connection.source), self.variable(connection.target)
+        assert source is not None
+        assert target is not None
+        plain = connection.factor == 1.0 and connection.offset == 0.0 and connection.quantum == 0.0
+        if not types_fit(source, target) or (target.type != "Real" and not plain):
+            text = (
+                f"must have type {source.type} like {connection.source}, but {connection.target} has type {target.type}"
+            )
+            if target.type != "Real" and not plain:
+                text = f"factor, offset and quantum must be left out, but {connection.target} has type {target.type}"
+            found.append(Problem(f"{path}.to", text, mismatch=True))
+        return found + self._unit_problems(path, connection)
+
+    def _unit_problems(self, path: str, connection: Connection) -> list[Problem]:
+        source, target = self.unit(connection.source), self.unit(connection.target)
+        if units.conversion(source, target) is None:
+            assert source is not None
+            assert target is not None
+            text = (
+                f"must have a unit that measures what {source.name} of {connection.source} does, but has {target.name}"
+            )
+            return [Problem(f"{path}.to", text, mismatch=True)]
+        if connection.unit is not None and (source is None or connection.unit != source.name):
+            own = "no unit" if source is None else source.name
+            text = f"must be the unit of {connection.source}, {own}, but is {connection.unit!r}"
+            return [Problem(f"{path}.unit", text, mismatch=True)]
+        return []
+
+    def _source_problems(self, k: int, source: Source) -> list[Problem]:
+        path = f"$.sources[{k}]"
+        found = self._end_problems(f"{path}.to", source.target, "input")
+        if source.at not in {None, "start", "end"}:
+            found.append(Problem(f"{path}.at", f"must be 'start' or 'end', but is {source.at!r}"))
+        if found:
+            return found
+        variable = self.variable(source.target)
+        assert variable is not None
+        if variable.type != "Real":
+            found.append(Problem(f"{path}.to", f"must be a Real input, but {source.target} has type {variable.type}"))
+        elif source.unit is not None and self._converted(source.target, Quantity(0.0, source.unit)) is None:
+            own = variable.unit or "no unit"
+            found.append(
+                Problem(f"{path}.unit", f"must measure what {own} of {source.target} does, but is {source.unit!r}")
+            )
+        return found
+
+    def _end_problems(self, path: str, address: str, causality: str) -> list[Problem]:
+        variable = self.variable(address)
+        if variable is None:
+            return [Problem(path, self._unknown(address), mismatch=True)]
+        if variable.causality != causality:
+            text = f"must be an {causality}, but {address} is of causality {variable.causality}"
+            return [Problem(path, text, mismatch=True)]
+        if variable.type not in NUMERIC:
+            return [Problem(path, f"must be numeric, but {address} has type {variable.type}", mismatch=True)]
+        return []
+
+    def _order_problems(self) -> list[Problem]:
+        names = [i.name for i in self.instances]
+        if self.order and sorted(self.order) != sorted(names):
+            text = f"must name every instance once ({', '.join(names)}), but is {', '.join(self.order)}"
+            return [Problem("$.master.order", text)]
+        return []
+
+    def record_problems(self, record: tuple[str, ...]) -> list[Problem]:
+        """Return what is wrong with a list of signals to be recorded."""
+        found = []
+        for k, address in enumerate(record):
+            variable = self.variable(address)
+            path = f"$.record[{k}]"
+            if variable is None:
+                found.append(Problem(path, self._unknown(address)))
+            elif variable.causality not in READABLE or variable.type not in NUMERIC:
+                found.append(
+                    Problem(
+                        path, f"must be numeric and readable, but {address} is a {variable.type} {variable.causality}"
+                    )
+                )
+            elif record.index(address) != k:
+                found.append(Problem(path, f"must be recorded once, but {address} is named twice"))
+        return found
+
+    def _unknown(self, address: str) -> str:
+        name, variable = split(address)
+        instance = self.instance(name)
+        if instance is None:
+            known = ", ".join(i.name for i in self.instances) or "none"
+            return f"must start with an instance's name ({known}), but is {address!r}"
+        close = nearest(variable, list(instance.model.variables))
+        return f"must name a variable of {name} ({instance.model.name}), but {variable!r} is none{close}"
+
+
+def nearest(name: str, known: list[str]) -> str:
+    """Return a hint such as ``; did you mean 'theta_m'?``, or nothing when no name is near."""
+    import difflib
+
+    close = difflib.get_close_matches(name, known, n=1)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def types_fit(source: Variable, target: Variable) -> bool:
+    """Return whether a value of ``source`` is one of ``target``: the same type, or an Integer into a Real."""
+    if source.type == "Enumeration" and target.type == "Enumeration":
+        return not source.items or not target.items or source.items == target.items
+    return source.type == target.type or (source.type == "Integer" and target.type == "Real")
+
+
+def typed_value(variable: Variable, value: Value) -> tuple[Value | None, str | None]:
+    """Return ``value`` as ``variable`` takes it, or ``None`` and what is wrong with it."""
+    kind = variable.type
+    if kind == "String":
+        return (value, None) if isinstance(value, str) else (None, f"must be a string, but is {value!r}")
+    if kind == "Boolean":
+        return (value, None) if isinstance(value, bool) else (None, f"must be true or false, but is {value!r}")
+    if kind == "Enumeration" and isinstance(value, str):
+        literals = dict(variable.items)
+        if value not in literals:
+            return None, f"must be one of {', '.join(literals)}, but is {value!r}{nearest(value, list(literals))}"
+        return literals[value], None
+    if isinstance(value, (bool, str)) or not math.isfinite(value) or (kind != "Real" and value != int(value)):
+        need = "a finite number" if kind == "Real" else "an integer"
+        return None, f"must be {need}, but is {value!r}"
+    low, high = variable.minimum, variable.maximum
+    if (low is not None and value < low) or (high is not None and value > high):
+        text = (
+            f"must be at least {low:g}"
+            if high is None
+            else f"must be at most {high:g}"
+            if low is None
+            else f"must lie in [{low:g}, {high:g}]"
+        )
+        return None, f"{text}, but is {value!r}"
+    return (float(value) if kind == "Real" else int(value)), None

@@ -1,0 +1,115 @@
+"""Slaves bound to the slots of a layout: flat lists of bound calls, so that a step looks nothing up."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.master.layout import Block, Feed, Layout
+from orchestrator.master.protocol import Signals, Slave, Transfer
+
+View = Any
+"""A ``memoryview`` of float64: reads and writes single values and runs of them faster than an array does."""
+
+Copy = tuple[View, View]
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One instance, ready to be stepped.
+
+    Attributes:
+        slave: the slave.
+        block: its part of the layout.
+        copies: ``(inputs, outputs)`` pairs of equal length: runs of neighbouring slots that are mere copies.
+        mixed: feeds that are more than a copy.
+        send: moves the input slots into the slave.
+        receive: moves the slave's outputs into its slots.
+        do_step: the slave's own.
+    """
+
+    slave: Slave
+    block: Block
+    copies: tuple[Copy, ...]
+    mixed: tuple[Feed, ...]
+    send: Transfer
+    receive: Transfer
+    do_step: Callable[[float, float], None]
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """All stages in execution order over one array of slots.
+
+    Attributes:
+        values: the slots, shape (size,).
+        view: the same memory, quicker to read one value from.
+        stages: see ``Stage``.
+        layout: the plan.
+    """
+
+    values: Signals
+    view: View
+    stages: tuple[Stage, ...]
+    layout: Layout
+
+
+def wire(layout: Layout, slaves: Mapping[str, Slave]) -> Wiring:
+    """Bind ``slaves`` to the slots of ``layout``."""
+    values = np.zeros(layout.size)
+    view = values.data
+    stages = tuple(_stage(block, slaves[block.name], values, view) for block in layout.blocks)
+    return Wiring(values, view, stages, layout)
+
+
+def _nothing() -> None:
+    return
+
+
+def _stage(block: Block, slave: Slave, values: Signals, view: View) -> Stage:
+    inputs = values[block.first_input : block.first_input + len(block.inputs)]
+    outputs = values[block.first_output : block.first_output + len(block.outputs)]
+    return Stage(
+        slave=slave,
+        block=block,
+        copies=_copies(block.feeds, view),
+        mixed=tuple(feed for feed in block.feeds if not feed.plain),
+        send=slave.sends(block.inputs, inputs) if block.inputs else _nothing,
+        receive=slave.receives(block.outputs, outputs) if block.outputs else _nothing,
+        do_step=slave.do_step,
+    )
+
+
+def _copies(feeds: tuple[Feed, ...], view: View) -> tuple[Copy, ...]:
+    runs: list[list[int]] = []
+    for feed in feeds:
+        if not feed.plain:
+            continue
+        if runs and feed.slot == runs[-1][0] + runs[-1][2] and feed.source == runs[-1][1] + runs[-1][2]:
+            runs[-1][2] += 1
+        else:
+            runs.append([feed.slot, feed.source, 1])
+    return tuple((view[slot : slot + n], view[source : source + n]) for slot, source, n in runs)
+
+
+def gather(stage: Stage, view: View, table: NDArray[np.float64], column: int) -> None:
+    """Fill the input slots of a stage from the outputs and from ``column`` of the table of signals."""
+    for target, source in stage.copies:
+        target[:] = source
+    for feed in stage.mixed:
+        value = feed.offset
+        if feed.source >= 0:
+            value += feed.factor * view[feed.source]
+        if feed.signal >= 0:
+            value += table[feed.signal, column]
+        if feed.quantum > 0.0:
+            value = quantised(value, feed.quantum)
+        view[feed.slot] = value
+
+
+def quantised(value: float, quantum: float) -> float:
+    """Return the multiple of ``quantum`` nearest to ``value``; what is not finite stays as it is."""
+    scaled = value / quantum
+    return quantum * round(scaled) if abs(scaled) < 2.0**53 else value
