@@ -69,7 +69,7 @@ def _pair(arguments: argparse.Namespace) -> int:
         pair = run_pair(experiment, fmus, alpha, arguments.seed)
         reference = experiment.reference()[0]
         signals = {"time": pair.machine.time, "reference": reference}
-        signals |= {name: values for name, values in pair.machine.signals.items()}
+        signals |= pair.machine.signals
         signals |= {f"twin_{name}": values for name, values in pair.twin.signals.items()}
         _write_csv(directory / "simulate.csv", signals)
         title = f"Paired loops, {experiment.backlash_model}, half-gap {alpha:g} rad"
