@@ -45,8 +45,9 @@ def keys(driver, selector, *presses):
 
 def test_nothing_is_asked_of_the_network(opened, page):
     messages = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
-    asked = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
-    assert [url for url in asked if not url.startswith("data:")] == [page.as_uri()]
+    asked = [m["params"] for m in messages if m["method"] == "Network.requestWillBeSent"]
+    urls = [a["request"]["url"] for a in asked if a["documentURL"] == page.as_uri()]
+    assert [url for url in urls if not url.startswith("data:")] == [page.as_uri()]
 
 
 @pytest.mark.parametrize("width", [1280, 390, 320])
