@@ -22,7 +22,6 @@ class SampledSlave(SlaveBase):
     """A slave with a sample clock; subclasses implement ``begin``, ``predict`` and ``correct``."""
 
     feedthrough = True
-    variable_step = False
     sample_time_reference: ClassVar[int] = 0
 
     def begin(self) -> None:

@@ -338,8 +338,8 @@ class SlaveBase(Fmi2Slave):
                     Fmi2Status.error, "fmi2SetFMUstate must be given a state of this very FMU, but was not; ignored"
                 )
                 return
-            self.real = dict(zip(self.real, state["real"], strict=True))
-            self.integer = dict(zip(self.integer, state["integer"], strict=True))
+            self.real = _rekeyed(self.real, state["real"])
+            self.integer = _rekeyed(self.integer, state["integer"])
             self.start_time, self.time, self._stop = state["times"]
             self.restore(state["hidden"])
             self._fresh = True
@@ -366,6 +366,12 @@ class SlaveBase(Fmi2Slave):
         from .model_xml import model_description
 
         return model_description(type(self), self.modelName)
+
+
+def _rekeyed(keys: dict[int, Any], values: list[Any]) -> dict[int, Any]:
+    if len(keys) != len(values):
+        raise ValueError(f"{len(keys)} values must be given, but there are {len(values)}")
+    return dict(zip(keys, values))  # noqa: B905 - Python 3.9 has no `strict`
 
 
 class StepRefusedError(ValueError):

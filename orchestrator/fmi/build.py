@@ -4,6 +4,7 @@ An FMU is stale when its fingerprint (sources, builder, versions, compiler there
 would have now. The fingerprint is in the FMU, so nothing beside the file itself is needed to tell.
 """
 
+import importlib
 import json
 import os
 import re
@@ -18,6 +19,7 @@ import orchestrator
 from orchestrator.errors import FmuError
 from orchestrator.fmi.launcher import find_toolchain
 from orchestrator.fmi.sources import Recipe, catalogue, fingerprint, recipe_of
+from pyfmu_sources.fmu_variables import with_starts
 
 ROOT = Path(orchestrator.__file__).resolve().parents[1]
 IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
@@ -29,15 +31,22 @@ def default_directory() -> Path:
     return ROOT / "fmus" if (ROOT / "pyproject.toml").exists() else Path("fmus")
 
 
-def ensure_built(names: Sequence[str] | None = None, directory: Path | None = None) -> dict[str, Path]:
+def ensure_built(
+    names: Sequence[str] | None = None, directory: Path | None = None, force: bool = False
+) -> dict[str, Path]:
     """Return the path of each FMU in ``names`` (default: all), after building what is missing or stale.
+
+    Args:
+        names: which FMUs.
+        directory: where they are (default: :func:`default_directory`).
+        force: build also what is up to date.
 
     Raises:
         FmuError: a name is unknown, a build fails or ``directory`` cannot be written.
     """
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = default_directory() if directory is None else directory
-    return {recipe.name: _ensure(recipe, folder) for recipe in recipes}
+    return {recipe.name: _ensure(recipe, folder, force) for recipe in recipes}
 
 
 def build_variant(
@@ -61,6 +70,11 @@ def build_variant(
         raise FmuError(f"`name` must be a new C identifier of at most 100 characters, but is {name!r}")
     starts = {parameter: _number(value) for parameter, value in (start_values or {}).items()}
     recipe = replace(recipe_of(base), name=name, starts=starts)
+    slave = getattr(importlib.import_module(f"pyfmu_sources.{recipe.module}"), recipe.class_name)
+    try:
+        with_starts(slave.table, starts)
+    except ValueError as error:
+        raise FmuError(str(error)) from None
     return _ensure(recipe, default_directory() if directory is None else directory)
 
 
@@ -82,10 +96,10 @@ def _number(value: float | str) -> float:
     raise FmuError(f"a start value must be a number or the name of an enumeration's item, but is {value!r}")
 
 
-def _ensure(recipe: Recipe, directory: Path) -> Path:
+def _ensure(recipe: Recipe, directory: Path, force: bool = False) -> Path:
     path = directory / f"{recipe.name}.fmu"
     current = fingerprint(recipe, find_toolchain().identity)
-    if _stamp(path) != current:
+    if force or _stamp(path) != current:
         _build(recipe, path, current)
     return path
 

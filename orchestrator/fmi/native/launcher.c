@@ -50,40 +50,44 @@ typedef struct {
     void *environment;
 } Callbacks;
 
+#define VALUES (n == 0 || (r && v))
+/* X(function, parameters, arguments, what must hold of the pointers) */
 #define FORWARDED(X) \
-    X(fmi2SetupExperiment, (Component c, Boolean a, double b, double d, Boolean e, double f), (s->inner, a, b, d, e, f)) \
-    X(fmi2EnterInitializationMode, (Component c), (s->inner)) \
-    X(fmi2ExitInitializationMode, (Component c), (s->inner)) \
-    X(fmi2Terminate, (Component c), (s->inner)) \
-    X(fmi2Reset, (Component c), (s->inner)) \
-    X(fmi2GetReal, (Component c, const Reference r[], size_t n, double v[]), (s->inner, r, n, v)) \
-    X(fmi2GetInteger, (Component c, const Reference r[], size_t n, int v[]), (s->inner, r, n, v)) \
-    X(fmi2GetBoolean, (Component c, const Reference r[], size_t n, Boolean v[]), (s->inner, r, n, v)) \
-    X(fmi2GetString, (Component c, const Reference r[], size_t n, const char *v[]), (s->inner, r, n, v)) \
-    X(fmi2SetReal, (Component c, const Reference r[], size_t n, const double v[]), (s->inner, r, n, v)) \
-    X(fmi2SetInteger, (Component c, const Reference r[], size_t n, const int v[]), (s->inner, r, n, v)) \
-    X(fmi2SetBoolean, (Component c, const Reference r[], size_t n, const Boolean v[]), (s->inner, r, n, v)) \
-    X(fmi2SetString, (Component c, const Reference r[], size_t n, const char *const v[]), (s->inner, r, n, v)) \
-    X(fmi2GetFMUstate, (Component c, State *x), (s->inner, x)) \
-    X(fmi2SetFMUstate, (Component c, State x), (s->inner, x)) \
-    X(fmi2SerializedFMUstateSize, (Component c, State x, size_t *n), (s->inner, x, n)) \
-    X(fmi2SerializeFMUstate, (Component c, State x, char b[], size_t n), (s->inner, x, b, n)) \
-    X(fmi2DeSerializeFMUstate, (Component c, const char b[], size_t n, State *x), (s->inner, b, n, x)) \
+    X(fmi2SetupExperiment, (Component c, Boolean a, double b, double d, Boolean e, double f), \
+      (s->inner, a, b, d, e, f), 1) \
+    X(fmi2EnterInitializationMode, (Component c), (s->inner), 1) \
+    X(fmi2ExitInitializationMode, (Component c), (s->inner), 1) \
+    X(fmi2Terminate, (Component c), (s->inner), 1) \
+    X(fmi2Reset, (Component c), (s->inner), 1) \
+    X(fmi2GetReal, (Component c, const Reference r[], size_t n, double v[]), (s->inner, r, n, v), VALUES) \
+    X(fmi2GetInteger, (Component c, const Reference r[], size_t n, int v[]), (s->inner, r, n, v), VALUES) \
+    X(fmi2GetBoolean, (Component c, const Reference r[], size_t n, Boolean v[]), (s->inner, r, n, v), VALUES) \
+    X(fmi2GetString, (Component c, const Reference r[], size_t n, const char *v[]), (s->inner, r, n, v), VALUES) \
+    X(fmi2SetReal, (Component c, const Reference r[], size_t n, const double v[]), (s->inner, r, n, v), VALUES) \
+    X(fmi2SetInteger, (Component c, const Reference r[], size_t n, const int v[]), (s->inner, r, n, v), VALUES) \
+    X(fmi2SetBoolean, (Component c, const Reference r[], size_t n, const Boolean v[]), (s->inner, r, n, v), VALUES) \
+    X(fmi2SetString, (Component c, const Reference r[], size_t n, const char *const v[]), \
+      (s->inner, r, n, v), VALUES && all_there(v, n)) \
+    X(fmi2GetFMUstate, (Component c, State *x), (s->inner, x), x) \
+    X(fmi2SetFMUstate, (Component c, State x), (s->inner, x), x) \
+    X(fmi2SerializedFMUstateSize, (Component c, State x, size_t *n), (s->inner, x, n), x && n) \
+    X(fmi2SerializeFMUstate, (Component c, State x, char b[], size_t n), (s->inner, x, b, n), x && b) \
+    X(fmi2DeSerializeFMUstate, (Component c, const char b[], size_t n, State *x), (s->inner, b, n, x), b && x) \
     X(fmi2GetDirectionalDerivative, \
       (Component c, const Reference u[], size_t n, const Reference k[], size_t m, const double dk[], double du[]), \
-      (s->inner, u, n, k, m, dk, du)) \
+      (s->inner, u, n, k, m, dk, du), 1) \
     X(fmi2SetRealInputDerivatives, (Component c, const Reference r[], size_t n, const int o[], const double v[]), \
-      (s->inner, r, n, o, v)) \
+      (s->inner, r, n, o, v), 1) \
     X(fmi2GetRealOutputDerivatives, (Component c, const Reference r[], size_t n, const int o[], double v[]), \
-      (s->inner, r, n, o, v)) \
-    X(fmi2DoStep, (Component c, double t, double h, Boolean p), (s->inner, t, h, p)) \
-    X(fmi2CancelStep, (Component c), (s->inner)) \
-    X(fmi2GetStatus, (Component c, int k, Status *v), (s->inner, k, v)) \
-    X(fmi2GetRealStatus, (Component c, int k, double *v), (s->inner, k, v)) \
-    X(fmi2GetIntegerStatus, (Component c, int k, int *v), (s->inner, k, v)) \
-    X(fmi2GetStringStatus, (Component c, int k, const char **v), (s->inner, k, v))
+      (s->inner, r, n, o, v), 1) \
+    X(fmi2DoStep, (Component c, double t, double h, Boolean p), (s->inner, t, h, p), 1) \
+    X(fmi2CancelStep, (Component c), (s->inner), 1) \
+    X(fmi2GetStatus, (Component c, int k, Status *v), (s->inner, k, v), v) \
+    X(fmi2GetRealStatus, (Component c, int k, double *v), (s->inner, k, v), v) \
+    X(fmi2GetIntegerStatus, (Component c, int k, int *v), (s->inner, k, v), v) \
+    X(fmi2GetStringStatus, (Component c, int k, const char **v), (s->inner, k, v), v)
 
-#define TABLE_ENTRY(name, parameters, arguments) Status(*name) parameters;
+#define TABLE_ENTRY(name, parameters, arguments, condition) Status(*name) parameters;
 static struct {
     FORWARDED(TABLE_ENTRY)
     Component (*fmi2Instantiate)(const char *, int, const char *, const char *, const Callbacks *, Boolean, Boolean);
@@ -208,11 +212,11 @@ static void load(void) {
         snprintf(problem, sizeof problem, "%s", dlerror());
         return;
     }
-#define TABLE_LOOKUP(name, parameters, arguments) *(void **)&wrapper.name = dlsym(library, #name);
+#define TABLE_LOOKUP(name, parameters, arguments, condition) *(void **)&wrapper.name = dlsym(library, #name);
     FORWARDED(TABLE_LOOKUP)
-    TABLE_LOOKUP(fmi2FreeInstance, , )
-    TABLE_LOOKUP(fmi2FreeFMUstate, , )
-    TABLE_LOOKUP(fmi2Instantiate, , )
+    TABLE_LOOKUP(fmi2FreeInstance, , , )
+    TABLE_LOOKUP(fmi2FreeFMUstate, , , )
+    TABLE_LOOKUP(fmi2Instantiate, , , )
     if (!wrapper.fmi2Instantiate)
         snprintf(problem, sizeof problem, "%s is not PythonFMU's library", path);
 }
@@ -379,16 +383,27 @@ static Status concluded(Shell *s, Status status) {
     return status;
 }
 
-#define FORWARD(name, parameters, arguments) \
-    EXPORT Status name parameters { \
+static int all_there(const char *const texts[], size_t n) {
+    for (size_t k = 0; k < n; k++)
+        if (!texts[k])
+            return 0;
+    return 1;
+}
+
+#define FORWARD(function, parameters, arguments, condition) \
+    EXPORT Status function parameters { \
         Shell *s = c; \
         if (!s) \
             return ERROR; \
         if (s->dead) \
             return FATAL; \
         s->worst = OK; \
+        if (!(condition)) { \
+            report(&s->host, s->name, #function " must not be given null pointers"); \
+            return ERROR; \
+        } \
         enter_thread(); \
-        return concluded(s, wrapper.name arguments); \
+        return concluded(s, wrapper.function arguments); \
     }
 FORWARDED(FORWARD)
 

@@ -1,0 +1,45 @@
+"""``build``: the FMUs, into ``fmus/``."""
+
+import argparse
+from pathlib import Path
+
+from orchestrator.fmi.build import ROOT, default_directory, ensure_built
+from orchestrator.fmi.launcher import find_toolchain
+from orchestrator.output import staged, write_result
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments."""
+    parser.add_argument("names", nargs="*", metavar="FMU", help="which FMUs (default: all)")
+    parser.add_argument(
+        "--directory",
+        type=Path,
+        default=None,
+        metavar="DIR",
+        help=f"where FMUs go (default: {_shown(default_directory())})",
+    )
+    parser.add_argument("--force", action="store_true", help="build even what is up to date")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Build what is missing or stale and say what this machine cannot give."""
+    directory = default_directory() if args.directory is None else args.directory
+    names = args.names or None
+    paths = ensure_built(names, directory, force=args.force)
+    for name, path in paths.items():
+        print(f"{name:<20}{_shown(path)}  {path.stat().st_size / 1024:.0f} kB")
+    remark = find_toolchain().remark
+    if remark is not None:
+        print(f"note: {remark}")
+    with staged(args.out) as folder:
+        results = {"fmus": {name: str(path) for name, path in paths.items()}, "remark": remark}
+        arguments = {"names": list(paths), "directory": str(directory), "force": args.force}
+        write_result(folder, "build", arguments, None, results)
+    return 0
+
+
+def _shown(path: Path) -> str:
+    try:
+        return str(path.resolve().relative_to(ROOT))
+    except ValueError:
+        return str(path)
