@@ -108,23 +108,25 @@ def reference_solution(
     x = np.zeros(6)
     if start is not None:
         x[:5] = start
-    flank = _first_flank(plant, x)
+    flank = first_flank(plant, x)
     states = np.empty((len(u) + 1, 5))
     states[0] = x[:5]
     for n, torque in enumerate(u):
-        x, flank = _sample(plant, x, flank, float(torque), T_l, h, rtol, atol)
+        x, flank = reference_sample(plant, x, flank, float(torque), T_l, h, rtol, atol)
         states[n + 1] = x[:5]
     return states
 
 
-def _first_flank(plant: ReferencePlant, x: Array) -> int:
+def first_flank(plant: ReferencePlant, x: Array) -> int:
+    """Return the flank (-1, 0, 1) at which a state of at least 3 values starts."""
     wound = x[0] / plant.i - x[2]
     return int(np.sign(wound)) if abs(wound) > plant.alpha else 0
 
 
-def _sample(
+def reference_sample(
     plant: ReferencePlant, x: Array, flank: int, u: float, T_l: float, h: float, rtol: float, atol: float
 ) -> tuple[Array, int]:
+    """Return state (6 values: the five of ``reference_solution`` and the shaft's own twist) and flank after ``h``."""
     time = 0.0
     for _ in range(MAX_EVENTS_PER_SAMPLE):
         slope = _slope(plant, flank, u, T_l)

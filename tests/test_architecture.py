@@ -53,7 +53,11 @@ def test_the_sources_of_the_fmus_stand_alone():
 
 
 def test_every_part_of_the_orchestrator_has_a_layer():
-    parts = {path.relative_to(ROOT / "orchestrator").parts[0].removesuffix(".py") for path in SOURCES if "orchestrator" in path.parts}
+    parts = {
+        path.relative_to(ROOT / "orchestrator").parts[0].removesuffix(".py")
+        for path in SOURCES
+        if "orchestrator" in path.parts
+    }
     unknown = {part for part in parts if part != "__init__" and layer_of(part) is None}
     assert not unknown
 

@@ -51,4 +51,7 @@ def test_the_command_writes_everything(tmp_path, capsys):
     assert "7.399e-03" in text
     results = json.loads((tmp_path / "out" / "thesis.json").read_text())["results"]
     assert len(results["errata"]) == 9
-    assert max(abs(e - r.alpha) for e, r in zip(results["table"]["our_estimates"], published.TABLE_4_1, strict=True)) < 1e-3
+    assert (
+        max(abs(e - r.alpha) for e, r in zip(results["table"]["our_estimates"], published.TABLE_4_1, strict=True))
+        < 1e-3
+    )

@@ -1,0 +1,113 @@
+"""The paired loops: co-simulated, compiled and monolithic, they are the same."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.paired.compiled_loop import COLUMNS, compiled_loop
+from orchestrator.paired.cosimulation import LoopSession
+from orchestrator.paired.experiment import Experiment
+from orchestrator.paired.pair import run_pair
+from tests.support.monolithic_loop import monolithic_loop
+
+
+@pytest.mark.parametrize("model", ["dead_zone", "nordin"])
+def test_the_paired_loop_matches_a_monolithic_simulation(fmus, model):
+    experiment = replace(Experiment(), backlash_model=model)
+    pair = run_pair(experiment, fmus, alpha=0.03)
+    for run, alpha in ((pair.machine, 0.03), (pair.twin, 0.0)):
+        truth = monolithic_loop(experiment, alpha)
+        got = np.column_stack([run["theta_m"], run["theta_l"], run["theta_l_hat"]])
+        assert np.abs(got - truth).max() < 1e-8
+
+
+def test_compiled_and_co_simulated_loop_agree(fmus):
+    experiment = replace(Experiment(), encoder_noise=1e-4)
+    errors = experiment.encoder_errors(3)
+    fast = compiled_loop(experiment).run(0.03, errors)
+    with LoopSession(experiment, fmus) as session:
+        for _ in range(2):
+            run = session.run(0.03, errors)
+            for name in ("theta_m", "theta_l", "theta_l_hat", "u"):
+                column = fast[:, COLUMNS.index(name)]
+                assert np.abs(run[name] - column).max() <= 1e-12 * max(1.0, np.abs(column).max())
+
+
+def test_a_session_forgets_the_run_before(fmus):
+    experiment = Experiment()
+    with LoopSession(experiment, fmus) as session:
+        first = session.run(0.05)["theta_l"].copy()
+        session.run(0.002)
+        assert np.array_equal(session.run(0.05)["theta_l"], first)
+
+
+def test_estimate_of_a_pair(fmus):
+    estimate = run_pair(Experiment(), fmus, alpha=0.024).estimate
+    assert estimate.alpha == pytest.approx(0.024, rel=1e-4)
+    outside = run_pair(Experiment(), fmus, alpha=0.3)
+    assert outside.estimate is None
+    assert "outside 0.002 to 0.1 rad" in outside.no_estimate
+
+
+def test_simulate_command(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["simulate", "--alpha", "0.02", "--noise", "1e-4", "--out", str(out)]) == 0
+    assert "estimated half-gap" in capsys.readouterr().out
+    assert sorted(p.name for p in out.iterdir() if p.suffix != ".html") == [
+        "simulate.csv",
+        "simulate.json",
+        "simulate.png",
+    ]
+    results = json.loads((out / "simulate.json").read_text())["results"]
+    assert results["estimate"]["lower"] <= 0.02 <= results["estimate"]["upper"]
+    rows = (out / "simulate.csv").read_text().splitlines()
+    assert len(rows) == 2002
+
+
+def test_sweep_command_is_reproducible_and_complete(tmp_path, capsys):
+    words = ["sweep", "--sizes", "random:4", "--noise", "0,1e-4", "--seed", "5"]
+    for name, workers in (("a", "1"), ("b", "2")):
+        assert main([*words, "--workers", workers, "--out", str(tmp_path / name)]) == 0
+    text = capsys.readouterr().out
+    assert "MSE" in text
+    assert (tmp_path / "a" / "sweep.csv").read_bytes() == (tmp_path / "b" / "sweep.csv").read_bytes()
+    names = {p.name for p in (tmp_path / "a").iterdir()}
+    assert {"sweep.csv", "sweep.json", "estimates.png", "errors.png", "loops.png"} <= names
+    results = json.loads((tmp_path / "a" / "sweep.json").read_text())["results"]
+    assert results["cases"] == 8
+    assert results["failed"] == 0
+    assert all(s["mean_percent"] < 0.5 for s in results["statistics"])
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--sizes", "0.5"], "within the calibrated 0.002 to 0.1 rad"),
+        (["--sizes", "0.01,nan"], "finite"),
+        (["--sizes", "-0.01"], "finite positive"),
+        (["--sizes", "random:x"], "random:COUNT"),
+        (["--sizes", "random:0"], "at least one"),
+        (["--noise", "-1"], "not negative"),
+        (["--noise", "a"], "numbers"),
+        (["--seeds", "0"], "at least"),
+        (["--experiment", "x"], "must be one of"),
+        (["--backlash-model", "x"], "must be one of"),
+        (["--vary", "plant.nothing=1,2"], "plant.nothing"),
+        (["--workers", "0"], "workers"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(tmp_path, capsys, words, complaint):
+    assert main(["sweep", "--sizes", "0.01", *words, "--out", str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert complaint in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_unwritable_output(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["simulate", "--out", str(tmp_path / "file")]) == 2
+    assert "writable directory" in capsys.readouterr().err
