@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Finding, has_errors
 
 MEBIBYTE = 1 << 20
 _RESERVED = re.compile(r"^(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?$", re.IGNORECASE)
@@ -43,6 +43,9 @@ class FmuFiles(Protocol):
     def extract(self, target: Path) -> None:
         """Copy all files below ``target``."""
 
+    def close(self) -> None:
+        """Let go of the archive."""
+
 
 class ZipFiles:
     """The files of a packed FMU."""
@@ -63,6 +66,9 @@ class ZipFiles:
             destination.parent.mkdir(parents=True, exist_ok=True)
             with self.archive.open(name) as source, destination.open("wb") as sink:
                 shutil.copyfileobj(source, sink)
+
+    def close(self) -> None:
+        self.archive.close()
 
 
 class FolderFiles:
@@ -85,6 +91,9 @@ class FolderFiles:
             destination.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(self.root / name, destination)
 
+    def close(self) -> None:
+        """Nothing is held open."""
+
 
 def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[Finding]]:
     """Open an FMU (file or unpacked folder) and check its archive.
@@ -96,18 +105,18 @@ def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[F
         return FolderFiles(path), list(_folder_findings(path, limits))
     try:
         files = ZipFiles(path)
-        findings = list(_entry_findings(files.archive, limits))
-        if not findings:
-            findings += _content_findings(files.archive)
-    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError, EOFError, RuntimeError) as error:
+    except Exception as error:  # zipfile raises all sorts on bytes that it did not foresee
         return None, [Finding("archive.not-a-zip", path.name, f"an FMU must be a ZIP archive, but: {error}")]
-    except Exception as error:  # a corrupt archive makes zipfile and zlib raise all sorts
-        return None, [Finding("archive.corrupt", path.name, f"the archive cannot be read: {error!r}")]
-    unfit = any(f.severity == "error" for f in findings)
-    if not unfit and "modelDescription.xml" not in files.names():
+    try:
+        findings = list(_entry_findings(files.archive, limits)) or list(_content_findings(files.archive))
+    except Exception as error:
+        findings = [Finding("archive.corrupt", path.name, f"the archive cannot be read: {error!r}")]
+    if not has_errors(findings) and "modelDescription.xml" not in files.names():
         findings.append(_no_description(path.name, files.names()))
-        unfit = True
-    return (None if unfit else files), findings
+    if has_errors(findings):
+        files.close()
+        return None, findings
+    return files, findings
 
 
 def _no_description(name: str, names: list[str]) -> Finding:

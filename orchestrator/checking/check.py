@@ -39,7 +39,12 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> Report:
     findings = list(result.findings)
     executed = False
     d, files = result.description, result.files
-    if not options.static and d is not None and files is not None and not has_errors(findings) and can_run(d, files):
-        findings += check_dynamic(d, files, result.references, options.limits)
-        executed = True
+    try:
+        if not options.static and d is not None and files is not None and not has_errors(findings):
+            executed = can_run(d, files)
+            if executed:
+                findings += check_dynamic(d, files, result.references, options.limits)
+    finally:
+        if files is not None:
+            files.close()
     return Report(str(path), ordered(findings), executed, result.facts)

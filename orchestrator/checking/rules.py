@@ -144,7 +144,7 @@ steps.variable | W | results hardly depend on the communication step | integrate
 reference.result | E | the reference result is reproduced | correct the model, or write the reference again
 reference.not-run | I | the reference result can be reproduced | give the inputs as columns of the result
 misuse.guid | W | a wrong guid is refused | compare the guid in fmi2Instantiate
-misuse.crash | E | misuse does not end the process | check the arguments and the state of the instance
+misuse.crash | W | misuse does not end the process | check the arguments and the state of the instance
 misuse.step-before-init | W | fmi2DoStep before initialisation is refused | return fmi2Error
 misuse.negative-step | W | a negative step is refused | return fmi2Error or fmi2Discard
 misuse.value-reference | W | unknown value references are refused | return fmi2Error

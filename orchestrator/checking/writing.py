@@ -24,7 +24,7 @@ def as_lines(report: Report) -> list[str]:
     lines = [summary(report)]
     for f in report.findings:
         lines += [f"  {f.severity:7} {f.rule}  {f.path}", f"          {f.message}", f"          -> {f.advice}"]
-    return [line.translate(_FORBIDDEN) for line in lines]
+    return [" ".join(line.translate(_FORBIDDEN).splitlines()) for line in lines]
 
 
 def as_results(reports: Sequence[Report]) -> dict[str, Any]:

@@ -44,6 +44,14 @@ static char *volatile hoard = NULL; /* volatile, or the compiler removes the lea
 static double shared = 0.0;
 #endif
 
+#ifdef FAULT_marks_loading
+__attribute__((constructor)) static void mark(void) {
+    const char *path = getenv("LOADING_MARK");
+    FILE *file = path ? fopen(path, "w") : NULL;
+    if (file) fclose(file);
+}
+#endif
+
 static State initial_state(void) {
     State s = {0.0, 40.0, 0.8, 1.0, 0.1, 0.0, 0.0, 0, 1, 2, 0, 1, "mass on a spring"};
 #ifdef FAULT_default_mismatch
