@@ -185,9 +185,7 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
     return Regulator(k, sample_time, tuple(complex(p) for p in poles))  # type: ignore[arg-type]
 
 
-def design_estimator(
-    model: LinearModel, process: Array, measurement: Array, sample_time: float
-) -> Estimator:
+def design_estimator(model: LinearModel, process: Array, measurement: Array, sample_time: float) -> Estimator:
     """Return the stationary Kalman filter of ``model``.
 
     Args:
@@ -225,4 +223,4 @@ def _sampled_noise(A: Array, intensity: Array, h: float) -> Array:
 def _quiet(function: object, *arguments: object) -> tuple[Array, Array, Array]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PendingDeprecationWarning)
-        return function(*arguments)  # type: ignore[operator, no-any-return]
+        return function(*arguments)  # type: ignore[operator]

@@ -79,7 +79,7 @@ class Experiment:
     @property
     def times(self) -> Array:
         """Communication points [s], shape (steps + 1,)."""
-        return np.arange(self.steps + 1) * self.sample_time
+        return np.arange(self.steps + 1, dtype=np.float64) * self.sample_time
 
     def reference(self) -> tuple[Array, Array]:
         """Return the wanted load angle [rad] and speed [rad/s] at the communication points."""
