@@ -101,6 +101,31 @@ class Model:
         return frozenset(self.named("input")) if declared is None else declared
 
 
+@dataclass(frozen=True)
+class NativeCalls:
+    """What machine code needs to step a slave without the interpreter: C functions with FMI 2.0's signatures.
+
+    Attributes:
+        component: first argument of every call.
+        set_real: address of ``status f(component, references, count, values)``.
+        get_real: address, likewise.
+        get_integer: address, likewise, with 32-bit integers.
+        do_step: address of ``status f(component, time, step, no_rollback)``.
+        inputs: references of the inputs.
+        reals: references of the Real outputs, which come first.
+        integers: references of the Integer outputs.
+    """
+
+    component: int
+    set_real: int
+    get_real: int
+    get_integer: int
+    do_step: int
+    inputs: NDArray[np.uint32]
+    reals: NDArray[np.uint32]
+    integers: NDArray[np.uint32]
+
+
 class Slave(Protocol):
     """One simulated unit.
 

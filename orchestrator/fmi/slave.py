@@ -1,0 +1,382 @@
+"""FMUs as slaves: FMI 2.0 co-simulation through FMPy. At run time nothing else in the project calls FMPy.
+
+FMPy loads the library and instantiates; the calls that are made at every step go straight to the library, through
+preallocated buffers, one batched call per type and direction. Python FMUs are called with the interpreter lock
+held (``ctypes.PyDLL``): they would take it back at once.
+"""
+
+import ctypes
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.errors import FmuError, SlaveError
+from orchestrator.fmi.extraction import content_hash, extracted
+from orchestrator.fmi.model_description import FmuDescription, read_description
+from orchestrator.master.protocol import Model, NativeCalls, Signals, StepDiscardedError, Transfer, Value
+from orchestrator.master.system import Instance, Start
+
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+
+MESSAGES_KEPT = 20
+_C_TYPES: dict[str, Any] = {
+    "Real": ctypes.c_double,
+    "Integer": ctypes.c_int,
+    "Enumeration": ctypes.c_int,
+    "Boolean": ctypes.c_int,
+    "String": ctypes.c_char_p,
+}
+_FUNCTIONS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
+
+_only_ones: set[str] = set()
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Variables of one type that are set or read in one call.
+
+    Attributes:
+        positions: of the variables in the list asked for.
+        references: value references as a C array.
+        values: C array that the call reads or fills.
+        call: returns the status.
+        function: its name, for messages.
+    """
+
+    positions: list[int]
+    references: Any
+    values: Any
+    call: Callable[[], int]
+    function: str
+
+
+class FmuSlave:
+    """One FMU instance. See ``Slave`` for the order of calls; ``messages`` holds the warnings and worse that it logged.
+
+    Args:
+        name: of the instance.
+        path: of the FMU.
+        description: what ``read_description`` returned, if it has been read already.
+
+    Raises:
+        FmuError: the FMU cannot be read, loaded or instantiated here.
+    """
+
+    def __init__(self, name: str, path: Path, description: FmuDescription | None = None) -> None:
+        self.name = name
+        self.path = path
+        self._description = read_description(path) if description is None else description
+        self.model: Model = self._description.model
+        self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
+        self._worst = OK
+        self._closed = False
+        self._once = ""
+        self._reserve()
+        try:
+            self._fmu = self._load()
+            self._instantiate()
+        except BaseException:
+            self._release()
+            raise
+        loader = ctypes.PyDLL if self._description.python else ctypes.CDLL
+        self._library: Any = loader(self._fmu.dll._name, handle=self._fmu.dll._handle)
+        self._component = ctypes.c_void_p(self._fmu.component)
+        self._step = self._library.fmi2DoStep
+        self._step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+        self._step.restype = ctypes.c_int
+
+    # Loading -------------------------------------------------------------------------------------------------
+
+    def _reserve(self) -> None:
+        if self._description.once:
+            digest = content_hash(self.path)
+            if digest in _only_ones:
+                raise FmuError(f"{self.name}: {self.path} may be instantiated only once per process, but is twice")
+            _only_ones.add(digest)
+            self._once = digest
+
+    def _release(self) -> None:
+        _only_ones.discard(self._once)
+        self._closed = True
+
+    def _load(self) -> Any:
+        from fmpy import platform, sharedLibraryExtension
+        from fmpy.fmi2 import FMU2Slave
+
+        folder = extracted(self.path)
+        identifier = self._description.identifier
+        library = folder / "binaries" / platform / f"{identifier}{sharedLibraryExtension}"
+        if not library.is_file():
+            raise FmuError(f"{self.name}: {self.path} must have a binary for {platform}, but has none")
+        try:
+            return FMU2Slave(
+                guid=self._description.guid,
+                modelIdentifier=identifier,
+                unzipDirectory=str(folder),
+                instanceName=self.name,
+                libraryPath=str(library),
+            )
+        except Exception as error:  # FMPy raises bare Exception, ctypes AttributeError
+            raise FmuError(f"{self.name}: the binary of {self.path} cannot be loaded: {error}") from None
+
+    def _instantiate(self) -> None:
+        from fmpy import calloc, fmi2, free
+
+        def log(_environment: Any, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
+            if status != OK:
+                self.messages.append((message or b"").decode("utf-8", "replace").strip())
+
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+        self._log = callbacks.logger
+        _format_messages(callbacks)
+        try:
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
+        except Exception:
+            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._said()}") from None
+
+    # Calls ---------------------------------------------------------------------------------------------------
+
+    def _said(self) -> str:
+        return f": {self.messages[-1]}" if self.messages else ""
+
+    def _check(self, status: int, what: str) -> None:
+        """Raise for what is worse than a warning, and remember that the instance must not be called again."""
+        if status in (OK, WARNING):
+            return
+        self._worst = max(self._worst, status if status != PENDING else ERROR)
+        label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+        text = f"{self.name}: {what} returned {label}{self._said()}"
+        if status == DISCARD:
+            raise StepDiscardedError(text)
+        raise SlaveError(text)
+
+    def _alive(self, what: str) -> None:
+        if self._closed or self._worst >= ERROR:
+            raise SlaveError(f"{self.name}: {what} must not be called after a failure, but was")
+
+    def _call(self, function: str, *arguments: Any) -> None:
+        self._alive(function)
+        entry = getattr(self._library, function)
+        entry.restype = ctypes.c_int
+        self._check(entry(self._component, *arguments), function)
+
+    def _batches(self, names: Sequence[str], direction: str, buffer: Signals | None = None) -> list[_Batch]:
+        groups: dict[str, list[int]] = {}
+        for position, name in enumerate(names):
+            groups.setdefault(_FUNCTIONS[self.model.variables[name].type], []).append(position)
+        batches = []
+        for kind, positions in groups.items():
+            variables = [self.model.variables[names[p]] for p in positions]
+            count = len(positions)
+            references = (ctypes.c_uint * count)(*(v.reference for v in variables))
+            values = (_C_TYPES[variables[0].type] * count)()
+            adjacent = positions == list(range(positions[0], positions[0] + count))
+            if buffer is not None and kind == "Real" and adjacent:
+                values = (ctypes.c_double * count).from_buffer(buffer[positions[0] : positions[0] + count].data)
+            function = f"fmi2{direction}{kind}"
+            entry = self._library[function]
+            entry.restype = ctypes.c_int
+            entry.argtypes = None
+            call = partial(entry, self._component, references, ctypes.c_size_t(count), values)
+            batches.append(_Batch(positions, references, values, call, function))
+        return batches
+
+    def set(self, values: Mapping[str, Value]) -> None:
+        """Set variables of any type by name."""
+        self._alive("fmi2Set")
+        names = list(values)
+        for batch in self._batches(names, "Set"):
+            for k, position in enumerate(batch.positions):
+                value = values[names[position]]
+                batch.values[k] = value.encode() if isinstance(value, str) else value
+            self._check(batch.call(), self._naming(batch, names))
+
+    def _naming(self, batch: _Batch, names: Sequence[str]) -> str:
+        some = ", ".join(names[p] for p in batch.positions[:3])
+        return f"{batch.function} of {some}" + (", ..." if len(batch.positions) > 3 else "")
+
+    def get(self, names: Sequence[str]) -> list[Value]:
+        """Return variables of any type by name."""
+        self._alive("fmi2Get")
+        found: list[Value] = [0.0] * len(names)
+        for batch in self._batches(names, "Get"):
+            self._check(batch.call(), self._naming(batch, names))
+            for position, value in zip(batch.positions, batch.values, strict=True):
+                kind = self.model.variables[names[position]].type
+                decoded = (value or b"").decode("utf-8", "replace") if kind == "String" else value
+                found[position] = bool(decoded) if kind == "Boolean" else decoded
+        return found
+
+    def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that sets the numeric variables ``names`` from ``buffer``; shape (len(names),)."""
+        batches = self._batches(names, "Set", buffer)
+        if len(batches) == 1 and isinstance(batches[0].values, ctypes.Array) and _shares(batches[0].values, buffer):
+            return self._direct(batches[0])
+
+        def send() -> None:
+            for batch in batches:
+                if not _shares(batch.values, buffer):
+                    whole = batch.values._type_ is ctypes.c_int
+                    for k, position in enumerate(batch.positions):
+                        batch.values[k] = int(buffer[position]) if whole else float(buffer[position])
+                self._alive(batch.function)
+                self._check(batch.call(), batch.function)
+
+        return send
+
+    def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that reads the numeric variables ``names`` into ``buffer``; shape (len(names),)."""
+        batches = self._batches(names, "Get", buffer)
+        if len(batches) == 1 and _shares(batches[0].values, buffer):
+            return self._direct(batches[0])
+        converted = [batch for batch in batches if not _shares(batch.values, buffer)]
+
+        def receive() -> None:
+            for batch in batches:
+                self._alive(batch.function)
+                self._check(batch.call(), batch.function)
+            for batch in converted:
+                for position, value in zip(batch.positions, batch.values, strict=True):
+                    buffer[position] = value
+
+        return receive
+
+    def _direct(self, batch: _Batch) -> Transfer:
+        call = batch.call
+
+        def transfer() -> None:
+            if self._worst >= ERROR:
+                self._alive(batch.function)
+            status = call()
+            if status:
+                self._check(status, batch.function)
+
+        return transfer
+
+    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
+        """Set the experiment up and enter initialisation mode."""
+        self.messages.clear()
+        self._call(
+            "fmi2SetupExperiment",
+            ctypes.c_int(tolerance is not None),
+            ctypes.c_double(tolerance or 0.0),
+            ctypes.c_double(start),
+            ctypes.c_int(stop is not None),
+            ctypes.c_double(stop or 0.0),
+        )
+        self._call("fmi2EnterInitializationMode")
+
+    def start(self) -> None:
+        """Exit initialisation mode."""
+        self._call("fmi2ExitInitializationMode")
+
+    def do_step(self, time: float, step: float) -> None:
+        """Advance from ``time`` to ``time + step`` [s], inputs held."""
+        if self._worst >= ERROR:
+            self._alive("fmi2DoStep")
+        status = self._step(self._component, time, step, 1)
+        if status:
+            self._check(status, f"fmi2DoStep at t = {time:g} s")
+
+    def get_state(self) -> Any:
+        """Return a handle of a copy of the whole state."""
+        state = ctypes.c_void_p()
+        self._call("fmi2GetFMUstate", ctypes.byref(state))
+        return state
+
+    def set_state(self, state: Any) -> None:
+        """Return to a state; the handle stays valid."""
+        self._call("fmi2SetFMUstate", state)
+
+    def free_state(self, state: Any) -> None:
+        """Give a handle back; after a failure it is left to the FMU."""
+        if not self._closed and self._worst < ERROR:
+            self._call("fmi2FreeFMUstate", ctypes.byref(state))
+
+    def terminate(self) -> None:
+        """End the run."""
+        self._call("fmi2Terminate")
+
+    def reset(self) -> None:
+        """Return to the condition of a new instance."""
+        self._call("fmi2Reset")
+
+    def close(self) -> None:
+        """Free the instance, unless it failed fatally; its library stays loaded when it runs Python."""
+        if self._closed:
+            return
+        self._release()
+        if self._worst >= FATAL:
+            return
+        self._fmu.fmi2FreeInstance(self._fmu.component)
+        if not self._description.python:
+            self._fmu.freeLibrary()
+
+    def __del__(self) -> None:
+        if not getattr(self, "_closed", True) and hasattr(self, "_library"):
+            self.close()
+
+    # The compiled loop -----------------------------------------------------------------------------------------
+
+    def native_calls(self, inputs: Sequence[str], outputs: Sequence[str]) -> NativeCalls | None:
+        """Return addresses for calls from machine code; ``None`` where types or language do not allow it."""
+        if not self._description.python or self._worst >= ERROR:
+            return None
+        kinds = {self.model.variables[name].type for name in (*inputs, *outputs)}
+        if not kinds <= {"Real", "Integer", "Enumeration"} or any(
+            self.model.variables[name].type != "Real" for name in inputs
+        ):
+            return None
+        variables = self.model.variables
+        reals = [variables[n].reference for n in outputs if variables[n].type == "Real"]
+        wholes = [variables[n].reference for n in outputs if variables[n].type != "Real"]
+
+        def address(function: str) -> int:
+            return int(ctypes.cast(self._library[function], ctypes.c_void_p).value or 0)
+
+        return NativeCalls(
+            component=int(self._component.value or 0),
+            set_real=address("fmi2SetReal"),
+            get_real=address("fmi2GetReal"),
+            get_integer=address("fmi2GetInteger"),
+            do_step=address("fmi2DoStep"),
+            inputs=np.array([variables[n].reference for n in inputs], dtype=np.uint32),
+            reals=np.array(reals, dtype=np.uint32),
+            integers=np.array(wholes, dtype=np.uint32),
+        )
+
+    def failed(self, status: int, function: str) -> None:
+        """Raise for a status that the compiled loop met."""
+        self._check(status, function)
+
+
+def _shares(values: Any, buffer: Signals) -> bool:
+    first = int(buffer.ctypes.data)
+    return first <= ctypes.addressof(values) < first + max(buffer.nbytes, 1)
+
+
+def _format_messages(callbacks: Any) -> None:
+    try:
+        from fmpy.logging import addLoggerProxy
+    except ImportError:
+        return
+    addLoggerProxy(ctypes.byref(callbacks))
+
+
+def fmu_instance(name: str, path: Path, start: Start | None = None) -> Instance:
+    """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
+
+    Raises:
+        FmuError: see ``read_description``.
+    """
+    description = read_description(path)
+    return Instance(name, description.model, lambda called: FmuSlave(called, path, description), start or {})
