@@ -6,12 +6,17 @@ from pathlib import Path
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
-from orchestrator.reporting.pages import check, generic
+from orchestrator.reporting.pages import check, generic, simulate, sweep, thesis
 from orchestrator.reporting.source import Source, load
 
 PAGE = "report.html"
 COMMANDS = ("build", "check", "simulate", "sweep", "estimate", "diagnose", "thesis", "ssp", "bench")
-_BUILDERS: dict[str, Callable[[Source], Report]] = {"check": check.build}
+_BUILDERS: dict[str, Callable[[Source], Report]] = {
+    "check": check.build,
+    "simulate": simulate.build,
+    "sweep": sweep.build,
+    "thesis": thesis.build,
+}
 
 
 def report_from_directory(directory: Path, command: str | None = None) -> Report:

@@ -56,7 +56,7 @@ class Source:
         arguments = self.document.get("arguments") or {}
         given = {name: plain(value) for name, value in arguments.items() if value not in (None, False, [], {})}
         head = {"command": self.command, "version": self.document.get("version"), "seed": self.document.get("seed")}
-        return tuple((name, value) for name, value in (head | given).items() if value is not None)
+        return tuple((name.replace("_", " "), value) for name, value in (head | given).items() if value is not None)
 
     def downloads(self) -> tuple[Path, ...]:
         """Return the data files of the directory, by name."""

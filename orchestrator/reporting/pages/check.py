@@ -13,7 +13,7 @@ def build(source: Source) -> Report:
     good = sum(bool(fmu["ok"]) for fmu in fmus)
     counts = {s: sum(fmu["counts"][s] for fmu in fmus) for s in ("error", "warning", "info")}
     sections: list[Section] = [_overview(fmus)]
-    sections += [_findings(fmu) for fmu in fmus]
+    sections += [_findings(fmu) for fmu in fmus if fmu["findings"]]
     return Report(
         title="FMI compliance check",
         summary=(

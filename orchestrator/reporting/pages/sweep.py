@@ -1,0 +1,124 @@
+"""The page of ``sweep``: how close the estimates are, and every case."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from orchestrator.reporting.model import Cell, Column, Plot, Report, Section, Series, Table
+from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.source import Source, numbers, table_of
+
+Columns = Mapping[str, list[Cell]]
+UNITS = {"alpha": "rad", "noise": "rad"}
+STATISTICS = {
+    "noise": ("noise", "rad"),
+    "count": ("cases", ""),
+    "mean_percent": ("mean error", "%"),
+    "worst_percent": ("worst error", "%"),
+    "mse": ("mean squared error", "rad²"),
+    "coverage": ("intervals that hold the size", "share"),
+}
+
+
+def build(source: Source) -> Report:
+    """Return the page."""
+    results = source.results
+    table = source.columns("sweep.csv")
+    failed, total = int(results["failed"]), int(results["cases"])
+    statistics: list[Mapping[str, Any]] = list(results.get("statistics", []))
+    sections: list[Section] = []
+    if statistics:
+        sections.append(_statistics(statistics))
+    if {"alpha", "noise", "estimate", "lower", "upper", "error_percent"} <= set(table):
+        sections += _plots(table)
+    units = {c["name"]: c["unit"] for c in results.get("columns", [])}
+    if failed:
+        sections.append(_cases("Failed cases", table, UNITS | units, failed=True))
+    sections.append(_cases("Cases", table, UNITS | units, failed=False))
+    sections += _provenance(results)
+    return Report(
+        title="Backlash sweep",
+        summary=_summary(statistics, total, failed),
+        badge=("bad", f"{failed} of {total} cases failed") if failed else ("good", f"all {total} cases done"),
+        sections=tuple(sections),
+        origin=source.origin(),
+        downloads=source.downloads(),
+    )
+
+
+def _summary(statistics: Sequence[Mapping[str, Any]], total: int, failed: int) -> str:
+    parts = []
+    for s in statistics:
+        where = f"With encoder noise of {s['noise']:g} rad" if s["noise"] else "Without noise"
+        error = f"{s['mean_percent']:.3g} % in the mean and {s['worst_percent']:.3g} % at worst"
+        parts.append(f"{where} the error is {error}.")
+    return " ".join([f"The half-gap was estimated in {total - failed} of {total} cases.", *parts])
+
+
+def _statistics(statistics: Sequence[Mapping[str, Any]]) -> Table:
+    names = [name for name in STATISTICS if name in statistics[0]]
+    columns = tuple(Column(*STATISTICS[name]) for name in names)
+    return Table("Errors by noise level", columns, tuple(tuple(s[name] for name in names) for s in statistics))
+
+
+def _plots(table: Columns) -> list[Section]:
+    alpha, estimate = numbers(table["alpha"]), numbers(table["estimate"])
+    percent = numbers(table["error_percent"])
+    noise = numbers(table["noise"])
+    case = [f"case {_whole(c)}" for c in table["case"]]
+    lower, upper = numbers(table["lower"]), numbers(table["upper"])
+    estimates, errors = [], []
+    for level in sorted({n for n in noise if n is not None}):
+        rows = [i for i, n in enumerate(noise) if n == level and estimate[i] is not None]
+        name = f"noise {level:g} rad" if level else "no noise"
+        x, labels = [alpha[i] for i in rows], [case[i] for i in rows]
+        low, high = [lower[i] for i in rows], [upper[i] for i in rows]
+        estimates.append(Series(name, x, [estimate[i] for i in rows], "points", low, high, labels))
+        errors.append(Series(name, x, [percent[i] for i in rows], "points", labels=labels))
+    known = [v for v in (*alpha, *lower) if v is not None]
+    wide = bool(known) and min(known) > 0.0 and max(known) / min(known) > 10.0
+    return [
+        Plot(
+            "Estimated against actual half-gap",
+            "actual [rad]",
+            "estimated [rad]",
+            tuple(estimates),
+            diagonal=True,
+            log_x=wide,
+            log_y=wide,
+            note="Bars: the interval given with each estimate. Dashed: estimated equals actual.",
+        ),
+        Plot("Error against size", "actual [rad]", "error [%]", tuple(errors), log_x=wide, log_y=True),
+    ]
+
+
+def _cases(title: str, table: Columns, units: Mapping[str, str], *, failed: bool) -> Table:
+    names = [n for n in table if failed or n != "message" or any(table[n])]
+    rows = zip(*(table[n] for n in names), strict=True)
+    status = names.index("status")
+    chosen = tuple(_row(names, row) for row in rows if not failed or row[status] != "done")
+    columns = tuple(Column(n.replace("_", " "), units.get(n, ""), 6) for n in names)
+    return Table(title, columns, chosen)
+
+
+def _row(names: Sequence[str], row: Sequence[Cell]) -> tuple[Cell, ...]:
+    return tuple(_whole(v) if n in {"case", "repetition"} else v for n, v in zip(names, row, strict=True))
+
+
+def _whole(value: Cell) -> Cell:
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _provenance(results: Mapping[str, Any]) -> list[Section]:
+    made: list[Section] = []
+    calibrations = results.get("calibrations") or {}
+    if calibrations:
+        made.append(
+            table_of("Calibrations", [{"noise [rad]": n, **c} for n, c in calibrations.items()], note=CALIBRATION_NOTE)
+        )
+    for name in ("experiment", "fmus"):
+        if isinstance(results.get(name), Mapping):
+            made += sections_of({"fmus": "FMUs by content"}.get(name, name.capitalize()), results[name])
+    return made
+
+
+CALIBRATION_NOTE = "The monotone map from S to the half-gap, made from runs that no sweep uses."

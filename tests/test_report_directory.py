@@ -1,0 +1,178 @@
+"""From a result directory to its page: every command, damaged input, the `report` command."""
+
+import json
+from dataclasses import asdict
+
+import pytest
+
+from orchestrator.checking.findings import Finding as CheckFinding
+from orchestrator.checking.findings import Report as CheckReport
+from orchestrator.checking.rules import RULES
+from orchestrator.checking.writing import as_results
+from orchestrator.cli import main
+from orchestrator.errors import ScenarioError
+from orchestrator.output import write_result
+from orchestrator.paired.metric import ErrorStatistics
+from orchestrator.paired.sweep import COLUMNS
+from orchestrator.reporting import Findings, Plot, Table, report_from_directory, write_report
+from orchestrator.reporting.directory import COMMANDS
+
+SWEEP = """case,noise,repetition,alpha,status,S,estimate,lower,upper,error,error_percent,message
+0,0.0,1.0,0.002,done,0.1,0.0021,0.0019,0.0022,1e-4,5.0,
+1,0.0,1.0,0.05,done,1.5,0.0499,0.049,0.051,1e-4,0.2,
+2,0.0001,1.0,0.002,done,0.1,0.0019,0.0018,0.0023,1e-4,5.0,
+3,0.0001,1.0,0.05,crash,,,,,,,the worker process died
+"""
+
+
+def sections(report, kind):
+    return [s for s in report.sections if isinstance(s, kind)]
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    statistics = [{"noise": n} | asdict(ErrorStatistics(2, 2.5, 5.0, 1e-8, 1.0)) for n in (0.0, 1e-4)]
+    results = {
+        "cases": 4,
+        "failed": 1,
+        "statistics": statistics,
+        "columns": [{"name": c.name, "unit": c.unit} for c in COLUMNS],
+        "experiment": {"name": "default", "duration": 2.0, "values": {"k": 3300.0}},
+        "calibrations": {"0": {"digest": "abc", "runs": 10}, "0.0001": {"digest": "def", "runs": 10}},
+        "fmus": {"Drivetrain": "0123"},
+    }
+    write_result(tmp_path, "sweep", {"sizes": "0.002,0.05", "resume": False}, 7, results)
+    (tmp_path / "sweep.csv").write_text(SWEEP)
+    return tmp_path
+
+
+def test_the_page_of_a_sweep_shows_statistics_estimates_and_failures(sweep):
+    report = report_from_directory(sweep)
+    assert report.badge == ("bad", "1 of 4 cases failed")
+    assert "Without noise the error is 2.5 % in the mean and 5 % at worst" in report.summary
+    estimates, _errors = sections(report, Plot)
+    quiet, noisy = estimates.series
+    assert (quiet.name, noisy.name) == ("no noise", "noise 0.0001 rad")
+    assert (quiet.x, quiet.y, quiet.low) == ([0.002, 0.05], [0.0021, 0.0499], [0.0019, 0.049])
+    assert noisy.x == [0.002]
+    assert estimates.log_x
+    tables = {t.title: t for t in sections(report, Table)}
+    assert [row[-1] for row in tables["Failed cases"].rows] == ["the worker process died"]
+    assert len(tables["Cases"].rows) == 4
+    assert ("seed", 7) in report.origin
+    assert ("resume", False) not in report.origin
+    assert [p.name for p in report.downloads] == ["sweep.csv", "sweep.json"]
+
+
+def test_the_page_of_a_check_lists_what_was_found(tmp_path):
+    rule = next(name for name, rule in RULES.items() if rule.severity == "error")
+    found = CheckReport("a/bad.fmu", (CheckFinding(rule, "modelDescription.xml", "A unit must be defined."),))
+    write_result(
+        tmp_path, "check", {}, None, as_results([found, CheckReport("good.fmu", (), True, {"version": "2.0"})])
+    )
+    report = report_from_directory(tmp_path)
+    assert report.badge == ("bad", "1 error")
+    assert report.summary.startswith("1 of 2 FMUs have no error.")
+    (findings,) = sections(report, Findings)
+    assert (findings.title, findings.items[0].text) == ("bad.fmu", "A unit must be defined.")
+    (table,) = sections(report, Table)
+    assert [row[0] for row in table.rows] == ["bad.fmu", "good.fmu"]
+
+
+def test_the_page_of_a_pair_shades_the_time_out_of_contact(tmp_path):
+    results = {"alpha": 0.02, "S": 1.0, "estimate": None, "no_estimate": "S is too large", "crossings": 1}
+    write_result(tmp_path, "simulate", {"alpha": 0.02}, 0, results)
+    (tmp_path / "simulate.csv").write_text(
+        "time,reference,theta_l_hat,theta_l,contact,twin_theta_l_hat,twin_theta_l\n"
+        "0,0,0,0,1,0,0\n1,0,1,0,0,0.5,0\n2,0,2,0,0,0.5,0\n3,0,3,0,-1,0.5,0\n4,0,3,0,0,0.5,0\n"
+    )
+    report = report_from_directory(tmp_path)
+    assert "S is too large" in report.summary
+    position, difference = sections(report, Plot)
+    assert [(s.start, s.end) for s in position.spans] == [(1.0, 3.0), (4.0, 4.0)]
+    assert [s.name for s in position.series] == ["with backlash", "without", "reference"]
+    assert difference.series[0].y == [0.0, 0.5, 1.5, 2.5, 2.5]
+
+
+def test_the_page_of_a_scenario_groups_signals_by_unit(tmp_path):
+    head = ("signal", "unit", "first", "last", "smallest", "largest")
+    rows = [
+        ("a.x", "rad", "0", "1", "0", "1"),
+        ("a.v", "rad/s", "0", "1", "0", "1"),
+        ("b.x", "rad", "0", "1", "0", "1"),
+    ]
+    signals = [dict(zip(head, row, strict=True)) for row in rows]
+    write_result(tmp_path, "simulate", {"scenario": "s.toml"}, None, {"signals": signals, "steps": 1})
+    (tmp_path / "simulate.csv").write_text("time,a.x,a.v,b.x\n0,0,0,0\n1,1,1,1\n")
+    plots = sections(report_from_directory(tmp_path), Plot)
+    assert [[s.name for s in p.series] for p in plots] == [["a.x", "b.x"], ["a.v"]]
+
+
+@pytest.mark.parametrize("command", ["build", "ssp", "bench"])
+def test_commands_without_a_page_of_their_own_get_facts_and_tables(tmp_path, command):
+    results = {
+        "count": 2,
+        "ratio": 1.5,
+        "rows": [{"name": "a", "time": 1.0}, {"name": "b", "time": None}],
+        "deep": {"x": 1},
+    }
+    write_result(tmp_path, command, {}, None, results)
+    report = report_from_directory(tmp_path)
+    (table,) = sections(report, Table)
+    assert table.rows == (("a", 1.0), ("b", None))
+    assert [s.title for s in report.sections] == ["Results", "Rows", "Deep"]
+
+
+def test_report_rebuilds_the_same_page_and_leaves_nothing_else(sweep, capsys):
+    before = write_report(sweep).read_bytes()
+    (sweep / "report.html").unlink()
+    assert main(["report", str(sweep)]) == 0
+    assert capsys.readouterr().out == f"{sweep / 'report.html'}\n"
+    assert (sweep / "report.html").read_bytes() == before
+    assert sorted(p.name for p in sweep.iterdir()) == ["report.html", "sweep.csv", "sweep.json"]
+
+
+def test_several_results_in_one_directory_are_told_apart(sweep):
+    write_result(sweep, "check", {}, None, as_results([]))
+    with pytest.raises(ScenarioError, match=r"but has those of check, sweep: choose with --command"):
+        report_from_directory(sweep)
+    assert report_from_directory(sweep, "sweep").title == "Backlash sweep"
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("{", "must be JSON"),
+        ("[]", "must be the result"),
+        ('{"command": "check", "results": {}}', "must be the result"),
+        ('{"command": "sweep", "results": {}}', "must hold results of this version"),
+        ('{"command": "sweep", "results": {"cases": "x", "failed": 0}}', "must hold results of this version"),
+    ],
+)
+def test_damaged_results_are_one_line_and_exit_2(tmp_path, capsys, content, said):
+    (tmp_path / "sweep.json").write_text(content)
+    assert main(["report", str(tmp_path)]) == 2
+    errors = capsys.readouterr().err
+    assert said in errors
+    assert errors.count("\n") == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["sweep.json"]
+
+
+def test_a_damaged_table_is_named(sweep, capsys):
+    (sweep / "sweep.csv").write_text("case,alpha\n1,2,3\n")
+    assert main(["report", str(sweep)]) == 2
+    assert "sweep.csv must be a CSV table" in capsys.readouterr().err
+
+
+def test_an_empty_directory_is_named(tmp_path, capsys):
+    assert main(["report", str(tmp_path)]) == 2
+    assert "has none" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_no_results_at_all_make_a_page_or_one_line(tmp_path, command, capsys):
+    (tmp_path / f"{command}.json").write_text(json.dumps({"command": command, "results": {}}))
+    code = main(["report", str(tmp_path)])
+    assert code in {0, 2}
+    assert (tmp_path / "report.html").exists() == (code == 0)
+    assert "Traceback" not in capsys.readouterr().err
