@@ -119,6 +119,8 @@ def reference_solution(
 
 def first_flank(plant: ReferencePlant, x: Array) -> int:
     """Return the flank (-1, 0, 1) at which a state of at least 3 values starts."""
+    if plant.alpha == 0.0:
+        return 1
     wound = x[0] / plant.i - x[2]
     return int(np.sign(wound)) if abs(wound) > plant.alpha else 0
 
@@ -155,6 +157,8 @@ def _slope(plant: ReferencePlant, flank: int, u: float, T_l: float) -> Callable[
 
 
 def _events(plant: ReferencePlant, flank: int) -> list[Callable[[float, Array], float]]:
+    if plant.alpha == 0.0:
+        return []
     i, alpha, nordin = plant.i, plant.alpha, plant.model == "nordin"
 
     def wound(x: Array) -> float:
