@@ -56,7 +56,7 @@ class Source:
         arguments = self.document.get("arguments") or {}
         given = {name: plain(value) for name, value in arguments.items() if value not in (None, False, [], {})}
         head = {"command": self.command, "version": self.document.get("version"), "seed": self.document.get("seed")}
-        return tuple((name.replace("_", " "), value) for name, value in (head | given).items() if value is not None)
+        return tuple((words(name), value) for name, value in (head | given).items() if value is not None)
 
     def downloads(self) -> tuple[Path, ...]:
         """Return the data files of the directory, by name."""
@@ -106,6 +106,12 @@ def _short(value: Cell) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
+def words(name: str) -> str:
+    """Return an identifier as words; a symbol with an index, such as ``J_m``, stays as it is."""
+    parts = name.split("_")
+    return name if any(len(part) < 2 for part in parts) else " ".join(parts)
+
+
 def numbers(values: Sequence[Any]) -> list[float | None]:
     """Return a column's numbers, ``None`` for everything else."""
     return [float(v) if isinstance(v, (int, float)) and not isinstance(v, bool) else None for v in values]
@@ -116,5 +122,5 @@ def table_of(
 ) -> Table:
     """Return a table of equally shaped JSON objects, one column per key in order of first appearance."""
     names = list(dict.fromkeys(name for item in items for name in item))
-    columns = tuple(Column(name.replace("_", " "), (units or {}).get(name, "")) for name in names)
+    columns = tuple(Column(words(name), (units or {}).get(name, "")) for name in names)
     return Table(title, columns, tuple(tuple(plain(item.get(name)) for name in names) for item in items), note)

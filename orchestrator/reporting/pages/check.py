@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.reporting.model import Column, Finding, Findings, Report, Section, Table
-from orchestrator.reporting.source import Source, plain
+from orchestrator.reporting.source import Source, plain, words
 
 
 def build(source: Source) -> Report:
@@ -40,7 +40,7 @@ def _overview(fmus: list[Mapping[str, Any]]) -> Table:
         )
         for fmu in fmus
     )
-    return Table("FMUs", tuple(Column(c.replace("_", " ")) for c in columns), rows)
+    return Table("FMUs", tuple(Column(words(c)) for c in columns), rows)
 
 
 def _findings(fmu: Mapping[str, Any]) -> Findings:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.reporting.model import Facts, Report, Section
-from orchestrator.reporting.source import Source, plain, table_of
+from orchestrator.reporting.source import Source, plain, table_of, words
 
 
 def build(source: Source) -> Report:
@@ -23,16 +23,21 @@ def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
     facts: list[tuple[str, Any]] = []
     further: list[Section] = []
     for name, item in value.items():
-        words = name.replace("_", " ")
+        heading = words(name)
         if _is_records(item):
-            further.append(table_of(words.capitalize(), item))
+            further.append(table_of(sentence(heading), item))
         elif _is_keyed_records(item):
-            further.append(table_of(words.capitalize(), [{"name": key, **inner} for key, inner in item.items()]))
+            further.append(table_of(sentence(heading), [{"name": key, **inner} for key, inner in item.items()]))
         elif isinstance(item, Mapping):
-            further += sections_of(words.capitalize(), item)
+            further += sections_of(sentence(heading), item)
         elif not (isinstance(item, Sequence) and not isinstance(item, str) and len(item) > 12):
-            facts.append((words, plain(item)))
+            facts.append((heading, plain(item)))
     return [*([Facts(title, tuple(facts))] if facts else []), *further]
+
+
+def sentence(text: str) -> str:
+    """Return text with a capital first letter, the rest as it is."""
+    return text[:1].upper() + text[1:]
 
 
 def _is_records(item: Any) -> bool:

@@ -5,17 +5,18 @@ from typing import Any
 
 from orchestrator.reporting.model import Cell, Column, Plot, Report, Section, Series, Table
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.source import Source, numbers, table_of
+from orchestrator.reporting.source import Source, numbers, table_of, words
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
+FIRST = ("case", "alpha", "estimate", "lower", "upper", "error_percent", "noise")
 STATISTICS = {
     "noise": ("noise", "rad"),
     "count": ("cases", ""),
     "mean_percent": ("mean error", "%"),
     "worst_percent": ("worst error", "%"),
     "mse": ("mean squared error", "rad²"),
-    "coverage": ("intervals that hold the size", "share"),
+    "coverage": ("intervals that hold the size", "%"),
 }
 
 
@@ -57,7 +58,8 @@ def _summary(statistics: Sequence[Mapping[str, Any]], total: int, failed: int) -
 def _statistics(statistics: Sequence[Mapping[str, Any]]) -> Table:
     names = [name for name in STATISTICS if name in statistics[0]]
     columns = tuple(Column(*STATISTICS[name]) for name in names)
-    return Table("Errors by noise level", columns, tuple(tuple(s[name] for name in names) for s in statistics))
+    rows = [{**s, "coverage": 100.0 * s["coverage"]} for s in statistics]
+    return Table("Errors by noise level", columns, tuple(tuple(row[name] for name in names) for row in rows))
 
 
 def _plots(table: Columns) -> list[Section]:
@@ -92,11 +94,12 @@ def _plots(table: Columns) -> list[Section]:
 
 
 def _cases(title: str, table: Columns, units: Mapping[str, str], *, failed: bool) -> Table:
-    names = [n for n in table if failed or n != "message" or any(table[n])]
+    names = [n for n in (*FIRST, *table) if n in table and (failed or n != "message" or any(table[n]))]
+    names = list(dict.fromkeys(names))
     rows = zip(*(table[n] for n in names), strict=True)
     status = names.index("status")
     chosen = tuple(_row(names, row) for row in rows if not failed or row[status] != "done")
-    columns = tuple(Column(n.replace("_", " "), units.get(n, ""), 6) for n in names)
+    columns = tuple(Column(words(n), units.get(n, ""), 6) for n in names)
     return Table(title, columns, chosen)
 
 
