@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.likelihood import ALPHA, STATE_NAMES, Fit, Likelihood, Problem, inverse
@@ -50,15 +51,12 @@ def bound(
     return math.sqrt(inverse(information)[column, column])
 
 
-def refined_information(likelihood: Likelihood, theta: Array, free: Array) -> Array:
-    """Return the Fisher information with difference steps matched to the standard errors that it implies."""
+def refined_information(likelihood: Likelihood, theta: Array, free: NDArray[np.int64]) -> Array:
+    """Return the Fisher information, its differences matched to the standard errors that it implies."""
     point = likelihood.at(theta)
-    scale = np.array([likelihood.problem.unknowns[n].scale for n in free])
-    steps = 1e-4 * scale
     information = np.eye(free.size)
-    for _ in range(3):
-        _, information = likelihood.derivatives(point, free, steps)
-        steps = np.clip(1e-2 * np.sqrt(np.diag(inverse(information))), 1e-8 * scale, 1e-1 * scale)
+    for _ in range(4):
+        _, information = likelihood.derivatives(point, free)
     return information
 
 

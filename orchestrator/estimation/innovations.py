@@ -7,6 +7,7 @@ With the process noise at zero this is the output-error likelihood of the determ
 is the likelihood in innovation form, in which an imperfect model does not drift away from the record.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from pyfmu_sources.equations import rates
 
 Array = NDArray[np.float64]
 STATES = 5
+BLUR = 3e-4  # least standard deviation of the twist [rad] in a soft run
 
 
 @dataclass(frozen=True)
@@ -48,13 +50,13 @@ def affine_model(p: tuple[float, ...]) -> AffineModel:
     p = tuple(chosen)
     matrices = np.zeros((3, STATES, STATES))
     constants = np.zeros((3, STATES))
-    zero = (0.0,) * 8
+    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     inputs = np.zeros(STATES)
     for flank in (-1, 0, 1):
-        base = rates(zero, flank, 0.0, 0.0, p, 0.0, 0.0)
+        base: tuple[float, ...] = rates(zero, flank, 0.0, 0.0, p, 0.0, 0.0)
         constants[flank + 1] = base[:STATES]
         for n in range(STATES):
-            unit = tuple(1.0 if m == n else 0.0 for m in range(8))
+            unit = _unit(n)
             moved = rates(unit, flank, 0.0, 0.0, p, 0.0, 0.0)
             matrices[flank + 1, :, n] = [moved[m] - base[m] for m in range(STATES)]
         moved = rates(zero, flank, 0.0, 0.0, p, 1.0, 0.0)
@@ -62,6 +64,11 @@ def affine_model(p: tuple[float, ...]) -> AffineModel:
     normal = np.array([1.0 / p[P_I], 0.0, -1.0, 0.0, 0.0])
     mobility = np.array([1.0 / p[P_J_M], 1.0 / p[P_J_L]])
     return AffineModel(matrices, inputs, constants, normal, p[P_ALPHA], mobility)
+
+
+def _unit(n: int) -> tuple[float, float, float, float, float, float, float, float]:
+    a, b, c, d, e = (1.0 if m == n else 0.0 for m in range(STATES))
+    return (a, b, c, d, e, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -95,7 +102,14 @@ class Innovations:
 
 
 def innovations(
-    model: AffineModel, u: Array, y: Array, step: float, x0: Array, noise: NoiseLevels, keep: bool = False
+    model: AffineModel,
+    u: Array,
+    y: Array,
+    step: float,
+    x0: Array,
+    noise: NoiseLevels,
+    keep: bool = False,
+    soft: bool = False,
 ) -> Innovations:
     """Run the filter over a record.
 
@@ -107,6 +121,8 @@ def innovations(
         x0: (5,) state at the first sample, taken as exact (its uncertainty is the fit's business).
         noise: measurement and process noise.
         keep: whether to return the states.
+        soft: whether the flanks are blurred by the uncertainty of the twist (statistical linearisation) instead of
+            followed sharply: coarser, but smooth in every unknown, so a fit may start with it.
     """
     phi, gain_u, gain_1 = _discrete(model, step)
     intensity = (np.array(noise.torque) * model.mobility) ** 2
@@ -117,7 +133,7 @@ def innovations(
     contacts = np.empty(n if keep else 0, dtype=np.int64)
     _filter(
         model.matrices, model.inputs, model.constants, model.normal, model.alpha, phi, gain_u, gain_1, step,
-        u, y, variance, intensity, x0, errors, variances, states, contacts,
+        u, y, variance, intensity, x0, errors, variances, states, contacts, soft,
     )  # fmt: skip
     return Innovations(errors, variances, states, contacts)
 
@@ -177,30 +193,35 @@ def _drift(a, b_u, b_1, x, u, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def _root(v0, s0, v1, s1, h):  # type: ignore[no-untyped-def]
-    """Return the first root in (0, h] of the cubic with these end values and slopes, or -1.0 (v0 >= 0)."""
-    # Coarse march on the Hermite cubic, then bisection: a sample holds at most two crossings.
-    before = v0
-    t0 = 0.0
-    for m in range(1, 9):
-        t = m / 8.0
-        a = (1.0 + 2.0 * t) * (1.0 - t) ** 2 * v0 + t * (1.0 - t) ** 2 * h * s0
-        a += t * t * (3.0 - 2.0 * t) * v1 + t * t * (t - 1.0) * h * s1
-        if m == 8:
-            a = v1
-        if a < 0.0:
-            low, high = t0, t
-            for _ in range(40):
+    """Return the first time in (0, h] at which the cubic with these end values and slopes turns negative, or -1.0."""
+    c1 = h * s0
+    c2 = 3.0 * (v1 - v0) - h * (2.0 * s0 + s1)
+    c3 = 2.0 * (v0 - v1) + h * (s0 + s1)
+    # Between its turning points the cubic is monotone, so looking there finds even a shallow dip.
+    first, second = 1.0, 1.0
+    square = c2 * c2 - 3.0 * c1 * c3
+    if square > 0.0:
+        q = -(c2 + math.sqrt(square) * (1.0 if c2 >= 0.0 else -1.0))
+        one = q / (3.0 * c3) if c3 != 0.0 else 1.0
+        two = c1 / q if q != 0.0 else 1.0
+        first, second = min(one, two), max(one, two)
+    low = 0.0
+    for m in range(3):
+        t = first if m == 0 else (second if m == 1 else 1.0)
+        if t <= low or t > 1.0:
+            continue
+        value = v1 if t == 1.0 else v0 + t * (c1 + t * (c2 + t * c3))
+        if value < 0.0:
+            high = t
+            for _ in range(45):
                 t = 0.5 * (low + high)
-                a = (1.0 + 2.0 * t) * (1.0 - t) ** 2 * v0 + t * (1.0 - t) ** 2 * h * s0
-                a += t * t * (3.0 - 2.0 * t) * v1 + t * t * (t - 1.0) * h * s1
-                if a < 0.0:
+                if v0 + t * (c1 + t * (c2 + t * c3)) < 0.0:
                     high = t
                 else:
                     low = t
             return 0.5 * (low + high) * h
-        before = a
-        t0 = t
-    return -1.0 if before >= 0.0 else h
+        low = t
+    return -1.0
 
 
 @njit(cache=True, nogil=True)
@@ -303,6 +324,52 @@ def _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x, tota
 
 
 @njit(cache=True, nogil=True)
+def _blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore[no-untyped-def]
+    """Advance ``x`` over ``h`` with the dead zone averaged over the twist's distribution (Booton 1954)."""
+    variance = 0.0
+    for r in range(0, 3, 2):
+        for c in range(0, 3, 2):
+            variance += normal[r] * normal[c] * cov[r, c]
+    sigma = math.sqrt(max(variance, 0.0) + BLUR * BLUR)
+    for r in range(5):
+        for c in range(5):
+            total[r, c] = 1.0 if r == c else 0.0
+    parts = 4
+    dt = h / parts
+    lin = np.empty((5, 5))
+    one = np.empty((5, 5))
+    moved = np.empty(5)
+    new = np.empty(5)
+    for _ in range(parts):
+        # The dead zone at the middle of the part, reached at the present rate.
+        d = normal[0] * (x[0] + 0.5 * dt * x[1]) + normal[2] * (x[2] + 0.5 * dt * x[3])
+        a = (d - alpha) / sigma
+        b = (-d - alpha) / sigma
+        upper = 0.5 * math.erfc(-a * 0.7071067811865476)
+        lower = 0.5 * math.erfc(-b * 0.7071067811865476)
+        bell = 0.3989422804014327 * sigma * (math.exp(-0.5 * a * a) - math.exp(-0.5 * b * b))
+        share = upper + lower
+        wound = (d - alpha) * upper + (d + alpha) * lower + bell
+        for r in range(5):
+            for c in range(5):
+                lin[r, c] = dt * (mats[1, r, c] + share * (mats[2, r, c] - mats[1, r, c]))
+            push = mats[2, r, 2] - mats[1, r, 2]
+            moved[r] = dt * (b_u[r] * u + b_1[1, r] - push * (wound - share * d))
+        for r in range(5):
+            acc = moved[r]
+            for c in range(5):
+                square = 0.0
+                for m in range(5):
+                    square += lin[r, m] * lin[m, c]
+                one[r, c] = (1.0 if r == c else 0.0) + lin[r, c] + 0.5 * square
+                acc += 0.5 * lin[r, c] * moved[c] + one[r, c] * x[c]
+            new[r] = acc
+        for r in range(5):
+            x[r] = new[r]
+        total[:, :] = one @ total
+
+
+@njit(cache=True, nogil=True)
 def _simulate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x0, states):  # type: ignore[no-untyped-def]
     x = x0.copy()
     total = np.empty((5, 5))
@@ -316,7 +383,7 @@ def _simulate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x0, stat
 @njit(cache=True, nogil=True)
 def _filter(  # type: ignore[no-untyped-def]
     mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, y, variance, intensity, x0, errors, variances,
-    states, contacts,
+    states, contacts, soft,
 ):  # fmt: skip
     n, outputs = y.shape
     x = x0.copy()
@@ -346,7 +413,10 @@ def _filter(  # type: ignore[no-untyped-def]
             contacts[k] = 1 if d > alpha else (-1 if d < -alpha else 0)
             for r in range(5):
                 states[k, r] = x[r]
-        _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u[k], x, total, gain)
+        if soft:
+            _blurred(mats, b_u, b_1, normal, alpha, cov, h, u[k], x, total)
+        else:
+            _propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u[k], x, total, gain)
         for r in range(5):
             for c in range(5):
                 acc = 0.0

@@ -22,7 +22,9 @@ STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start
 OFFSET = "effects.sensor_offset.load.offset"
 OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
-TORQUE_NOISE = (1e-7, 30.0)  # range of the white torque noise [N.m.s^0.5]
+START_DAMPING = 1e-6
+DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
+TORQUE_NOISE = (1e-9, 30.0)  # range of the white torque noise [N.m.s^0.5]
 
 
 @dataclass(frozen=True)
@@ -95,12 +97,16 @@ def make_problem(record: Record, model: Model) -> Problem:
         levels.append(level)
         known = model.encoder(column).noise is not None and model.encoder(column).resolution is not None
         spread = 0.02 if known else NOISE_SPREAD
-        noises.append(Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0))
+        noises.append(
+            Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0)
+        )
     low, high = (math.log(bound) for bound in TORQUE_NOISE)
-    noises += [Unknown(f"log_torque_{side}", -7.0, 5.0, 0.5, low, high) for side in ("motor", "load")]
+    noises += [Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, low, high) for side in ("motor", "load")]
     if not both:
         levels.append(levels[0])
-    return Problem(record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0)))
+    return Problem(
+        record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0))
+    )
 
 
 def _initial_state(record: Record, ratio: float) -> list[Unknown]:
@@ -177,8 +183,11 @@ class Likelihood:
 
     def __init__(self, problem: Problem, threads: int = 1) -> None:
         self.problem = problem
+        self.soft = False  # whether flanks are blurred, which smooths the likelihood for the start of a fit
         names = problem.names
         self._offset = names.index(OFFSET) if OFFSET in names else None
+        self._alpha = names.index("alpha")
+        self._information = np.diag([(10.0 / u.scale) ** 2 for u in problem.unknowns])  # the last one known
         self._places = [(n, NAMES.index(name)) for n, name in enumerate(names) if name in NAMES and name != OFFSET]
         self._state = [problem.index(name) for name in STATE_NAMES]
         self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
@@ -210,7 +219,7 @@ class Likelihood:
             shift = theta[self._offset]
             outputs = outputs - np.array([0.0, shift])
             x0 = x0 - np.array([0.0, 0.0, shift, 0.0, 0.0])
-        return innovations(model, record.u, outputs, record.step, x0, self.noise(theta), keep)
+        return innovations(model, record.u, outputs, record.step, x0, self.noise(theta), keep, self.soft)
 
     def at(self, theta: Array) -> Point:
         """Return the likelihood at ``theta``; infinite where the filter diverges."""
@@ -221,27 +230,47 @@ class Likelihood:
         prior = float(np.sum(self._weight * (theta - self._mean) ** 2))
         return Point(theta, deviance + prior, deviance, result)
 
-    def derivatives(self, point: Point, free: NDArray[np.int64], steps: Array) -> tuple[Array, Array]:
-        """Return the gradient (k,) of half the objective and the Fisher information (k, k) of the free unknowns."""
+    def derivatives(self, point: Point, free: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Return the gradient (k,) of half the objective and the Fisher information (k, k) of the free unknowns.
+
+        Differences are taken along the columns of a factor of the covariance that the last information implies, a
+        hundredth of a standard deviation far: the unknowns themselves may be correlated to one part in 1e9.
+        """
         base = point.result
+        basis = self._basis(free)
 
         def run(n: int) -> tuple[Array, Array]:
             moved = point.theta.copy()
-            moved[free[n]] += steps[n]
+            moved[free] += DIFFERENCE * basis[:, n]
             result = self.run(moved)
-            error = (result.errors - base.errors) / (steps[n] * np.sqrt(base.variances))
-            spread = (result.variances - base.variances) / (steps[n] * base.variances)
+            error = (result.errors - base.errors) / (DIFFERENCE * np.sqrt(base.variances))
+            spread = (result.variances - base.variances) / (DIFFERENCE * base.variances)
             return error.ravel(), spread.ravel()
 
         columns = list(self._pool.map(run, range(free.size)) if self._pool else map(run, range(free.size)))
         error = np.array([column[0] for column in columns])
         spread = np.array([column[1] for column in columns])
         white = (base.errors / np.sqrt(base.variances)).ravel()
-        gradient = error @ white + 0.5 * spread @ (1.0 - white**2)
-        information = error @ error.T + 0.5 * spread @ spread.T
+        back = np.linalg.inv(basis)
+        gradient = back.T @ (error @ white + 0.5 * spread @ (1.0 - white**2))
+        information = back.T @ (error @ error.T + 0.5 * spread @ spread.T) @ back
         weight = self._weight[free]
         gradient += weight * (point.theta - self._mean)[free]
-        return gradient, information + np.diag(weight)
+        information = 0.5 * (information + information.T) + np.diag(weight)
+        self._information[np.ix_(free, free)] = information
+        return gradient, information
+
+    def _basis(self, free: NDArray[np.int64]) -> Array:
+        """Return a factor (k, k) of the covariance of the free unknowns; alpha never moves down along a column."""
+        information = self._information[np.ix_(free, free)]
+        diagonal = np.sqrt(np.diag(information))
+        values, vectors = np.linalg.eigh(information / np.outer(diagonal, diagonal))
+        values = np.maximum(values, 1e-13 * values[-1])
+        basis = vectors / np.sqrt(values) / diagonal[:, None]
+        alpha = np.flatnonzero(free == self._alpha)
+        if alpha.size:
+            basis = basis * np.where(basis[alpha[0]] < 0.0, -1.0, 1.0)
+        return np.asarray(basis)
 
 
 def maximise(
@@ -259,20 +288,21 @@ def maximise(
     places = np.array(list(free), dtype=np.int64)
     lower = np.array([unknowns[n].lower for n in places])
     upper = np.array([unknowns[n].upper for n in places])
-    scale = np.array([unknowns[n].scale for n in places])
     point = likelihood.at(start)
-    steps = 1e-3 * scale
-    damping, converged, done = 1e-3, False, 0
+    damping, converged, done = START_DAMPING, False, 0
     information = np.eye(places.size)
-    for done in range(1, iterations + 1):
+    for _ in range(iterations):
+        done += 1
         value = point.theta[places]
-        gradient, information = likelihood.derivatives(point, places, np.where(value + steps > upper, -steps, steps))
+        gradient, information = likelihood.derivatives(point, places)
         held = ((value <= lower) & (gradient > 0.0)) | ((value >= upper) & (gradient < 0.0))
         before = point.objective
         point, damping = _step(likelihood, point, places, gradient, information, held, (lower, upper), damping)
-        variance = np.diag(inverse(information))
-        steps = np.clip(1e-3 * np.sqrt(np.maximum(variance, 0.0)), 1e-7 * scale, 1e-1 * scale)
         if before - point.objective < tolerance:
+            # The first differences may have been taken too coarsely: look again with better ones.
+            if before == point.objective and done == 1:
+                damping = START_DAMPING
+                continue
             converged = True
             break
     return Fit(point, places, information, inverse(information), done, converged)
@@ -292,15 +322,15 @@ def _step(
     open_ = np.flatnonzero(~held)
     diagonal = np.sqrt(np.diag(information)[open_])
     scaled = information[np.ix_(open_, open_)] / np.outer(diagonal, diagonal)
-    for _ in range(12):
+    for _ in range(16):
         move = np.linalg.solve(scaled + damping * np.eye(open_.size), -gradient[open_] / diagonal) / diagonal
         theta = point.theta.copy()
         theta[places[open_]] += move
         theta[places] = np.clip(theta[places], *bounds)
         new = likelihood.at(theta)
         if new.objective < point.objective:
-            return new, max(damping * 0.1, 1e-9)
-        damping = max(damping * 8.0, 1e-6)
+            return new, max(damping * 0.1, 1e-12)
+        damping *= 10.0
         if damping > 1e6:
             break
     return point, damping

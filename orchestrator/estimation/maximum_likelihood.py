@@ -2,12 +2,14 @@
 
 The one-step prediction likelihood has many optima in alpha when the filter trusts the model too much. So the fit
 starts where it trusts the model little (much torque noise): there every record has one broad optimum, found on a
-grid of alpha. Then the torque noise is lowered decade by decade for as long as the likelihood rises, each optimum
+grid of alpha. Then the torque noise is lowered step by step for as long as the likelihood rises, each optimum
 starting the next fit, and at last freed. A model that is exact ends at the deterministic output-error fit; one that
-is not ends at the noise level that its flaws deserve.
+is not ends at the noise level that its flaws deserve. Without a load encoder the load's state is known too badly for
+a sharp flank, so there the first fits blur it.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,9 +23,24 @@ from orchestrator.estimation.protocol import LEVEL, Estimate
 from orchestrator.model_file import Model
 from orchestrator.record import Record
 
-GRID = (0.0, *(3e-4 * 1.55**n for n in range(18)))  # to half a radian
-SUSPICIOUS_GAIN = 2.0  # objective that a decade less torque noise must win
-STEPS_PER_DECADE = 5
+GRID = (0.0, *(3e-4 * 1.28**n for n in range(31)))  # to half a radian
+# Torque noise [N.m.s^0.5] of motor and load, from the start of the continuation on.
+BOTH_ENCODERS = tuple((w, w) for w in (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-9))
+BLURRED = ((0.1, 1.0), (0.06, 0.5), (0.03, 0.2), (0.02, 0.1), (0.01, 0.05))
+MOTOR_ENCODER = (
+    (0.03, 0.2),
+    (0.01, 0.03),
+    (3e-3, 1e-2),
+    (1e-3, 3e-3),
+    (1e-4, 3e-4),
+    (1e-5, 3e-5),
+    (1e-6, 3e-6),
+    (1e-9, 1e-9),
+)
+# A lower torque noise is preferred unless the objective rises by this much above the least: the 5 % limit of the
+# likelihood ratio for a noise level at its bound, zero.
+ALLOWED_RISE = 2.7
+STEPS_PER_LEVEL = 10
 FLAT_INFORMATION = 0.3
 
 
@@ -43,43 +60,61 @@ def fit_record(likelihood: Likelihood) -> Fit:
     problem = likelihood.problem
     torque = [n for n, name in enumerate(problem.names) if name.startswith("log_torque_")]
     others = [n for n in range(len(problem.names)) if n not in torque]
-    best = _first_fit(likelihood, torque, others)
-    level = 0.0
-    while level > -6.5:
-        level -= 1.0
+    if problem.outputs.shape[1] == 2:
+        first = _first_fit(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
+        best = _continue(likelihood, first, BOTH_ENCODERS[1:])
+    else:
+        likelihood.soft = True
+        first = _first_fit(likelihood, torque, others, np.log(BLURRED[0]))
+        best = _continue(likelihood, first, BLURRED[1:])
+        likelihood.soft = False
         start = best.point.theta.copy()
-        start[torque] = level * math.log(10.0)
-        trial = maximise(likelihood, start, others, STEPS_PER_DECADE, tolerance=0.5)
-        if not trial.point.objective < best.point.objective - SUSPICIOUS_GAIN:
-            break
-        best = trial
+        first = maximise(likelihood, start, others, STEPS_PER_LEVEL, tolerance=0.5)
+        best = _continue(likelihood, first, MOTOR_ENCODER)
     return _free_fit(likelihood, best, torque, others)
 
 
-def _first_fit(likelihood: Likelihood, torque: list[int], others: list[int]) -> Fit:
-    """Return the best fit at high torque noise from the two best places of the grid."""
+def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, float]]) -> Fit:
+    """Return the last fit that paid while the torque noise goes through ``levels``."""
+    names = likelihood.problem.names
+    torque = [n for n, name in enumerate(names) if name.startswith("log_torque_")]
+    others = [n for n in range(len(names)) if n not in torque]
+    failures, least = 0, best.point.objective
+    for level in levels:
+        start = best.point.theta.copy()
+        start[torque] = np.log(level)
+        trial = maximise(likelihood, start, others, STEPS_PER_LEVEL, tolerance=1.0)
+        least = min(least, trial.point.objective)
+        if trial.point.objective < least + ALLOWED_RISE:
+            best, failures = trial, 0
+            continue
+        failures += 1
+        if failures == 2:
+            break
+    return best
+
+
+def _first_fit(likelihood: Likelihood, torque: list[int], others: list[int], level: Array) -> Fit:
+    """Return the best fit at high torque noise (its logarithm ``level``) from the two best places of the grid."""
     problem = likelihood.problem
     place = problem.index("alpha")
     points = []
     for alpha in GRID:
         theta = problem.start
-        theta[torque] = 0.0
+        theta[torque] = level
         theta[place] = alpha
         points.append(likelihood.at(theta))
     points.sort(key=lambda point: point.objective)
     if not math.isfinite(points[0].objective):
         raise ConvergenceError("the likelihood must be finite somewhere, but no start led to one; check the units")
-    fits: list[Fit] = []
-    for point in points[:2]:
-        fits.append(maximise(likelihood, point.theta, others, 3, tolerance=1.0))
+    fits = [maximise(likelihood, point.theta, others, 3, tolerance=1.0) for point in points[:2]]
     return min(fits, key=lambda fit: fit.point.objective)
 
 
 def _free_fit(likelihood: Likelihood, best: Fit, torque: list[int], others: list[int]) -> Fit:
     """Return the fit with the torque noise free, except where the record cannot tell it from none."""
     everything = sorted(others + torque)
-    steps = np.array([unknown.scale for unknown in likelihood.problem.unknowns]) * 1e-2
-    _, information = likelihood.derivatives(best.point, np.array(torque), steps[torque])
+    _, information = likelihood.derivatives(best.point, np.array(torque))
     told = [n for n, value in zip(torque, np.diag(information), strict=True) if value > FLAT_INFORMATION]
     free = [n for n in everything if n in others or n in told]
     return maximise(likelihood, best.point.theta, free, 40, tolerance=2e-3)
