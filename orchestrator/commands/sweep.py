@@ -5,6 +5,8 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from orchestrator.commands._console import print_table
 from orchestrator.commands._experiment import add_experiment_arguments, chosen_experiment
 from orchestrator.commands._progress import CaseProgress, add_engine_arguments, engine_options
@@ -189,7 +191,7 @@ def _draw(directory: Path, plan: SweepPlan, fmus: dict[str, Path], arrays: Sweep
         arrays.noise,
         f"Error against size ({name} experiment)",
     )
-    middle = float(arrays.actual[len(arrays.actual) // 2])
+    middle = float(np.sort(arrays.actual)[len(arrays.actual) // 2])
     pair = run_pair(with_settings(plan.experiment, noise=plan.noise[-1]), fmus, middle, plan.seed)
     title = f"Paired loops, half-gap {middle:.4g} rad"
     draw_pair(directory / "loops.png", pair.machine, pair.twin, plan.experiment.reference()[0], title)

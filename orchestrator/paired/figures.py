@@ -5,8 +5,10 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 
 from orchestrator.paired.cosimulation import LoopRun
@@ -56,29 +58,48 @@ def shade_gap(axis: Axes, time: Array, contact: Array) -> None:
 def draw_estimates(
     path: Path, actual: Array, estimated: Array, lower: Array, upper: Array, noise: Array, title: str
 ) -> None:
-    """Draw estimated against actual half-gap, with intervals, one colour for each noise level."""
-    figure, (axis,) = _figure(1, (6.0, 5.6))
+    """Draw estimated against actual half-gap, and below it their relative deviation, each with its interval."""
+    figure, axes = _figure(2, (6.6, 7.4))
     ends = np.array([actual.min(), actual.max()])
-    axis.plot(ends, ends, color=GREY, linewidth=0.8, label="estimated = actual")
+    axes[0].plot(ends, ends, color=GREY, linewidth=0.8, label="estimated = actual")
+    axes[1].axhline(0.0, color=GREY, linewidth=0.8)
     for colour, level, chosen in _by_noise(noise):
-        below, above = estimated[chosen] - lower[chosen], upper[chosen] - estimated[chosen]
-        axis.errorbar(
-            actual[chosen],
-            estimated[chosen],
-            np.maximum(np.array([below, above]), 0.0),
-            fmt="o",
-            markersize=3.0,
-            linewidth=0.9,
-            capsize=2.0,
-            color=colour,
-            label=_noise_label(level),
-        )
+        size = actual[chosen]
+        for axis, scale, shift in ((axes[0], np.ones_like(size), 0.0), (axes[1], 100.0 / size, 100.0)):
+            values, low, high = (scale * v[chosen] - shift for v in (estimated, lower, upper))
+            axis.errorbar(
+                size,
+                values,
+                np.maximum(np.array([values - low, high - values]), 0.0),
+                fmt="o",
+                markersize=3.0,
+                linewidth=0.9,
+                capsize=2.0,
+                color=colour,
+                label=_noise_label(level),
+            )
+    axes[0].set_yscale("log")
+    _decimal_ticks(axes[0].yaxis)
+    axes[0].set_ylabel("estimated half-gap [rad]")
+    axes[0].set_title(title)
+    axes[1].set_ylabel("deviation from the actual [%]")
+    for axis in axes:
+        axis.grid(alpha=0.25)
+        axis.legend(fontsize=8)
+    _size_axis(axes[1])
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def _size_axis(axis: Axes) -> None:
     axis.set_xscale("log")
-    axis.set_yscale("log")
+    _decimal_ticks(axis.xaxis)
     axis.set_xlabel("actual half-gap [rad]")
-    axis.set_ylabel("estimated half-gap [rad]")
-    axis.set_title(title)
-    _finish(figure, axis, path)
+
+
+def _decimal_ticks(axis: Axis) -> None:
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def draw_errors(path: Path, actual: Array, estimated: Array, noise: Array, title: str) -> None:
@@ -95,15 +116,10 @@ def draw_errors(path: Path, actual: Array, estimated: Array, noise: Array, title
             color=colour,
             label=_noise_label(level),
         )
-    axis.set_xscale("log")
     axis.set_yscale("log")
-    axis.set_xlabel("actual half-gap [rad]")
     axis.set_ylabel("error of the estimate [%]")
     axis.set_title(title)
-    _finish(figure, axis, path)
-
-
-def _finish(figure: Figure, axis: Axes, path: Path) -> None:
+    _size_axis(axis)
     axis.grid(alpha=0.25, which="both")
     axis.legend(fontsize=8)
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
