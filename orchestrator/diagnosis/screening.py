@@ -154,7 +154,8 @@ def with_cycles(scene: Scene, likelihood: Likelihood, plant: Plant, model: Fit, 
 class ErrorResponse:
     """How whitened innovations answer to a torque: ``xi+ = F xi + B torque``, ``e = -W xi``.
 
-    B has one column for a torque on the motor and one for a twist of the shaft (k times a twist error).
+    B has one column for a torque on the motor, one for a twist of the shaft (k times a twist error) and one for a
+    torque on the load; a single axis has the first alone.
     """
 
     F: Array
@@ -175,12 +176,13 @@ def error_response(likelihood: Likelihood, plant: Plant, model: Fit) -> ErrorRes
     for channel in range(m):
         C[channel, at[plant.measured[channel]]] = 1.0
     A = plant.transition(p, h)
-    columns = np.zeros((len(rows), 2 if "k" in plant.names else 1))
+    columns = np.zeros((len(rows), 3 if "k" in plant.names else 1))
     columns[at[1], 0] = 1.0 / p[plant.index(plant.pushed[0][1])]
     if "k" in plant.names:
         k, ratio = p[plant.index("k")], p[plant.index("i")]
         columns[at[1], 1] = -k / ratio / p[plant.index("J_m")]
         columns[at[3], 1] = k / p[plant.index("J_l")]
+        columns[at[3], 2] = 1.0 / p[plant.index("J_l")]
     jac = plant.jacobian(p)
     B = (np.eye(len(rows)) * h + jac * h**2 / 2) @ columns
     e = model.z
