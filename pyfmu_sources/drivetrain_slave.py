@@ -16,6 +16,8 @@ FIRST_PARAMETER = CONTACT + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
 MODEL = FIRST_PARAMETER + P_MODEL
 KNOWN_STEPS = 16
+# The work of a step grows with its length; a host that asks for more than this has mistaken the unit.
+LONGEST_STEP = 100.0
 
 _NAMES = tuple(parameter.name for parameter in PARAMETERS)
 _STARTS = (
@@ -163,6 +165,8 @@ class Drivetrain(SlaveBase):
         for known, table in self._tables.items():
             if abs(known - step) <= noise:
                 return known, table
+        if step > LONGEST_STEP:
+            raise StepRefusedError(f"a step must be at most {LONGEST_STEP!r} s long, but is {step!r} s")
         table = _prepare(self._p, step)
         if len(self._tables) < KNOWN_STEPS:
             self._tables[step] = table

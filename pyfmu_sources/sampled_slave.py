@@ -1,8 +1,9 @@
 """Base of the sampled-data slaves: a clock of sample instants ``start + n sample_time``.
 
-A communication step ends at or before the next sample instant. The sample is taken at the end of the step, from the
-inputs as they are then set; between samples the outputs hold. A step over a sample instant is refused, so that a
-communication step must divide ``sample_time`` a whole number of times.
+A communication step should divide ``sample_time`` a whole number of times. The sample is then taken at the end of a
+step, from the inputs as they are set; between samples the outputs hold. A step that passes over a sample instant takes
+that sample too, but from the inputs held over the step, which are older or newer than the instant: the first such
+step says so in a warning.
 
 Outputs depend on inputs directly. A master that runs plant, estimator and controller one after the other sets inputs of
 the step's end before the step; one that runs them side by side sets them after it and reads the outputs again.
@@ -13,9 +14,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from .slave_base import SlaveBase, StepRefusedError
+from .slave_base import Fmi2Status, SlaveBase, StepRefusedError
 
 SLACK = 1e-6
+MOST_SAMPLES = 1_000_000
 
 
 class SampledSlave(SlaveBase):
@@ -23,6 +25,7 @@ class SampledSlave(SlaveBase):
 
     feedthrough = True
     sample_time_reference: ClassVar[int] = 0
+    _warned = False
 
     def begin(self) -> None:
         """Compute the outputs at the first sample instant."""
@@ -47,20 +50,32 @@ class SampledSlave(SlaveBase):
         self.begin()
 
     def advance(self, time: float, step: float) -> None:
-        """Hold the outputs, or take a sample when the step ends at one."""
+        """Hold the outputs, or take every sample that is due by the end of the step."""
         period = self.real[self.sample_time_reference]
-        due = self.start_time + (self._samples + 1) * period
-        early = due - time - step
-        if early < -SLACK * period:
-            raise StepRefusedError(
-                f"a step must not pass the sample at t = {due!r}, but ends at {time + step!r}; "
-                f"take a step that divides `sample_time` = {period!r} s a whole number of times"
-            )
-        self._at_sample = early <= SLACK * period
-        if self._at_sample:
+        slack = SLACK * period
+        end = time + step
+        if step > MOST_SAMPLES * period:
+            raise StepRefusedError(f"a step must hold at most {MOST_SAMPLES} samples, but is {step!r} s long")
+        self._at_sample = False
+        while not self._at_sample:
+            due = self.start_time + (self._samples + 1) * period
+            if due > end + slack:
+                return
             self.predict()
             self.correct()
             self._samples += 1
+            self._at_sample = due >= end - slack
+            if not self._at_sample:
+                self._warn(due, end, period)
+
+    def _warn(self, due: float, end: float, period: float) -> None:
+        if not self._warned:
+            self._warned = True
+            self.say(
+                Fmi2Status.warning,
+                f"a step should end at the sample at t = {due!r}, but ends at {end!r}: that sample saw the inputs held "
+                f"over the step; a step that divides `sample_time` = {period!r} s a whole number of times avoids this",
+            )
 
     def refresh(self) -> None:
         """Take the present sample anew with the inputs as they are now."""

@@ -330,14 +330,20 @@ def test_a_controller_holds_between_samples() -> None:
     assert requests[7] > requests[6]
 
 
-def test_a_step_over_a_sample_is_refused_with_advice() -> None:
+def test_a_step_over_a_sample_takes_it_with_the_held_inputs_and_warns_once() -> None:
     slave = controller()
+    slave.set_real([lqr_slave.REFERENCE], [1.0])
     assert slave.do_step(0.0, 0.7e-3)
-    assert slave.do_step(0.7e-3, 0.7e-3) is False
+    slave.set_real([lqr_slave.REFERENCE], [2.0])
+    assert slave.do_step(0.7e-3, 0.7e-3)
     status, text = said(slave)
-    assert status == "discard"
+    assert status == "warning"
     assert "divides `sample_time`" in text
-    assert slave.do_step(0.7e-3, 0.3e-3)
+    assert slave.get_real([lqr_slave.U]) == [pytest.approx(2.0 * (2.0 * 3.984 + 3.0))]
+    assert slave.do_step(1.4e-3, 1.6e-3)
+    assert slave._samples == 3
+    assert slave.do_step(3.0e-3, 1.5e-3)
+    assert not slave.log_queue
 
 
 def test_an_output_read_after_inputs_were_set_takes_the_sample_anew() -> None:

@@ -98,8 +98,8 @@ def _completed(
         kept[f"{LINUX}/{wrapper}"] = kept[library]
         kept[library] = compile_launcher(toolchain, wrapper)
     description = ElementTree.fromstring(kept.pop("modelDescription.xml"))
-    kept |= documentation(description)
-    kept |= reference_files(recipe.class_name, description)
+    kept |= documentation(recipe, description)
+    kept |= reference_files(recipe, description)
     kept["documentation/licenses/PythonFMU.txt"] = _pythonfmu_license()
     annotations = ElementTree.Element("VendorAnnotations")
     tool = ElementTree.SubElement(annotations, "Tool", {"name": "backlash-cosim"})
