@@ -93,7 +93,7 @@ class Lane:
             self._discard()
             return None
         assert isinstance(answer, Answer)
-        if answer.grown:
+        if answer.spent:
             self._discard()
         return answer.outcome
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.engine.cases import Case, Column, Outcome, Status, Value
-from orchestrator.errors import FmuError
+from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 
 MESSAGE_LENGTH = 300
 
@@ -51,17 +51,23 @@ def file_hash(path: Path) -> str:
         raise FmuError(f"cannot read {path}: {error.strerror}") from None
 
 
-def evaluate(work: Work, prepared: Any, case: Case) -> Outcome:
-    """Run one case; whatever goes wrong in it becomes the outcome's status and message."""
+def evaluate(work: Work, prepared: Any, case: Case) -> tuple[Outcome, bool]:
+    """Run one case; whatever goes wrong in it becomes the outcome's status and message.
+
+    Returns:
+        The outcome, and whether the process can be trusted with another case: not after a slave has failed in it, nor
+        after an error that nobody raised on purpose.
+    """
     try:
         values = _in_column_order(work.columns, work.run(prepared, case))
     except BaseException as error:  # a slave may even call sys.exit
-        return Outcome(case.index, Status.ERROR, one_line(error))
+        sound = isinstance(error, OrchestratorError) and not isinstance(error, SlaveError)
+        return Outcome(case.index, Status.ERROR, one_line(error)), sound
     bad = [c.name for c, v in zip(work.columns, values, strict=True) if isinstance(v, float) and not math.isfinite(v)]
     if bad:
         message = f"not finite: {', '.join(bad)}"
-        return Outcome(case.index, Status.NON_FINITE, message[:MESSAGE_LENGTH])
-    return Outcome(case.index, Status.DONE, "", values)
+        return Outcome(case.index, Status.NON_FINITE, message[:MESSAGE_LENGTH]), True
+    return Outcome(case.index, Status.DONE, "", values), True
 
 
 def _in_column_order(columns: tuple[Column, ...], result: Mapping[str, Value]) -> tuple[Value, ...]:

@@ -43,10 +43,10 @@ class Assignment:
 
 @dataclass(frozen=True)
 class Answer:
-    """One case's outcome, and whether the process has grown so much that it should be replaced."""
+    """One case's outcome, and whether the process should be replaced: it has grown too much, or a slave failed in it."""
 
     outcome: Outcome
-    grown: bool
+    spent: bool
 
 
 def main(descriptor: int) -> None:
@@ -76,10 +76,10 @@ def _serve(connection: Connection) -> None:
     while True:
         case = connection.recv()
         faulthandler.dump_traceback_later(assignment.time_limit + ORPHAN_MARGIN, exit=True, file=silence)
-        outcome = evaluate(work, prepared, case)
+        outcome, sound = evaluate(work, prepared, case)
         faulthandler.cancel_dump_traceback_later()
         grown = bool(assignment.memory) and allocated_memory() - base > assignment.memory // 2
-        connection.send(Answer(outcome, grown))
+        connection.send(Answer(outcome, grown or not sound))
 
 
 def allocated_memory() -> int:
