@@ -60,8 +60,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OrchestratorError as error:
         sys.stderr.write(f"error: {error}\n")
         return 1
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
+    except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
+        sys.stderr.write(f"interrupted: {interruption}\n" if str(interruption) else "interrupted\n")
         return 130
     except BrokenPipeError:
         return 1

@@ -43,7 +43,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class Answer:
-    """One case's outcome, and whether the process should be replaced: it has grown too much, or a slave failed in it."""
+    """One case's outcome, and whether to replace the process: it has grown too much, or a slave failed in it."""
 
     outcome: Outcome
     spent: bool
