@@ -16,11 +16,11 @@ from orchestrator.errors import ScenarioError
 from orchestrator.fmi.build import ensure_built
 from orchestrator.output import staged, write_result
 from orchestrator.paired.calibration import Calibration
-from orchestrator.paired.cosimulation import FMUS
+from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system
 from orchestrator.paired.figures import draw_errors, draw_estimates, draw_pair
 from orchestrator.paired.metric import ErrorStatistics
 from orchestrator.paired.pair import run_pair, with_settings
-from orchestrator.paired.sweep import COLUMNS, SweepArrays, SweepPlan, gather, sweep_work
+from orchestrator.paired.sweep import COLUMNS, OWN_PARAMETERS, SweepArrays, SweepPlan, gather, sweep_work
 
 MOST_ROWS_PRINTED = 40
 
@@ -63,6 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out
     with staged(out) as directory:
         fmus = ensure_built(FMUS)
+        plan.check_parameters(cases, loop_system(plan.experiment, fmus, (MACHINE,)))
         calibrations = plan.calibrations()
         work = sweep_work(plan, fmus, calibrations)
         with CaseProgress("sweep") as progress:
@@ -138,14 +139,14 @@ def _print_rows(sweep: Sweep, cases: DesignCases) -> None:
     title = f"Sweep of {len(cases)} cases"
     if len(cases) > len(shown):
         title += f", the first {len(shown)}; all of them are in sweep.csv"
-    extra = [name for name in cases.names if name not in {"alpha", "noise", "repetition"}]
+    extra = [name for name in cases.names if name not in OWN_PARAMETERS]
     head = ["actual [rad]", "noise [rad]", *extra, "S [rad]", "estimate [rad]", "interval [rad]", "error [rad]", "[%]"]
     print_table(title, head, shown)
 
 
 def _cells(row: Row, names: tuple[str, ...]) -> list[str]:
     p = row.case.parameters
-    extra = [str(p[name]) for name in names if name not in {"alpha", "noise", "repetition"}]
+    extra = [str(p[name]) for name in names if name not in OWN_PARAMETERS]
     start = [f"{p['alpha']:.6g}", f"{p['noise']:g}", *extra]
     if row.outcome.status is not Status.DONE:
         return [*start, row.outcome.status.value, row.outcome.message, "", "", ""]

@@ -1,0 +1,62 @@
+"""What README and docs tell a reader to type works as it stands there."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+# Pages whose Python examples are complete programs.
+PROGRAMS = ("README.md", "docs/experiment.md")
+
+
+def blocks(page, language):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return [body for kind, body in BLOCK.findall(text) if kind == language]
+
+
+def run(words, folder):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+
+
+COMMANDS = [line for body in blocks("README.md", "sh") for line in body.splitlines() if line.startswith("python -m")]
+
+
+def test_there_are_commands_to_test():
+    assert len(COMMANDS) >= 4
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_command_of_the_readme(line, tmp_path, fmus):
+    words = shlex.split(line)
+    done = run([sys.executable, *words[1:]], tmp_path)
+    assert done.returncode == 0, done.stderr
+    command = words[3]
+    assert (tmp_path / "results" / command / f"{command}.json").exists()
+
+
+@pytest.mark.parametrize("page", PROGRAMS)
+def test_program(page, tmp_path, fmus):
+    for body in blocks(page, "python"):
+        done = run([sys.executable, "-c", body], tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.strip()
+
+
+def test_the_page_of_the_experiment_prints_its_own_figures(tmp_path):
+    done = run([sys.executable, "-c", blocks("docs/experiment.md", "python")[0]], tmp_path)
+    low, high = done.stdout.split(" to ")
+    assert f"| default | {low} | {high.strip()} |" in (ROOT / "docs/experiment.md").read_text(encoding="utf-8")
+
+
+def test_links_lead_somewhere():
+    for page in [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]:
+        for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
+            if "://" not in target:
+                assert (page.parent / target).exists(), f"{page.name}: {target}"
