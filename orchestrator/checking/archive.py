@@ -108,7 +108,9 @@ def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[F
     except Exception as error:  # zipfile raises all sorts on bytes that it did not foresee
         return None, [Finding("archive.not-a-zip", path.name, f"an FMU must be a ZIP archive, but: {error}")]
     try:
-        findings = list(_entry_findings(files.archive, limits)) or list(_content_findings(files.archive))
+        findings = list(_entry_findings(files.archive, limits))
+        if not has_errors(findings):
+            findings += _content_findings(files.archive)
     except Exception as error:
         findings = [Finding("archive.corrupt", path.name, f"the archive cannot be read: {error!r}")]
     if not has_errors(findings) and "modelDescription.xml" not in files.names():

@@ -21,6 +21,7 @@ SUFFIXES = {
     "darwin32": ".dylib",
     "darwin64": ".dylib",
 }
+_LONGEST_NAME = 1 << 16
 _FORMAT = {"win": "PE", "lin": "ELF", "dar": "Mach-O"}
 
 _COMMON = (
@@ -161,7 +162,7 @@ def inspect(data: bytes) -> Library:
         if data[:2] == b"MZ":
             return _pe(data)
         return _mach(data)
-    except (struct.error, IndexError, UnicodeDecodeError):
+    except (struct.error, IndexError, ValueError):
         return Library("unknown")
 
 
@@ -220,7 +221,8 @@ def _elf_symbols(
 
 
 def _text(data: bytes, at: int) -> str:
-    return data[at : data.index(b"\0", at)].decode() if 0 <= at < len(data) else ""
+    """The text that ends with a zero byte; a hostile table must not make this slow."""
+    return data[at : data.index(b"\0", at, at + _LONGEST_NAME)].decode() if 0 <= at < len(data) else ""
 
 
 def _pe(data: bytes) -> Library:

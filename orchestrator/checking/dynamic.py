@@ -163,7 +163,7 @@ def _job(
     length = (stop if stop is not None else start + 1.0) - start
     step = d.experiment("stepSize") or length / _STEPS
     # Steps beyond the stop time may be refused, so a fraction of one is left out.
-    steps = max(1, min(_STEPS, math.floor(length / step + 1e-6)))
+    steps = max(1, math.floor(min(_STEPS, length / step + 1e-6)))
     return {
         "library": str(fmu / library_name(str(interface.identifier), here())),
         "guid": d.root.get("guid", ""),

@@ -142,7 +142,7 @@ state.serialise | E | a serialised state continues as before, also in a new inst
 state.free | W | fmi2FreeFMUstate sets the state to null | set the pointer to NULL
 steps.variable | W | results hardly depend on the communication step | integrate over the step given, or clear canHandleVariableCommunicationStepSize
 reference.result | E | the reference result is reproduced | correct the model, or write the reference again
-reference.not-run | I | the reference result can be reproduced | give the inputs as columns of the result
+reference.not-run | I | the reference result can be reproduced in reasonable time | shorten the result
 misuse.guid | W | a wrong guid is refused | compare the guid in fmi2Instantiate
 misuse.crash | W | misuse does not end the process | check the arguments and the state of the instance
 misuse.step-before-init | W | fmi2DoStep before initialisation is refused | return fmi2Error

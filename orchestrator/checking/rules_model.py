@@ -1,5 +1,6 @@
 """Rules of FMI 2.0.x about the head of the modelDescription, its types, units and ModelStructure."""
 
+import math
 import re
 from collections.abc import Iterator
 from itertools import pairwise
@@ -58,6 +59,11 @@ def _experiment(d: Description) -> Iterator[Finding]:
     start, stop, step = (d.experiment(n) for n in ("startTime", "stopTime", "stepSize"))
     tolerance = d.experiment("tolerance")
     begin = start if start is not None else 0.0
+    for name in ("startTime", "stopTime", "stepSize", "tolerance"):
+        value = d.experiment(name)
+        if value is not None and not math.isfinite(value):
+            yield Finding("model.experiment", xpath(element, name), f"{name} must be finite, but is {value}")
+            return
     if stop is not None and not stop > begin:
         message = f"stopTime must be greater than startTime ({begin:g}), but is {stop:g}"
         yield Finding("model.experiment", xpath(element, "stopTime"), message)

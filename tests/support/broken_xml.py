@@ -50,6 +50,7 @@ REPLACEMENTS: list[tuple[str, str, str, str]] = [
      '<Category name="logStatusError"/><Category name="logStatusError"/>'),
     ("stop before start", "model.experiment", 'stopTime="2"', 'stopTime="-2"'),
     ("step negative", "model.experiment", 'stepSize="0.01"', 'stepSize="-0.01"'),
+    ("stop at infinity", "model.experiment", 'stopTime="2"', 'stopTime="INF"'),
     ("tolerance zero", "model.experiment", 'tolerance="1e-6"', 'tolerance="0"'),
     ("type name is a variable", "type.name", '<SimpleType name="Position">',
      '<SimpleType name="mass"><Real/></SimpleType><SimpleType name="Position">'),

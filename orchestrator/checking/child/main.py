@@ -5,7 +5,7 @@ import os
 import sys
 from typing import Any
 
-from orchestrator.checking.child import probes, probes_compare, probes_misuse
+from orchestrator.checking.child import probes, probes_compare, probes_misuse, probes_reference
 from orchestrator.checking.child.binding import CurrentCall, Library, StatusError
 from orchestrator.checking.child.trajectory import Bench, Job, Variable
 
@@ -17,7 +17,7 @@ PROBES: dict[str, probes.Probe] = {
     "reset": probes_compare.reset,
     "state": probes_compare.state,
     "variable steps": probes_compare.variable_steps,
-    "reference": probes.reference,
+    "reference": probes_reference.reference,
     "memory": probes.memory,
     "misuse": probes_misuse.misuse,
 }

@@ -63,7 +63,7 @@ def life_cycle(context: Context) -> bool:
         slave.call("fmi2ExitInitializationMode")
         complaints: set[str] = set()
         _look(context, outputs, bench.read(slave, outputs, "after initialisation"), "after initialisation", complaints)
-        clock = beat = time.monotonic()
+        clock = time.monotonic()
         for n in range(job.steps):
             t = job.start + n * job.step
             try:
@@ -73,9 +73,7 @@ def life_cycle(context: Context) -> bool:
                 break
             when = f"at t = {t + job.step:g}"
             _look(context, outputs, bench.read(slave, outputs, when), when, complaints)
-            if time.monotonic() - beat > 0.5:
-                beat = time.monotonic()
-                bench.beat()
+            bench.beat_sometimes()
             if time.monotonic() - clock > job.budget:
                 bench.job = replace(job, steps=n + 1)
                 break
@@ -145,72 +143,6 @@ def inputs(context: Context) -> bool:
     return True
 
 
-def reference(context: Context) -> bool:
-    """Simulate what the reference result shows and compare."""
-    job = context.bench.job
-    if job.reference is None:
-        return True
-    names, rows, path = job.reference["names"], job.reference["rows"], job.reference["path"]
-    by_name = {v.name: v for v in job.variables}
-    missing = [v.name for v in job.variables if v.causality == "input" and v.name not in names and v.start is None]
-    if missing:
-        context.report("reference.not-run", f"the result must have the input `{missing[0]}`, but has not", path)
-        return True
-    shown = [by_name[n] for n in names]
-    driven = [(i, v) for i, v in enumerate(shown) if v.causality == "input" and v.base != "String"]
-    compared = [
-        (i, v) for i, v in enumerate(shown) if v.causality not in ("input", "independent") and v.base != "String"
-    ]
-    scale = [_scale([r[i + 1] for r in rows], v) for i, v in compared]
-    worst: tuple[float, str] = (0.0, "")
-    outside = 0
-    deadline = time.monotonic() + 20.0 * job.budget
-    with context.bench.instance(initialised=False) as slave:
-        _drive(slave, driven, rows[0])
-        slave.setup(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]), job.tolerance)
-        slave.call("fmi2EnterInitializationMode")
-        slave.call("fmi2ExitInitializationMode")
-        beat = time.monotonic()
-        for row, following in zip(rows, [*rows[1:], None], strict=True):
-            values = context.bench.read(slave, [v for _, v in compared], f"at t = {row[0]:g}")
-            off = [abs(float(x) - row[i + 1]) / s for x, (i, _), s in zip(values, compared, scale, strict=True)]
-            outside += bool(off) and max(off) > 1.0
-            if off and max(off) > worst[0]:
-                at = off.index(max(off))
-                i, v = compared[at]
-                worst = (max(off), f"`{v.name}` is {values[at]:.6g} instead of {row[i + 1]:.6g} at t = {row[0]:g}")
-            if following is None:
-                break
-            _drive(slave, driven, row)
-            if following[0] > row[0]:
-                try:
-                    slave.step(row[0], following[0] - row[0], f"at t = {row[0]:g}")
-                except TerminatedError:
-                    break
-            if time.monotonic() > deadline:
-                context.report("reference.not-run", "the reference result takes too long to be reproduced", path)
-                return True
-            if time.monotonic() - beat > 0.5:
-                beat = time.monotonic()
-                context.bench.beat()
-    if outside > 0.02 * len(rows):
-        where = f"{outside} of {len(rows)} points are outside the tube: {worst[1]}"
-        message = f"the reference result must be reproduced, but {where}"
-        context.report("reference.result", message, path)
-    return True
-
-
-def _drive(slave: Slave, driven: list[tuple[int, Variable]], row: list[float]) -> None:
-    for i, v in driven:
-        slave.set(v.base, [v.reference], [row[i + 1] if v.base == "Real" else int(row[i + 1])], f"at t = {row[0]:g}")
-
-
-def _scale(column: list[float], v: Variable) -> float:
-    """Half the width of the tube: 2 % of the range of the signal, and at least a millionth of its size."""
-    spread = max(column) - min(column)
-    return max(0.02 * spread, 1e-6 * max(map(abs, column)), 1e-9 * (v.nominal or 1.0))
-
-
 def memory(context: Context) -> bool:
     """Resident memory over instances and over steps."""
     bench, job = context.bench, context.bench.job
@@ -221,7 +153,7 @@ def memory(context: Context) -> bool:
     for n in range(30):
         with bench.instance():
             pass
-        bench.beat()
+        bench.beat_sometimes()
         if n == 9:
             gc.collect()
             before = _resident()

@@ -37,8 +37,7 @@ def instances(context: Context) -> bool:
                     one.step(t, job.step, f"at t = {t:g} with a second instance")
                     other.step(t, job.step, f"at t = {t:g} in the second instance")
                     rows.append(bench.read(one, outputs))
-                    if n % 20 == 0:
-                        bench.beat()
+                    bench.beat_sometimes()
         except StatusError as error:
             context.single = True
             context.report("instances.second", str(error))
@@ -153,6 +152,5 @@ def _run_in_pairs(context: Context, outputs: list[Variable], sizes: tuple[float,
                 slave.step(t, goal - t, f"with {size:g} times the usual step at t = {t:g}")
                 t = goal
             rows.append(bench.read(slave, outputs))
-            if n % 20 == 0:
-                bench.beat()
+            bench.beat_sometimes()
     return rows
