@@ -127,6 +127,11 @@ def test_the_mouse_reads_values_zooms_and_resets(opened):
     tip = opened.find_element(By.CSS_SELECTOR, "#section-3 .tip")
     assert "estimate:" in tip.text
     assert "case " in tip.text
+    frame, box = svg.rect, tip.rect
+    assert frame["x"] <= box["x"]
+    assert box["x"] + box["width"] <= frame["x"] + frame["width"]
+    assert frame["y"] <= box["y"]
+    assert box["y"] + box["height"] <= frame["y"] + frame["height"]
     chain.move_to_element_with_offset(svg, -100, 0).click_and_hold().move_by_offset(150, 60).release().perform()
     assert ticks(opened, "#section-3") != before
     chain.double_click(svg).perform()

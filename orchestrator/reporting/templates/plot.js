@@ -21,10 +21,10 @@ class Plot {
       legend.append(element("span", {}, swatch("var(--span)"), name));
     }
     if (this.data.diagonal) legend.append(element("span", {}, swatch("var(--soft)"), "equal"));
-    tools.append(legend, element("span", { class: "space" }));
-    tools.append(this.button("+", "Zoom in", () => this.zoom(0.5)));
-    tools.append(this.button("−", "Zoom out", () => this.zoom(2)));
-    tools.append(this.button("Reset", "Show everything", () => this.reset()));
+    tools.append(legend, element("div", { class: "buttons" },
+      this.button("+", "Zoom in", () => this.zoom(0.5)),
+      this.button("−", "Zoom out", () => this.zoom(2)),
+      this.button("Reset", "Show everything", () => this.reset())));
     this.svg = shape("svg", { tabindex: 0, role: "img", "aria-label": this.description() });
     this.tip = element("div", { class: "tip", hidden: "" });
     this.spoken = element("div", { class: "quiet", "aria-live": "polite" });
@@ -217,8 +217,9 @@ class Plot {
   }
 
   place(event) {
-    const frame = this.svg.getBoundingClientRect();
-    return [event.clientX - frame.left, event.clientY - frame.top];
+    const svg = this.svg.getBoundingClientRect();
+    const within = (value, { from, to }) => Math.min(Math.max(value, Math.min(from, to)), Math.max(from, to));
+    return [within(event.clientX - svg.left, this.x), within(event.clientY - svg.top, this.y)];
   }
 
   moved(event) {
@@ -274,6 +275,7 @@ class Plot {
       const flat = series.kind !== "points";
       for (let m = 0; m < series.x.length; m++) {
         if (series.x[m] === null || series.y[m] === null) continue;
+        if (!this.x.holds(series.x[m]) || (!flat && !this.y.holds(series.y[m]))) continue;
         const dx = this.x.pixel(series.x[m]) - px;
         const dy = this.y.pixel(series.y[m]) - py;
         const distance = dx * dx + dy * dy * (flat ? 0.05 : 1);
@@ -327,13 +329,14 @@ class Plot {
     const words = this.words();
     this.tip.replaceChildren(...words.map((text) => element("div", {}, text)));
     if (speak) this.spoken.textContent = words.join(", ");
-    if (x === null || y === null) return;
+    if (x === null || y === null || !this.x.holds(x)) return;
     const [px, py] = [this.x.pixel(x), this.y.pixel(y)];
     this.overlay.prepend(line(px, this.y.from, px, this.y.to, "cursor"),
       shape("circle", { cx: px, cy: py, r: 5, fill: "none", stroke: colour(this.cursor.n), "stroke-width": 2 }));
     const width = this.svg.clientWidth;
     this.tip.style.left = `${px > width / 2 ? Math.max(0, px - this.tip.offsetWidth - 12) : Math.min(px + 12, width - this.tip.offsetWidth)}px`;
-    this.tip.style.top = `${this.svg.offsetTop + Math.max(4, Math.min(py, this.y.from - this.tip.offsetHeight))}px`;
+    const above = this.svg.getBoundingClientRect().top - this.figure.getBoundingClientRect().top;
+    this.tip.style.top = `${above + Math.max(4, Math.min(py + 8, this.y.from - this.tip.offsetHeight))}px`;
   }
 
   // What the cursor says: the point itself, and the other curves at the same x.

@@ -20,6 +20,10 @@ class Scale {
     return this.from + part * (this.to - this.from);
   }
 
+  holds(value) {
+    return value >= this.low && value <= this.high;
+  }
+
   value(pixel) {
     const part = (pixel - this.from) / (this.to - this.from);
     const [a, b] = [this.low, this.high].map((v) => Scale.forward(v, this.logarithmic));
