@@ -146,7 +146,10 @@ def _fractions(scene: Scene) -> tuple[float, ...]:
 
 
 def _limits(scene: Scene) -> tuple[float, ...]:
-    return tuple(float(v) for v in np.quantile(np.abs(scene.u), (0.3, 0.5, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995, 0.998)))
+    return tuple(
+        float(v)
+        for v in np.quantile(np.abs(scene.u), (0.3, 0.5, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995, 0.998, 0.9992))
+    )
 
 
 def _delays(scene: Scene) -> tuple[float, ...]:
@@ -155,7 +158,7 @@ def _delays(scene: Scene) -> tuple[float, ...]:
 
 def _frequencies(scene: Scene) -> tuple[float, ...]:
     top = 0.8 * np.pi / scene.h
-    return tuple(float(f) for f in np.geomspace(min(8.0, top / 8), min(250.0, top), 14))
+    return tuple(float(f) for f in np.geomspace(min(8.0, top / 8), min(250.0, top), 32))
 
 
 def _periodic(name: str, site: str, unit: Callable[[Scene], float]) -> Effect:
@@ -206,7 +209,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "extra_resonance", "load", _group("extra_resonance", "inertia", "frequency", "damping_ratio"), "inertia",
         lambda s: 0.01 * s.inertia,
-        lambda s: {"inertia": (0.05 * s.inertia, 0.2 * s.inertia), "frequency": _frequencies(s), "damping_ratio": (0.03,)},
+        lambda s: {"frequency": _frequencies(s), "damping_ratio": (0.03,)}, amplitudes=("inertia",),
         scales=lambda s: {"frequency": 0.5, "damping_ratio": 0.01},
     ),
     Effect(

@@ -126,10 +126,12 @@ def free_run(plant: Plant, p: Array, guess: Array, signals: Signals, part: slice
     cost = _cost(out, measured, scale)
     damping = 1e-6
     for _ in range(ITERATIONS):
-        J = np.column_stack([
-            ((outputs(_followed(plant, _nudged(start, place, step))) - out) / step / scale).ravel()
-            for place, step in zip(free, steps, strict=True)
-        ])
+        J = np.column_stack(
+            [
+                ((outputs(_followed(plant, _nudged(start, place, step))) - out) / step / scale).ravel()
+                for place, step in zip(free, steps, strict=True)
+            ]
+        )
         residual = ((out - measured) / scale).ravel()
         if not np.all(np.isfinite(J)):
             break

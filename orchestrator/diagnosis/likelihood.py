@@ -56,7 +56,9 @@ def signals_of(record: Record, tau: float) -> Signals:
     y = np.ascontiguousarray(np.column_stack([record.theta_m, load]))
     channels = 1 if one else 2
     noise = np.array([noise_level(y[:, n]) for n in range(channels)])
-    return Signals(y, np.ascontiguousarray(record.u), record.step, channels, noise, lagged_rms(record.u, record.step, tau))
+    return Signals(
+        y, np.ascontiguousarray(record.u), record.step, channels, noise, lagged_rms(record.u, record.step, tau)
+    )
 
 
 def noise_level(values: Array, window: int = 9) -> float:

@@ -16,7 +16,9 @@ from pyfmu_sources import servo_axis as sa
 
 Array = NDArray[np.float64]
 
-PRESLIDING = dt.Parameter("presliding", "1", math.log(1e-5), math.log(1e-9), 0.0, "Logarithm of friction's build-up distance")
+PRESLIDING = dt.Parameter(
+    "presliding", "1", math.log(1e-5), math.log(1e-9), 0.0, "Logarithm of friction's build-up distance"
+)
 
 
 @dataclass(frozen=True)

@@ -258,7 +258,13 @@ def line_spectrum(
     response = error_response(likelihood, plant, model)
     effort = back_propagated(response, raw[part, : likelihood.signals.channels])
     return np.asarray(
-        _scan(np.ascontiguousarray(effort[:, column]), states[part, 0], states[part, 1], cycles, *_gain_table(response, column))
+        _scan(
+            np.ascontiguousarray(effort[:, column]),
+            states[part, 0],
+            states[part, 1],
+            cycles,
+            *_gain_table(response, column),
+        )
     )
 
 

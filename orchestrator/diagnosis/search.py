@@ -149,9 +149,7 @@ class Search:
         least = max(3.0, WORTH * own[0][1].gain)
         return [pair for n, pair in enumerate(own) if n < SHORTLIST and pair[1].gain > least] or own[:1]
 
-    def refined(
-        self, found: Sequence[Candidate], current: Candidate, base: Candidate, scene: Scene
-    ) -> list[Candidate]:
+    def refined(self, found: Sequence[Candidate], current: Candidate, base: Candidate, scene: Scene) -> list[Candidate]:
         """Return candidates whose effect contains one that pays (Stribeck's friction contains Coulomb's)."""
         refined = []
         for source in [c for c in (*found, current) if c is current or c.pays_over(current, base)]:
@@ -206,9 +204,7 @@ class Search:
     def linear(self) -> tuple[Free, ...]:
         """Return the uncertain parameters of the model file."""
         return tuple(
-            Free(
-                self.plant.index(u.name), u.standard_deviation, u.minimum, u.maximum, (u.value, u.standard_deviation)
-            )
+            Free(self.plant.index(u.name), u.standard_deviation, u.minimum, u.maximum, (u.value, u.standard_deviation))
             for u in self.model.uncertain
         )
 

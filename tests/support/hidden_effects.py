@@ -88,7 +88,9 @@ def double_case(kinds: tuple[str, str], seed: int, duration: float = 30.0) -> Ca
 def unknown_case(kind: str, seed: int, duration: float = 30.0) -> Case:
     """Return a record with an effect that the library does not hold."""
     rng = np.random.default_rng([seed, 4])
-    effects = {name: value * (rng.uniform(0.7, 1.5) if name not in ("bw_x",) else 1.0) for name, value in UNKNOWN[kind].items()}
+    effects = {
+        name: value * (rng.uniform(0.7, 1.5) if name not in ("bw_x",) else 1.0) for name, value in UNKNOWN[kind].items()
+    }
     return _case(kind, seed, effects, (), str(rng.choice(EXCITATIONS)), duration)
 
 

@@ -1,0 +1,222 @@
+"""The diagnosis of one record: search, verdict, where, gap."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.bank import Effect
+from orchestrator.diagnosis.fitting import Fit, Parts, anneal, split
+from orchestrator.diagnosis.free_run import free_run
+from orchestrator.diagnosis.likelihood import HEAD, Likelihood, Signals, signals_of
+from orchestrator.diagnosis.outcome import Diagnosis, Estimate, Gap, Named, Workings
+from orchestrator.diagnosis.plants import Plant, plant_of
+from orchestrator.diagnosis.remainder import Predictable, Remainder, remainder
+from orchestrator.diagnosis.search import LEVELS, Candidate, Search, Step
+from orchestrator.diagnosis.where import missing_torque, places
+from orchestrator.model_file import Model
+from orchestrator.record import Record
+
+Array = NDArray[np.float64]
+
+SEGMENT = 2.0  # s, length of a free run; the length of the thesis's tests
+LEAST_EXPLAINED = 0.5  # share of the missing log-likelihood that named effects must recover
+LEAST_MISSING = 0.05  # per sample: missing log-likelihood below which nothing is left to explain
+GROWN = 2.0  # innovations that grow this much after the fitted part speak of something that changes with time
+ALIKE = 0.05  # share of the gain within which effects of a family cannot be told apart
+EXPLAINED_BY_NOMINAL = 3.0  # per parameter: log-likelihood that re-fitting gains when the nominal values hold
+
+Progress = Callable[[int, int, str], None]
+
+
+def diagnose(record: Record, model: Model, progress: Progress = lambda done, expected, what: None) -> Diagnosis:
+    """Compare a record with a model; name what is missing.
+
+    Args:
+        record: at least 200 samples; one encoder or two.
+        model: nominal values and how far each may be off.
+        progress: called with (fits done, expected, what was fitted).
+
+    Raises:
+        ScenarioError: the model's backlash model cannot be diagnosed.
+    """
+    plant = plant_of(model)
+    nominal = plant.extended(model.values)
+    tau = float(nominal[plant.index("tau")])
+    signals = signals_of(record, tau)
+    parts = split(signals.size, HEAD)
+    likelihood = Likelihood(plant, signals, nominal, parts.validated.stop)
+    search = Search(likelihood, plant, model, parts, progress)
+    base, best = search.run()
+    whole = Parts(slice(parts.fitted.start, parts.validated.stop), parts.validated, parts.held_out)
+    base_fit = anneal(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, LEVELS)
+    final = base_fit if not best.effects else anneal(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, LEVELS)
+    left = _left(likelihood, plant, base_fit, final, best.fit, parts)
+    floor_off = left.missing > LEAST_MISSING * (parts.validated.stop - HEAD)
+    unknown = floor_off and left.explained < LEAST_EXPLAINED
+    unknown |= left.growth > GROWN and left.explained < 0.8
+    named = tuple(_name(plant, effect, final, search.steps) for effect in best.effects)
+    chosen = base_fit if unknown else final
+    verdict = "unknown" if unknown else "effects" if named else _plain_verdict(likelihood, nominal, base_fit, parts)
+    before = missing_torque(likelihood, plant, Fit(nominal, base_fit.q, base_fit.z, base_fit.free, base_fit.covariance, 0.0, 0.0)
+                            if verdict in ("none", "parameters") else base_fit)  # fmt: skip
+    after = missing_torque(likelihood, plant, chosen)
+    stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
+    return Diagnosis(
+        verdict=verdict,
+        effects=() if unknown else named,
+        suspects=named if unknown else (),
+        parameters=_parameters(plant, model, chosen),
+        where=places(before, signals.h),
+        gap=held_out_gap(plant, signals, nominal, chosen.q, stages, parts.held_out),
+        remainder=left,
+        warnings=_warnings(unknown, left, named, search.steps, floor_off, signals.channels),
+        corrected={name: float(chosen.p[plant.index(name)]) for name in _changed(plant, nominal, chosen.p)},
+        workings=Workings(
+            plant, likelihood, parts, nominal, base_fit, chosen, best, tuple(search.steps), before, after
+        ),
+    )
+
+
+def held_out_gap(
+    plant: Plant, signals: Signals, nominal: Array, q: float, stages: Sequence[tuple[str, Array]], part: slice
+) -> tuple[Gap, ...]:
+    """Return the gap of each model over free runs of ``SEGMENT`` seconds that cover a part of a record.
+
+    Args:
+        plant: the plant.
+        signals: of the record.
+        nominal: nominal parameters (they make the filter's gains).
+        q: process noise of the filter that guesses each segment's initial state.
+        stages: name and parameters of each model, in the order of the report.
+        part: the samples, which no fit has touched.
+    """
+    length = max(round(SEGMENT / signals.h), 40)
+    begin, end, _ = part.indices(signals.size)
+    starts = list(range(begin, end - length + 1, length)) or [begin]
+    whole = Likelihood(plant, signals, nominal, signals.size)
+    rows = []
+    for name, p in stages:
+        _, states = whole.innovations(p, q)
+        squares = [free_run(plant, p, states[s], signals, slice(s, min(s + length, end))).rms ** 2 for s in starts]
+        rows.append((name, np.sqrt(np.mean(squares, axis=0))))
+    return tuple(
+        Gap(signal, "rad", float(signals.noise[n]), tuple((name, float(rms[n])) for name, rms in rows))
+        for n, signal in enumerate(("theta_m", "theta_l")[: signals.channels])
+    )
+
+
+def _left(likelihood: Likelihood, plant: Plant, base: Fit, final: Fit, fitted: Fit, parts: Parts) -> Remainder:
+    """Return the remainder of the final fit; growth and predictability are those of the fit to the first part."""
+    seen = remainder(likelihood, plant, base, fitted, parts, LEVELS[-1])
+    floor = seen.missing + fitted.fitted + fitted.validated
+    had, left = floor - base.fitted, floor - final.fitted
+    explained = 1.0 - left / had if had > 0.0 else 0.0
+    return Remainder(left, explained, seen.growth, seen.predictable)
+
+
+def _plain_verdict(likelihood: Likelihood, nominal: Array, base: Fit, parts: Parts) -> str:
+    """Return "none" when the nominal values explain the record as well as re-fitted ones do, else "parameters"."""
+    part = slice(parts.fitted.start, parts.validated.stop)
+    z = likelihood.whitened(nominal, base.q)
+    gained = base.fitted - likelihood.log_likelihood(z, base.q, part)
+    return "none" if gained < EXPLAINED_BY_NOMINAL * len(base.free) else "parameters"
+
+
+def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step]) -> Named:
+    step = next(s for s in reversed(steps) if any(effect in c.effects[-1:] for c in s.candidates))
+    own = next(c for c in step.candidates if c.effects[-1] is effect)
+    others = [c for c in step.candidates if c is not own]
+    gain = own.gain_over(step.before)
+    runner = others[0] if others else None
+    alike = [
+        c.effects[-1].label
+        for c in others
+        if effect.family and c.effects[-1].family == effect.family and own.score - c.score < max(8.0, ALIKE * gain)
+    ]
+    family = (effect.label, *alike) if alike else ()
+    parameters = {
+        short: Estimate(float(final.p[place]), final.standard_error(place), plant.table[place].unit)
+        for short, place in effect.places(plant).items()
+        if place < len(plant.table)
+    }
+    margin = own.score - runner.score if runner else gain
+    return Named(effect.name, effect.site, parameters, gain, runner.effects[-1].label if runner else "", margin, family)
+
+
+def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, dict[str, float | str]]:
+    return {
+        u.name: {
+            "nominal": u.value,
+            "value": float(final.p[plant.index(u.name)]),
+            "standard_error": final.standard_error(plant.index(u.name)),
+            "unit": u.unit,
+        }
+        for u in model.uncertain
+    }
+
+
+def _changed(plant: Plant, nominal: Array, p: Array) -> list[str]:
+    """Return the names of the plant's own parameters whose value differs from the nominal one."""
+    return [entry.name for n, entry in enumerate(plant.table) if p[n] != nominal[n]]
+
+
+def _stages(
+    nominal: Array, base: Fit, steps: Sequence[Step], best: Candidate, chosen: Fit, unknown: bool
+) -> list[tuple[str, Array]]:
+    stages = [("nominal", nominal), ("parameters", base.p)]
+    if unknown or not best.effects:
+        return stages
+    for step in steps[1:]:
+        if step.before.effects and step.accepted:
+            stages.append((f"+ {step.before.effects[-1].label}", step.before.fit.p))
+    return [*stages, (f"+ {best.effects[-1].label}", chosen.p)]
+
+
+def _warnings(
+    unknown: bool, left: Remainder, named: Sequence[Named], steps: Sequence[Step], floor_off: bool, channels: int
+) -> tuple[str, ...]:
+    found = []
+    if unknown:
+        found.append(f"a gap is left that nothing in the library explains; it {_kind(left)}")
+        if named:
+            names = ", ".join(f"{n.name} ({n.site})" for n in named)
+            found.append(f"{names} would take {100 * max(left.explained, 0):.0f} % of it: too little to be named")
+    elif floor_off and left.explained < 0.8:
+        found.append(f"{100 * (1 - left.explained):.0f} % of the gap's evidence is left; it {_kind(left)}")
+    for effect in named:
+        if effect.family:
+            found.append(f"this record cannot tell {' from '.join(effect.family)}; {_experiment(effect)}")
+    if channels == 1:
+        found.append("one encoder: an effect of the shaft and one of the load are harder to tell apart")
+    return tuple(found)
+
+
+def _kind(left: Remainder) -> str:
+    """Return in words of which kind the rest is."""
+    if left.growth > GROWN:
+        return (
+            f"changes with time: innovations are {left.growth:.1f} times larger on later parts than where it was fitted"
+        )
+    top = left.predictable[0] if left.predictable else None
+    if top is None or top.gain < 8.0:
+        return "does not repeat with speed, twist, angle or input: a disturbance, or something with a memory of its own"
+    return f"follows {_words(top)} ({100 * top.share:.0f} % of the innovations on data that was not fitted)"
+
+
+def _words(entry: Predictable) -> str:
+    return {
+        "speed": "the speed", "angle": "the angle", "input": "the input", "twist": "the twist of the shaft",
+        "twist memory": "the history of the twist (hysteresis)", "memory of position": "the history of the position",
+    }[entry.kind] + f" at the {entry.site}"  # fmt: skip
+
+
+def _experiment(effect: Named) -> str:
+    """Return the experiment that would tell the members of a family apart."""
+    if "shaft" in effect.site:
+        return "torque reversals that swing the twist over the whole range, slowly and then fast, would"
+    if "friction" in effect.name:
+        return "a slow reversal (speeds well below the Stribeck speed, held for a while) would"
+    if "offset" in effect.name:
+        return "turning one side by hand through the index mark of its encoder would"
+    return "travel over more revolutions would"
