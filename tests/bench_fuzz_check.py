@@ -44,7 +44,7 @@ def one_case(rng: random.Random, folder: Path, run_share: float = 0.25) -> tuple
     rules = {f["rule"] for fmu in results["fmus"] for f in fmu["findings"]}
     assert code == int(results["counts"]["error"] > 0)
     assert "run.failed" not in rules, results
-    assert sorted(p.name for p in out.iterdir()) == ["check.json"]
+    assert sorted(p.name for p in out.iterdir()) == ["check.json", "report.html"]
     assert duration < SLOW, f"took {duration:.0f} s"
     return code, rules, duration
 

@@ -3,9 +3,13 @@
 import argparse
 import json
 import os
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
 
 from orchestrator.checking.archive import MEBIBYTE, ArchiveLimits
 from orchestrator.checking.check import CheckOptions, check_fmu
@@ -14,6 +18,7 @@ from orchestrator.checking.sandbox import Limits
 from orchestrator.checking.writing import as_junit, as_lines, as_results
 from orchestrator.errors import FmuError, OutputError
 from orchestrator.output import staged, write_result
+from orchestrator.reporting import write_report
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     )
     paths = find_fmus(args.fmus) if args.fmus else _own()
     reports = []
-    for path in paths:
+    for path in _shown(paths):
         reports.append(check_fmu(path, options))
         print("\n".join(as_lines(reports[-1])), flush=True)
     arguments = {
@@ -71,8 +76,15 @@ def run(args: argparse.Namespace) -> int:
     }
     with staged(args.out) as directory:
         write_result(directory, "check", arguments, None, as_results(reports))
+        write_report(directory, "check")
     _write_extra(args, reports)
     return 0 if all(r.ok for r in reports) else 1
+
+
+def _shown(paths: Sequence[Path]) -> Iterator[Path]:
+    """The paths one after the other, with a progress bar on a terminal."""
+    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
+        yield from progress.track(paths, description="check")
 
 
 def _write_extra(args: argparse.Namespace, reports: Sequence[Report]) -> None:
