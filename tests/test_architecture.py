@@ -20,6 +20,7 @@ LAYERS = (
     {"fmi"},
     {"scenario"},
     {"ssp", "checking", "engine"},
+    {"scenario_sweep"},
     {"paired", "estimation"},
     {"diagnosis", "thesis", "bench"},
     {"reporting"},

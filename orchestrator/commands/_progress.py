@@ -3,17 +3,35 @@
 import argparse
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from types import TracebackType
-from typing import IO
+from typing import IO, Any
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
-from orchestrator.engine import Limits, OpenPool, Progress, choose_pool
+from orchestrator.engine import (
+    DesignCases,
+    Limits,
+    OpenPool,
+    Progress,
+    Sweep,
+    Work,
+    choose_pool,
+    run_cases,
+    write_csv,
+    write_parquet,
+)
+from orchestrator.output import write_result
+from orchestrator.reporting import write_report
 
 SECONDS_BETWEEN_LINES = 60.0
 MIB = 1024**2
+# Where and how a sweep ran does not change what it found.
+NOT_PART_OF_THE_RESULT = frozenset({"run", "command", "out", "resume", "workers", "scheduler"})
 
 
 def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
@@ -111,3 +129,34 @@ def _bar(stream: IO[str]) -> Bar:
         console=Console(file=stream),
         transient=True,
     )
+
+
+@contextmanager
+def swept(
+    cases: DesignCases, work: Work, args: argparse.Namespace, directory: Path
+) -> Iterator[tuple[Sweep, dict[str, Any]]]:
+    """Run all cases with progress; yield the sweep and what goes into ``sweep.json``; write CSV, JSON and report.
+
+    The journal stays in ``args.out``; discard it when ``directory`` has been published.
+    """
+    open_pool, limits = engine_options(args)
+    with CaseProgress("sweep") as progress:
+        sweep = run_cases(
+            cases,
+            work,
+            args.out / "sweep.journal",
+            open_pool=open_pool,
+            limits=limits,
+            resume=args.resume,
+            on_progress=progress.update,
+        )
+    with sweep:
+        write_csv(directory / "sweep.csv", cases.names, work.columns, sweep.rows())
+        if args.parquet:
+            write_parquet(directory / "sweep.parquet", cases.names, work.columns, sweep.rows())
+        columns = [{"name": c.name, "unit": c.unit} for c in work.columns]
+        results: dict[str, Any] = {"cases": len(cases), "failed": sweep.failed, "columns": columns}
+        yield sweep, results
+        given = {name: value for name, value in vars(args).items() if name not in NOT_PART_OF_THE_RESULT}
+        write_result(directory, "sweep", given, args.seed, results)
+        write_report(directory, "sweep")

@@ -18,6 +18,7 @@ from orchestrator.output import staged, write_result
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.figures import draw_pair, draw_signals
 from orchestrator.paired.pair import PairRun, run_pair, with_settings
+from orchestrator.reporting import write_report
 from orchestrator.scenario import load_scenario, run_scenario
 
 
@@ -49,7 +50,8 @@ def _scenario(arguments: argparse.Namespace) -> int:
         print_table(f"{arguments.scenario.name}: {len(result.time) - 1} steps", head, rows)
         results = {"signals": [dict(zip(head, row, strict=True)) for row in rows], "steps": len(result.time) - 1}
         write_result(directory, "simulate", {"scenario": str(arguments.scenario)}, None, results)
-    sys.stdout.write(f"Written to {arguments.out}: simulate.csv, simulate.json, simulate.png\n")
+        write_report(directory, "simulate")
+    sys.stdout.write(f"Written to {arguments.out}: report.html, simulate.csv, simulate.json, simulate.png\n")
     return 0
 
 
@@ -86,7 +88,8 @@ def _pair(arguments: argparse.Namespace) -> int:
         given = {"alpha": alpha, "noise": noise, "experiment": experiment.name}
         given |= {"backlash_model": experiment.backlash_model}
         write_result(directory, "simulate", given, arguments.seed, results)
-    sys.stdout.write(f"Written to {arguments.out}: simulate.csv, simulate.json, simulate.png\n")
+        write_report(directory, "simulate")
+    sys.stdout.write(f"Written to {arguments.out}: report.html, simulate.csv, simulate.json, simulate.png\n")
     return 0
 
 

@@ -10,6 +10,7 @@ from orchestrator.paired.calibration import estimate_gap, load_or_calibrate
 from orchestrator.paired.compiled_loop import compiled_loop
 from orchestrator.paired.experiment import thesis_experiment
 from orchestrator.paired.metric import difference_sum
+from orchestrator.reporting import write_report
 from orchestrator.thesis import published
 from orchestrator.thesis.errata import Erratum, errata
 from orchestrator.thesis.recompute import Comparison, gain_comparisons, table_comparison
@@ -46,6 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
             "others": [asdict(o) for o in published.OTHERS],
         }
         write_result(directory, "thesis", {}, None, results)
+        write_report(directory, "thesis")
     return 0
 
 

@@ -372,6 +372,18 @@ def _format_messages(callbacks: Any) -> None:
     addLoggerProxy(ctypes.byref(callbacks))
 
 
+@dataclass(frozen=True)
+class FmuFactory:
+    """Makes slaves from the FMU at ``path``."""
+
+    path: Path
+    description: FmuDescription
+
+    def __call__(self, name: str) -> FmuSlave:
+        """Return a new slave called ``name``."""
+        return FmuSlave(name, self.path, self.description)
+
+
 def fmu_instance(name: str, path: Path, start: Start | None = None) -> Instance:
     """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
 
@@ -379,4 +391,4 @@ def fmu_instance(name: str, path: Path, start: Start | None = None) -> Instance:
         FmuError: see ``read_description``.
     """
     description = read_description(path)
-    return Instance(name, description.model, lambda called: FmuSlave(called, path, description), start or {})
+    return Instance(name, description.model, FmuFactory(path, description), start or {})

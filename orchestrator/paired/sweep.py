@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from orchestrator.engine import Case, Column, DesignCases, Row, Status, Work, parse_design
 from orchestrator.engine.cases import Value
 from orchestrator.errors import ScenarioError
-from orchestrator.master.system import Problem, System, raise_problems
 from orchestrator.paired.calibration import Calibration, estimate_gap, load_or_calibrate
 from orchestrator.paired.cosimulation import LoopSession
 from orchestrator.paired.experiment import Experiment
@@ -32,8 +31,6 @@ COLUMNS = (
 )
 THESIS_RANGE = (1.2, 4.8)
 OWN_PARAMETERS = frozenset({"alpha", "noise", "repetition"})
-# So many cases are looked at before a sweep starts; a wrong value beyond them becomes a row.
-CHECKED_CASES = 10_000
 
 
 @dataclass(frozen=True)
@@ -80,22 +77,6 @@ class SweepPlan:
             for index in range(len(cases)):
                 self._require(cases[index].parameters["alpha"])
         return cases
-
-    def check_parameters(self, cases: DesignCases, system: System) -> None:
-        """Refuse names and values of ``vary`` that the machine's FMUs do not take.
-
-        Raises:
-            ScenarioError: names every parameter that is wrong, once.
-        """
-        problems: dict[str, Problem] = {}
-        for index in range(min(len(cases), CHECKED_CASES) if self.vary else 0):
-            for name, value in cases[index].parameters.items():
-                if name in OWN_PARAMETERS or name in problems or value is None:
-                    continue
-                _, text = system.start_value(name, value)
-                if text is not None:
-                    problems[name] = Problem(name, text)
-        raise_problems(list(problems.values()), "--vary")
 
     def _require(self, alpha: Value) -> None:
         if not isinstance(alpha, float) or not np.isfinite(alpha) or alpha <= 0.0:
