@@ -1,4 +1,4 @@
-"""Prints how far the plant FMU lies from solutions that share no code with it: ``python tests/bench_plant_accuracy.py``."""
+"""Prints how far the plant FMU lies from solutions that share no code with it."""
 
 import numpy as np
 
@@ -42,7 +42,8 @@ def main():
     """Run all cases and print the table."""
     path = ensure_built(["Drivetrain"])["Drivetrain"]
     print(
-        f"{'model':10s} {'alpha [rad]':>11s} {'crossings':>9s} {'theta_m [rad]':>14s} {'theta_l [rad]':>14s} {'numba':>9s}"
+        f"{'model':10s} {'alpha [rad]':>11s} {'crossings':>9s} "
+        f"{'theta_m [rad]':>14s} {'theta_l [rad]':>14s} {'numba':>9s}"
     )
     for model in ("dead_zone", "nordin"):
         for k, alpha in enumerate((0.002, 0.02, 0.1)):
