@@ -176,3 +176,63 @@ def test_no_results_at_all_make_a_page_or_one_line(tmp_path, command, capsys):
     assert code in {0, 2}
     assert (tmp_path / "report.html").exists() == (code == 0)
     assert "Traceback" not in capsys.readouterr().err
+
+
+def estimate(value):
+    return {"value": value, "standard_error": 0.01 * value, "unit": "N.m"}
+
+
+def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
+    effect = {
+        "name": "coulomb_friction",
+        "site": "motor",
+        "parameters": {"torque": estimate(1.5)},
+        "score": 120.0,
+        "runner_up": "stribeck_friction (motor)",
+        "margin": 15.0,
+        "family": ["coulomb_friction", "stribeck_friction"],
+    }
+    stages = [{"model": "nominal", "rms": 0.1}, {"model": "+ coulomb_friction", "rms": 0.001}]
+    results = {
+        "verdict": "effects",
+        "effects": [effect],
+        "suspects": [],
+        "parameters": {"J_m": {"nominal": 0.4, "value": 0.42, "standard_error": 0.001, "unit": "kg.m2"}},
+        "where": [
+            {"signal": "theta_m", "regime": "speed", "interval": [-0.1, 0.1], "unit": "rad/s", "share_of_gap": 0.8}
+        ],
+        "gap": {"theta_m": {"before": 0.1, "after": 0.001, "noise": 0.0009, "unit": "rad", "stages": stages}},
+        "model": "Corrected.fmu",
+        "warnings": ["the record is short"],
+        "candidates": [
+            {"on_top_of": [], "accepted": True, "tried": [{"effect": "delay", "gain": -1.0, "decided": 0.0}]}
+        ],
+    }
+    write_result(tmp_path, "diagnose", {"data": "record.csv"}, None, results)
+    (tmp_path / "diagnose.csv").write_text("time,theta_m,theta_m_before,theta_m_after\n0,0,0,0\n1,1,1.1,1.001\n")
+    report = report_from_directory(tmp_path)
+    assert "The record shows coulomb friction (motor)." in report.summary
+    assert "theta_m from 0.1 to 0.001 rad" in report.summary
+    tables = {t.title: t for t in sections(report, Table)}
+    assert tables["Missing effects"].rows[0][2] == "torque 1.5 ± 0.015 N.m"
+    assert tables["Parameters"].rows[0][4] == pytest.approx(5.0)
+    plots = {p.title: p for p in sections(report, Plot)}
+    assert plots["Gap of each model in turn"].categories == ("nominal", "+ coulomb_friction")
+    assert [s.name for s in plots["theta_m"].series] == ["measured", "before", "after"]
+    assert ("corrected model", "Corrected.fmu") in report.origin
+
+
+@pytest.mark.parametrize("verdict", ["none", "parameters", "unknown"])
+def test_a_diagnosis_without_effects_is_a_page_too(tmp_path, verdict):
+    results = {"verdict": verdict, "effects": [], "parameters": {}, "where": [], "gap": {}, "model": None}
+    write_result(tmp_path, "diagnose", {}, None, results)
+    assert report_from_directory(tmp_path).summary
+
+
+def test_the_page_of_a_sweep_of_any_scenario_plots_its_results(tmp_path):
+    results = {"cases": 2, "failed": 0, "columns": [{"name": "a.y.last", "unit": "rad"}], "scenario": {"name": "s"}}
+    write_result(tmp_path, "sweep", {}, 0, results)
+    (tmp_path / "sweep.csv").write_text("case,a.k,a.model,status,a.y.last,message\n0,1,x,done,5,\n1,2,y,done,,\n")
+    (plot,) = sections(report_from_directory(tmp_path), Plot)
+    assert (plot.x_label, plot.y_label) == ("a.k", "a.y.last [rad]")
+    assert (plot.series[0].x, plot.series[0].y) == ([1.0, 2.0], [5.0, None])

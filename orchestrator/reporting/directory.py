@@ -6,13 +6,14 @@ from pathlib import Path
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
-from orchestrator.reporting.pages import check, generic, simulate, sweep, thesis
+from orchestrator.reporting.pages import check, diagnose, generic, simulate, sweep, thesis
 from orchestrator.reporting.source import Source, load
 
 PAGE = "report.html"
 COMMANDS = ("build", "check", "simulate", "sweep", "estimate", "diagnose", "thesis", "ssp", "bench")
 _BUILDERS: dict[str, Callable[[Source], Report]] = {
     "check": check.build,
+    "diagnose": diagnose.build,
     "simulate": simulate.build,
     "sweep": sweep.build,
     "thesis": thesis.build,

@@ -9,6 +9,7 @@ from orchestrator.reporting.source import Source, numbers, table_of, words
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
+MOST_PLOTS = 12
 FIRST = ("case", "alpha", "estimate", "lower", "upper", "error_percent", "noise")
 STATISTICS = {
     "noise": ("noise", "rad"),
@@ -26,19 +27,21 @@ def build(source: Source) -> Report:
     table = source.columns("sweep.csv")
     failed, total = int(results["failed"]), int(results["cases"])
     statistics: list[Mapping[str, Any]] = list(results.get("statistics", []))
+    units = {c["name"]: c["unit"] for c in results.get("columns", [])}
     sections: list[Section] = []
     if statistics:
         sections.append(_statistics(statistics))
     if {"alpha", "noise", "estimate", "lower", "upper", "error_percent"} <= set(table):
         sections += _plots(table)
-    units = {c["name"]: c["unit"] for c in results.get("columns", [])}
+    else:
+        sections += _signals(table, units)
     if failed:
         sections.append(_cases("Failed cases", table, UNITS | units, failed=True))
     sections.append(_cases("Cases", table, UNITS | units, failed=False))
     sections += _provenance(results)
     return Report(
-        title="Backlash sweep",
-        summary=_summary(statistics, total, failed),
+        title="Backlash sweep" if statistics else "Sweep",
+        summary=_summary(statistics, total, failed) if statistics else f"{total - failed} of {total} cases are done.",
         badge=("bad", f"{failed} of {total} cases failed") if failed else ("good", f"all {total} cases done"),
         sections=tuple(sections),
         origin=source.origin(),
@@ -90,6 +93,22 @@ def _plots(table: Columns) -> list[Section]:
             note="Bars: the interval given with each estimate. Dashed: estimated equals actual.",
         ),
         Plot("Error against size", "actual [rad]", "error [%]", tuple(errors), log_x=wide, log_y=True),
+    ]
+
+
+def _signals(table: Columns, units: Mapping[str, str]) -> list[Section]:
+    """Return each result against the parameter that was varied first, for sweeps of any scenario."""
+    varied = [n for n in table if n not in units and n not in {"case", "status", "message"}]
+    numeric = [n for n in varied if any(v is not None for v in numbers(table[n]))]
+    if not numeric:
+        return []
+    name = numeric[0]
+    x = numbers(table[name])
+    others = [n for n in varied if n != name]
+    labels = [", ".join(f"{n} {table[n][i]}" for n in ("case", *others)) for i in range(len(x))]
+    shown = [n for n in units if n in table][:MOST_PLOTS]
+    return [
+        Plot(n, name, f"{n} [{units[n]}]", (Series(n, x, numbers(table[n]), "points", labels=labels),)) for n in shown
     ]
 
 
