@@ -11,6 +11,8 @@ same, the model file states the unit.
     tau drive' = u - drive          (tau = 0: drive = u)
 """
 
+from math import exp, sqrt
+
 from .drivetrain_parameters import BIG, TINY, Parameter
 from .effects import gravity_torque, quadratic_drag, sliding_friction, torque_ripple
 
@@ -91,3 +93,104 @@ def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
     """
     lag = (u - x[2]) / p[P_TAU] if p[P_TAU] > 0.0 else 0.0
     return (x[1], (sliding_torque(x, p, u, T_l) - sign * friction(x, p)) / p[P_J], lag)
+
+
+def capacity(p: Parameters) -> float:
+    """Return the breakaway torque [N.m] below which an axis that stands still keeps standing."""
+    return p[P_COULOMB] + max(p[P_STRIBECK], p[P_BREAKAWAY])
+
+
+def slip_at_rest(x: State, p: Parameters, u: float, T_l: float) -> int:
+    """Return the direction in which an axis at rest starts to slide, 0 when friction holds it."""
+    push = sliding_torque((x[0], 0.0, x[2]), p, u, T_l)
+    if push > capacity(p):
+        return 1
+    if push < -capacity(p):
+        return -1
+    return 0
+
+
+def initial_mode(x: State, p: Parameters, u: float) -> int:
+    """Return the direction of sliding (-1, 1; 0: held by friction) from which a simulation starts."""
+    if x[1] > 0.0:
+        return 1
+    if x[1] < 0.0:
+        return -1
+    return slip_at_rest(x, p, u, 0.0)
+
+
+def longest_step(x: State, p: Parameters, h: float) -> float:
+    """Return a step [s] that resolves damping, lag and ripple well (a Runge-Kutta step errs by its 5th power)."""
+    rate = (p[P_B] + 2.0 * p[P_DRAG] * abs(x[1])) / p[P_J]
+    if p[P_TAU] > 0.0:
+        rate = max(rate, 1.0 / p[P_TAU])
+    if p[P_RIPPLE] != 0.0:
+        rate = max(rate, p[P_RIPPLE_N] * (abs(x[1]) + sqrt(abs(p[P_RIPPLE]) / (p[P_RIPPLE_N] * p[P_J] + TINY))))
+    if p[P_BREAKAWAY] != p[P_STRIBECK]:
+        rate = max(rate, abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / (p[P_STRIBECK_SPEED] * p[P_J]))
+    return min(h, 0.05 / (rate + TINY))
+
+
+def smooth_step(x: State, sign: float, p: Parameters, u: float, T_l: float, h: float) -> State:
+    """Return the state after one classical Runge-Kutta step in one direction of sliding."""
+    a = rates(x, sign, p, u, T_l)
+    b = rates((x[0] + 0.5 * h * a[0], x[1] + 0.5 * h * a[1], x[2] + 0.5 * h * a[2]), sign, p, u, T_l)
+    c = rates((x[0] + 0.5 * h * b[0], x[1] + 0.5 * h * b[1], x[2] + 0.5 * h * b[2]), sign, p, u, T_l)
+    d = rates((x[0] + h * c[0], x[1] + h * c[1], x[2] + h * c[2]), sign, p, u, T_l)
+    w = h / 6.0
+    return (
+        x[0] + w * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]),
+        x[1] + w * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]),
+        x[2] + w * (a[2] + 2.0 * b[2] + 2.0 * c[2] + d[2]),
+    )
+
+
+def stopping_time(x: State, sign: int, p: Parameters, u: float, T_l: float, h: float) -> float:
+    """Return when within ``h`` [s] an axis that slides comes to rest (bisection; its speed changes sign in ``h``)."""
+    low, high = 0.0, h
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if smooth_step(x, float(sign), p, u, T_l, middle)[1] * sign > 0.0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def held(x: State, p: Parameters, u: float, h: float) -> State:
+    """Return the state after ``h`` [s] at rest: the drive's torque alone moves."""
+    share = 1.0 - exp(-h / p[P_TAU]) if p[P_TAU] > 0.0 else 0.0
+    return (x[0], 0.0, x[2] + share * (u - x[2]))
+
+
+def advance(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> tuple[State, int]:
+    """Return state and direction of sliding after ``h`` [s] with the inputs held; stops are located.
+
+    Args:
+        x: state.
+        mode: direction of sliding, from :func:`initial_mode` or the step before.
+        p: parameters.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: step [s], positive.
+    """
+    dry = capacity(p) > 0.0
+    elapsed = 0.0
+    while h - elapsed > 1e-12 * h:
+        step = min(longest_step(x, p, h), h - elapsed)
+        if dry and mode == 0:
+            mode = slip_at_rest(x, p, u, T_l)
+            if mode == 0:
+                x = held(x, p, u, step)
+                elapsed += step
+                continue
+        moved = smooth_step(x, float(mode), p, u, T_l, step)
+        if dry and moved[1] * mode < 0.0:
+            step = stopping_time(x, mode, p, u, T_l, step)
+            moved = smooth_step(x, float(mode), p, u, T_l, step)
+            x = (moved[0], 0.0, moved[2])
+            mode = slip_at_rest(x, p, u, T_l)
+        else:
+            x = moved
+        elapsed += step
+    return (x, mode)
