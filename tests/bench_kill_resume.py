@@ -51,6 +51,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--longest", type=float, default=4.0, help="seconds until a kill, at most")
     parser.add_argument("--table", default="table.csv")
     parser.add_argument("command", nargs="*", default=DRIVER)
     args = parser.parse_args()
@@ -62,7 +63,7 @@ def main() -> int:
         kills, sweeps, kept = 0, 0, 0
         while kills < args.kills:
             out = Path(scratch) / f"killed{sweeps}"
-            killed, found = kill_once(args.command, out, dice.uniform(0.2, 4.0))
+            killed, found = kill_once(args.command, out, dice.uniform(0.2, args.longest))
             kills += killed
             if killed and found < kept:
                 raise SystemExit(f"cases lost: {found} after {kept}")
