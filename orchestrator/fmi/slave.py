@@ -17,6 +17,7 @@ import numpy as np
 
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.extraction import content_hash, extracted
+from orchestrator.fmi.messages import logging_callbacks
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.master.protocol import Model, NativeCalls, Signals, StepDiscardedError, Transfer, Value
 from orchestrator.master.system import Instance, Start
@@ -126,18 +127,7 @@ class FmuSlave:
             raise FmuError(f"{self.name}: the binary of {self.path} cannot be loaded: {error}") from None
 
     def _instantiate(self) -> None:
-        from fmpy import calloc, fmi2, free
-
-        def log(_environment: Any, _instance: bytes, status: int, _category: bytes, message: bytes) -> None:
-            if status != OK:
-                self.messages.append((message or b"").decode("utf-8", "replace").strip())
-
-        callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
-        callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-        callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
-        self._log = callbacks.logger
-        _format_messages(callbacks)
+        callbacks = logging_callbacks(self.messages)
         try:
             self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
         except Exception:
@@ -362,14 +352,6 @@ class FmuSlave:
 def _shares(values: Any, buffer: Signals) -> bool:
     first = int(buffer.ctypes.data)
     return first <= ctypes.addressof(values) < first + max(buffer.nbytes, 1)
-
-
-def _format_messages(callbacks: Any) -> None:
-    try:
-        from fmpy.logging import addLoggerProxy
-    except ImportError:
-        return
-    addLoggerProxy(ctypes.byref(callbacks))
 
 
 @dataclass(frozen=True)

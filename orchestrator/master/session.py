@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +19,17 @@ from orchestrator.master.signals import Signal
 from orchestrator.master.system import Problem, Quantity, System, raise_problems, split
 from orchestrator.master.wiring import Wiring, wire
 
+if TYPE_CHECKING:
+    from orchestrator.master.compiled import CompiledLoop
+
 Array = NDArray[np.float64]
+Slots = NDArray[np.int64]
 
 INITIAL_TOLERANCE = 1e-12
 INITIAL_PASSES = 100
+
+COMPILED_FROM = 100_000
+"""Calls of ``do_step`` in a session from which on loading the compiled loop pays."""
 
 
 class Session:
@@ -52,7 +60,9 @@ class Session:
         self.layout: Layout = lay_out(system, names, simultaneous=isinstance(algorithm, Jacobi))
         self._slaves: dict[str, Slave] = {}
         self._wiring: Wiring | None = None
+        self._compiled: CompiledLoop | None = None
         self._used: set[str] = set()
+        self._do_steps = 0
 
     def __enter__(self) -> "Session":
         return self
@@ -67,7 +77,7 @@ class Session:
         for slave in self._slaves.values():
             slave.close()
         self._slaves.clear()
-        self._wiring = None
+        self._wiring = self._compiled = None
 
     def run(
         self, start: Mapping[str, Value | Quantity] | None = None, signals: Mapping[int, Signal] | None = None
@@ -148,11 +158,8 @@ class Session:
         record = np.array(self.layout.recorded, dtype=np.int64)
         np.take(wiring.values, record, out=rows[0], mode="clip")
         match algorithm:
-            case GaussSeidel():
-                run_sequential(wiring, table, self.start, algorithm.step, steps, rows, record)
-                sweeps = steps
-            case Jacobi():
-                run_simultaneous(wiring, table, self.start, algorithm.step, steps, rows, record)
+            case GaussSeidel() | Jacobi():
+                self._fixed_step(wiring, table, rows, record, algorithm)
                 sweeps = steps
             case Iterated():
                 sweeps = run_iterated(wiring, table, self.start, algorithm, steps, rows, record)
@@ -161,3 +168,19 @@ class Session:
             case _:
                 raise ScenarioError(f"`algorithm` must be a master algorithm, but is {algorithm!r}")
         return Statistics(steps, 0, dict.fromkeys(self.system.execution_order(), steps), sweeps)
+
+    def _fixed_step(
+        self, wiring: Wiring, table: Array, rows: Array, record: Slots, algorithm: GaussSeidel | Jacobi
+    ) -> None:
+        simultaneous = isinstance(algorithm, Jacobi)
+        self._do_steps += self.steps * len(wiring.stages)
+        compiled = self._compiled
+        if compiled is None and algorithm.compiled and self._do_steps >= COMPILED_FROM:
+            from orchestrator.master.compiled import compiled_loop
+
+            compiled = self._compiled = compiled_loop(wiring)
+        if compiled is not None:
+            compiled.run(table, self.start, algorithm.step, simultaneous, rows, record)
+        else:
+            run = run_simultaneous if simultaneous else run_sequential
+            run(wiring, table, self.start, algorithm.step, self.steps, rows, record)
