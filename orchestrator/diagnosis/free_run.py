@@ -84,7 +84,7 @@ def _servo_axis_runner() -> Any:
 _RUNNERS: dict[str, Callable[[], Any]] = {"Drivetrain": _drivetrain_runner, "ServoAxis": _servo_axis_runner}
 
 
-def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice) -> Array:
+def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice, history: bool = True) -> Array:
     """Return the simulated encoder angles (n, 2) of a part of a record.
 
     Args:
@@ -93,6 +93,8 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
         start: (8,) state at the part's first sample.
         signals: of the record; requests before the part matter when there is a dead time.
         part: samples to simulate.
+        history: requests before the part are still under way in a dead time; False: there were none, as in an FMU
+            that starts with the part.
     """
     begin, end, _ = part.indices(signals.size)
     limit = p[plant.index("effects.torque_saturation.limit")]
@@ -101,7 +103,7 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
     whole = int(np.floor(delay / signals.h + 1e-9))
     first = delay - whole * signals.h
     at = np.arange(begin, end)
-    late, early = u[np.maximum(at - whole, 0)], u[np.maximum(at - whole - 1, 0)]
+    late, early = (_requests(u, at - back, 0 if history else begin) for back in (whole, whole + 1))
     out = np.empty((end - begin, 2))
     flat = tuple(float(v) for v in p[: len(plant.table)])
     _RUNNERS[plant.name]()(tuple(start.tolist()), flat, early, late, max(first, 0.0), signals.h, out)
@@ -110,14 +112,19 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
     return out
 
 
-def free_run(plant: Plant, p: Array, guess: Array, signals: Signals, part: slice) -> FreeRun:
+def _requests(u: Array, at: Array, first: int) -> Array:
+    """Return the requests at samples ``at``; there were none before ``first``."""
+    return np.where(at >= first, u[np.maximum(at, 0)], u[0] if first == 0 else 0.0)
+
+
+def free_run(plant: Plant, p: Array, guess: Array, signals: Signals, part: slice, history: bool = True) -> FreeRun:
     """Return the free run whose initial state lies closest to the measurement (Gauss-Newton with damping)."""
     m = signals.channels
     measured = signals.y[part, :m]
     scale = signals.noise
 
     def outputs(start: Array) -> Array:
-        return simulate(plant, p, start, signals, part)[:, :m]
+        return simulate(plant, p, start, signals, part, history)[:, :m]
 
     start = _followed(plant, np.array(guess, dtype=float))
     free = _free_places(plant, p)

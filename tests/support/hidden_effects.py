@@ -166,7 +166,7 @@ def _varied(effects: dict[str, float], rng: np.random.Generator) -> dict[str, fl
 
 def _raw(effects: dict[str, float], seed: int, excitation: str, duration: float) -> np.ndarray:
     """Return the true encoder angles (n, 2), offsets included; closed loops are compared open, by the same torque."""
-    columns, truth = make_record(
+    _, truth = make_record(
         effects, seed, duration, excitation="multisine" if excitation == "closed_loop" else excitation, substeps=25
     )
     angles = truth["states"][:, [0, 2]].copy()
@@ -178,5 +178,5 @@ def _case(
     kind: str, seed: int, effects: dict[str, float], right: tuple[tuple[str, ...], ...], excitation: str,
     duration: float, ratio: float = 0.0,
 ) -> Case:  # fmt: skip
-    columns, truth = make_record(effects, seed, duration, excitation=excitation)
+    _, truth = make_record(effects, seed, duration, excitation=excitation)
     return Case(kind, seed, record_from_columns(columns, f"{kind}-{seed}"), truth, right, ratio)

@@ -1,0 +1,150 @@
+"""``diagnose``: where a record and the model disagree, what is missing, and the corrected FMU."""
+
+import argparse
+import csv
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from orchestrator.commands._console import print_table
+from orchestrator.diagnosis.corrected import BeforeAfter, before_and_after, build_corrected
+from orchestrator.diagnosis.diagnose import diagnose
+from orchestrator.diagnosis.figures import draw_candidates, draw_innovations, draw_missing, draw_signals
+from orchestrator.diagnosis.outcome import Diagnosis, Gap
+from orchestrator.diagnosis.validate import gap_on
+from orchestrator.model_file import read_model
+from orchestrator.output import staged, write_result
+from orchestrator.record import read_record
+from orchestrator.reporting import write_report
+
+SHOWN = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument("record", type=Path, metavar="DATA.csv", help="measured record: time,u,theta_m[,theta_l]")
+    parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the model it is compared with")
+    parser.add_argument("--validate", type=Path, metavar="OTHER.csv", help="a second record, to show the gap on")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU."""
+    model = read_model(args.model)
+    record = read_record(args.record, model.columns)
+    other = read_record(args.validate, model.columns) if args.validate else None
+    begun = time.monotonic()
+    with _shown() as progress:
+        diagnosis = diagnose(record, model, progress)
+    with staged(args.out) as directory:
+        fmu = build_corrected(diagnosis, args.record.name, directory)
+        runs = before_and_after(diagnosis, fmu)
+        results = diagnosis.as_json() | {"model": str(args.out / fmu.name)}
+        results["cosimulation"] = {"largest_difference_from_compiled": runs.difference, "unit": "rad"}
+        if other is not None:
+            results["validation"] = {gap.signal: _gap(gap) for gap in gap_on(other, diagnosis)}
+        results["seconds"] = time.monotonic() - begun
+        _write_csv(directory / "diagnose.csv", runs)
+        draw_signals(directory / "diagnose_signals.png", runs, diagnosis)
+        draw_innovations(directory / "diagnose_innovations.png", diagnosis)
+        draw_candidates(directory / "diagnose_candidates.png", diagnosis)
+        draw_missing(directory / "diagnose_missing_torque.png", diagnosis)
+        given = {"record": str(args.record), "model": args.model and str(args.model)}
+        given["validate"] = args.validate and str(args.validate)
+        write_result(directory, "diagnose", given, None, results)
+        write_report(directory, "diagnose")
+    _print(diagnosis, results)
+    sys.stdout.write(f"Corrected FMU: {results['model']}\nWritten to {args.out}: report.html, diagnose.json, figures\n")
+    return 0
+
+
+def _gap(gap: Gap) -> dict[str, Any]:
+    return {"before": gap.before, "after": gap.after, "noise": gap.noise, "unit": gap.unit}
+
+
+def _print(diagnosis: Diagnosis, results: dict[str, Any]) -> None:
+    for line in summary(diagnosis):
+        sys.stdout.write(line + "\n")
+    rows = [
+        [
+            ", ".join(step["on_top_of"]) or "parameters",
+            tried["effect"],
+            f"{tried['gain']:.1f}",
+            f"{tried['decided']:.1f}",
+            "added" if step["accepted"] and n == 0 else "",
+        ]
+        for step in results["candidates"]
+        for n, tried in enumerate(step["tried"][:SHOWN])
+    ]
+    if rows:
+        print_table("Candidates", ("on top of", "effect", "gain", "of it on deciding part", ""), rows)
+    gaps = [
+        [gap.signal, name, f"{rms:.4g}", f"{rms / gap.noise:.2f}"] for gap in diagnosis.gap for name, rms in gap.stages
+    ]
+    print_table("Gap on held-out data", ("signal", "model", "rms [rad]", "times noise"), gaps)
+    if "validation" in results:
+        rows = [
+            [signal, f"{g['before']:.4g}", f"{g['after']:.4g}", f"{g['noise']:.4g}"]
+            for signal, g in results["validation"].items()
+        ]
+        print_table("Gap on the other record", ("signal", "before [rad]", "after [rad]", "noise [rad]"), rows)
+
+
+def summary(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield what was found, one sentence a line."""
+    meaning = {
+        "none": "the model explains the record to its noise",
+        "parameters": "re-fitted parameters explain the record",
+        "effects": "effects are missing in the model",
+        "unknown": "a gap is left that nothing in the library explains",
+    }
+    yield f"Verdict: {diagnosis.verdict}: {meaning[diagnosis.verdict]}"
+    for effect in diagnosis.effects:
+        values = ", ".join(
+            f"{name} = {e.value:.5g} +- {e.standard_error:.2g} {e.unit}".rstrip()
+            for name, e in effect.parameters.items()
+        )
+        runner = f"; runner-up {effect.runner_up}, behind by {effect.margin:.0f}" if effect.runner_up else ""
+        yield f"  {effect.name} ({effect.site}): {values}; gain {effect.score:.0f}{runner}"
+    if diagnosis.where and diagnosis.verdict not in ("none", "parameters"):
+        yield "Where:"
+        for place in diagnosis.where[:SHOWN]:
+            yield f"  {place.words}"
+    for warning in diagnosis.warnings:
+        yield f"Note: {warning}"
+
+
+def _write_csv(path: Path, runs: BeforeAfter) -> None:
+    names: Sequence[str] = ("theta_m", "theta_l")[: runs.measured.shape[1]]
+    header = ["time", "u"] + [f"{name}{suffix}" for name in names for suffix in ("", "_before", "_after")]
+    columns = [runs.time, runs.u]
+    for n in range(len(names)):
+        columns += [runs.measured[:, n], runs.before[:, n], runs.after[:, n]]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+
+
+@contextmanager
+def _shown() -> Iterator[Any]:
+    """Yield a progress callback: a bar on a terminal, nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda done, expected, what: None
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed} fits"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(file=sys.stderr), transient=True) as bar:
+        task = bar.add_task("diagnose", total=None)
+        yield lambda done, expected, what: bar.update(
+            task, completed=done, total=expected, description=f"fitted {what}"
+        )
