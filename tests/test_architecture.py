@@ -15,7 +15,8 @@ MOST_FUNCTION_LINES = 60
 LAYERS = (
     {"errors"},
     {"output", "cache"},
-    {"compiled", "design", "reference", "record", "model_file"},
+    {"compiled", "design", "reference", "record"},
+    {"model_file"},
     {"master"},
     {"fmi"},
     {"scenario"},
