@@ -8,7 +8,7 @@ import pytest
 from orchestrator.checking.check import check_fmu
 from orchestrator.checking.rules import RULES
 from tests.support.broken_fmus import QUICK, Broken, corpus, good
-from tests.support.c_fmu import have_compiler
+from tests.support.c_fmu import fmu_files, have_compiler, write_fmu
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
@@ -31,9 +31,25 @@ def test_names_the_rule(broken: Broken, tmp_path: Path) -> None:
     assert named == {broken.rule}, "\n".join(f"{f.rule} {f.path}: {f.message}" for f in report.findings)
 
 
-def test_nothing_runs_after_a_static_error() -> None:
-    """Covered per FMU above by the rules named; here: no static error leaves an FMU executed."""
-    assert all(b.rule in RULES for b in CORPUS)
+@pytest.mark.parametrize(
+    ("behaviour", "old", "new"),
+    [
+        ("asynchronous", "canHandleVar", 'canRunAsynchronuously="true" canHandleVar'),
+        ("ends_early", "canHandleVar", "canHandleVar"),
+        ("instantiate_once", "canHandleVar", 'canBeInstantiatedOnlyOncePerProcess="true" canHandleVar'),
+        ("variable_refused", 'StepSize="true"', 'StepSize="false"'),
+        ("state_refused", 'canGetAndSetFMUstate="true" canSerializeFMUstate="true"', ""),
+        ("serialised_empty", 'canSerializeFMUstate="true"', ""),
+    ],
+)
+def test_what_the_flags_do_not_promise_is_not_asked_for(behaviour: str, old: str, new: str, tmp_path: Path) -> None:
+    files = fmu_files(behaviour)
+    xml = " ".join(files["modelDescription.xml"].decode().split())
+    assert xml.count(old) == 1
+    path = write_fmu(tmp_path / "flags.fmu", files | {"modelDescription.xml": xml.replace(old, new).encode()})
+    report = check_fmu(path, QUICK)
+    assert report.findings == ()
+    assert report.executed
 
 
 def test_the_corpus_is_large_and_covers_the_rules() -> None:

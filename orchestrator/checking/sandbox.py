@@ -6,11 +6,12 @@ library runs with the rights of the user. Look at what `--static` says before yo
 
 import contextlib
 import os
+import queue
 import re
-import selectors
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -79,6 +80,7 @@ def run_child(
         command,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
+        bufsize=0,
         stderr=subprocess.DEVNULL,
         cwd=folder,
         env=_environment(scratch),
@@ -117,36 +119,46 @@ def _limiter(limits: Limits) -> Callable[[], None]:
 
 
 def _watch(process: subprocess.Popen[bytes], limits: Limits, on_line: Callable[[bytes], None]) -> Ending:
-    """Read lines until the process ends or breaks a limit; any line is a sign of life."""
+    """Take lines until the process ends or breaks a limit; any line is a sign of life."""
     assert process.stdout is not None
-    stream = process.stdout.fileno()
+    lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    # A thread, because Windows cannot wait for a pipe with a time limit.
+    reader = threading.Thread(target=_read_lines, args=(process.stdout.fileno(), lines), daemon=True)
+    reader.start()
     began = alive = time.monotonic()
-    pending = b""
     reason = ""
-    with selectors.DefaultSelector() as selector:
-        selector.register(stream, selectors.EVENT_READ)
-        is_open = True
-        while not reason:
-            if not is_open:
-                time.sleep(_POLL)
-            if is_open and selector.select(_POLL):
-                data = os.read(stream, 65536)
-                if not data:
-                    selector.unregister(stream)
-                    is_open = False
-                pending += data
-                *lines, pending = pending.split(b"\n")
-                for line in lines:
-                    on_line(line)
-                alive = time.monotonic()
-            elif _ended(process):
+    while not reason:
+        ended = _ended(process)
+        try:
+            on_line(lines.get(timeout=_POLL))
+            alive = time.monotonic()
+        except queue.Empty:
+            if ended:
                 break
-            now = time.monotonic()
-            if now - alive > limits.time or now - began > limits.total:
-                reason = "time"
-            elif _resident(process.pid) > limits.memory:
-                reason = "memory"
-    return _finish(process, reason, limits)
+        now = time.monotonic()
+        if now - alive > limits.time or now - began > limits.total:
+            reason = "time"
+        elif _resident(process.pid) > limits.memory:
+            reason = "memory"
+    ending = _finish(process, reason, limits)
+    reader.join(timeout=1.0)
+    while not lines.empty():
+        on_line(lines.get())
+    return ending
+
+
+def _read_lines(stream: int, lines: "queue.SimpleQueue[bytes]") -> None:
+    pending = b""
+    while True:
+        try:
+            data = os.read(stream, 65536)
+        except OSError:  # closed, because somebody outside the group still holds the other end
+            return
+        if not data:
+            return
+        *whole, pending = (pending + data).split(b"\n")
+        for line in whole:
+            lines.put(line)
 
 
 def _ended(process: subprocess.Popen[bytes]) -> bool:

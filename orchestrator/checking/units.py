@@ -5,7 +5,7 @@ import re
 # kg, m, s, A, K, mol, cd (the radian is taken as dimensionless)
 _SYMBOLS: dict[str, dict[str, int]] = {
     "1": {}, "rad": {}, "deg": {}, "rev": {}, "sr": {}, "%": {},
-    "kg": {"kg": 1}, "g": {"kg": 1},
+    "kg": {"kg": 1},
     "m": {"m": 1}, "mm": {"m": 1}, "cm": {"m": 1}, "km": {"m": 1}, "um": {"m": 1},
     "s": {"s": 1}, "ms": {"s": 1}, "min": {"s": 1}, "A": {"A": 1}, "K": {"K": 1}, "degC": {"K": 1},
     "mol": {"mol": 1}, "cd": {"cd": 1}, "Hz": {"s": -1}, "rpm": {"s": -1},

@@ -66,7 +66,7 @@ BEHAVIOURS = {
     "write_file": "files.written",
     "write_resources": "files.changed",
 }
-QUICK = CheckOptions(limits=Limits(time=3.0, memory=512 << 20))
+QUICK = CheckOptions(limits=Limits(time=4.0, memory=192 << 20))
 
 
 @dataclass(frozen=True)

@@ -56,8 +56,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
     return (fmi2Status)17;
 #endif
 #ifdef FAULT_step_leak
-    hoard = malloc(1 << 16);
-    memset(hoard, 1, 1 << 16);
+    if (self->s.force == 0.0) {
+        hoard = malloc(1 << 17);
+        memset(hoard, 1, 1 << 17);
+    }
 #endif
 #ifdef FAULT_eat_memory
     for (int i = 0; i < 64; i++) {
@@ -110,12 +112,23 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 #endif
     self->s.steps++;
     self->s.moving = fabs(self->s.v) > 1e-3;
+#ifdef FAULT_asynchronous
+    return fmi2Pending;
+#endif
+#ifdef FAULT_ends_early
+    if (self->s.steps > 50) return fmi2Discard;
+#endif
     return fmi2OK;
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(c, "fmi2CancelStep: no step is pending"); }
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
     (void)kind; (void)value;
+#ifdef FAULT_asynchronous
+    static int polls = 0;
+    *value = ++polls % 2 ? fmi2Pending : fmi2OK;
+    return fmi2OK;
+#endif
     return refuse(c, "fmi2GetStatus: no step is pending") == fmi2Error ? fmi2Discard : fmi2Error;
 }
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
@@ -129,6 +142,10 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
 }
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
     (void)c; (void)kind; (void)value;
+#ifdef FAULT_ends_early
+    *value = kind == fmi2Terminated;
+    return fmi2OK;
+#endif
     return fmi2Discard;
 }
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {

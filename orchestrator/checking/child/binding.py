@@ -4,6 +4,7 @@ import ctypes
 import math
 import mmap
 import sys
+import time
 from collections.abc import Sequence
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from typing import Any
@@ -13,7 +14,7 @@ STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi
 _LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
 _TYPES: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
 _MESSAGES = 4
-_TERMINATED = 3
+_DO_STEP_STATUS, _TERMINATED = 0, 3
 
 
 class _Callbacks(ctypes.Structure):
@@ -56,10 +57,16 @@ class CurrentCall:
 
 
 class Library:
-    """The shared library of an FMU."""
+    """The shared library of an FMU.
 
-    def __init__(self, path: str, current: CurrentCall) -> None:
+    Attributes:
+        asynchronous: whether fmi2DoStep may return fmi2Pending.
+        messages: the last few that an instance logged during the present call.
+    """
+
+    def __init__(self, path: str, current: CurrentCall, asynchronous: bool = False) -> None:
         self.current = current
+        self.asynchronous = asynchronous
         current.note("loading the library")
         self.handle = ctypes.CDLL(path)
         current.note("")
@@ -165,7 +172,7 @@ class Slave:
             data = (_TYPES[base] * n)(*values)
             self.call(f"fmi2Set{base}", (c_uint * n)(*references), c_size_t(n), data, when=when)
 
-    def step(self, time: float, size: float, when: str = "") -> None:
+    def step(self, t: float, size: float, when: str = "") -> None:
         """fmi2DoStep, with the earlier states kept.
 
         Raises:
@@ -173,13 +180,24 @@ class Slave:
             TerminatedError: the slave ended the simulation.
         """
         self.library.messages = []
-        status = self.raw("fmi2DoStep", c_double(time), c_double(size), c_int(0))
+        status = self.raw("fmi2DoStep", c_double(t), c_double(size), c_int(0))
         if status == DISCARD:
             ended = c_int()
             if self.raw("fmi2GetBooleanStatus", c_int(_TERMINATED), ctypes.byref(ended)) == OK and ended.value:
                 raise TerminatedError
+        elif status == PENDING and self.library.asynchronous:
+            status = self._wait()
         if status not in (OK, WARNING):
             raise StatusError("fmi2DoStep", status, self._complaint("fmi2DoStep", status, when))
+
+    def _wait(self) -> int:
+        """Ask until the step is done; the parent ends this when it takes too long."""
+        status = c_int(PENDING)
+        while status.value == PENDING:
+            if self.raw("fmi2GetStatus", c_int(_DO_STEP_STATUS), ctypes.byref(status)) not in (OK, PENDING):
+                break
+            time.sleep(0.001)
+        return status.value
 
     def get_state(self) -> c_void_p:
         """A new FMU state."""
