@@ -218,7 +218,10 @@ def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
     assert tables["Parameters"].rows[0][4] == pytest.approx(5.0)
     plots = {p.title: p for p in sections(report, Plot)}
     assert plots["Gap of each model in turn"].categories == ("nominal", "+ coulomb_friction")
-    assert [s.name for s in plots["theta_m"].series] == ["measured", "before", "after"]
+    assert [s.name for s in plots["Motor angle"].series] == ["measured", "before", "after"]
+    before, after = plots["Motor angle: simulated minus measured"].series
+    assert before.y == [0.0, pytest.approx(0.1)]
+    assert after.y == [0.0, pytest.approx(0.001)]
     assert ("corrected model", "Corrected.fmu") in report.origin
 
 

@@ -124,7 +124,7 @@ def _where(places: Sequence[Json]) -> list[Section]:
         (p["signal"], p["regime"], *_interval(p.get("interval")), p.get("unit"), 100.0 * p["share_of_gap"])
         for p in places
     )
-    labels = tuple(f"{p['signal']}, {p['regime']}" for p in places)
+    labels = tuple(f"{p['signal'].removeprefix('torque of the ')}: {p['regime']}" for p in places)
     share: list[float | None] = [100.0 * float(p["share_of_gap"]) for p in places]
     series = Series("share of the gap", list(range(len(places))), share, "bars")
     return [

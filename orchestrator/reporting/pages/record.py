@@ -1,36 +1,49 @@
 """Plots of measured and simulated signals that several pages share."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from orchestrator.reporting.model import Cell, Plot, Section, Series
-from orchestrator.reporting.source import Source, numbers, words
+from orchestrator.reporting.source import Source, numbers
 
-UNITS = {"theta_m": "rad", "theta_l": "rad", "omega_m": "rad/s", "omega_l": "rad/s", "u": "N.m", "T_m": "N.m"}
+SIGNALS = {
+    "theta_m": ("Motor angle", "rad"),
+    "theta_l": ("Load angle", "rad"),
+    "omega_m": ("Motor speed", "rad/s"),
+    "omega_l": ("Load speed", "rad/s"),
+    "u": ("Requested torque", "N.m"),
+    "T_m": ("Motor torque", "N.m"),
+}
+Table = Mapping[str, list[Cell]]
+Numbers = Sequence[float | None]
 
 
 def record_plots(source: Source, name: str) -> list[Section]:
-    """Return one plot against ``time`` for each group of columns that share a first word, ``theta_m_before`` and so on.
+    """Return plots against ``time`` of a file with measured columns (``theta_m``) and simulated ones (``theta_m_after``).
 
-    Returns an empty list where there is no such file, or no column ``time``.
+    For each signal with simulated columns there is a second plot of simulated minus measured. Empty where there is no
+    such file, or no column ``time``.
     """
     table = source.columns(name)
-    if "time" not in table:
-        return []
+    return list(_plots(table)) if "time" in table else []
+
+
+def _plots(table: Table) -> Iterator[Plot]:
     time = numbers(table["time"])
-    return [
-        Plot(words(signal), "time [s]", f"{signal} [{UNITS[signal]}]", _series(signal, time, table))
-        for signal in UNITS
-        if any(_belongs(column, signal) for column in table)
-    ]
+    for signal, (title, unit) in SIGNALS.items():
+        simulated = {_words(c, signal): numbers(v) for c, v in table.items() if c.startswith(f"{signal}_")}
+        measured = numbers(table[signal]) if signal in table else None
+        found = ({"measured": measured} if measured is not None else {}) | simulated
+        if found:
+            curves = tuple(Series(name, time, values) for name, values in found.items())
+            yield Plot(title, "time [s]", f"{signal} [{unit}]", curves)
+        if measured is not None and simulated:
+            gaps = tuple(Series(name, time, _difference(values, measured)) for name, values in simulated.items())
+            yield Plot(f"{title}: simulated minus measured", "time [s]", f"difference [{unit}]", gaps)
 
 
-def _belongs(column: str, signal: str) -> bool:
-    return column == signal or column.startswith(f"{signal}_")
+def _words(column: str, signal: str) -> str:
+    return column.removeprefix(f"{signal}_").replace("_", " ")
 
 
-def _series(signal: str, time: list[float | None], table: Mapping[str, list[Cell]]) -> tuple[Series, ...]:
-    return tuple(
-        Series(column.removeprefix(signal).strip("_").replace("_", " ") or "measured", time, numbers(values))
-        for column, values in table.items()
-        if _belongs(column, signal)
-    )
+def _difference(values: Numbers, measured: Numbers) -> list[float | None]:
+    return [None if a is None or b is None else a - b for a, b in zip(values, measured, strict=True)]
