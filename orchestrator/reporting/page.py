@@ -16,6 +16,7 @@ from orchestrator.reporting.model import (
     Cell,
     Facts,
     Findings,
+    Numbers,
     Plot,
     Report,
     Section,
@@ -95,12 +96,17 @@ def _plot_data(plot: Plot) -> Markup:
 
 
 def _series_data(series: Series) -> dict[str, Any]:
-    data: dict[str, Any] = {"name": series.name, "kind": series.kind, "x": list(series.x), "y": list(series.y)}
+    data: dict[str, Any] = {"name": series.name, "kind": series.kind, "x": _rounded(series.x), "y": _rounded(series.y)}
     if series.low is not None and series.high is not None:
-        data |= {"low": list(series.low), "high": list(series.high)}
+        data |= {"low": _rounded(series.low), "high": _rounded(series.high)}
     if series.labels is not None:
         data["labels"] = list(series.labels)
     return data
+
+
+def _rounded(values: Numbers) -> list[float | None]:
+    """Return numbers to ten significant digits: half the size of the page, and more than any zoom shows."""
+    return [None if value is None else float(f"{value:.10g}") for value in values]
 
 
 def _download(path: Path) -> dict[str, str]:

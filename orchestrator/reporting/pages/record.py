@@ -18,7 +18,7 @@ Numbers = Sequence[float | None]
 
 
 def record_plots(source: Source, name: str) -> list[Section]:
-    """Return plots against ``time`` of a file with measured columns (``theta_m``) and simulated ones (``theta_m_after``).
+    """Return plots against ``time`` of a file with measured columns (``theta_m``) and simulated (``theta_m_after``).
 
     For each signal with simulated columns there is a second plot of simulated minus measured. Empty where there is no
     such file, or no column ``time``.
