@@ -115,8 +115,7 @@ class KalmanEstimator(SampledSlave):
     def _report(self, estimate: Any, innovation_m: float, innovation_l: float, squared: float) -> None:
         real = self.real
         self._estimate = estimate
-        for n in range(6):
-            real[FIRST_ESTIMATE + n] = estimate[n]
+        real[3], real[4], real[5], real[6], real[7], real[8] = estimate  # from FIRST_ESTIMATE on
         real[INNOVATION_M] = innovation_m
         real[INNOVATION_L] = innovation_l
         real[INNOVATION_SQUARED] = squared

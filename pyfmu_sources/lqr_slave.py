@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
 from typing import Any, ClassVar
 
 from .fmu_variables import Variable
@@ -32,6 +33,9 @@ _GAINS = (
 )
 _INPUT_NAMES = tuple(name for name, _, _ in _INPUTS)
 _PARAMETER_NAMES = (*(name for name, _, _ in _GAINS), "i", "compliance", "u_max")
+
+
+_estimate: Any = itemgetter(*range(FIRST_ESTIMATE, FIRST_ESTIMATE + 6))
 
 
 class LqrController(SampledSlave):
@@ -72,5 +76,4 @@ class LqrController(SampledSlave):
     def correct(self) -> None:
         """Compute the torque request of this sample."""
         real = self.real
-        estimate: Any = tuple(real[FIRST_ESTIMATE + n] for n in range(6))
-        real[U] = control(real[REFERENCE], real[REFERENCE_SPEED], estimate, self._gains, *self._rest)
+        real[U] = control(real[REFERENCE], real[REFERENCE_SPEED], _estimate(real), self._gains, *self._rest)
