@@ -24,7 +24,10 @@ OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the e
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
 START_DAMPING = 1e-6
 DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
-TORQUE_NOISE = (1e-9, 30.0)  # range of the white torque noise [N.m.s^0.5]
+# White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record; a least noise of
+# motor and load keeps it honest.
+LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-9, 30.0
+LEAST_WITH_ONE_ENCODER = (1e-4, 1e-3)
 
 
 @dataclass(frozen=True)
@@ -100,8 +103,9 @@ def make_problem(record: Record, model: Model) -> Problem:
         noises.append(
             Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0)
         )
-    low, high = (math.log(bound) for bound in TORQUE_NOISE)
-    noises += [Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, low, high) for side in ("motor", "load")]
+    least = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE) if both else LEAST_WITH_ONE_ENCODER
+    for side, low in zip(("motor", "load"), least, strict=True):
+        noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(LARGEST_TORQUE_NOISE)))
     if not both:
         levels.append(levels[0])
     return Problem(
@@ -179,15 +183,20 @@ class Fit:
 
 
 class Likelihood:
-    """Evaluates a problem at vectors of unknowns; two threads share the runs of one derivative."""
+    """Evaluates a problem at vectors of unknowns; two threads share the runs of one derivative.
+
+    ``soft`` blurs the flanks by the uncertainty of the twist, which smooths the likelihood for the start of a fit.
+    ``information`` is the last Fisher information of each unknown; the difference quotients are scaled by it.
+    """
 
     def __init__(self, problem: Problem, threads: int = 1) -> None:
         self.problem = problem
-        self.soft = False  # whether flanks are blurred, which smooths the likelihood for the start of a fit
+        self.soft = False
         names = problem.names
         self._offset = names.index(OFFSET) if OFFSET in names else None
         self._alpha = names.index("alpha")
-        self._information = np.diag([(10.0 / u.scale) ** 2 for u in problem.unknowns])  # the last one known
+        self.information = np.diag([(10.0 / u.scale) ** 2 for u in problem.unknowns])  # the last one known
+        self._floor = np.array([(0.1 / u.scale) ** 2 for u in problem.unknowns])
         self._places = [(n, NAMES.index(name)) for n, name in enumerate(names) if name in NAMES and name != OFFSET]
         self._state = [problem.index(name) for name in STATE_NAMES]
         self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
@@ -195,6 +204,16 @@ class Likelihood:
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._mean = problem.start
         self._weight = np.array([u.deviation**-2 if math.isfinite(u.deviation) else 0.0 for u in problem.unknowns])
+
+    @property
+    def difference(self) -> float:
+        """Return the step of a difference quotient in standard deviations: long while the flanks are blurred."""
+        return 1.0 if self.soft else DIFFERENCE
+
+    @property
+    def damping(self) -> float:
+        """Return the damping with which a fit starts."""
+        return 1e-3 if self.soft else START_DAMPING
 
     def parameters(self, theta: Array) -> tuple[float, ...]:
         """Return the parameter tuple ``p`` of a vector."""
@@ -241,10 +260,10 @@ class Likelihood:
 
         def run(n: int) -> tuple[Array, Array]:
             moved = point.theta.copy()
-            moved[free] += DIFFERENCE * basis[:, n]
+            moved[free] += self.difference * basis[:, n]
             result = self.run(moved)
-            error = (result.errors - base.errors) / (DIFFERENCE * np.sqrt(base.variances))
-            spread = (result.variances - base.variances) / (DIFFERENCE * base.variances)
+            error = (result.errors - base.errors) / (self.difference * np.sqrt(base.variances))
+            spread = (result.variances - base.variances) / (self.difference * base.variances)
             return error.ravel(), spread.ravel()
 
         columns = list(self._pool.map(run, range(free.size)) if self._pool else map(run, range(free.size)))
@@ -257,12 +276,13 @@ class Likelihood:
         weight = self._weight[free]
         gradient += weight * (point.theta - self._mean)[free]
         information = 0.5 * (information + information.T) + np.diag(weight)
-        self._information[np.ix_(free, free)] = information
+        self.information[np.ix_(free, free)] = information
         return gradient, information
 
     def _basis(self, free: NDArray[np.int64]) -> Array:
         """Return a factor (k, k) of the covariance of the free unknowns; alpha never moves down along a column."""
-        information = self._information[np.ix_(free, free)]
+        # What is hardly known must not be moved far: a tenth of its scale bounds the step.
+        information = self.information[np.ix_(free, free)] + np.diag(self._floor[free])
         diagonal = np.sqrt(np.diag(information))
         values, vectors = np.linalg.eigh(information / np.outer(diagonal, diagonal))
         values = np.maximum(values, 1e-13 * values[-1])
@@ -289,7 +309,7 @@ def maximise(
     lower = np.array([unknowns[n].lower for n in places])
     upper = np.array([unknowns[n].upper for n in places])
     point = likelihood.at(start)
-    damping, converged, done = START_DAMPING, False, 0
+    damping, converged, done = likelihood.damping, False, 0
     information = np.eye(places.size)
     for _ in range(iterations):
         done += 1
@@ -301,7 +321,7 @@ def maximise(
         if before - point.objective < tolerance:
             # The first differences may have been taken too coarsely: look again with better ones.
             if before == point.objective and done == 1:
-                damping = START_DAMPING
+                damping = likelihood.damping
                 continue
             converged = True
             break

@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.cramer_rao import bound_of_fit
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import Fit, Likelihood, Point, make_problem, maximise
+from orchestrator.estimation.likelihood import LEAST_WITH_ONE_ENCODER, Fit, Likelihood, Point, make_problem, maximise
 from orchestrator.estimation.protocol import LEVEL, Estimate
 from orchestrator.model_file import Model
 from orchestrator.record import Record
@@ -26,16 +26,14 @@ from orchestrator.record import Record
 GRID = (0.0, *(3e-4 * 1.28**n for n in range(31)))  # to half a radian
 # Torque noise [N.m.s^0.5] of motor and load, from the start of the continuation on.
 BOTH_ENCODERS = tuple((w, w) for w in (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-9))
-BLURRED = ((0.1, 1.0), (0.06, 0.5), (0.03, 0.2), (0.02, 0.1), (0.01, 0.05))
+BLURRED = ((0.1, 1.0), (0.08, 0.7), (0.06, 0.5), (0.045, 0.3), (0.03, 0.2), (0.02, 0.1), (0.01, 0.05))
 MOTOR_ENCODER = (
     (0.03, 0.2),
     (0.01, 0.03),
     (3e-3, 1e-2),
     (1e-3, 3e-3),
-    (1e-4, 3e-4),
-    (1e-5, 3e-5),
-    (1e-6, 3e-6),
-    (1e-9, 1e-9),
+    (3e-4, 2e-3),
+    LEAST_WITH_ONE_ENCODER,
 )
 # A lower torque noise is preferred unless the objective rises by this much above the least: the 5 % limit of the
 # likelihood ratio for a noise level at its bound, zero.
@@ -83,11 +81,13 @@ def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, f
     for level in levels:
         start = best.point.theta.copy()
         start[torque] = np.log(level)
+        known = likelihood.information.copy()
         trial = maximise(likelihood, start, others, STEPS_PER_LEVEL, tolerance=1.0)
         least = min(least, trial.point.objective)
         if trial.point.objective < least + ALLOWED_RISE:
             best, failures = trial, 0
             continue
+        likelihood.information = known
         failures += 1
         if failures == 2:
             break
@@ -113,11 +113,15 @@ def _first_fit(likelihood: Likelihood, torque: list[int], others: list[int], lev
 
 def _free_fit(likelihood: Likelihood, best: Fit, torque: list[int], others: list[int]) -> Fit:
     """Return the fit with the torque noise free, except where the record cannot tell it from none."""
-    everything = sorted(others + torque)
     _, information = likelihood.derivatives(best.point, np.array(torque))
-    told = [n for n, value in zip(torque, np.diag(information), strict=True) if value > FLAT_INFORMATION]
-    free = [n for n in everything if n in others or n in told]
-    return maximise(likelihood, best.point.theta, free, 40, tolerance=2e-3)
+    free = [n for n, value in zip(torque, np.diag(information), strict=True) if value > FLAT_INFORMATION]
+    while True:
+        best = maximise(likelihood, best.point.theta, sorted(others + free), 40, tolerance=2e-3)
+        column = {int(n): k for k, n in enumerate(best.free)}
+        told = [n for n in free if best.information[column[n], column[n]] > FLAT_INFORMATION]
+        if told == free:
+            return best
+        free = told
 
 
 @dataclass(frozen=True)

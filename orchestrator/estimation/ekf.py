@@ -1,0 +1,92 @@
+"""The online estimator run over a whole record: the same source as the FMU ``BacklashEstimator``, compiled."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+
+import numba
+import numpy as np
+
+from orchestrator.compiled import compiled
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.likelihood import measurement_noise
+from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
+from orchestrator.model_file import Model
+from orchestrator.record import Record
+from pyfmu_sources.backlash_estimator import FILTERS, SIZE, Settings
+
+UNMEASURED = 1e6  # rad, standard deviation that stands for an encoder that is absent
+NORMAL_QUANTILE = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class OnlineTrace:
+    """The online estimate over time: half-gap and its standard deviation [rad], flank, all (n,)."""
+
+    alpha: Array
+    deviation: Array
+    contact: Array
+
+
+@cache
+def _runner() -> Callable[..., None]:
+    """Return the compiled loop over a record."""
+    source = compiled("backlash_estimator")
+    begin, advance, measure = source.begin, source.advance, source.measure
+    look, touching = source.combine, source.contact
+
+    @numba.njit
+    def loop(u, theta_m, theta_l, model, settings, step, filters, alpha, deviation, contact):  # type: ignore[no-untyped-def]
+        begin(filters, theta_m[0], theta_l[0], settings)
+        for n in range(u.size):
+            if n > 0:
+                advance(filters, model, settings, u[n - 1], step)
+                measure(filters, settings, theta_m[n], theta_l[n])
+            alpha[n], deviation[n], best = look(filters, filters.shape[0])
+            contact[n] = touching(filters[best], model[6])
+
+    return loop
+
+
+def trace(record: Record, model: Model, settings: Settings | None = None) -> OnlineTrace:
+    """Return the online estimate over a record; ``settings`` default to what the record and the model say."""
+    loop = _runner()
+    p = {name: entry.value for name, entry in model.parameters.items()}
+    plant = (p["J_m"], p["J_l"], p["k"], p["c"], p["b_m"], p["b_l"], p["i"], p["tau"])
+    load = record.theta_m / p["i"] if record.theta_l is None else record.theta_l
+    chosen = settings or default_settings(record, model)
+    n = record.size
+    alpha, deviation, contact = np.empty(n), np.empty(n), np.empty(n)
+    loop(
+        record.u, record.theta_m, load, plant, tuple(chosen), record.step, np.zeros((FILTERS, SIZE)), alpha, deviation,
+        contact,
+    )  # fmt: skip
+    return OnlineTrace(alpha, deviation, contact)
+
+
+def default_settings(record: Record, model: Model) -> Settings:
+    """Return the settings for a record: encoder noise as measured, stiffness as uncertain as the model says."""
+    noise_m = measurement_noise(record, model, "theta_m")
+    noise_l = UNMEASURED if record.theta_l is None else measurement_noise(record, model, "theta_l")
+    stiffness = model.parameters["k"]
+    spread = stiffness.standard_deviation / stiffness.value
+    return Settings(noise_m=noise_m, noise_l=noise_l, stiffness_spread=max(spread, 1e-6))
+
+
+def estimate(record: Record, model: Model) -> Estimate:
+    """Return the online estimate at the end of the record."""
+    if model.fmu != "Drivetrain":
+        raise NotApplicableError("the online estimator needs the model `Drivetrain`")
+    run = trace(record, model)
+    alpha, error = float(run.alpha[-1]), float(run.deviation[-1])
+    if not math.isfinite(alpha):
+        raise NotApplicableError("the online estimator diverged on this record")
+    half = NORMAL_QUANTILE * error
+    flanks = run.contact[run.contact != 0.0]
+    traversals = int(np.count_nonzero(np.diff(flanks)))
+    settled = error < 0.2 * alpha
+    message = "" if settled else "the online estimate has not settled: its standard deviation is above a fifth of it"
+    diagnostics = {"traversals": traversals, "level": LEVEL, "settings": default_settings(record, model)._asdict()}
+    curves = {"alpha": run.alpha, "deviation": run.deviation}
+    return Estimate("ekf", alpha, error, (max(alpha - half, 0.0), alpha + half), settled, message, diagnostics, curves)

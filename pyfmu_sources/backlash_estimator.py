@@ -1,0 +1,287 @@
+"""Online estimate of state, contact and half-gap: a Gaussian sum of extended Kalman filters.
+
+One filter cannot start from "anything between 2 mrad and 0.2 rad": whether the teeth touch decides everything. So
+several filters start from sizes a factor of two apart, each with the half-gap among its states (Lagerberg and
+Egardt, IEEE Trans. Control Systems Technology 15, 2007), and their likelihoods weigh them (Alspach and Sorenson,
+IEEE Trans. Automatic Control 17, 1972). The dead zone is averaged over what each filter does not know (statistical
+linearisation, Booton 1954), which keeps the estimate smooth while the gap is still uncertain.
+
+A filter is a flat sequence ``f`` of ``SIZE`` floats, changed in place: nine states, their covariance row by row, and
+the logarithm of the filter's weight. The states are
+``(theta_m, omega_m, theta_l, omega_l, T_m, T_l, alpha, kappa, offset)``: ``kappa`` the relative error of the
+stiffness, ``offset`` the twist [rad] in mid-gap. ``m`` is the tuple ``(J_m, J_l, k, c, b_m, b_l, i, tau)``.
+"""
+
+from math import erfc, exp, log, sqrt
+from typing import NamedTuple
+
+Model = tuple[float, float, float, float, float, float, float, float]
+
+STATES = 9
+SIZE = STATES + STATES * STATES + 1
+WEIGHT = SIZE - 1
+ALPHA = 6
+FILTERS = 7
+SMALLEST = 0.0025  # half-gap of the first filter [rad]; each next one is twice as large
+RELATIVE_SPREAD = 0.4  # standard deviation of each filter's half-gap over its size
+FORGOTTEN = -30.0  # log weight below which a filter is no longer run
+ROOT_HALF = 0.7071067811865476
+ROOT_INVERSE_2PI = 0.3989422804014327
+LEAST_BLUR = 1e-8  # least variance [rad2] of the distance to a flank
+LONGEST_PART = 0.06  # of the shaft's oscillation, in radians of its phase
+
+
+class Settings(NamedTuple):
+    """What the estimator is told about noise; each is a standard deviation."""
+
+    noise_m: float = 3.5e-4  # of the motor's angle, rounding included [rad]
+    noise_l: float = 1.75e-4  # of the load's angle [rad]
+    torque_noise_m: float = 0.08  # white torque at the motor, for what the model lacks [N.m.s^0.5]
+    torque_noise_l: float = 0.25  # the same at the load [N.m.s^0.5]
+    load_walk: float = 0.5  # random walk of the load torque [N.m/s^0.5]
+    alpha_walk: float = 0.0  # random walk of the half-gap, for wear [rad/s^0.5]
+    stiffness_spread: float = 0.03  # relative error of the stiffness
+    offset_spread: float = 0.01  # twist in mid-gap [rad]
+
+
+def covariance(r: int, c: int) -> int:
+    """Return where the covariance of states ``r`` and ``c`` stands in a filter."""
+    return STATES + STATES * r + c
+
+
+def start(f, number, theta_m, theta_l, noise_m, noise_l, stiffness_spread, offset_spread):  # type: ignore[no-untyped-def]
+    """Set filter ``number`` (0 to ``FILTERS`` - 1) at the first measured angles [rad].
+
+    Args:
+        f: the filter, changed in place.
+        number: which size it starts from.
+        theta_m: measured motor angle.
+        theta_l: measured load angle; for a machine without load encoder, motor angle over gear ratio.
+        noise_m: standard deviation of the motor's angle [rad].
+        noise_l: the same of the load's; large when it is not measured.
+        stiffness_spread: standard deviation of the stiffness's relative error.
+        offset_spread: standard deviation of the twist in mid-gap [rad].
+    """
+    for n in range(SIZE):
+        f[n] = 0.0
+    size = SMALLEST * 2.0**number
+    f[0] = theta_m
+    f[2] = theta_l
+    f[ALPHA] = size
+    spreads = (noise_m, 1.0, noise_l, 0.3, 5.0, 1.0, RELATIVE_SPREAD * size, stiffness_spread, offset_spread)
+    for n in range(STATES):
+        f[covariance(n, n)] = spreads[n] * spreads[n]
+
+
+def distance_variance(f, side):  # type: ignore[no-untyped-def]
+    """Return the part of the variance [rad2] of the distance to a flank that does not concern the motor's angle."""
+    return (
+        f[covariance(2, 2)]
+        + f[covariance(8, 8)]
+        + f[covariance(6, 6)]
+        + 2.0 * (f[covariance(2, 8)] + side * f[covariance(2, 6)] + side * f[covariance(6, 8)])
+    )
+
+
+def flank(distance, variance):  # type: ignore[no-untyped-def]
+    """Return (probability that a flank is loaded, mean penetration [rad]) for a Gaussian distance beyond it."""
+    sigma = sqrt(variance)
+    z = distance / sigma
+    share = 0.5 * erfc(-z * ROOT_HALF)
+    bell = ROOT_INVERSE_2PI * exp(-0.5 * z * z) if abs(z) < 37.0 else 0.0
+    return share, distance * share + sigma * bell
+
+
+def predict(f, m, u, h, torque_noise_m, torque_noise_l, load_walk, alpha_walk):  # type: ignore[no-untyped-def]
+    """Advance a filter by ``h`` [s] with the torque request ``u`` [N.m] held.
+
+    Args:
+        f: the filter, changed in place.
+        m: model.
+        u: requested torque [N.m].
+        h: step [s], short beside the shaft's oscillation.
+        torque_noise_m: white torque noise at the motor [N.m.s^0.5], for what the model lacks.
+        torque_noise_l: the same at the load.
+        load_walk: random walk of the load torque [N.m/s^0.5].
+        alpha_walk: random walk of the half-gap [rad/s^0.5]: wear.
+    """
+    J_m, J_l, k, c, b_m, b_l, i, tau = m
+    mean = 1.0 / i
+    cross = -2.0 * mean * f[covariance(0, 2)] + mean * mean * f[covariance(0, 0)]
+    upper_variance = distance_variance(f, 1.0) + cross - 2.0 * mean * (f[covariance(0, 8)] + f[covariance(0, 6)])
+    lower_variance = distance_variance(f, -1.0) + cross - 2.0 * mean * (f[covariance(0, 8)] - f[covariance(0, 6)])
+    rate = f[1] * mean - f[3]
+    wound = (f[0] + 0.5 * h * f[1]) * mean - f[2] - 0.5 * h * f[3] - f[8]
+    upper, above = flank(wound - f[6], max(upper_variance, LEAST_BLUR))
+    lower, below = flank(-wound - f[6], max(lower_variance, LEAST_BLUR))
+    share = upper + lower
+    elastic = k * (above - below)
+    stiff = k * (1.0 + f[7]) * share
+    damping = c * share
+    shaft = (1.0 + f[7]) * elastic + damping * rate
+    a_m = (f[4] - b_m * f[1] - shaft * mean) / J_m
+    a_l = (shaft - b_l * f[3] - f[5]) / J_l
+    squeeze = k * (1.0 + f[7]) * (lower - upper)  # of the shaft torque by alpha
+    # Rows of h A for the two speeds; the other rows have one or two entries.
+    s_m = -h * mean / J_m
+    s_l = h / J_l
+    row_m = (
+        s_m * stiff * mean,
+        s_m * damping * mean - h * b_m / J_m,
+        -s_m * stiff,
+        -s_m * damping,
+        h / J_m,
+        0.0,
+        s_m * squeeze,
+        s_m * elastic,
+        -s_m * stiff,
+    )
+    row_l = (
+        s_l * stiff * mean,
+        s_l * damping * mean,
+        -s_l * stiff,
+        -s_l * damping - h * b_l / J_l,
+        0.0,
+        -h / J_l,
+        s_l * squeeze,
+        s_l * elastic,
+        -s_l * stiff,
+    )
+    keep = exp(-h / tau)
+    f[0] += h * f[1] + 0.5 * h * h * a_m
+    f[2] += h * f[3] + 0.5 * h * h * a_l
+    f[1] += h * a_m
+    f[3] += h * a_l
+    f[4] = keep * f[4] + (1.0 - keep) * u
+    _spread(f, row_m, row_l, h, keep)
+    f[covariance(1, 1)] += h * (torque_noise_m / J_m) ** 2
+    f[covariance(3, 3)] += h * (torque_noise_l / J_l) ** 2
+    f[covariance(5, 5)] += h * load_walk * load_walk
+    f[covariance(6, 6)] += h * alpha_walk * alpha_walk
+
+
+def _spread(f, row_m, row_l, h, keep):  # type: ignore[no-untyped-def]
+    """Replace the covariance P by F P F^T for the sparse transition F of :func:`predict`.
+
+    Angles move with the new speeds (semi-implicit Euler), which keeps the undamped oscillation's covariance bounded.
+    """
+    for c in range(STATES):
+        add_m = 0.0
+        add_l = 0.0
+        for n in range(STATES):
+            value = f[STATES + STATES * n + c]
+            add_m += row_m[n] * value
+            add_l += row_l[n] * value
+        f[STATES + STATES + c] += add_m
+        f[STATES + STATES * 3 + c] += add_l
+        f[STATES + c] += h * f[STATES + STATES + c]
+        f[STATES + STATES * 2 + c] += h * f[STATES + STATES * 3 + c]
+        f[STATES + STATES * 4 + c] *= keep
+    for r in range(STATES):
+        base = STATES + STATES * r
+        add_m = 0.0
+        add_l = 0.0
+        for n in range(STATES):
+            value = f[base + n]
+            add_m += row_m[n] * value
+            add_l += row_l[n] * value
+        f[base + 1] += add_m
+        f[base + 3] += add_l
+        f[base] += h * f[base + 1]
+        f[base + 2] += h * f[base + 3]
+        f[base + 4] *= keep
+
+
+def correct(f, state, measured, variance):  # type: ignore[no-untyped-def]
+    """Take in one measured angle.
+
+    Args:
+        f: the filter, changed in place; its log weight gains the log likelihood of the measurement.
+        state: 0 for the motor's angle, 2 for the load's.
+        measured: [rad].
+        variance: of the measurement [rad2].
+
+    Returns:
+        innovation [rad] and its variance [rad2].
+    """
+    base = STATES + STATES * state
+    spread = f[base + state] + variance
+    error = measured - f[state]
+    scale = error / spread
+    a, b, c, d, e = f[base], f[base + 1], f[base + 2], f[base + 3], f[base + 4]
+    column = (a, b, c, d, e, f[base + 5], f[base + 6], f[base + 7], f[base + 8])
+    for r in range(STATES):
+        f[r] += column[r] * scale
+        gain = column[r] / spread
+        row = STATES + STATES * r
+        for n in range(STATES):
+            f[row + n] -= gain * column[n]
+    f[ALPHA] = max(f[ALPHA], 0.0)
+    f[WEIGHT] -= 0.5 * (log(spread) + error * scale)
+    return error, spread
+
+
+def combine(filters, count):  # type: ignore[no-untyped-def]
+    """Return (alpha [rad], its standard deviation [rad], number of the heaviest filter) of the Gaussian sum.
+
+    Log weights are shifted so that the largest is zero, and kept from falling out of range.
+    """
+    largest = filters[0][WEIGHT]
+    best = 0
+    for n in range(1, count):
+        if filters[n][WEIGHT] > largest:
+            largest = filters[n][WEIGHT]
+            best = n
+    total = 0.0
+    mean = 0.0
+    square = 0.0
+    for n in range(count):
+        f = filters[n]
+        f[WEIGHT] = max(f[WEIGHT] - largest, 2.0 * FORGOTTEN)
+        if f[WEIGHT] > FORGOTTEN:
+            weight = exp(f[WEIGHT])
+            total += weight
+            mean += weight * f[ALPHA]
+            square += weight * (f[ALPHA] * f[ALPHA] + max(f[covariance(ALPHA, ALPHA)], 0.0))
+    mean /= total
+    return mean, sqrt(max(square / total - mean * mean, 0.0)), best
+
+
+def contact(f, i):  # type: ignore[no-untyped-def]
+    """Return the flank (-1, 0, 1) at which a filter puts the gear, for the gear ratio ``i``."""
+    wound = f[0] / i - f[2] - f[8]
+    if wound > f[ALPHA]:
+        return 1
+    return -1 if wound < -f[ALPHA] else 0
+
+
+def begin(filters, theta_m, theta_l, s):  # type: ignore[no-untyped-def]
+    """Set all filters at the first measured angles [rad] with the settings ``s``."""
+    for n in range(FILTERS):
+        start(filters[n], n, theta_m, theta_l, s[0], s[1], s[6], s[7])
+
+
+def advance(filters, m, s, u, h):  # type: ignore[no-untyped-def]
+    """Predict with all filters over a sample of ``h`` [s].
+
+    Args:
+        filters: ``FILTERS`` filters, changed in place.
+        m: model.
+        s: settings, in the order of :class:`Settings`.
+        u: torque request held over the sample [N.m].
+        h: sample time [s].
+    """
+    fastest = sqrt(m[2] * (1.0 / m[1] + 1.0 / (m[0] * m[6] * m[6])))
+    parts = 1 + int(h * fastest / LONGEST_PART)
+    for n in range(FILTERS):
+        if filters[n][WEIGHT] > FORGOTTEN:
+            for _ in range(parts):
+                predict(filters[n], m, u, h / parts, s[2], s[3], s[4], s[5])
+
+
+def measure(filters, s, theta_m, theta_l):  # type: ignore[no-untyped-def]
+    """Take both measured angles [rad] into all filters."""
+    for n in range(FILTERS):
+        if filters[n][WEIGHT] > FORGOTTEN:
+            correct(filters[n], 0, theta_m, s[0] * s[0])
+            correct(filters[n], 2, theta_l, s[1] * s[1])

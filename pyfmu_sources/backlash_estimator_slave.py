@@ -1,0 +1,121 @@
+"""The FMU ``BacklashEstimator``: adapter from FMI to :mod:`backlash_estimator`."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from . import backlash_estimator as source
+from .fmu_variables import Variable
+from .sampled_slave import SampledSlave
+
+U, THETA_M, THETA_L, ALPHA_HAT, ALPHA_DEVIATION, CONTACT_HAT, FIRST_ESTIMATE = range(7)
+FIRST_MODEL = FIRST_ESTIMATE + 6
+FIRST_SETTING = FIRST_MODEL + 8
+SAMPLE_TIME = FIRST_SETTING + 8
+
+_MEASURED = ("theta_m", "theta_l")
+_STATES = (
+    ("theta_m_hat", "rad", "motor angle"),
+    ("omega_m_hat", "rad/s", "motor speed"),
+    ("theta_l_hat", "rad", "load angle"),
+    ("omega_l_hat", "rad/s", "load speed"),
+    ("T_m_hat", "N.m", "motor torque"),
+    ("T_l_hat", "N.m", "load torque"),
+)
+_MODEL = (
+    ("J_m", "kg.m2", 0.4, "Motor inertia"),
+    ("J_l", "kg.m2", 5.6, "Load inertia"),
+    ("k", "N.m/rad", 3300.0, "Shaft stiffness, load side"),
+    ("c", "N.m.s/rad", 1.0, "Shaft damping, load side"),
+    ("b_m", "N.m.s/rad", 0.1, "Viscous friction of the motor"),
+    ("b_l", "N.m.s/rad", 1.0, "Viscous friction of the load"),
+    ("i", "1", 3.984, "Gear ratio: motor angle over load angle"),
+    ("tau", "s", 1.0, "Time constant of the motor's torque"),
+)
+_DEFAULT = source.Settings()
+_SETTINGS = (
+    ("noise_m", "rad", "Standard deviation of the measured motor angle, rounding included", 1e-9),
+    ("noise_l", "rad", "Standard deviation of the measured load angle; 1e6: no load encoder", 1e-9),
+    ("torque_noise_m", "N.m", "Standard deviation over one second of white torque at the motor", 0.0),
+    ("torque_noise_l", "N.m", "Standard deviation over one second of white torque at the load", 0.0),
+    ("load_walk", "N.m", "Standard deviation of the load torque's change in one second", 0.0),
+    ("alpha_walk", "rad", "Standard deviation of the half-gap's change in one second (wear)", 0.0),
+    ("stiffness_spread", "1", "Relative standard deviation of the stiffness", 0.0),
+    ("offset_spread", "rad", "Standard deviation of the twist in mid-gap", 0.0),
+)
+_ZERO_ALLOWED = ("c", "b_m", "b_l")
+
+
+class BacklashEstimator(SampledSlave):
+    """Sampled-data estimator of the half-gap, with its uncertainty, in a running loop."""
+
+    title = "Online estimator of the half-gap, its standard deviation, the flank and the state"
+    sample_time_reference = SAMPLE_TIME
+    table: ClassVar[tuple[Variable, ...]] = (
+        Variable("u", "input", "N.m", 0.0, "Requested motor torque, held since the last sample", nominal=100.0),
+        Variable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
+        Variable("theta_l", "input", "rad", 0.0, "Measured load angle"),
+        *(
+            Variable(name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED)
+            for name, unit, text in (
+                ("alpha_hat", "rad", "Estimated half-gap"),
+                ("alpha_deviation", "rad", "Standard deviation of the estimated half-gap"),
+                ("contact_hat", "1", "Estimated flank: -1, 0 or 1"),
+                *((name, unit, f"Estimated {text}") for name, unit, text in _STATES),
+            )
+        ),
+        *(
+            Variable(name, "parameter", unit, start, text, 0.0 if name in _ZERO_ALLOWED else 1e-9, 1e12)
+            for name, unit, start, text in _MODEL
+        ),
+        *(
+            Variable(name, "parameter", unit, getattr(_DEFAULT, name), text, least, 1e6)
+            for name, unit, text, least in _SETTINGS
+        ),
+        Variable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1.0),
+    )
+
+    def take_parameters(self) -> None:
+        """Collect model, settings and sample time."""
+        real = self.real
+        self._model: Any = tuple(real[FIRST_MODEL + n] for n in range(8))
+        self._settings: Any = tuple(real[FIRST_SETTING + n] for n in range(8))
+
+    def begin(self) -> None:
+        """Start all filters at the first measurement."""
+        self._predicted: Any = [[0.0] * source.SIZE for _ in range(source.FILTERS)]
+        source.begin(self._predicted, self.real[THETA_M], self.real[THETA_L], self._settings)
+        self._filters: Any = [list(f) for f in self._predicted]
+        self._report()
+
+    def predict(self) -> None:
+        """Predict with the torque request that was held over the sample period."""
+        self._predicted = [list(f) for f in self._filters]
+        source.advance(self._predicted, self._model, self._settings, self.real[U], self.real[SAMPLE_TIME])
+
+    def correct(self) -> None:
+        """Correct the prediction with the measurement."""
+        self._filters = [list(f) for f in self._predicted]
+        source.measure(self._filters, self._settings, self.real[THETA_M], self.real[THETA_L])
+        self._report()
+
+    def _report(self) -> None:
+        real = self.real
+        alpha, deviation, best = source.combine(self._filters, source.FILTERS)
+        state = self._filters[best]
+        real[ALPHA_HAT] = alpha
+        real[ALPHA_DEVIATION] = deviation
+        real[CONTACT_HAT] = float(source.contact(state, self._model[6]))
+        for n in range(6):
+            real[FIRST_ESTIMATE + n] = state[n]
+
+    def saved(self) -> Any:
+        """Return the clock, the filters and the prediction that the present sample corrects."""
+        return [super().saved(), self._filters, self._predicted]
+
+    def restore(self, saved: Any) -> None:
+        """Take over a saved state."""
+        clock, filters, predicted = saved
+        super().restore(clock)
+        self._filters = [list(f) for f in filters]
+        self._predicted = [list(f) for f in predicted]
