@@ -47,6 +47,21 @@ class Constant:
 
 
 @dataclass(frozen=True, slots=True)
+class Scaled:
+    """``factor * signal + offset``."""
+
+    signal: Signal
+    factor: float
+    offset: float
+
+    def sample(self, times: Array) -> Array:
+        return self.factor * self.signal.sample(times) + self.offset
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        return self.signal.breaks(start, stop)
+
+
+@dataclass(frozen=True, slots=True)
 class Step:
     """``before`` until ``time`` [s], ``after`` from then on."""
 
