@@ -28,8 +28,8 @@ def _pair(results: Mapping[str, Any], table: Columns) -> tuple[list[Section], st
     ]
     if estimate:
         summary = (
-            f"The half-gap of {alpha:g} rad is estimated as {estimate['alpha']:.6g} rad "
-            f"(interval {estimate['lower']:.6g} to {estimate['upper']:.6g} rad)."
+            f"The half-gap of {alpha:g} rad is estimated as {estimate['alpha']:.8g} rad "
+            f"(interval {estimate['lower']:.8g} to {estimate['upper']:.8g} rad)."
         )
         facts += [(f"estimate: {name} [rad]", estimate[name]) for name in ("alpha", "lower", "upper")]
     else:
