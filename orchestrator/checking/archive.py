@@ -14,6 +14,8 @@ from orchestrator.checking.findings import Finding, has_errors
 MEBIBYTE = 1 << 20
 _RESERVED = re.compile(r"^(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?$", re.IGNORECASE)
 _CHUNK = 1 << 18
+_LONGEST_NAME = 255
+_LONGEST_PATH = 1000
 
 
 @dataclass(frozen=True)
@@ -162,6 +164,11 @@ def _name_findings(name: str) -> Iterator[Finding]:
         yield Finding(
             "archive.odd-name", name.encode("unicode_escape").decode(), "a file name must not have control characters"
         )
+    elif len(name) > _LONGEST_PATH or any(len(p.encode("utf-8", "replace")) > _LONGEST_NAME for p in parts):
+        message = (
+            f"a path must have at most {_LONGEST_PATH} characters, a name {_LONGEST_NAME} bytes, but this has more"
+        )
+        yield Finding("archive.long-name", f"{name[:80]}…", message)
     elif any(_RESERVED.match(p) or p.endswith((".", " ")) or set(p) & set('<>:"|?*') for p in parts):
         yield Finding("archive.odd-name", name, "a file name must be possible on Windows too, but this one is not")
 

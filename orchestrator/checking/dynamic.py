@@ -4,7 +4,6 @@ import json
 import math
 import os
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from orchestrator.checking.binaries import here, library_name
 from orchestrator.checking.description import Description, Interface, Variable, number
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.layered import ReferenceResult
+from orchestrator.checking.rules import RULES
 from orchestrator.checking.sandbox import Ending, Limits, run_child
 
 PROBES = (
@@ -20,6 +20,7 @@ PROBES = (
     "misuse",
 )  # fmt: skip
 _STEPS = 200
+_MOST_FINDINGS = 10_000
 _FLAGS = (
     "canGetAndSetFMUstate",
     "canSerializeFMUstate",
@@ -48,7 +49,10 @@ def check_dynamic(d: Description, files: FmuFiles, references: list[ReferenceRes
     assert interface is not None
     with tempfile.TemporaryDirectory(prefix="fmu-check-", ignore_cleanup_errors=True) as name:
         base = Path(name)
-        files.extract(base / "fmu")
+        try:
+            files.extract(base / "fmu")
+        except OSError as error:
+            return [Finding("run.failed", "", f"the FMU must be unpacked to be run, but cannot be: {error.strerror}")]
         findings: list[Finding] = []
         for position, reference in enumerate(references or [None]):
             probes = PROBES if position == 0 else ("reference",)
@@ -81,7 +85,8 @@ class _Watcher:
         file.write_text(json.dumps(job), encoding="utf-8")
         before = _snapshot(self.fmu)
         ending = run_child("orchestrator.checking.child.main", [str(file)], self.work, self.limits, self._line)
-        function = call.read_bytes().rstrip(b"\0").decode("utf-8", "replace")
+        # The FMU may have deleted what it was given.
+        function = call.read_bytes().rstrip(b"\0").decode("utf-8", "replace") if call.exists() else ""
         if not self.done:
             self._ended_early(ending, function, log)
         self._skipped(probes)
@@ -89,15 +94,18 @@ class _Watcher:
         return self.findings
 
     def _line(self, line: bytes) -> None:
+        """Take in a message. The FMU might write to the same pipe, so nothing is taken for granted."""
         try:
-            message: Mapping[str, Any] = json.loads(line)
+            message = json.loads(line)
         except ValueError:
             return
-        self.probe = message.get("probe", self.probe)
-        self.stopped = message.get("stopped", self.stopped)
+        if not isinstance(message, dict):
+            return
+        self.probe = str(message.get("probe", self.probe))
+        self.stopped = str(message.get("stopped", self.stopped))
         self.done = self.done or bool(message.get("done"))
-        if "rule" in message:
-            self._add(message["rule"], message["message"], message.get("path", ""))
+        if message.get("rule") in RULES and len(self.findings) < _MOST_FINDINGS:
+            self._add(str(message["rule"]), str(message.get("message")), str(message.get("path", "")))
 
     def _add(self, rule: str, message: str, path: str = "") -> None:
         self.findings.append(Finding(rule, path or f"({self.probe})", message))

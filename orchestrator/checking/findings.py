@@ -1,11 +1,13 @@
 """What the checks report: one flat list of findings per FMU."""
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from orchestrator.checking.rules import RULES
 
 SEVERITIES = ("error", "warning", "info")
+MOST_PER_RULE = 100
 
 
 @dataclass(frozen=True)
@@ -85,8 +87,17 @@ class Report:
 
 
 def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Errors first, each kept in the order found, repeats removed."""
-    return tuple(sorted(dict.fromkeys(findings), key=lambda f: SEVERITIES.index(f.severity)))
+    """Errors first, each kept in the order found, repeats removed, at most ``MOST_PER_RULE`` of one rule."""
+    seen: Counter[str] = Counter()
+    kept = []
+    for finding in dict.fromkeys(findings):
+        seen[finding.rule] += 1
+        if seen[finding.rule] <= MOST_PER_RULE:
+            kept.append(finding)
+    for rule, count in seen.items():
+        if count > MOST_PER_RULE:
+            kept.append(Finding(rule, "", f"and {count - MOST_PER_RULE} more findings of this rule"))
+    return tuple(sorted(kept, key=lambda f: SEVERITIES.index(f.severity)))
 
 
 def has_errors(findings: Iterable[Finding]) -> bool:

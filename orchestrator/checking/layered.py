@@ -94,7 +94,7 @@ def _references(
         elif role == "result" and related.get("type") == "text/csv":
             try:
                 results.append(_read_csv(path, files.read(path, _MAXIMUM_CSV), {v.name for v in d.variables}))
-            except ValueError as error:
+            except (ValueError, csv.Error) as error:
                 findings.append(Finding("layered.result", path, str(error)))
     return results, findings
 

@@ -31,6 +31,7 @@ archive.traversal | E | no path leaves the FMU | do not unpack this archive; wri
 archive.absolute | E | all paths are relative | do not unpack this archive; write it with plain relative paths
 archive.backslash | E | folders are separated by `/` | write the archive with forward slashes
 archive.odd-name | W | file names work on every platform | rename the file
+archive.long-name | E | names are short enough to be unpacked | shorten the names
 archive.symlink | E | there are only files and folders | store the file that the link means
 archive.duplicate | E | every path occurs once | write the archive anew; tools differ in which copy they take
 archive.case-clash | W | paths differ by more than upper and lower case | rename one; Windows and macOS keep only one of them

@@ -151,7 +151,7 @@ def _structure(d: Description) -> Iterator[Finding]:
         if variable is not None and "derivative" not in variable.own:
             derived = False
             message = f"an entry of Derivatives must have the attribute derivative, but `{variable.name}` has not"
-            yield Finding("structure.derivatives", xpath(u.element, "index"), message)
+            yield Finding("structure.derivatives", u.path("index"), message)
     if derived:
         expected = _initial_unknowns(d)
         yield from _set(
@@ -196,14 +196,12 @@ def _unknowns(d: Description, section: tuple[Unknown, ...]) -> Iterator[Finding]
             continue
         if d.variable(u.index) is None:
             message = f"an index must be from 1 to {len(d.variables)}, but is {u.index}"
-            yield Finding("structure.index", xpath(u.element, "index"), message)
+            yield Finding("structure.index", u.path("index"), message)
         elif u.index in seen:
             message = f"a variable must be listed once, but `{d.variables[u.index - 1].name}` is listed again"
-            yield Finding("structure.duplicate", xpath(u.element, "index"), message)
+            yield Finding("structure.duplicate", u.path("index"), message)
         elif initial and u.index < last:
-            yield Finding(
-                "structure.order", xpath(u.element, "index"), "InitialUnknowns must be sorted by index, but are not"
-            )
+            yield Finding("structure.order", u.path("index"), "InitialUnknowns must be sorted by index, but are not")
         seen.add(u.index)
         last = max(last, u.index)
         yield from _dependencies(d, u, initial)
@@ -215,18 +213,18 @@ def _dependencies(d: Description, u: Unknown, initial: bool) -> Iterator[Finding
         message = (
             f"dependenciesKind ({len(u.kinds)} long) must go with dependencies of the same length, but they are {count}"
         )
-        yield Finding("structure.dependencies-kind", xpath(u.element, "dependenciesKind"), message)
+        yield Finding("structure.dependencies-kind", u.path("dependenciesKind"), message)
     for index in u.dependencies or ():
         known = d.variable(index)
         if known is None:
             message = f"a dependency must be an index from 1 to {len(d.variables)}, but is {index}"
-            yield Finding("structure.dependencies", xpath(u.element, "dependencies"), message)
+            yield Finding("structure.dependencies", u.path("dependencies"), message)
         elif initial and known.causality in ("output", "local", "calculatedParameter") and known.initial != "exact":
             message = (
                 f"a dependency must be an input, a parameter or have initial exact, but `{known.name}` is none of these"
             )
-            yield Finding("structure.dependencies", xpath(u.element, "dependencies"), message)
+            yield Finding("structure.dependencies", u.path("dependencies"), message)
     listed = u.dependencies or ()
     if any(a >= b for a, b in pairwise(listed)):
         message = "dependencies must be sorted and without repeats, but are not"
-        yield Finding("structure.order", xpath(u.element, "dependencies"), message)
+        yield Finding("structure.order", u.path("dependencies"), message)

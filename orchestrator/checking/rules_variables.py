@@ -3,9 +3,17 @@
 import math
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 
-from orchestrator.checking.description import CAUSALITIES, INITIAL, NUMERIC, VARIABILITIES, Description, Variable
+from orchestrator.checking.description import (
+    CAUSALITIES,
+    INITIAL,
+    NUMERIC,
+    VARIABILITIES,
+    Description,
+    SimpleType,
+    Variable,
+)
 from orchestrator.checking.findings import Finding
 
 # EBNF of section 2.2.9.
@@ -18,13 +26,15 @@ _STRUCTURED = re.compile(rf"(?:{_IDENTIFIER}|der\({_IDENTIFIER}(?:,[0-9]+)?\))")
 def check_variables(d: Description) -> Iterator[Finding]:
     """All findings about ModelVariables."""
     yield from _names(d)
+    types = {t.name: t for t in d.types}
+    states = {_as_int(v.own.get("derivative")) for v in d.variables}
     for v in d.variables:
         yield from _combination(v)
         yield from _start(v)
         if v.kind in NUMERIC:
             yield from _bounds(v)
-        yield from _declared_type(d, v)
-        yield from _real_only(d, v)
+        yield from _declared_type(types, v)
+        yield from _real_only(d, v, states)
         if v.element.get("canHandleMultipleSetPerTimeInstant") in ("true", "1") and d.model_exchange is None:
             message = f"`{v.name}` must not set canHandleMultipleSetPerTimeInstant, because only model exchange has it"
             yield Finding("variable.multiple-set", v.path("canHandleMultipleSetPerTimeInstant"), message)
@@ -111,11 +121,11 @@ def _bounds(v: Variable) -> Iterator[Finding]:
             yield Finding("variable.not-finite", v.path(attribute), message)
 
 
-def _declared_type(d: Description, v: Variable) -> Iterator[Finding]:
+def _declared_type(types: Mapping[str, SimpleType], v: Variable) -> Iterator[Finding]:
     name = v.own.get("declaredType")
     if name is None:
         return
-    declared = next((t for t in d.types if t.name == name), None)
+    declared = types.get(name)
     if declared is None:
         message = f"declaredType of `{v.name}` must be defined in TypeDefinitions, but `{name}` is not"
         yield Finding("variable.declared-type", v.path("declaredType"), message)
@@ -136,7 +146,7 @@ def _declared_type(d: Description, v: Variable) -> Iterator[Finding]:
             yield Finding("variable.bounds-exceed-type", v.path(attribute), message)
 
 
-def _real_only(d: Description, v: Variable) -> Iterator[Finding]:
+def _real_only(d: Description, v: Variable, states: Collection[int | None]) -> Iterator[Finding]:
     unit = v.attributes.get("unit")
     if unit is not None and unit not in d.units:
         message = f"unit of `{v.name}` must be defined in UnitDefinitions, but `{unit}` is not"
@@ -156,11 +166,9 @@ def _real_only(d: Description, v: Variable) -> Iterator[Finding]:
         if target is None or target is v or target.kind != "Real" or v.variability != "continuous":
             message = f"`{v.name}` must be continuous and the derivative of another Real variable, but is not"
             yield Finding("variable.derivative", v.path("derivative"), message)
-    if v.own.get("reinit") in ("true", "1"):
-        is_state = any(_as_int(w.own.get("derivative")) == v.index for w in d.variables)
-        if d.model_exchange is None or not is_state:
-            message = f"only continuous-time states of model exchange can have reinit, but `{v.name}` is none"
-            yield Finding("variable.reinit", v.path("reinit"), message)
+    if v.own.get("reinit") in ("true", "1") and (d.model_exchange is None or v.index not in states):
+        message = f"only continuous-time states of model exchange can have reinit, but `{v.name}` is none"
+        yield Finding("variable.reinit", v.path("reinit"), message)
 
 
 def _aliases(d: Description) -> Iterator[Finding]:

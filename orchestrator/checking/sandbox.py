@@ -20,6 +20,7 @@ from typing import Any
 
 _POSIX = os.name == "posix"
 _POLL = 0.05
+_LONGEST_LINE = 1 << 20
 _PYTHON = "import sys; sys.path.insert(0, {root!r}); import {module} as m; sys.path.remove({root!r}); m.main()"
 _SECRET = re.compile(r"TOKEN|SECRET|PASSWORD|PASSWD|CREDENTIAL|PRIVATE|API_?KEY", re.IGNORECASE)
 
@@ -159,6 +160,7 @@ def _read_lines(stream: int, lines: "queue.SimpleQueue[bytes]") -> None:
         *whole, pending = (pending + data).split(b"\n")
         for line in whole:
             lines.put(line)
+        pending = pending[:_LONGEST_LINE]
 
 
 def _ended(process: subprocess.Popen[bytes]) -> bool:

@@ -58,7 +58,7 @@ def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
         where = xml_reading.xpath(root)
         findings.append(Finding("model.no-co-simulation", where, "the FMU has model exchange only: it is not run"))
     if not any(f.severity == "error" for f in findings):
-        findings += check_with_fmpy(path)
+        findings += check_with_fmpy(path, len(description.variables))
     return StaticResult(findings, files, description, references, facts)
 
 

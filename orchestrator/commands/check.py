@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     reports = []
     for path in _shown(paths):
         reports.append(check_fmu(path, options))
-        print("\n".join(as_lines(reports[-1])), flush=True)
+        _print("\n".join(as_lines(reports[-1])))
     arguments = {
         "fmus": [str(p) for p in paths],
         "static": args.static,
@@ -79,6 +79,12 @@ def run(args: argparse.Namespace) -> int:
         write_report(directory, "check")
     _write_extra(args, reports)
     return 0 if all(r.ok for r in reports) else 1
+
+
+def _print(text: str) -> None:
+    """Print names of any script, whatever the encoding of the terminal or file."""
+    encoding = sys.stdout.encoding or "utf-8"
+    print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)
 
 
 def _shown(paths: Sequence[Path]) -> Iterator[Path]:

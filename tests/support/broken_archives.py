@@ -102,6 +102,7 @@ ARCHIVES: list[tuple[str, str, Callable[[Path], None]]] = [
     ("drive letter", "archive.absolute", _with_entry("C:/outside.txt")),
     ("backslash", "archive.backslash", _with_entry("resources\\inside.txt")),
     ("control character", "archive.odd-name", _with_entry("resources/a\x07b.txt")),
+    ("long name", "archive.long-name", _with_entry("resources/" + "n" * 300)),
     ("device name", "archive.odd-name", _with_entry("resources/aux.txt")),
     ("symbolic link", "archive.symlink", _with_entry(_symlink(), b"/etc/passwd", zipfile.ZIP_STORED)),
     ("duplicate", "archive.duplicate", _with_entry("modelDescription.xml", b"<other/>")),
