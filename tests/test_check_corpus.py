@@ -13,6 +13,7 @@ from tests.support.c_fmu import fmu_files, have_compiler, write_fmu
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
 )
+DOCS = Path(__file__).parents[1] / "docs" / "check.md"
 CORPUS = corpus() if have_compiler() else []
 
 
@@ -55,6 +56,7 @@ def test_what_the_flags_do_not_promise_is_not_asked_for(behaviour: str, old: str
 def test_the_corpus_is_large_and_covers_the_rules() -> None:
     covered = {b.rule for b in CORPUS}
     assert len(CORPUS) >= 40
+    assert f"{len(CORPUS)} FMUs, each broken by one mutation" in DOCS.read_text(encoding="utf-8")
     assert len({b.name for b in CORPUS}) == len(CORPUS)
     uncovered = {r for r, rule in RULES.items() if rule.severity != "info"} - covered
     assert uncovered == NOT_IN_THE_CORPUS
