@@ -159,7 +159,7 @@ def test_damaged_results_are_one_line_and_exit_2(tmp_path, capsys, content, said
 
 
 def test_a_damaged_table_is_named(sweep, capsys):
-    (sweep / "sweep.csv").write_text("case,alpha\n1,2,3\n")
+    (sweep / "sweep.csv").write_text("case,status\n1,2,3\n")
     assert main(["report", str(sweep)]) == 2
     assert "sweep.csv must be a CSV table" in capsys.readouterr().err
 
@@ -239,3 +239,16 @@ def test_the_page_of_a_sweep_of_any_scenario_plots_its_results(tmp_path):
     (plot,) = sections(report_from_directory(tmp_path), Plot)
     assert (plot.x_label, plot.y_label) == ("a.k", "a.y.last [rad]")
     assert (plot.series[0].x, plot.series[0].y) == ([1.0, 2.0], [5.0, None])
+
+
+def test_the_page_of_a_large_sweep_shows_part_of_it_and_says_so(tmp_path):
+    count = 10_000
+    results = {"cases": count, "failed": 0, "columns": [{"name": "y", "unit": "rad"}]}
+    write_result(tmp_path, "sweep", {}, 0, results)
+    lines = [f"{i},{i / count},done,{i}," for i in range(count)]
+    (tmp_path / "sweep.csv").write_text("\n".join(["case,k,status,y,message", *lines, ""]))
+    report = report_from_directory(tmp_path)
+    (plot,) = sections(report, Plot)
+    assert 3000 <= len(plot.series[0].x) <= 4000
+    assert plot.series[0].x[-1] > 0.999
+    assert "The first 500 of 10000 rows" in write_report(tmp_path).read_text()

@@ -40,13 +40,17 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table that the reader can sort. Only the first ``limit`` rows are shown, and the table says so."""
+    """A table that the reader can sort. Only the first ``limit`` rows are shown, and the table says so.
+
+    ``total`` is the number of rows that there are, where ``rows`` are not all of them.
+    """
 
     title: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
     limit: int = ROW_LIMIT
+    total: int = 0
 
 
 @dataclass(frozen=True)

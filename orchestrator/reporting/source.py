@@ -3,7 +3,7 @@
 import csv
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,8 +28,8 @@ class Source:
         results = self.document.get("results")
         return results if isinstance(results, Mapping) else {}
 
-    def columns(self, name: str) -> dict[str, list[Cell]]:
-        """Return a CSV file of the directory by column, empty when there is no such file.
+    def rows(self, name: str) -> Iterator[list[Cell]]:
+        """Yield the heading and then the rows of a CSV file of the directory; nothing when there is no such file.
 
         Numbers become floats, what is empty or not finite becomes ``None``.
 
@@ -38,18 +38,24 @@ class Source:
         """
         path = self.directory / name
         if not path.is_file():
-            return {}
+            return
         try:
             with path.open(encoding="utf-8", newline="") as stream:
-                rows = csv.reader(stream)
-                header = next(rows, [])
-                columns: list[list[Cell]] = [[] for _ in header]
-                for row in rows:
-                    for column, text in zip(columns, row, strict=True):
-                        column.append(_cell(text))
+                lines = csv.reader(stream)
+                header = next(lines, [])
+                yield list(header)
+                for line in lines:
+                    if len(line) != len(header):
+                        raise ValueError(f"line {lines.line_num} has {len(line)} values under {len(header)} headings")
+                    yield [_cell(text) for text in line]
         except (ValueError, csv.Error) as error:
             raise ScenarioError(f"{path} must be a CSV table, but is not: {error}") from None
-        return dict(zip(header, columns, strict=True))
+
+    def columns(self, name: str) -> dict[str, list[Cell]]:
+        """Return a whole CSV file by column, empty when there is no such file; see ``rows``."""
+        rows = self.rows(name)
+        header = next(rows, [])
+        return by_column(header, rows)
 
     def origin(self) -> tuple[tuple[str, Cell], ...]:
         """Return what was run and with what."""
@@ -83,6 +89,15 @@ def load(directory: Path, command: str) -> Source:
     if not isinstance(document, dict) or document.get("command") != command or "results" not in document:
         raise ScenarioError(f'{path} must be the result of `{command}` (with "command" and "results"), but is not')
     return Source(directory, command, document)
+
+
+def by_column(header: Sequence[Cell], rows: Iterable[Sequence[Cell]]) -> dict[str, list[Cell]]:
+    """Return rows as columns by name."""
+    columns: list[list[Cell]] = [[] for _ in header]
+    for row in rows:
+        for column, value in zip(columns, row, strict=True):
+            column.append(value)
+    return dict(zip((str(name) for name in header), columns, strict=True))
 
 
 def _cell(text: str) -> Cell:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestrator.reporting.model import Cell, Column, Plot, Report, Section, Series, Table
+from orchestrator.reporting.model import POINT_LIMIT, ROW_LIMIT, Cell, Column, Plot, Report, Section, Series, Table
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.source import Source, numbers, table_of, words
+from orchestrator.reporting.source import Source, by_column, numbers, table_of, words
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
@@ -24,8 +24,8 @@ STATISTICS = {
 def build(source: Source) -> Report:
     """Return the page."""
     results = source.results
-    table = source.columns("sweep.csv")
     failed, total = int(results["failed"]), int(results["cases"])
+    first, failures, table = _excerpts(source, total)
     statistics: list[Mapping[str, Any]] = list(results.get("statistics", []))
     units = {c["name"]: c["unit"] for c in results.get("columns", [])}
     sections: list[Section] = []
@@ -36,8 +36,8 @@ def build(source: Source) -> Report:
     else:
         sections += _signals(table, units)
     if failed:
-        sections.append(_cases("Failed cases", table, UNITS | units, failed=True))
-    sections.append(_cases("Cases", table, UNITS | units, failed=False))
+        sections.append(_cases("Failed cases", failures, UNITS | units, failed))
+    sections.append(_cases("Cases", first, UNITS | units, total))
     sections += _provenance(results)
     return Report(
         title="Backlash sweep" if statistics else "Sweep",
@@ -112,14 +112,30 @@ def _signals(table: Columns, units: Mapping[str, str]) -> list[Section]:
     ]
 
 
-def _cases(title: str, table: Columns, units: Mapping[str, str], *, failed: bool) -> Table:
-    names = [n for n in (*FIRST, *table) if n in table and (failed or n != "message" or any(table[n]))]
-    names = list(dict.fromkeys(names))
+def _excerpts(source: Source, total: int) -> tuple[Columns, Columns, Columns]:
+    """Return the first rows, the first failed rows, and rows spread over all for the plots; memory stays bounded."""
+    rows = source.rows("sweep.csv")
+    header = next(rows, [])
+    status = header.index("status")
+    stride = max(1, -(-total // POINT_LIMIT))
+    first: list[list[Cell]] = []
+    failures: list[list[Cell]] = []
+    spread: list[list[Cell]] = []
+    for number, row in enumerate(rows):
+        if number < ROW_LIMIT:
+            first.append(row)
+        if row[status] != "done" and len(failures) < ROW_LIMIT:
+            failures.append(row)
+        if number % stride == 0:
+            spread.append(row)
+    return by_column(header, first), by_column(header, failures), by_column(header, spread)
+
+
+def _cases(title: str, table: Columns, units: Mapping[str, str], total: int) -> Table:
+    names = [n for n in dict.fromkeys((*FIRST, *table)) if n in table and (n != "message" or any(table[n]))]
     rows = zip(*(table[n] for n in names), strict=True)
-    status = names.index("status")
-    chosen = tuple(_row(names, row) for row in rows if not failed or row[status] != "done")
     columns = tuple(Column(words(n), units.get(n, ""), 6) for n in names)
-    return Table(title, columns, chosen)
+    return Table(title, columns, tuple(_row(names, row) for row in rows), total=total)
 
 
 def _row(names: Sequence[str], row: Sequence[Cell]) -> tuple[Cell, ...]:
