@@ -28,6 +28,8 @@ FORGOTTEN = -30.0  # log weight below which a filter is no longer run
 ROOT_HALF = 0.7071067811865476
 ROOT_INVERSE_2PI = 0.3989422804014327
 LEAST_BLUR = 1e-8  # least variance [rad2] of the distance to a flank
+LARGEST_ERROR = 1e3  # innovation [rad] at which a filter counts as diverged
+DEAD = -1e9  # log weight of such a filter
 LONGEST_PART = 0.06  # of the shaft's oscillation, in radians of its phase
 
 
@@ -207,15 +209,20 @@ def correct(f, state, measured, variance):  # type: ignore[no-untyped-def]
     base = STATES + STATES * state
     spread = f[base + state] + variance
     error = measured - f[state]
+    if not (spread > 0.0 and abs(error) < LARGEST_ERROR):
+        # A filter on the wrong side of a small gap may diverge: it has nothing more to say.
+        f[WEIGHT] = DEAD
+        return error, spread
     scale = error / spread
     a, b, c, d, e = f[base], f[base + 1], f[base + 2], f[base + 3], f[base + 4]
     column = (a, b, c, d, e, f[base + 5], f[base + 6], f[base + 7], f[base + 8])
     for r in range(STATES):
         f[r] += column[r] * scale
         gain = column[r] / spread
-        row = STATES + STATES * r
-        for n in range(STATES):
-            f[row + n] -= gain * column[n]
+        # The lower half repeats the upper: asymmetry of rounding would otherwise grow until the filter breaks.
+        for n in range(r, STATES):
+            f[STATES + STATES * r + n] -= gain * column[n]
+            f[STATES + STATES * n + r] = f[STATES + STATES * r + n]
     f[ALPHA] = max(f[ALPHA], 0.0)
     f[WEIGHT] -= 0.5 * (log(spread) + error * scale)
     return error, spread

@@ -96,8 +96,8 @@ def motor_only(n: int) -> list[dict]:
 
 
 def none(n: int) -> list[dict]:
-    """No gap, 5 % mismatch, noise and rounding, 15 s."""
-    columns, _ = make_record({}, 500_000 + n, 15.0, excitation=EXCITATIONS[n % 3])
+    """No gap, 5 % mismatch, noise and rounding, 6 s."""
+    columns, _ = make_record({}, 500_000 + n, 6.0, excitation=EXCITATIONS[n % 3])
     return [_row(record_from_columns(columns, "none"), 0.0, "maximum_likelihood")]
 
 

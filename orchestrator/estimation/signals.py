@@ -1,0 +1,55 @@
+"""Derived signals that the classical methods share: smoothed speeds and the shaft's torque."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.protocol import NotApplicableError
+from orchestrator.model_file import Model
+from orchestrator.record import Record
+
+WINDOW = 0.06  # s, of the Savitzky-Golay derivatives
+
+
+@dataclass(frozen=True)
+class ShaftSignals:
+    """Signals seen from the load, all (n,).
+
+    Attributes:
+        twist: theta_m/i - theta_l [rad].
+        twist_rate: its derivative [rad/s], smoothed.
+        torque: shaft torque from the load's motion, J_l theta_l'' + b_l theta_l' [N.m], smoothed.
+        noise: standard deviation of ``torque`` due to the load encoder [N.m].
+    """
+
+    twist: Array
+    twist_rate: Array
+    torque: Array
+    noise: float
+
+
+def shaft_signals(record: Record, model: Model) -> ShaftSignals:
+    """Return the derived signals of a record with both encoders.
+
+    Raises:
+        NotApplicableError: there is no load encoder.
+    """
+    if record.theta_l is None:
+        raise NotApplicableError("this method needs the load's angle `theta_l`")
+    p = {name: entry.value for name, entry in model.parameters.items()}
+    h = record.step
+    width = max(5, 2 * round(0.5 * WINDOW / h) + 1)
+    twist = record.theta_m / p["i"] - record.theta_l
+    rate = savgol_filter(twist, width, 2, deriv=1, delta=h)
+    speed = savgol_filter(record.theta_l, width, 3, deriv=1, delta=h)
+    acceleration = savgol_filter(record.theta_l, width, 3, deriv=2, delta=h)
+    torque = p["J_l"] * acceleration + p["b_l"] * speed
+    impulse = np.zeros(4 * width + 1)
+    impulse[2 * width] = 1.0
+    gain = float(np.linalg.norm(savgol_filter(impulse, width, 3, deriv=2, delta=h)))
+    third = np.diff(record.theta_l, 3)
+    sigma = 1.4826 * float(np.median(np.abs(third))) / math.sqrt(20.0)
+    return ShaftSignals(twist, rate, torque, p["J_l"] * gain * sigma)

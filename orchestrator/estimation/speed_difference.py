@@ -1,0 +1,46 @@
+"""Integral of the speed difference over a traversal of the gap (Yang, Tang, Tan and Xu).
+
+From the moment at which one flank parts to the moment at which the other touches, the integral of
+``omega_m/i - omega_l`` is the whole gap, 2 alpha. The load's motion tells which flank is loaded; what the shaft is
+wound up at both ends (torque over stiffness) is taken off.
+"""
+
+import numpy as np
+
+from orchestrator.estimation.protocol import Estimate, NotApplicableError
+from orchestrator.estimation.signals import shaft_signals
+from orchestrator.model_file import Model
+from orchestrator.record import Record
+
+LEAST_TRAVERSALS = 3
+THRESHOLD = 4.0  # standard deviations of the torque's noise
+LEAST_SHARE = 0.05  # of the torque's effective value
+
+
+def estimate(record: Record, model: Model) -> Estimate:
+    """Return the median half-gap over all traversals.
+
+    Raises:
+        NotApplicableError: the gap is traversed less than three times, or there is no load encoder.
+    """
+    shaft = shaft_signals(record, model)
+    stiffness = model.parameters["k"].value
+    limit = max(THRESHOLD * shaft.noise, LEAST_SHARE * float(np.sqrt(np.mean(shaft.torque**2))))
+    side = np.where(shaft.torque > limit, 1, np.where(shaft.torque < -limit, -1, 0))
+    loaded = np.flatnonzero(side)
+    turns = np.flatnonzero(np.diff(side[loaded]) != 0)
+    sizes = []
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (shaft.twist_rate[1:] + shaft.twist_rate[:-1]) * record.step)])
+    for n in turns:
+        first, last = loaded[n], loaded[n + 1]
+        moved = (integral[last] - integral[first]) * side[last]
+        wound = (abs(shaft.torque[first]) + abs(shaft.torque[last])) / stiffness
+        sizes.append(0.5 * (moved - wound))
+    if len(sizes) < LEAST_TRAVERSALS:
+        raise NotApplicableError(f"the gap must be traversed {LEAST_TRAVERSALS} times, but is {len(sizes)} times")
+    values = np.array(sizes)
+    alpha = max(float(np.median(values)), 0.0)
+    error = 1.2533 * float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
+    diagnostics = {"traversals": len(sizes), "torque_limit": limit}
+    interval = (max(alpha - 1.96 * error, 0.0), alpha + 1.96 * error)
+    return Estimate("speed_difference", alpha, error, interval, interval[0] > 0.0, "", diagnostics)

@@ -1,0 +1,111 @@
+"""Does a record fit its model at all: units, signs, exchanged columns.
+
+Three numbers of the record are compared with the model's, each only where the motion is large enough for it to mean
+something: the slope of the load's angle over the motor's, the inertia that the torque seems to move, and their signs.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.model_file import Model
+from orchestrator.record import Record
+
+DEGREES = 180.0 / math.pi
+LARGE_TRAVEL = 0.5  # rad of the load, beyond which twist no longer disturbs the slope
+SMOOTHING_TIME = 0.05  # s
+NEEDED_FIT = 0.8
+
+
+def check_plausible(record: Record, model: Model) -> None:
+    """Refuse a record of a ``Drivetrain`` whose units, signs or columns cannot be what the format demands.
+
+    Raises:
+        RecordError: the message names the column and what it seems to hold.
+    """
+    if model.fmu != "Drivetrain":
+        return
+    parameters = {name: entry.value for name, entry in model.parameters.items()}
+    if record.theta_l is not None:
+        _check_slope(record, record.theta_l, parameters["i"])
+    _check_inertia(record, parameters)
+
+
+def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> None:
+    """Compare the slope of load over motor angle with 1/i."""
+    motor = record.theta_m - record.theta_m.mean()
+    load = theta_l - theta_l.mean()
+    if min(float(np.ptp(motor)) / ratio, float(np.ptp(load))) < LARGE_TRAVEL:
+        return
+    correlation = float(motor @ load) / math.sqrt(float(motor @ motor) * float(load @ load))
+    if abs(correlation) < 0.95:
+        raise RecordError(
+            f"{record.source}: column `theta_l` must follow `theta_m`, but their correlation is {correlation:.2f}"
+        )
+    relative = float(np.std(load) / np.std(motor)) * ratio
+    if correlation < 0.0:
+        raise RecordError(
+            f"{record.source}: column `theta_l` must grow with `theta_m`, but falls: one of them has the wrong sign"
+        )
+    suspects = (
+        (DEGREES, "column `theta_l` must be in radians, but seems to be in degrees"),
+        (1.0 / DEGREES, "column `theta_m` must be in radians, but seems to be in degrees"),
+        (ratio * ratio, "columns `theta_m` and `theta_l` seem to be exchanged"),
+    )
+    for factor, text in suspects:
+        if abs(math.log(relative / factor)) < 0.2:
+            raise RecordError(f"{record.source}: {text} (theta_m/theta_l is {ratio / relative:.4g}, i is {ratio:g})")
+    if abs(math.log(relative)) > 0.3:
+        raise RecordError(
+            f"{record.source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have "
+            f"{ratio / relative:.4g}: wrong units, or a wrong `i` in the model"
+        )
+
+
+def _check_inertia(record: Record, p: dict[str, float]) -> None:
+    """Compare the inertia that the torque moves with the model's.
+
+    The momentum balance ``integral of T = J omega + b theta + constant + slope t`` is fitted to smoothed data.
+    """
+    width = max(5, round(SMOOTHING_TIME / record.step))
+    if record.size < 20 * width:
+        return
+    kernel = np.ones(width) / width
+    torque = _lagged(record.u, p["tau"], record.step)
+    impulse = np.cumsum(torque) * record.step
+    speed = np.gradient(record.theta_m, record.step)
+    speed, angle, impulse = (np.convolve(v, kernel, "valid") for v in (speed, record.theta_m, impulse))
+    if np.ptp(angle) < 0.2:
+        return
+    time = np.linspace(-1.0, 1.0, speed.size)
+    table = np.column_stack([speed, angle, np.ones_like(time), time])
+    solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
+    left = impulse - table @ solution
+    trend, *_ = np.linalg.lstsq(table[:, 2:], impulse, rcond=None)
+    explained = 1.0 - float(np.var(left)) / max(float(np.var(impulse - table[:, 2:] @ trend)), 1e-300)
+    if explained < NEEDED_FIT:
+        return
+    relative = float(solution[0]) / (p["J_m"] + p["J_l"] / p["i"] ** 2)
+    if relative < -0.2:
+        raise RecordError(
+            f"{record.source}: column `u` must be positive where it drives `theta_m` forward, but the motion goes "
+            "against it: the sign of `u` or of the angles is wrong"
+        )
+    if abs(relative) < 3.0 / DEGREES:
+        raise RecordError(
+            f"{record.source}: column `theta_m` must be in radians, but seems to be in degrees (the torque would move "
+            f"only {relative:.2g} of the model's inertia)"
+        )
+
+
+def _lagged(u: NDArray[np.float64], tau: float, step: float) -> NDArray[np.float64]:
+    """Return the motor's torque [N.m] for a request held from sample to sample."""
+    keep = math.exp(-step / tau)
+    torque = np.empty_like(u)
+    value = 0.0
+    for n, request in enumerate(u.tolist()):
+        torque[n] = value
+        value = keep * value + (1.0 - keep) * request
+    return torque
