@@ -69,6 +69,7 @@ class Effect:
         bounds: scene -> short name -> (least, largest), narrower than the table's.
         nuisances: parameters of the predictor alone that are fitted with the effect, and not reported as its own.
         priors: scene -> short name -> (mean, standard deviation).
+        angular: True if it makes sense for an angle only, not for a position in metres.
         both_encoders: True if it can be seen only with an encoder on either side.
     """
 
@@ -87,6 +88,7 @@ class Effect:
     plausible: Callable[[dict[str, float]], bool] = lambda values: True
     bounds: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
     both_encoders: bool = False
+    angular: bool = False
     nuisances: dict[str, str] = field(default_factory=dict)
     priors: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
 
@@ -165,8 +167,8 @@ def _periodic(name: str, site: str, unit: Callable[[Scene], float]) -> Effect:
     return Effect(
         name, site, _group(name, "amplitude", "cycles_per_rev", "phase"), "amplitude", unit,
         lambda scene: {"cycles_per_rev": scene.cycles.get(name, ())}, amplitudes=("amplitude",), phase="phase",
-        scales=lambda scene: {"cycles_per_rev": 1e-3, "phase": 0.05},
-        bounds=lambda scene: {"cycles_per_rev": (0.7 / max(scene.turns, 1e-3), 1e9)}, family=f"periodic, {site}",
+        scales=lambda scene: {"cycles_per_rev": 0.01 / max(scene.turns, 1e-9), "phase": 0.05},
+        bounds=lambda scene: {"cycles_per_rev": (0.7 / max(scene.turns, 1e-9), 1e9)}, family=f"periodic, {site}",
     )  # fmt: skip
 
 
@@ -204,7 +206,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     ),
     Effect(
         "gravity_load", "load", _group("gravity_load", "amplitude", "phase"), "amplitude", _load_torque,
-        amplitudes=("amplitude",), phase="phase", scales=lambda s: {"phase": 0.05},
+        amplitudes=("amplitude",), phase="phase", scales=lambda s: {"phase": 0.05}, angular=True,
     ),
     Effect(
         "extra_resonance", "load", _group("extra_resonance", "inertia", "frequency", "damping_ratio"), "inertia",

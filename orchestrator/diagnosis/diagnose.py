@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 SEGMENT = 2.0  # s, length of a free run; the length of the thesis's tests
 LEAST_EXPLAINED = 0.5  # share of the missing log-likelihood that named effects must recover
+ENOUGH_SHRINKAGE = 5.0  # or the factor by which they must shrink the gap (real noise floors are rarely reached)
 LEAST_MISSING = 0.05  # per sample: missing log-likelihood below which nothing is left to explain
 GROWN = 2.0  # innovations that grow this much after the fitted part speak of something that changes with time
 ALIKE = 0.05  # share of the gain within which effects of a family cannot be told apart
@@ -53,7 +54,8 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
     final = base_fit if not best.effects else anneal(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, LEVELS)
     left = _left(likelihood, plant, base_fit, final, best.fit, parts)
     floor_off = left.missing > LEAST_MISSING * (parts.validated.stop - HEAD)
-    unknown = floor_off and left.explained < LEAST_EXPLAINED
+    shrunk = _shrinkage(plant, signals, nominal, base_fit, final, parts) if best.effects else 1.0
+    unknown = floor_off and left.explained < LEAST_EXPLAINED and shrunk < ENOUGH_SHRINKAGE
     unknown |= left.growth > GROWN and left.explained < 0.8
     named = tuple(_name(plant, effect, final, search.steps) for effect in best.effects)
     chosen = base_fit if unknown else final
@@ -76,6 +78,13 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
             plant, likelihood, parts, nominal, base_fit, chosen, best, tuple(search.steps), before, after
         ),
     )
+
+
+def _shrinkage(plant: Plant, signals: Signals, nominal: Array, base: Fit, final: Fit, parts: Parts) -> float:
+    """Return by which factor the effects shrink the gap on the deciding part, smallest over the encoders."""
+    stages = (("parameters", base.p), ("effects", final.p))
+    gaps = held_out_gap(plant, signals, nominal, final.q, stages, parts.validated)
+    return min(gap.before / max(gap.after, 1e-300) for gap in gaps)
 
 
 def held_out_gap(

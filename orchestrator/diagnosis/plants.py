@@ -66,7 +66,12 @@ class Plant:
 
     def transition(self, p: Array, h: float) -> Array:
         """Return the discrete transition matrix of the linear plant (every effect off) for a step ``h`` [s]."""
-        return _matrix_exponential(self.jacobian(p) * h)
+        A = _matrix_exponential(self.jacobian(p) * h)
+        if p[self.index("tau")] == 0.0:
+            # Without a lag there is no drive state; its place would stand for an integrator.
+            row = self.states.index(4)
+            A[row, :] = A[:, row] = 0.0
+        return A
 
     def jacobian(self, p: Array) -> Array:
         """Return the matrix of the linear plant, by differences of its own (linear) rates."""

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 PERIODIC = {"torque_ripple": False, "gear_eccentricity": True}  # name -> acts on the shaft
 PEAKS = 5
+HIGHEST = 60.0  # cycles per revolution that are looked for
+HIGHEST_PER_TRAVEL = 300.0  # or cycles over the whole travel, where that is more
 TRUST = 0.6  # regression is followed only so far: the response is linear near zero only
 
 
@@ -135,10 +137,11 @@ def with_cycles(scene: Scene, likelihood: Likelihood, plant: Plant, model: Fit, 
     response = error_response(likelihood, plant, model)
     effort = back_propagated(response, raw[part, : likelihood.signals.channels])
     # Lines closer than the reciprocal of the travel cannot be told apart: three points per such width.
-    spacing = max(1.0 / (3.0 * max(turns, 0.2)), 1e-3)
-    highest = min(60.0, 0.8 * np.pi / likelihood.signals.h / max(scene.speed_m, 1e-9) * 3.0)
-    lowest = min(max(0.2, 0.7 / max(turns, 0.2)), 0.5 * highest)
-    cycles = np.arange(lowest, highest, spacing)
+    spacing = 1.0 / (3.0 * turns)
+    highest = min(
+        max(HIGHEST, HIGHEST_PER_TRAVEL / turns), 2.4 * np.pi / likelihood.signals.h / max(scene.speed_m, 1e-9)
+    )
+    cycles = np.arange(min(0.7 / turns, 0.5 * highest), highest, spacing)
     cycles = cycles[:: max(1, cycles.size // 3000)]
     found = {}
     for name, shaft in PERIODIC.items():

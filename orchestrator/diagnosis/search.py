@@ -135,7 +135,7 @@ class Search:
         present = {effect.label for effect in current.effects}
         replaced = {effect.needs for effect in current.effects}
         for effect in BANKS[self.plant.name]:
-            if effect.needs:
+            if effect.needs or (effect.angular and in_metres(self.model)):
                 continue
             blind = effect.both_encoders and self.likelihood.signals.channels < 2
             if effect.label not in present | replaced and not blind:
@@ -245,3 +245,9 @@ class Search:
         self.done += 1
         expected = max(self.done + 2, (len(self.steps) + 1) * (SHORTLIST + 2))
         self.progress(self.done, expected, what)
+
+
+def in_metres(model: Model) -> bool:
+    """Tell whether the model's position is a length."""
+    column = model.columns.get("theta_m")
+    return column is not None and column.unit in ("m", "mm")

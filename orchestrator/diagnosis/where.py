@@ -73,7 +73,11 @@ def missing_torque(likelihood: Likelihood, plant: Plant, model: Fit) -> Missing:
     sites = {"torque of the motor": (0, variance)}
     if effort.shape[1] > 2:
         k = float(model.p[plant.index("k")])
-        sites |= {"torque of the shaft": (1, variance * ratio**2 / k), "torque of the load": (2, variance * ratio**2)}
+        # A shaft torque shows at both ends; the two estimates weigh the same, hence the half.
+        sites |= {
+            "torque of the shaft": (1, 0.5 * variance * ratio**2 / k),
+            "torque of the load": (2, variance * ratio**2),
+        }
     torque, energy = {}, {}
     for name, (column, scale) in sites.items():
         torque[name] = scale * effort[settled, column]

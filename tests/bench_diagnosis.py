@@ -1,0 +1,183 @@
+"""Benchmark of the diagnosis on records of the independent simulator: confusion matrix and rates.
+
+    python -m tests.bench_diagnosis --singles 200 --none 100 --doubles 40 --unknown 50 --seed 70000 --out results/bench
+
+One line a record as it goes, the matrix and the figures at the end, and ``bench_diagnosis.json``. Interrupted runs go on
+where they stopped (``--out`` keeps the lines).
+"""
+
+import argparse
+import itertools
+import json
+import time
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.diagnosis.bank import DRIVETRAIN_BANK
+from orchestrator.diagnosis.diagnose import diagnose
+from orchestrator.diagnosis.outcome import Diagnosis
+from orchestrator.model_file import default_model
+from tests.support.hidden_effects import (
+    SINGLE,
+    UNKNOWN,
+    Case,
+    double_case,
+    none_case,
+    single_case,
+    unknown_case,
+)
+
+FAMILY = {effect.label: effect.family or effect.label for effect in DRIVETRAIN_BANK}
+# Truth of the independent simulator -> named parameter, for cases whose meaning is the same.
+RECOVERED = {
+    "alpha": ("backlash", "alpha"), "Fc_m": ("coulomb_friction", "torque"), "Fc_l": ("coulomb_friction", "torque"),
+    "delay": ("input_delay", "delay"), "sat": ("torque_saturation", "limit"), "rip": ("torque_ripple", "amplitude"),
+    "ecc": ("gear_eccentricity", "amplitude"), "T0": ("load_torque", "torque"), "grav": ("gravity_load", "amplitude"),
+    "J3": ("extra_resonance", "inertia"), "qd": ("quadratic_drag", "coefficient"),
+}  # fmt: skip
+
+
+def judge(case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return one row: what was hidden, what was said, whether that is right, wrong or neither."""
+    labels = [f"{effect.name}@{effect.site}" for effect in diagnosis.effects]
+    families = [set(effect.family) | {label} for effect, label in zip(diagnosis.effects, labels, strict=True)]
+    found = [any(group & set(right) for group in families) for right in case.right]
+    spare = [
+        label for label, group in zip(labels, families, strict=True)
+        if not any(group & set(right) for right in case.right)
+    ]  # fmt: skip
+    row: dict[str, Any] = {"kind": case.kind, "seed": case.seed, "times_noise": case.times_noise,
+                           "verdict": diagnosis.verdict, "named": labels, "found": found, "spare": spare}  # fmt: skip
+    row["right"] = bool(case.right) and all(found) and not spare
+    row["wrong"] = bool(spare)
+    row["warned"] = bool(diagnosis.warnings)
+    row["gaps"] = [[gap.before, gap.after, gap.noise] for gap in diagnosis.gap]
+    row["errors"] = errors(case, diagnosis)
+    return row
+
+
+def errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, float]]:
+    """Return (parameter, relative error, error in standard errors) of each hidden size that was named."""
+    rows = []
+    for short, value in case.truth["effects"].items():
+        name, parameter = RECOVERED.get(short, ("", ""))
+        for effect in diagnosis.effects:
+            if effect.name == name and parameter in effect.parameters:
+                estimate = effect.parameters[parameter]
+                off = abs(estimate.value) - abs(value)
+                rows.append((short, off / abs(value), off / max(estimate.standard_error, 1e-300)))
+    return rows
+
+
+def cases(args: argparse.Namespace) -> Any:
+    """Yield (group, function that makes the case)."""
+    kinds = list(SINGLE)
+    pairs = [pair for pair in itertools.combinations(kinds, 2) if not _same_family(*pair)]
+    np.random.default_rng(args.seed).shuffle(pairs)
+    unknown = list(UNKNOWN)
+    groups = [
+        *(("none", lambda s=args.seed + n: none_case(s)) for n in range(args.none)),
+        *(("single", lambda k=kinds[n % len(kinds)], s=args.seed + 1000 + n: single_case(k, s)) for n in range(args.singles)),
+        *(("unknown", lambda k=unknown[n % len(unknown)], s=args.seed + 3000 + n: unknown_case(k, s)) for n in range(args.unknown)),
+        *(("double", lambda k=tuple(pairs[n % len(pairs)]), s=args.seed + 2000 + n: double_case(k, s)) for n in range(args.doubles)),
+    ]  # fmt: skip
+    order = np.random.default_rng(args.seed + 1).permutation(len(groups))
+    return [(int(n), *groups[n]) for n in order]
+
+
+def _same_family(a: str, b: str) -> bool:
+    return FAMILY[SINGLE[a][2][0]] == FAMILY[SINGLE[b][2][0]]
+
+
+def report(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Print the matrix and the rates of what has been run, and return the figures."""
+    figures: dict[str, Any] = {}
+    print("\nHidden (rows) against named (columns, family)")
+    matrix = Counter((row["kind"], _said(row)) for row in rows if row["group"] in ("none", "single", "unknown"))
+    said = sorted({name for _, name in matrix})
+    for number, name in enumerate(said):
+        print(f"  [{number}] {name}")
+    for kind in dict.fromkeys(row["kind"] for row in rows if row["group"] in ("none", "single", "unknown")):
+        print(f"{kind:>22} " + " ".join(f"{matrix[kind, name] or '.':>4}" for name in said))
+    for group in ("none", "single", "double", "unknown"):
+        chosen = [row for row in rows if row["group"] == group]
+        if chosen:
+            figures[group] = _rates(group, chosen)
+            print(group, figures[group])
+    effects = [row for row in rows if row["verdict"] == "effects" and row["right"]]
+    if effects:
+        after = [max(after / noise for _, after, noise in row["gaps"]) for row in effects]
+        ratio = [min(before / after for before, after, _ in row["gaps"]) for row in effects]
+        figures["gap"] = {
+            "after_over_noise_median": float(np.median(after)),
+            "after_over_noise_90": float(np.quantile(after, 0.9)),
+            "before_over_after_median": float(np.median(ratio)),
+            "before_over_after_10": float(np.mean(np.array(ratio) >= 10.0)),
+        }
+        errors_ = [e for row in effects if row["group"] == "single" for e in row["errors"]]
+        figures["parameters"] = {
+            "relative_error_median": float(np.median([abs(e[1]) for e in errors_])),
+            "relative_error_90": float(np.quantile([abs(e[1]) for e in errors_], 0.9)),
+            "within_two_standard_errors": float(np.mean([abs(e[2]) < 2.0 for e in errors_])),
+        }
+        print(figures["gap"], figures["parameters"])
+    figures["seconds_median"] = float(np.median([row["seconds"] for row in rows]))
+    figures["seconds_largest"] = float(np.max([row["seconds"] for row in rows]))
+    print({name: round(value, 1) for name, value in figures.items() if isinstance(value, float)})
+    return figures
+
+
+def _said(row: dict[str, Any]) -> str:
+    names = sorted({FAMILY[name] for name in row["named"]})
+    return " + ".join(names) if names else "no effect" if row["verdict"] in ("none", "parameters") else row["verdict"]
+
+
+def _rates(group: str, rows: list[dict[str, Any]]) -> dict[str, Any]:
+    count = len(rows)
+    rates: dict[str, Any] = {"records": count, "wrong": sum(row["wrong"] for row in rows)}
+    if group == "none":
+        rates["false_alarms"] = sum(row["verdict"] not in ("none", "parameters") for row in rows)
+    elif group == "unknown":
+        rates["unknown"] = sum(row["verdict"] == "unknown" for row in rows)
+        rates["missed"] = sum(row["verdict"] in ("none", "parameters") for row in rows)
+    else:
+        rates["right"] = sum(row["right"] for row in rows)
+        rates["all_found"] = sum(all(row["found"]) for row in rows)
+        rates["missed"] = sum(not row["wrong"] and not row["right"] for row in rows)
+    return rates
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default in (("singles", 200), ("none", 100), ("doubles", 40), ("unknown", 50)):
+        parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--seed", type=int, default=70_000)
+    parser.add_argument("--out", type=Path, default=Path("results/bench_diagnosis"))
+    args = parser.parse_args()
+    args.out.mkdir(parents=True, exist_ok=True)
+    lines = args.out / f"rows-{args.seed}.jsonl"
+    rows = [json.loads(line) for line in lines.read_text().splitlines()] if lines.exists() else []
+    done = {row["number"] for row in rows}
+    model = default_model()
+    for number, group, make in cases(args):
+        if number in done:
+            continue
+        case = make()
+        begun = time.process_time()
+        row = judge(case, diagnose(case.record, model))
+        row |= {"number": number, "group": group, "seconds": time.process_time() - begun}
+        row["truth"] = {name: float(value) for name, value in case.truth["effects"].items()}
+        rows.append(row)
+        with lines.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+        mark = "ok" if row["right"] or (not case.right and not row["named"]) else "WRONG" if row["wrong"] else "miss"
+        print(f"{mark:>5} {case.kind} {case.seed} {row['verdict']} {row['named']} {row['truth']} {row['seconds']:.1f} s", flush=True)
+    figures = report(rows)
+    (args.out / "bench_diagnosis.json").write_text(json.dumps(figures, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
