@@ -186,6 +186,15 @@ def test_a_wrong_variant_is_one_clear_line_and_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_two_builds_at_a_time_do_no_harm(tmp_path: Path, fmus: dict[str, Path]) -> None:
+    words = [sys.executable, "-c", BUILD_HERE]
+    environment = os.environ | {"PYTHONPATH": str(build.ROOT)}
+    processes = [subprocess.Popen(words, cwd=tmp_path, env=environment) for _ in range(2)]
+    assert [process.wait(timeout=120) for process in processes] == [0, 0]
+    assert [path.name for path in tmp_path.iterdir()] == ["Drivetrain.fmu"]
+    assert (tmp_path / "Drivetrain.fmu").read_bytes() == fmus["Drivetrain"].read_bytes()
+
+
 def test_a_compiler_that_fails_is_one_clear_line(tmp_path: Path) -> None:
     with pytest.raises(FmuError, match="cannot be run"):
         compile_launcher(Toolchain(str(tmp_path / "cc"), None, ""), "x.so")

@@ -164,8 +164,10 @@ for round in range(50):
     plant.library.fmi2SetFMUstate(c, state); plant.library.fmi2FreeFMUstate(c, ctypes.byref(state))
     plant.library.fmi2Terminate(c); plant.library.fmi2Terminate(c); plant.step(c, 0.0, 1e-3)
     plant.library.fmi2FreeInstance(c)
-    plant.library.fmi2FreeInstance(None); plant.step(None, 0.0, 1.0)
-print("alive", max(status for status, _ in plant.messages))
+    if sys.argv[2] == "launcher":
+        plant.library.fmi2FreeInstance(None); plant.step(None, 0.0, 1.0)
+        plant.library.fmi2SetReal(plant.started(), None, ctypes.c_size_t(1), None)
+print("alive", max((status for status, _ in plant.messages), default=None))
 """
 
 
@@ -173,7 +175,7 @@ print("alive", max(status for status, _ in plant.messages))
 def test_misuse_never_kills_the_process(fmus: dict[str, Path], name: str) -> None:
     root = Path(__file__).parents[1]
     run = subprocess.run(
-        [sys.executable, "-c", MISUSE, str(fmus[name])],
+        [sys.executable, "-c", MISUSE, str(fmus[name]), "launcher"],
         cwd=root,
         capture_output=True,
         text=True,
@@ -181,6 +183,41 @@ def test_misuse_never_kills_the_process(fmus: dict[str, Path], name: str) -> Non
         check=False,
     )
     assert (run.returncode, run.stdout) == (0, "alive 3\n"), run.stderr[-500:]
+
+
+@pytest.fixture(scope="module")
+def stock(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The plant as it is built where no compiler is found: with PythonFMU's own library."""
+    folder = tmp_path_factory.mktemp("stock")
+    code = "from orchestrator.fmi.build import *; ensure_built(['Drivetrain'], Path('.'))"
+    environment = {"PATH": str(folder), "PYTHONPATH": str(Path(__file__).parents[1])}
+    subprocess.run([sys.executable, "-c", code], cwd=folder, env=environment, check=True)
+    return folder / "Drivetrain.fmu"
+
+
+def test_without_a_compiler_the_fmu_still_refuses_and_runs_in_python_hosts(stock: Path, fmus: dict[str, Path]) -> None:
+    with zipfile.ZipFile(stock) as archive:
+        assert len([name for name in archive.namelist() if name.startswith("binaries/linux64")]) == 1
+    root = Path(__file__).parents[1]
+    run = subprocess.run(
+        [sys.executable, "-c", MISUSE, str(stock), "stock"],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert (run.returncode, run.stdout) == (0, "alive None\n"), run.stderr[-500:]
+    ends = []
+    for raw in (RawFmu(stock), RawFmu(fmus["Drivetrain"])):
+        c = raw.started(alpha=0.02)
+        assert raw.step(c, 0.5, 1e-3) == DISCARD
+        for n in range(200):
+            raw.set_real(c, ["u"], [30.0])
+            assert raw.step(c, n * 1e-3, 1e-3) == OK
+        ends.append(raw.get_real(c, ["theta_m", "theta_l", "T_shaft"]))
+        raw.library.fmi2FreeInstance(c)
+    assert ends[0] == ends[1]
 
 
 # --- Hosts without Python ----------------------------------------------------------------------------------------
