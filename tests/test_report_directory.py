@@ -94,7 +94,8 @@ def test_the_page_of_a_pair_shades_the_time_out_of_contact(tmp_path):
     assert difference.series[0].y == [0.0, 0.5, 1.5, 2.5, 2.5]
 
 
-def test_the_page_of_a_scenario_groups_signals_by_unit(tmp_path):
+@pytest.mark.parametrize("command", ["simulate", "ssp"])
+def test_the_page_of_a_scenario_groups_signals_by_unit(tmp_path, command):
     head = ("signal", "unit", "first", "last", "smallest", "largest")
     rows = [
         ("a.x", "rad", "0", "1", "0", "1"),
@@ -102,8 +103,8 @@ def test_the_page_of_a_scenario_groups_signals_by_unit(tmp_path):
         ("b.x", "rad", "0", "1", "0", "1"),
     ]
     signals = [dict(zip(head, row, strict=True)) for row in rows]
-    write_result(tmp_path, "simulate", {"scenario": "s.toml"}, None, {"signals": signals, "steps": 1})
-    (tmp_path / "simulate.csv").write_text("time,a.x,a.v,b.x\n0,0,0,0\n1,1,1,1\n")
+    write_result(tmp_path, command, {"scenario": "s.toml"}, None, {"signals": signals, "steps": 1})
+    (tmp_path / f"{command}.csv").write_text("time,a.x,a.v,b.x\n0,0,0,0\n1,1,1,1\n")
     plots = sections(report_from_directory(tmp_path), Plot)
     assert [[s.name for s in p.series] for p in plots] == [["a.x", "b.x"], ["a.v"]]
 

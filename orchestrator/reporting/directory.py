@@ -15,6 +15,7 @@ _BUILDERS: dict[str, Callable[[Source], Report]] = {
     "check": check.build,
     "diagnose": diagnose.build,
     "simulate": simulate.build,
+    "ssp": simulate.build,
     "sweep": sweep.build,
     "thesis": thesis.build,
 }

@@ -1,9 +1,10 @@
-"""The page of ``simulate``: the paired loops, or any scenario's signals, against time."""
+"""The pages of ``simulate`` and ``ssp``: the paired loops, or any system's signals, against time."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.reporting.model import Cell, Facts, Plot, Report, Section, Series, Span
+from orchestrator.reporting.pages import generic
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import Source, numbers
 
@@ -13,8 +14,10 @@ Columns = Mapping[str, list[Cell]]
 
 def build(source: Source) -> Report:
     """Return the page."""
-    table = source.columns("simulate.csv")
+    table = source.columns(f"{source.command}.csv")
     results = source.results
+    if not table:
+        return generic.build(source)
     sections, summary = _pair(results, table) if "alpha" in results else _scenario(results, table)
     return Report("Simulation", summary, tuple(sections), None, source.origin(), source.downloads())
 
