@@ -124,7 +124,7 @@ def _friction(site: str) -> tuple[Effect, Effect]:
     def refine(values: dict[str, float], scene: Scene) -> tuple[dict[str, float], ...]:
         level = values["torque"]
         common = {"coulomb": 0.9 * level, "breakaway": 1.7 * level, "presliding": values["presliding"]}
-        return tuple(common | {"stribeck_speed": f * rms(scene)} for f in (0.03, 0.12, 0.4))
+        return tuple(common | {"stribeck_speed": f * rms(scene)} for f in (0.04, 0.25))
 
     def falls(values: dict[str, float]) -> bool:
         return values["breakaway"] > 1.02 * values["coulomb"] > 0.0

@@ -178,5 +178,5 @@ def _case(
     kind: str, seed: int, effects: dict[str, float], right: tuple[tuple[str, ...], ...], excitation: str,
     duration: float, ratio: float = 0.0,
 ) -> Case:  # fmt: skip
-    _, truth = make_record(effects, seed, duration, excitation=excitation)
+    columns, truth = make_record(effects, seed, duration, excitation=excitation)
     return Case(kind, seed, record_from_columns(columns, f"{kind}-{seed}"), truth, right, ratio)
