@@ -16,8 +16,8 @@ from orchestrator.checking.rules import RULES
 from orchestrator.checking.sandbox import Ending, Limits, run_child
 
 PROBES = (
-    "life cycle", "inputs", "determinism", "instances", "reset", "state", "variable steps", "reference", "memory",
-    "misuse",
+    "life cycle", "inputs", "determinism", "setting", "instances", "reset", "state", "variable steps", "reference",
+    "memory", "misuse",
 )  # fmt: skip
 _STEPS = 200
 _MOST_FINDINGS = 10_000

@@ -132,6 +132,7 @@ run.input-refused | W | inputs within their bounds are accepted | state the boun
 value.not-finite | E | outputs are finite | look for a division by zero or a missing initialisation
 value.out-of-range | W | outputs stay within min and max | correct the bounds or the model
 value.start | W | start values of the XML are those of the binary | generate both from one source
+value.set | E | start values can be set before initialisation, and change nothing | accept what the XML says can be set
 value.string | E | strings are not null | return "" instead
 instances.second | E | a second instance can be made | set canBeInstantiatedOnlyOncePerProcess, or remove global state
 instances.interference | E | instances do not influence one another | move global variables into the instance

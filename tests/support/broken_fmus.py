@@ -49,6 +49,8 @@ BEHAVIOURS = {
     "reset_incomplete": "run.reset",
     "serialised_empty": "state.status",
     "serialised_incomplete": "state.serialise",
+    "set_has_effect": "value.set",
+    "set_refused": "value.set",
     "shared_state": "instances.interference",
     "slow_physics": "reference.result",
     "spin_step": "limits.time",

@@ -242,6 +242,12 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 #ifdef FAULT_input_refused
         if (vr[i] == VR_FORCE && value[i] != 0.0) return refuse(self, "force cannot be set");
 #endif
+#ifdef FAULT_set_refused
+        if (vr[i] == VR_STIFFNESS) return refuse(self, "stiffness cannot be set");
+#endif
+#ifdef FAULT_set_has_effect
+        if (vr[i] == VR_V) s->x += 0.01;
+#endif
         if (vr[i] == VR_FORCE) s->force = value[i];
         else if (vr[i] == VR_DAMPING) s->damping = value[i];
         else if (vr[i] == VR_STIFFNESS && before) s->stiffness = value[i];

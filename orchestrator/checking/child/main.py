@@ -13,6 +13,7 @@ PROBES: dict[str, probes.Probe] = {
     "life cycle": probes.life_cycle,
     "inputs": probes.inputs,
     "determinism": probes_compare.determinism,
+    "setting": probes.setting,
     "instances": probes_compare.instances,
     "reset": probes_compare.reset,
     "state": probes_compare.state,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from orchestrator.checking.child.binding import Library, Slave, StatusError, TerminatedError, finite
-from orchestrator.checking.child.trajectory import Bench, Variable, excitation
+from orchestrator.checking.child.trajectory import Bench, Variable, excitation, first_difference
 
 _LEAK_PER_INSTANCE = 256 * 1024
 _LEAK_PER_STEP = 8 * 1024
@@ -142,6 +142,33 @@ def inputs(context: Context) -> bool:
     with bench.instance() as slave:
         context.trace = bench.run(slave)
     return True
+
+
+def setting(context: Context) -> bool:
+    """Set everything that can be set to its start value before initialisation: accepted, and without effect."""
+    bench, job = context.bench, context.bench.job
+    settable = [v for v in job.variables if _settable(v)]
+    difference = None
+    with bench.instance(initialised=False) as slave:
+        for v in settable:
+            value = v.start.encode() if v.base == "String" else v.start
+            try:
+                slave.set(v.base, [v.reference], [value], f"for `{v.name}`, set to its start value,")
+            except StatusError as error:
+                context.report("value.set", str(error), v.name)
+                return True
+        if context.trace is not None:
+            bench.initialise(slave)
+            difference = first_difference(context.trace, bench.run(slave), context.names)
+    if difference is not None:
+        message = f"to set the start values of the XML must change nothing, but {difference}"
+        context.report("value.set", message)
+    return True
+
+
+def _settable(v: Variable) -> bool:
+    """Whether the standard allows to set the variable before initialisation."""
+    return v.start is not None and v.variability != "constant" and (v.initial == "exact" or v.causality == "input")
 
 
 def memory(context: Context) -> bool:
