@@ -18,3 +18,9 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
         table.add_row(*row)
     console = Console(file=sys.stdout, width=None if sys.stdout.isatty() else PIPE_WIDTH, highlight=False, markup=False)
     console.print(table)
+
+
+def say(text: str) -> None:
+    """Tell a person at a terminal what takes time; say nothing in a pipe."""
+    if sys.stderr.isatty():
+        sys.stderr.write(f"{text} ...\n")

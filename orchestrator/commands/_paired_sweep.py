@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.commands._console import print_table
+from orchestrator.commands._console import print_table, say
 from orchestrator.commands._experiment import chosen_experiment
 from orchestrator.commands._progress import swept
 from orchestrator.engine import DesignCases, Row, Status, Sweep
@@ -37,9 +37,10 @@ def run_paired_sweep(arguments: argparse.Namespace) -> int:
     )
     cases = plan.cases()
     with staged(arguments.out) as directory:
+        say("preparing FMUs, compiled loop and calibration (the first time takes half a minute)")
         fmus = ensure_built(FMUS)
         check_parameters(loop_system(plan.experiment, fmus, (MACHINE,)), cases, OWN_PARAMETERS)
-        calibrations = plan.calibrations()
+        calibrations = plan.calibrations(say)
         with swept(cases, sweep_work(plan, fmus, calibrations), arguments, directory) as (sweep, results):
             arrays = gather(sweep.rows())
             statistics = arrays.statistics()

@@ -127,7 +127,7 @@ def load_or_calibrate(experiment: Experiment, progress: Callable[[str], None] | 
         except msgspec.DecodeError:
             path.unlink()
     if progress is not None:
-        progress(f"calibrating the {experiment.name} experiment")
+        progress(f"calibrating the {experiment.name} experiment at encoder noise {experiment.encoder_noise:g} rad")
     calibration = calibrate(experiment)
     write_text(path, msgspec.json.format(msgspec.json.encode(calibration), indent=1).decode())
     return calibration

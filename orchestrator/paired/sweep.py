@@ -3,7 +3,7 @@
 The twin without a gap has no noise and is the same for every case, so each worker process runs it once.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -95,13 +95,13 @@ class SweepPlan:
             return "random:{}:{}".format(*THESIS_RANGE), count
         return f"lograndom:{self.experiment.smallest}:{self.experiment.largest}", count
 
-    def calibrations(self) -> dict[float, Calibration]:
-        """Return the calibration of each noise level.
+    def calibrations(self, progress: Callable[[str], None] | None = None) -> dict[float, Calibration]:
+        """Return the calibration of each noise level; ``progress`` is told of those that must be made.
 
         Raises:
             CalibrationError: S is not monotone for this experiment.
         """
-        return {level: load_or_calibrate(with_settings(self.experiment, noise=level)) for level in self.noise}
+        return {level: load_or_calibrate(with_settings(self.experiment, noise=level), progress) for level in self.noise}
 
 
 def sweep_work(plan: SweepPlan, fmus: Mapping[str, Path], calibrations: Mapping[float, Calibration]) -> Work:
