@@ -8,7 +8,7 @@ import pytest
 from orchestrator.checking.check import check_fmu
 from orchestrator.checking.rules import RULES
 from tests.support.broken_fmus import QUICK, Broken, corpus, good
-from tests.support.c_fmu import fmu_files, have_compiler, write_fmu
+from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
@@ -51,6 +51,11 @@ def test_what_the_flags_do_not_promise_is_not_asked_for(behaviour: str, old: str
     report = check_fmu(path, QUICK)
     assert report.findings == ()
     assert report.executed
+
+
+def test_an_fmu_that_writes_to_our_pipe_forges_no_finding(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "forged_messages"), QUICK)
+    assert report.findings == ()
 
 
 def test_the_corpus_is_large_and_covers_the_rules() -> None:

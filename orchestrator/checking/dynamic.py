@@ -97,15 +97,16 @@ class _Watcher:
         """Take in a message. The FMU might write to the same pipe, so nothing is taken for granted."""
         try:
             message = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             return
         if not isinstance(message, dict):
             return
         self.probe = str(message.get("probe", self.probe))
         self.stopped = str(message.get("stopped", self.stopped))
         self.done = self.done or bool(message.get("done"))
-        if message.get("rule") in RULES and len(self.findings) < _MOST_FINDINGS:
-            self._add(str(message["rule"]), str(message.get("message")), str(message.get("path", "")))
+        rule = str(message.get("rule"))
+        if rule in RULES and len(self.findings) < _MOST_FINDINGS:
+            self._add(rule, str(message.get("message")), str(message.get("path", "")))
 
     def _add(self, rule: str, message: str, path: str = "") -> None:
         self.findings.append(Finding(rule, path or f"({self.probe})", message))

@@ -81,6 +81,19 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
     FILE *file = self->s.steps ? NULL : fopen(path, "w");
     if (file) { fputs("a file nobody asked for\n", file); fclose(file); }
 #endif
+#ifdef FAULT_forged_messages
+    if (self->s.steps == 0) {
+        static char deep[100001];
+        const char *lines[] = {"[1]\n", "{\"rule\": []}\n", "{\"rule\": \"no.such\"}\n", "\xff\xfe\n", "7\n", "\n"};
+        memset(deep, '[', 100000);
+        deep[100000] = '\n';
+        for (int fd = 3; fd < 8; fd++) {
+            for (size_t i = 0; i < sizeof lines / sizeof *lines; i++)
+                if (write(fd, lines[i], strlen(lines[i])) < 0) break;
+            if (write(fd, deep, sizeof deep) < 0) continue;
+        }
+    }
+#endif
 #ifdef FAULT_orphan
     if (self->s.steps == 0 && fork() == 0) { sleep(60); _exit(0); }
 #endif
