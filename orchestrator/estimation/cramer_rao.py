@@ -7,8 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import ALPHA, STATE_NAMES, Fit, Likelihood, Problem, inverse
+from orchestrator.estimation.likelihood import ALPHA, STATE_NAMES, Fit, Likelihood, Problem, inverse, make_problem
+from orchestrator.model_file import Model
+from orchestrator.record import Record
 
+MODEST_TORQUE_NOISE = 1e-2  # N.m.s^0.5, where no fit has told
 NOISE_PREFIXES = ("log_noise_", "log_torque_")
 
 
@@ -63,3 +66,10 @@ def refined_information(likelihood: Likelihood, theta: Array, free: NDArray[np.i
 def truth_values(linear: Mapping[str, float], alpha: float, state: Array) -> dict[str, float]:
     """Return true values by the names of the unknowns: linear parameters, alpha and initial state (5,)."""
     return {**linear, ALPHA: alpha, **dict(zip(STATE_NAMES, map(float, state), strict=True))}
+
+
+def bound_at(record: Record, model: Model, alpha: float) -> float:
+    """Return the bound [rad] for a half-gap ``alpha`` on a record, for the nominal plant and modest torque noise."""
+    problem = make_problem(record, model)
+    noise = problem.noise.measured
+    return bound(problem, {ALPHA: alpha}, noise, MODEST_TORQUE_NOISE)

@@ -1,0 +1,199 @@
+"""``estimate``: the gap, with interval, from a measured record; or the excitation that would show it."""
+
+import argparse
+import csv
+import math
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from scipy.stats import chi2
+
+from orchestrator.commands._console import print_table
+from orchestrator.errors import RecordError, ScenarioError
+from orchestrator.estimation import cramer_rao
+from orchestrator.estimation.design import Limits, design
+from orchestrator.estimation.protocol import LEVEL, METHODS, Estimate, NotApplicableError, estimator
+from orchestrator.model_file import Model, read_model
+from orchestrator.output import staged, write_result
+from orchestrator.record import Record, read_record
+from orchestrator.record_plausibility import check_plausible
+from orchestrator.reporting import write_report
+
+DEFAULT_METHOD = "maximum_likelihood"
+UNSEEN = 1.0  # rad, bound from which on a record says nothing
+HEAD = ("method", "half-gap [rad]", "standard error", "Cramer-Rao", "95 % interval", "s")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.add_argument("record", type=Path, nargs="?", metavar="DATA.csv", help="record: time,u,theta_m[,theta_l]")
+    parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the model it is compared with")
+    listed = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
+    parser.add_argument(
+        "--method", choices=[*METHODS, "all"], default=DEFAULT_METHOD, help=f"{listed} (default: %(default)s)"
+    )
+    parser.add_argument("--motor-only", action="store_true", help="leave the load encoder out")
+    group = parser.add_argument_group("design of an experiment")
+    group.add_argument("--design", action="store_true", help="propose a torque record that shows the gap best")
+    group.add_argument(
+        "--size", type=float, metavar="RAD", help="half-gap to be seen (default: 0.005, or the estimate)"
+    )
+    group.add_argument("--torque-limit", type=float, default=250.0, metavar="N.m", help="default: %(default)g")
+    group.add_argument("--speed-limit", type=float, default=50.0, metavar="RAD/S", help="motor speed (%(default)g)")
+    group.add_argument("--duration", type=float, default=10.0, metavar="S", help="of the proposal (%(default)g)")
+    group.add_argument("--rate", type=float, default=200.0, metavar="HZ", help="samples per second (%(default)g)")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Estimate or design, print tables, write JSON, CSV, figures and report."""
+    if args.record is None and not args.design:
+        raise RecordError("a record must be given, unless --design is")
+    model = read_model(args.model)
+    _require_linear(model)
+    results: dict[str, Any] = {}
+    estimates: list[Estimate] = []
+    record = None
+    if args.record is not None:
+        record = read_record(args.record, model.columns)
+        record = record.without_load_encoder() if args.motor_only else record
+        check_plausible(record, model)
+        names = list(METHODS) if args.method == "all" else [args.method]
+        estimates, results = _estimate(record, model, names)
+    with staged(args.out) as directory:
+        if record is not None:
+            _draw(directory, record, estimates, model)
+        if args.design:
+            size = args.size or next((e.alpha for e in estimates if e.visible and e.alpha > 0.0), 0.005)
+            results["design"] = _design(directory, args, model, size)
+        given = {k: str(v) if isinstance(v, Path) else v for k, v in vars(args).items() if k not in ("run", "command")}
+        write_result(directory, "estimate", given, None, results)
+        write_report(directory, "estimate")
+    sys.stdout.write(f"Written to {args.out}\n")
+    return 0
+
+
+def _require_linear(model: Model) -> None:
+    """Refuse models that the estimators would not see whole."""
+    if model.fmu != "Drivetrain":
+        raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain to have a gap, but is {model.fmu}")
+    for name, entry in model.parameters.items():
+        active = name.startswith("effects.") and name.rsplit(".", 1)[1] in (
+            "delay", "amplitude", "coulomb", "breakaway", "cubic", "coefficient", "inertia"
+        )  # fmt: skip
+        active = active or (name.startswith("effects.coulomb") and name.endswith("torque"))
+        if active and (entry.value != 0.0 or entry.uncertainty > 0.0):
+            raise ScenarioError(
+                f"{model.source}: `estimate` fits the plant without nonlinear effects, but `{name}` is "
+                f"{entry.value:g}; `diagnose` fits the gap together with them"
+            )
+
+
+def _estimate(record: Record, model: Model, names: list[str]) -> tuple[list[Estimate], dict[str, Any]]:
+    """Run the methods, print their table and messages, and return estimates and results."""
+    estimates, rows, table = [], [], {}
+    with _progress(len(names)) as advance:
+        for name in names:
+            begun = time.perf_counter()
+            try:
+                estimate = estimator(name)(record, model)
+            except NotApplicableError as error:
+                rows.append([name, "not applicable", "", "", str(error), ""])
+                table[name] = {"not_applicable": str(error)}
+            else:
+                estimates.append(estimate)
+                seconds = time.perf_counter() - begun
+                bound = _bound(record, model, estimates)
+                rows.append(_row(estimate, bound, seconds))
+                table[name] = _entry(estimate, bound, seconds)
+            advance()
+    length = f"{record.duration:g} s at {1.0 / record.step:g} Hz"
+    print_table(f"{record.source}: {length}, {'one encoder' if record.theta_l is None else 'two encoders'}", HEAD, rows)
+    for estimate in estimates:
+        if estimate.message:
+            sys.stdout.write(f"{estimate.method}: {estimate.message}\n")
+    results: dict[str, Any] = {"record": {"rows": record.size, "step": record.step, "source": record.source}}
+    results["estimates"] = table
+    if estimates:
+        results |= table[estimates[0].method] | {"method": estimates[0].method}
+    return estimates, results
+
+
+def _bound(record: Record, model: Model, estimates: list[Estimate]) -> float:
+    """Return the record's Cramer-Rao bound: at the fit of the likelihood, or else at the newest estimate."""
+    for estimate in estimates:
+        if "cramer_rao" in estimate.diagnostics:
+            return float(estimate.diagnostics["cramer_rao"])
+    bound = cramer_rao.bound_at(record, model, estimates[-1].alpha)
+    return bound if bound < UNSEEN else math.inf
+
+
+def _row(estimate: Estimate, bound: float, seconds: float) -> list[str]:
+    low, high = estimate.interval
+    numbers = [f"{estimate.alpha:.6g}", f"{estimate.standard_error:.2g}", f"{bound:.2g}"]
+    return [estimate.method, *numbers, f"{low:.6g} to {high:.6g}", f"{seconds:.1f}"]
+
+
+def _entry(estimate: Estimate, bound: float, seconds: float) -> dict[str, Any]:
+    return {
+        "alpha": estimate.alpha,
+        "standard_error": estimate.standard_error,
+        "cramer_rao": bound,
+        "interval": list(estimate.interval),
+        "level": LEVEL,
+        "unit": "rad",
+        "visible": estimate.visible,
+        "message": estimate.message,
+        "seconds": seconds,
+        "diagnostics": dict(estimate.diagnostics),
+    }
+
+
+def _draw(directory: Path, record: Record, estimates: list[Estimate], model: Model) -> None:
+    from orchestrator.estimation.figures import draw_fit, draw_online, draw_profile
+
+    for estimate in estimates:
+        if estimate.method == "maximum_likelihood":
+            fitted = estimate.diagnostics["parameters"].get("i", {}).get("value", model.parameters["i"].value)
+            draw_fit(directory / "estimate_fit.png", record, estimate, fitted)
+            limit = float(chi2.ppf(LEVEL, 1))
+            draw_profile(directory / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
+        elif estimate.method == "ekf":
+            draw_online(directory / "estimate_online.png", record, estimate)
+
+
+def _design(directory: Path, args: argparse.Namespace, model: Model, size: float) -> list[dict[str, Any]]:
+    """Choose an excitation, print the candidates, write the record to run."""
+    from orchestrator.estimation.figures import draw_design
+
+    limits = Limits(args.torque_limit, args.speed_limit)
+    with _progress(None) as advance:
+        grid, candidates = design(model, size, limits, args.duration, args.rate, lambda done, total: advance())
+    rows = [[c.name, f"{c.bound:.2g}", f"{c.torque:.4g}", f"{c.speed:.4g}"] for c in candidates]
+    head = ("excitation", "bound on the half-gap [rad]", "peak torque [N.m]", "peak motor speed [rad/s]")
+    print_table(f"To see a half-gap of {size:g} rad in {args.duration:g} s", head, rows)
+    with (directory / "design.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(("time", "u"))
+        writer.writerows((f"{t:.9g}", f"{u:.6g}") for t, u in zip(grid.tolist(), candidates[0].u.tolist(), strict=True))
+    draw_design(directory / "design.png", grid, candidates[0])
+    return [
+        {"name": c.name, "bound": c.bound, "peak_torque": c.torque, "peak_motor_speed": c.speed}
+        for c in candidates
+        if math.isfinite(c.bound)
+    ]
+
+
+@contextmanager
+def _progress(total: int | None) -> Iterator[Any]:
+    """Show a bar on a terminal; yield what is to be called after each piece of work."""
+    console = Console(file=sys.stderr)
+    columns = (TextColumn("estimating"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda: bar.advance(task)

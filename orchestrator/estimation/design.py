@@ -1,0 +1,126 @@
+"""Which torque record would show the gap best, within limits of torque and speed.
+
+Each candidate (square pulses and multisines of several paces) is scaled until torque or motor speed meets its limit on
+the nominal plant; the one with the least Cramer-Rao bound on alpha wins. The bound allows for some torque noise, since
+a bound for a perfect model would reward excitations that only a perfect model can use.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.errors import DesignError
+from orchestrator.estimation import cramer_rao
+from orchestrator.estimation.innovations import Array, affine_model, simulate
+from orchestrator.estimation.likelihood import make_problem
+from orchestrator.model_file import Model
+from orchestrator.record import Record
+from pyfmu_sources.drivetrain_parameters import P_ALPHA
+
+TORQUE_NOISE = 1e-2  # N.m.s^0.5
+DEFAULT_NOISE = (3.5e-4, 1.75e-4)  # rad
+PULSE_PERIODS = (0.3, 0.5, 0.8, 1.2, 2.0, 3.0)  # s
+BANDS = (1.0, 2.0, 4.0, 8.0)  # Hz
+SEED = 20
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the machine may be asked for: requested torque [N.m] and motor speed [rad/s]."""
+
+    torque: float = 250.0
+    speed: float = 50.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One excitation: its name, torque request (n,) [N.m], bound on alpha [rad], peak torque and motor speed."""
+
+    name: str
+    u: Array
+    bound: float
+    torque: float
+    speed: float
+
+
+def design(
+    model: Model,
+    alpha: float,
+    limits: Limits,
+    duration: float = 10.0,
+    rate: float = 200.0,
+    tell: Callable[[int, int], None] | None = None,
+) -> tuple[Array, list[Candidate]]:
+    """Return the time grid (n,) [s] and all candidates, the best first.
+
+    Args:
+        model: plant and encoders.
+        alpha: half-gap that shall be measured, or the smallest that shall be seen [rad].
+        limits: of torque and speed.
+        duration: of the record [s].
+        rate: samples per second.
+        tell: called with candidates done and in all.
+
+    Raises:
+        DesignError: limits, size, duration or rate are not positive, or the record would be too short or too long.
+    """
+    for name, value in (("torque", limits.torque), ("speed", limits.speed), ("alpha", alpha), ("rate", rate)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise DesignError(f"`{name}` must be a positive finite number, but is {value:g}")
+    n = round(duration * rate)
+    if not 200 <= n <= 200_000:
+        raise DesignError(f"`duration` times `rate` must be 200 to 200000 samples, but is {duration * rate:g}")
+    time = np.arange(n) / rate
+    shapes = [(f"square pulses, period {period:g} s", _pulses(time, period)) for period in PULSE_PERIODS]
+    shapes += [(f"multisine to {top:g} Hz", _multisine(time, top)) for top in BANDS]
+    candidates = []
+    for k, (name, shape) in enumerate(shapes):
+        candidates.append(_judge(name, shape, time, model, alpha, limits))
+        if tell is not None:
+            tell(k + 1, len(shapes))
+    return time, sorted(candidates, key=lambda candidate: candidate.bound)
+
+
+def _pulses(time: Array, period: float) -> Array:
+    """Return square pulses of alternating sign; the first half pulse keeps the mean speed at zero."""
+    return np.where(np.floor(2.0 * (time + 0.25 * period) / period) % 2 == 0, 1.0, -1.0)
+
+
+def _multisine(time: Array, top: float) -> Array:
+    """Return a random-phase multisine from 0.2 Hz to ``top`` [Hz] with amplitudes that make up for the motor's lag."""
+    rng = np.random.default_rng(SEED)
+    step = time[1] - time[0]
+    frequency = np.fft.rfftfreq(time.size, step)
+    amplitude = np.where((frequency >= 0.2) & (frequency <= top), np.sqrt(1.0 + frequency**2), 0.0)
+    wave = np.fft.irfft(amplitude * np.exp(2j * np.pi * rng.random(frequency.size)), time.size)
+    return np.asarray(wave / np.max(np.abs(wave)))
+
+
+def _judge(name: str, shape: Array, time: Array, model: Model, alpha: float, limits: Limits) -> Candidate:
+    values = list(model.values)
+    values[P_ALPHA] = alpha
+    plant = affine_model(tuple(values))
+    step = float(time[1] - time[0])
+    scale = limits.torque / float(np.max(np.abs(shape)))
+    states = simulate(plant, scale * shape, step, np.zeros(5))
+    for _ in range(6):
+        fastest = float(np.max(np.abs(states[:, 1])))
+        if fastest <= limits.speed:
+            break
+        scale *= 0.98 * limits.speed / fastest
+        states = simulate(plant, scale * shape, step, np.zeros(5))
+    u = np.round(scale * shape, 4)
+    record = Record(time, u, states[:, 0].copy(), states[:, 2].copy(), name)
+    noise = tuple(_noise(model, column, k) for k, column in enumerate(("theta_m", "theta_l")))
+    truth = cramer_rao.truth_values({}, alpha, np.zeros(5))
+    bound = cramer_rao.bound(make_problem(record, model), truth, (noise[0], noise[1]), TORQUE_NOISE)
+    return Candidate(name, u, bound, float(np.max(np.abs(u))), float(np.max(np.abs(states[:, 1]))))
+
+
+def _noise(model: Model, column: str, place: int) -> float:
+    encoder = model.encoder(column)
+    if encoder.noise is None and encoder.resolution is None:
+        return DEFAULT_NOISE[place]
+    return max(math.hypot(encoder.noise or 0.0, (encoder.resolution or 0.0) / math.sqrt(12.0)), 1e-9)

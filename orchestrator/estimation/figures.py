@@ -1,0 +1,116 @@
+"""Figures of an estimate, drawn with matplotlib's object interface (no global state, no display)."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from orchestrator.estimation.design import Candidate
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.maximum_likelihood import Profile
+from orchestrator.estimation.protocol import Estimate
+from orchestrator.record import Record
+
+BLUE, ORANGE, GREY, SHADE = "#2166ac", "#d6604d", "#555555", "#f4d58d"
+DPI = 130
+SHOWN_SECONDS = 4.0
+
+
+def _figure(rows: int, size: tuple[float, float]) -> tuple[Figure, list]:
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, list(np.atleast_1d(figure.subplots(rows, 1, sharex=rows > 1)))
+
+
+def draw_fit(path: Path, record: Record, estimate: Estimate, ratio: float) -> None:
+    """Draw record against fitted model over the liveliest seconds, time in the gap shaded, and the innovations."""
+    states, contacts, errors = (estimate.curves[name] for name in ("states", "contacts", "errors"))
+    span = _liveliest(record, contacts)
+    t = record.time[span]
+    figure, axes = _figure(3, (9.0, 7.5))
+    fitted = 1e3 * (states[span, 0] / ratio - states[span, 2])
+    if record.theta_l is not None:
+        measured = record.theta_m / ratio - record.theta_l + estimate.curves["offset"]
+        axes[0].plot(t, 1e3 * measured[span], ".", markersize=2.5, color=GREY, label="record")
+    axes[0].plot(t, fitted, color=BLUE, linewidth=1.2, label="fitted model")
+    for sign in (-1.0, 1.0):
+        axes[0].axhline(sign * 1e3 * estimate.alpha, color=ORANGE, linewidth=0.8, linestyle="--")
+    axes[0].set_ylabel("twist [mrad]")
+    axes[0].set_title(f"half-gap {estimate.alpha:.5g} rad; dashed: its flanks")
+    axes[1].plot(t, record.theta_m[span], ".", markersize=2.5, color=GREY, label="motor, record")
+    axes[1].plot(t, states[span, 0], color=BLUE, linewidth=1.0, label="motor, fitted")
+    axes[1].set_ylabel("motor angle [rad]")
+    for n, name in enumerate(("motor", "load")[: errors.shape[1]]):
+        axes[2].plot(t, 1e3 * errors[span, n], linewidth=0.7, color=(BLUE, ORANGE)[n], label=f"{name} encoder")
+    axes[2].set_ylabel("one-step error [mrad]")
+    axes[2].set_xlabel("time [s]")
+    for axis in axes:
+        _shade(axis, t, contacts[span])
+        axis.legend(loc="upper right", fontsize=8)
+        axis.grid(alpha=0.25)
+        axis.margins(x=0.0)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def _liveliest(record: Record, contacts: Array) -> slice:
+    """Return the rows of the ``SHOWN_SECONDS`` in which the flank changes most."""
+    width = min(record.size, round(SHOWN_SECONDS / record.step))
+    changes = np.concatenate([[0], np.cumsum(np.diff(contacts) != 0)])
+    counts = changes[width - 1 :] - changes[: record.size - width + 1]
+    start = int(np.argmax(counts))
+    return slice(start, start + width)
+
+
+def _shade(axis, time: Array, contacts: Array) -> None:  # type: ignore[no-untyped-def]
+    free = np.concatenate([[False], contacts == 0, [False]])
+    edges = np.flatnonzero(free[1:] != free[:-1])
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        axis.axvspan(time[first], time[min(last, time.size - 1)], color=SHADE, alpha=0.6, linewidth=0.0)
+
+
+def draw_profile(path: Path, profile: Profile, estimate: Estimate, limit: float) -> None:
+    """Draw the profile likelihood with the interval that it gives."""
+    figure, (axis,) = _figure(1, (6.5, 4.2))
+    axis.plot(profile.alpha, profile.drop, "o-", color=BLUE, markersize=4)
+    axis.axhline(limit, color=GREY, linestyle="--", linewidth=0.9, label="95 % limit")
+    low, high = estimate.interval
+    axis.axvspan(low, high if math.isfinite(high) else float(profile.alpha[-1]), color=ORANGE, alpha=0.18)
+    axis.axvline(estimate.alpha, color=ORANGE, linewidth=1.0, label=f"estimate {estimate.alpha:.6g} rad")
+    axis.set_xlabel("half-gap [rad]")
+    axis.set_ylabel("twice the drop of the log likelihood")
+    axis.set_ylim(bottom=0.0, top=max(2.0 * limit, 1.0))
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.25)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def draw_online(path: Path, record: Record, estimate: Estimate) -> None:
+    """Draw the online estimate over time with its 95 % band."""
+    figure, (axis,) = _figure(1, (8.0, 4.2))
+    alpha, deviation = estimate.curves["alpha"], estimate.curves["deviation"]
+    axis.fill_between(
+        record.time, np.maximum(alpha - 1.96 * deviation, 0.0), alpha + 1.96 * deviation, color=BLUE, alpha=0.25,
+        linewidth=0.0, label="95 % band",
+    )  # fmt: skip
+    axis.plot(record.time, alpha, color=BLUE, linewidth=1.2, label="online estimate")
+    axis.set_xlabel("time [s]")
+    axis.set_ylabel("half-gap [rad]")
+    axis.set_ylim(0.0, max(2.5 * float(alpha[-1]), 1e-4))
+    axis.margins(x=0.0)
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.25)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def draw_design(path: Path, time: Array, best: Candidate) -> None:
+    """Draw the proposed torque record."""
+    figure, (axis,) = _figure(1, (8.0, 3.6))
+    axis.step(time, best.u, where="post", color=BLUE, linewidth=0.9)
+    axis.set_xlabel("time [s]")
+    axis.set_ylabel("requested torque [N.m]")
+    axis.set_title(f"{best.name}: standard error of the half-gap at least {best.bound:.2g} rad")
+    axis.grid(alpha=0.25)
+    axis.margins(x=0.0)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
