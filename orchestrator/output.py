@@ -1,5 +1,6 @@
 """Result directories that are written whole or not at all."""
 
+import errno
 import json
 import math
 import os
@@ -12,6 +13,8 @@ from typing import Any
 
 from orchestrator import __version__
 from orchestrator.errors import OutputError
+
+DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by writes, which name no file
 
 
 @contextmanager
@@ -37,7 +40,7 @@ def staged(directory: Path) -> Iterator[Path]:
         yield staging
         _publish(staging, directory)
     except OSError as error:
-        if error.filename is not None and str(staging) in str(error.filename):
+        if error.errno in DISK_ERRORS or (error.filename is not None and str(staging) in str(error.filename)):
             raise OutputError(f"cannot write to {directory}: {error.strerror}") from None
         raise
     finally:
