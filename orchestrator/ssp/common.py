@@ -14,6 +14,7 @@ SPACES = {
     "ssc": BASE + "SystemStructureCommon",
     "ssm": BASE + "SystemStructureParameterMapping",
     "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
 }
 SCHEMAS = {
     "ssd": "SystemStructureDescription.xsd",
@@ -22,6 +23,9 @@ SCHEMAS = {
 }
 OSP = "com.opensimulationplatform"
 """Type of the annotation in which libcosim looks for the communication step; others pass over it."""
+
+OMS = "org.openmodelica"
+"""Type of the annotation without which OMSimulator does not know that a system is co-simulated."""
 
 STRUCTURE = "SystemStructure.ssd"
 EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")

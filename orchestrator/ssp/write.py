@@ -12,7 +12,7 @@ from orchestrator.master.protocol import Unit, Value, Variable
 from orchestrator.master.signals import Constant
 from orchestrator.master.system import Connection, Instance, System, split
 from orchestrator.scenario import Scenario
-from orchestrator.ssp.common import EXPONENTS, OSP, SPACES, STRUCTURE, require_valid, tag
+from orchestrator.ssp.common import EXPONENTS, OMS, OSP, SPACES, STRUCTURE, require_valid, tag
 
 DATE = "2026-01-01T00:00:00Z"
 """Date in the files' metadata: fixed, so that the same system gives the same bytes."""
@@ -77,7 +77,7 @@ def _start_values(system: System, instance: Instance) -> dict[str, Value]:
 
 
 def _structure(scenario: Scenario) -> bytes:
-    spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp")}
+    spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp", "oms")}
     root = etree.Element(tag("ssd", "SystemStructureDescription"), nsmap=spaces, version="1.0", name=scenario.name)
     root.set("generationTool", "backlash-cosim")
     root.set("generationDateAndTime", DATE)
@@ -88,6 +88,7 @@ def _structure(scenario: Scenario) -> bytes:
     connections = etree.SubElement(system, tag("ssd", "Connections"))
     for k, connection in enumerate(scenario.system.connections):
         _connection(connections, connection, k)
+    _master(system, scenario)
     _units(etree.SubElement(root, tag("ssd", "Units")), scenario.system.instances)
     _experiment(root, scenario)
     return _bytes(root, "ssd", STRUCTURE)
@@ -168,6 +169,17 @@ def _unit(parent: etree._Element, unit: Unit) -> None:
         base.set("factor", repr(unit.factor))
     if unit.offset != 0.0:
         base.set("offset", repr(unit.offset))
+
+
+def _master(system: etree._Element, scenario: Scenario) -> None:
+    annotations = etree.SubElement(system, tag("ssd", "Annotations"))
+    annotation = etree.SubElement(annotations, tag("ssc", "Annotation"), type=OMS)
+    information = etree.SubElement(
+        etree.SubElement(annotation, tag("oms", "Annotations")), tag("oms", "SimulationInformation")
+    )
+    step = {"description": "oms-ma", "stepSize": repr(scenario.algorithm.step)}
+    tolerances = {"absoluteTolerance": "0.0001", "relativeTolerance": "0.0001"}
+    etree.SubElement(information, tag("oms", "FixedStepMaster"), step | tolerances)
 
 
 def _experiment(root: etree._Element, scenario: Scenario) -> None:
