@@ -162,7 +162,7 @@ def inspect(data: bytes) -> Library:
         if data[:2] == b"MZ":
             return _pe(data)
         return _mach(data)
-    except (struct.error, IndexError, ValueError):
+    except (struct.error, IndexError, ValueError, OverflowError):
         return Library("unknown")
 
 

@@ -1,0 +1,65 @@
+"""Headers of shared libraries, held against binutils and against libraries that others built."""
+
+import shutil
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+from orchestrator.checking.binaries import COSIMULATION_FUNCTIONS, inspect
+from tests.support.broken_xml import windows_library
+from tests.support.c_fmu import compile_library, have_compiler
+
+BINARIES = Path(str(files("pythonfmu"))) / "resources" / "binaries"
+
+
+def _nm(path: Path, *words: str) -> set[str]:
+    done = subprocess.run(["nm", "-D", "--format=posix", *words, str(path)], capture_output=True, text=True, check=True)
+    return {line.split()[0].split("@")[0] for line in done.stdout.splitlines()}
+
+
+@pytest.mark.skipif(
+    sys.platform != "linux" or shutil.which("nm") is None or not have_compiler(), reason="needs cc and nm on Linux"
+)
+def test_elf_symbols_are_those_that_nm_reads(tmp_path: Path) -> None:
+    path = tmp_path / "library.so"
+    path.write_bytes(compile_library())
+    library = inspect(path.read_bytes())
+    assert (library.format, library.bits, library.shared) == ("ELF", 64, True)
+    assert library.exported == _nm(path, "--defined-only")
+    weak = {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable", "_ITM_registerTMCloneTable"}
+    assert library.undefined == _nm(path, "--undefined-only") - weak
+    assert set(COSIMULATION_FUNCTIONS) <= library.exported
+    assert "libc.so.6" in (library.needed or ())
+
+
+@pytest.mark.parametrize(("folder", "form"), [("linux64", "ELF"), ("win64", "PE")])
+def test_libraries_of_pythonfmu(folder: str, form: str) -> None:
+    found = [p for p in (BINARIES / folder).glob("*") if p.suffix in (".so", ".dll", ".dylib")]
+    assert found
+    for path in found:
+        data = path.read_bytes()
+        library = inspect(data)
+        assert (library.format, library.bits, library.shared) == (form, 64, True)
+        if library.exported is None:
+            assert all(f.encode() + b"\0" in data for f in COSIMULATION_FUNCTIONS)
+        else:
+            assert set(COSIMULATION_FUNCTIONS) <= library.exported
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (b"", "unknown"),
+        (b"MZ", "unknown"),
+        (b"MZ".ljust(0x40, b"\xff"), "unknown"),
+        (b"\x7fELF", "unknown"),
+        (b"\x7fELF\x02\x01".ljust(64, b"\xff"), "unknown"),
+        (windows_library(0xAA64), "PE"),
+        (b"\xcf\xfa\xed\xfe" + b"\x07\0\0\x01" + bytes(4) + b"\x06\0\0\0", "Mach-O"),
+    ],
+)
+def test_damaged_headers_are_no_exception(data: bytes, expected: str) -> None:
+    assert inspect(data).format == expected
