@@ -156,6 +156,37 @@ def test_mastersim_runs_the_paired_loops(fmus: dict[str, Path], tmp_path: Path) 
         assert [float(row[n]) for n in columns] == pytest.approx(expected[at], abs=1e-9)
 
 
+def test_omsimulator_runs_the_exported_loops_as_we_do(tmp_path: Path) -> None:
+    """The SSP file of `ssp export`; OMSimulator passes values on in the order of the declared dependencies."""
+    omsimulator = program("OMSimulator")
+    ours = [sys.executable, "-m", "orchestrator", "ssp"]
+    subprocess.run([*ours, "export", "--out", str(tmp_path)], capture_output=True, check=True)
+    (package,) = tmp_path.glob("*.ssp")
+    subprocess.run([*ours, "run", str(package), "--out", str(tmp_path)], capture_output=True, check=True)
+    words = [
+        omsimulator,
+        "--stopTime=2",
+        "--stepSize=1e-3",
+        "--intervals=2000",
+        "--resultFile=theirs.csv",
+        str(package),
+    ]
+    subprocess.run(words, cwd=tmp_path, env=without_hints(), capture_output=True, check=True)
+    with (tmp_path / "ssp.csv").open() as stream:
+        expected = {round(float(row["time"]) / STEP): row for row in csv.DictReader(stream)}
+    compared = 0
+    with (tmp_path / "theirs.csv").open() as stream:
+        # Two rows for each time: before and after the values are passed on.
+        theirs = {round(float(row["time"]) / STEP): row for row in csv.DictReader(stream, skipinitialspace=True)}
+    for n, row in expected.items():
+        for name, value in row.items():
+            found = theirs[n].get(f"{package.stem}.system.{name}")
+            if found is not None:
+                assert float(found) == pytest.approx(float(value), abs=1e-9)
+                compared += 1
+    assert compared > 2000 * 20
+
+
 # Each host runs in a process of its own: these bring native libraries with their own threads and finalisers.
 ECOS = """
 from ecospy import EcosSimulation, EcosSimulationStructure
