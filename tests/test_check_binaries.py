@@ -7,6 +7,8 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from orchestrator.checking.binaries import COSIMULATION_FUNCTIONS, inspect
 from tests.support.broken_xml import windows_library
@@ -63,3 +65,19 @@ def test_libraries_of_pythonfmu(folder: str, form: str) -> None:
 )
 def test_damaged_headers_are_no_exception(data: bytes, expected: str) -> None:
     assert inspect(data).format == expected
+
+
+_LIBRARIES = [p.read_bytes()[:100_000] for p in sorted(BINARIES.glob("*/*")) if p.is_file()]
+
+
+@given(
+    data=st.sampled_from(_LIBRARIES),
+    changes=st.lists(st.tuples(st.integers(0, 600), st.binary(min_size=1, max_size=8)), min_size=1, max_size=4),
+    length=st.integers(0, 100_000),
+)
+@settings(max_examples=200, deadline=None)
+def test_any_header_is_read_or_unknown(data: bytes, changes: list[tuple[int, bytes]], length: int) -> None:
+    changed = bytearray(data)
+    for at, new in changes:
+        changed[at : at + len(new)] = new
+    assert inspect(bytes(changed[:length])).format in ("ELF", "PE", "Mach-O", "unknown")

@@ -1,9 +1,12 @@
 """Rules one by one, where no whole FMU is needed."""
 
+import csv
 import re
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from lxml import etree
 
 from orchestrator.checking import xml_reading
@@ -11,6 +14,7 @@ from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.checking.description import read_description
 from orchestrator.checking.findings import Finding, Report, ordered
+from orchestrator.checking.layered import _read_csv
 from orchestrator.checking.rules import RULES
 from orchestrator.checking.rules_model import check_model
 from orchestrator.checking.rules_variables import check_variables
@@ -155,3 +159,25 @@ def test_the_documentation_lists_every_rule() -> None:
     rows = re.findall(r"^\| `([a-z0-9.-]+)` \| (\w+) \| (.+?) \| (.+?) \|$", DOCS.read_text(encoding="utf-8"), re.M)
     written = {name: (severity, expects, advice) for name, severity, expects, advice in rows}
     assert written == {name: (r.severity, r.expects, r.advice) for name, r in RULES.items()}
+
+
+@given(st.binary(max_size=300) | st.text(max_size=200).map(lambda t: f"<a b='{t}'/>".encode(errors="replace")))
+@settings(max_examples=200, deadline=None)
+def test_any_bytes_are_xml_or_a_finding(data: bytes) -> None:
+    root, findings = xml_reading.parse(data, "a.xml")
+    assert root is not None or len(findings) == 1
+
+
+_CELL = st.text(st.characters(blacklist_categories=()), max_size=6) | st.floats().map(str)
+
+
+@given(st.lists(st.lists(_CELL, max_size=4), max_size=6), st.binary(max_size=20))
+@settings(max_examples=200, deadline=None)
+def test_any_bytes_are_a_reference_result_or_refused(rows: list[list[str]], tail: bytes) -> None:
+    data = b"time,x\n0,1\n" + "\n".join(",".join(r) for r in rows).encode(errors="replace") + tail
+    try:
+        result = _read_csv("r.csv", data, {"x"})
+    except (ValueError, csv.Error):
+        return
+    assert result.names == ("x",)
+    assert all(len(r) == 2 for r in result.rows)
