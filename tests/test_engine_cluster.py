@@ -88,3 +88,9 @@ def test_a_scheduler_that_is_not_there_is_named(tmp_path, monkeypatch):
 def test_workers_and_scheduler_exclude_each_other():
     with pytest.raises(ScenarioError, match="must not be given with"):
         choose_pool(2, "tcp://127.0.0.1:9")
+
+
+def test_workers_of_another_version_are_refused(tmp_path, cluster, monkeypatch):
+    monkeypatch.setattr("orchestrator.engine.cluster.__version__", "9.9.9")
+    with pytest.raises(ScenarioError, match=r"must run version 9\.9\.9, but tcp://\S+ has"):
+        table(tmp_path, choose_pool(None, cluster.address))

@@ -8,6 +8,7 @@ hangs takes a lane's process with it, not the Dask worker.
 import time
 from collections.abc import Mapping
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,10 @@ class ClusterPool:
             client.register_plugin(_Supply(self._plugin, pickled(work), blobs, limits), name=self._plugin)
         except TimeoutError:
             raise SimulationError(f"the Dask cluster has had no worker for {FIRST_WORKER_LIMIT:g} s") from None
+        except ScenarioError:
+            with suppress(Exception):  # a worker that refuses the plugin may refuse to let it go, too
+                client.unregister_worker_plugin(self._plugin)
+            raise
         except ModuleNotFoundError as error:
             raise ScenarioError(f"the Dask workers must have this project installed, but: {error}") from None
         self._executor = client.get_executor(pure=False)
