@@ -230,7 +230,10 @@ AROUND = (
 
 def run_in_package(code: str, package: str, fmus: dict[str, Path], folder: Path) -> list[list[float]]:
     if importlib.util.find_spec(package) is None:
-        pytest.skip(f"{package} is not installed")
+        pytest.skip(f"{package} is not installed (`pip install .[hosts]`)")
+    probe = subprocess.run([sys.executable, "-c", f"import {package}"], capture_output=True, text=True, check=False)
+    if "cannot open shared object file" in probe.stderr:
+        pytest.skip(probe.stderr.splitlines()[-1])
     job: dict[str, Any] = {
         "instances": INSTANCES,
         "fmus": {model: str(path) for model, path in fmus.items()},
