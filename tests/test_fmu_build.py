@@ -147,6 +147,39 @@ def test_a_variant_carries_its_values_and_runs_its_own_code(tmp_path: Path, fmus
     assert np.max(np.abs(loose["theta_l"] - nominal["theta_l"])) > 1e-3
 
 
+STOCK = """
+import subprocess, sys
+from pathlib import Path
+import fmpy
+SLAVE = '''
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+class Plant(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.y = GAIN
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+    def do_step(self, current_time, step_size):
+        return True
+'''
+ends = []
+for gain in ("1.0", "2.0"):
+    folder = Path(gain)
+    folder.mkdir()
+    (folder / "plant.py").write_text(SLAVE.replace("GAIN", gain))
+    build = "import sys; from pythonfmu import FmuBuilder; FmuBuilder.build_FMU(sys.argv[1], dest=sys.argv[2])"
+    subprocess.run([sys.executable, "-c", build, str(folder / "plant.py"), gain], check=True)
+    result = fmpy.simulate_fmu(str(folder / "Plant.fmu"), stop_time=0.1, output_interval=0.1, output=["y"])
+    ends.append(float(result["y"][-1]))
+print(ends)
+"""
+
+
+def test_a_stock_build_runs_the_first_version_for_both(tmp_path: Path) -> None:
+    """What the next test would show without the hashed package: the reason for it."""
+    run = subprocess.run([sys.executable, "-c", STOCK], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert run.stdout == "[1.0, 1.0]\n"
+
+
 def test_two_versions_of_one_model_in_one_process(tmp_path: Path, fmus: dict[str, Path]) -> None:
     """The same model name, built from sources of which one line differs."""
     copy = tmp_path / "changed"

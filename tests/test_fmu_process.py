@@ -72,6 +72,17 @@ def test_a_wrong_guid_is_refused(plant: RawFmu, guid: str) -> None:
     assert plant.messages[0][0] == ERROR
 
 
+def test_refusals_are_told_whatever_the_logging_and_categories_filter_the_rest(plant: RawFmu) -> None:
+    c = plant.started()
+    category = (ctypes.c_char_p * 1)(b"logStatusWarning")
+    for on, count in ((0, 0), (1, 1)):
+        assert plant.library.fmi2SetDebugLogging(c, on, ctypes.c_size_t(count), category) == OK
+        plant.messages.clear()
+        assert plant.step(c, 0.0, -1.0) == DISCARD
+        assert [status for status, _ in plant.messages] == [DISCARD]
+    plant.library.fmi2FreeInstance(c)
+
+
 def test_resource_locations_in_every_spelling(plant: RawFmu) -> None:
     path = plant.folder / "resources"
     spellings = [path.as_uri(), path.as_uri().replace("file:///", "file:/"), path.as_uri() + "/"]
