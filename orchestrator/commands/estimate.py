@@ -19,6 +19,7 @@ from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.design import Limits, design
 from orchestrator.estimation.protocol import LEVEL, METHODS, Estimate, NotApplicableError, estimator
+from orchestrator.estimation.tables import write_tables
 from orchestrator.model_file import Model, read_model
 from orchestrator.output import staged, write_result
 from orchestrator.record import Record, read_record
@@ -161,10 +162,12 @@ def _draw(directory: Path, record: Record, estimates: list[Estimate], model: Mod
         if estimate.method == "maximum_likelihood":
             fitted = estimate.diagnostics["parameters"].get("i", {}).get("value", model.parameters["i"].value)
             draw_fit(directory / "estimate_fit.png", record, estimate, fitted)
+            write_tables(directory, record, [estimate], fitted)
             limit = float(chi2.ppf(LEVEL, 1))
             draw_profile(directory / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
         elif estimate.method == "ekf":
             draw_online(directory / "estimate_online.png", record, estimate)
+            write_tables(directory, record, [estimate], model.parameters["i"].value)
 
 
 def _design(directory: Path, args: argparse.Namespace, model: Model, size: float) -> list[dict[str, Any]]:

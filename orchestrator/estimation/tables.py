@@ -1,0 +1,51 @@
+"""The curves behind an estimate as CSV, for plots elsewhere and for the report."""
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.protocol import Estimate
+from orchestrator.record import Record
+
+
+def write_tables(directory: Path, record: Record, estimates: Iterable[Estimate], ratio: float) -> None:
+    """Write ``estimate.csv`` (record and fitted model), ``profile.csv`` and ``online.csv``, as far as there is data.
+
+    Args:
+        directory: where to.
+        record: the measured record.
+        estimates: of which those by ``maximum_likelihood`` and ``ekf`` have curves.
+        ratio: fitted gear ratio.
+    """
+    for estimate in estimates:
+        if estimate.method == "maximum_likelihood":
+            _write(directory / "estimate.csv", fit_columns(record, estimate, ratio))
+            profile = estimate.curves["profile"]
+            _write(directory / "profile.csv", {"alpha": profile.alpha, "drop": profile.drop})
+        elif estimate.method == "ekf":
+            alpha, deviation = estimate.curves["alpha"], estimate.curves["deviation"]
+            low, high = np.maximum(alpha - 1.96 * deviation, 0.0), alpha + 1.96 * deviation
+            _write(directory / "online.csv", {"time": record.time, "alpha": alpha, "low": low, "high": high})
+
+
+def fit_columns(record: Record, estimate: Estimate, ratio: float) -> dict[str, Array]:
+    """Return record and fit by column name, each of shape (n,): SI units, contact in (-1, 0, 1)."""
+    states, errors = estimate.curves["states"], estimate.curves["errors"]
+    columns = {"time": record.time, "u": record.u, "theta_m": record.theta_m, "theta_m_fitted": states[:, 0]}
+    if record.theta_l is not None:
+        offset = estimate.curves["offset"]
+        columns |= {"theta_l": record.theta_l, "theta_l_fitted": states[:, 2] + offset}
+        columns["twist"] = record.theta_m / ratio - record.theta_l + offset
+    columns |= {"twist_fitted": states[:, 0] / ratio - states[:, 2], "contact": estimate.curves["contacts"]}
+    return columns | {f"one_step_error_{n}": errors[:, k] for k, n in enumerate(("m", "l")[: errors.shape[1]])}
+
+
+def _write(path: Path, columns: Mapping[str, Array]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        rows: Iterable[Sequence[float]] = zip(*(values.tolist() for values in columns.values()), strict=True)
+        writer.writerows([f"{value:.10g}" for value in row] for row in rows)
