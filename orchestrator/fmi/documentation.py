@@ -75,7 +75,8 @@ def _table(description: Element, heading: str, causality: str) -> str:
 
 def _row(variable: Element) -> str:
     kind = variable[0].attrib
-    numbers = "".join(f'<td class="number">{kind.get(key, "")}</td>' for key in ("start", "min", "max"))
+    texts = (f"{float(kind[key]):.6g}" if key in kind else "" for key in ("start", "min", "max"))
+    numbers = "".join(f'<td class="number">{text}</td>' for text in texts)
     name, text = html.escape(variable.attrib["name"]), html.escape(variable.attrib["description"])
     return f"<tr><td><code>{name}</code></td><td>{kind.get('unit', '')}</td>{numbers}<td>{text}</td></tr>"
 
@@ -90,11 +91,16 @@ def _plot(class_name: str) -> str:
     caption = (
         f"The reference experiment inside the FMU{f' ({with_values})' if with_values else ''}, each signal scaled."
     )
-    lines = [
-        _line([float(r["time"]) for r in rows], [float(r[n]) for r in rows], k, n)
-        for k, n in enumerate(PLOTTED[class_name])
-    ]
-    return f'<svg viewBox="0 0 640 260" role="img">{"".join(lines)}</svg>\n<p>{caption}</p>'
+    times = [float(row["time"]) for row in rows]
+    lines = [_line(times, [float(row[n]) for row in rows], k, n) for k, n in enumerate(PLOTTED[class_name])]
+    return f'<svg viewBox="0 0 640 270" role="img">{_axis(times[-1])}{"".join(lines)}</svg>\n<p>{caption}</p>'
+
+
+def _axis(end: float) -> str:
+    marks = "".join(
+        f'<text x="{10 + 115 * n}" y="262" fill="#666">{end * n / 4:g}{" s" if n == 4 else ""}</text>' for n in range(5)
+    )
+    return f'<path stroke="#bbb" d="M10 130H470M10 245H470"/>{marks}'
 
 
 def _line(times: list[float], values: list[float], k: int, name: str) -> str:
