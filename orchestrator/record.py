@@ -23,6 +23,7 @@ COLUMNS = ("time", "u", "theta_m", "theta_l")
 OPTIONAL = ("theta_l",)
 MINIMUM_ROWS = 200
 MAXIMUM_BYTES = 500_000_000
+LARGEST_GAP = 0.3  # rad, load side: motion beyond it that one encoder misses is no gap
 UNIT_FACTORS = {
     "s": 1.0,
     "ms": 1e-3,
@@ -102,9 +103,7 @@ class Record:
         return Record(self.time, self.u, self.theta_m, None, self.source, self.further)
 
 
-def read_record(
-    path: Path, columns: Mapping[str, Column] | None = None, further: Sequence[str] = ()
-) -> Record:
+def read_record(path: Path, columns: Mapping[str, Column] | None = None, further: Sequence[str] = ()) -> Record:
     """Read and check a CSV record.
 
     Args:
@@ -127,9 +126,7 @@ def read_record(
     return record_from_columns(table, path.name, shown)
 
 
-def record_from_columns(
-    table: Mapping[str, Array], source: str, shown: Mapping[str, str] | None = None
-) -> Record:
+def record_from_columns(table: Mapping[str, Array], source: str, shown: Mapping[str, str] | None = None) -> Record:
     """Check columns that are already numbers (any mapping of name to (n,) array) and return the record.
 
     Args:
@@ -217,16 +214,12 @@ def _missing(header: list[str], name: str, path: Path) -> str:
     return text
 
 
-def _numbers(
-    rows: list[list[str]], places: Mapping[str, int], header: list[str], path: Path
-) -> dict[str, Array]:
+def _numbers(rows: list[list[str]], places: Mapping[str, int], header: list[str], path: Path) -> dict[str, Array]:
     """Return the columns as arrays; the slow search for the bad cell runs only when there is one."""
     width = len(header)
     for number, row in enumerate(rows, start=1):
         if len(row) != width:
-            raise RecordError(
-                f"{path}: row {number} must have {width} fields like the header, but has {len(row)}"
-            )
+            raise RecordError(f"{path}: row {number} must have {width} fields like the header, but has {len(row)}")
     table = {}
     for name, index in places.items():
         try:
@@ -235,9 +228,7 @@ def _numbers(
             number = next(n for n, row in enumerate(rows, start=1) if not _is_number(row[index]))
             cell = rows[number - 1][index]
             what = "is empty" if not cell.strip() else f"is `{_short(cell)}`"
-            raise RecordError(
-                f"{path}: row {number}, column `{header[index]}` must be a number, but {what}"
-            ) from None
+            raise RecordError(f"{path}: row {number}, column `{header[index]}` must be a number, but {what}") from None
     return table
 
 
@@ -271,16 +262,12 @@ def _check_time(time: Array, name: str, source: str) -> None:
     if back.size:
         row = int(back[0]) + 2
         word = "repeats the row before" if difference[back[0]] == 0.0 else "goes back"
-        raise RecordError(
-            f"{where.format(row)} must increase, but {word} ({time[row - 2]:g} then {time[row - 1]:g} s)"
-        )
+        raise RecordError(f"{where.format(row)} must increase, but {word} ({time[row - 2]:g} then {time[row - 1]:g} s)")
     off = np.flatnonzero(np.abs(difference - step) > 0.1 * step + 1e-9 * np.abs(time[1:]))
     if off.size:
         row, jump = int(off[0]) + 2, float(difference[off[0]])
         lost = round(jump / step) - 1
-        text = (
-            f"there is a gap of {jump:g} s ({lost} rows missing)" if lost > 0 else f"the step is {jump:g} s"
-        )
+        text = f"there is a gap of {jump:g} s ({lost} rows missing)" if lost > 0 else f"the step is {jump:g} s"
         raise RecordError(f"{where.format(row)} must be uniform with a step of {step:g} s, but {text}")
     if step >= 0.5:
         hint = "; this looks like milliseconds" if step < 100.0 else ""
@@ -303,13 +290,15 @@ def _check_moving(arrays: Mapping[str, Array], name: str, label: str, source: st
         return
     if length < max(20, size // 100):
         return
-    unit = _resolution(values)
-    before = _leaving_speed(values, start, stop)
-    expected = before * length / unit
-    if other is not None:
-        ratio = float(np.std(values)) / max(float(np.std(other)), 1e-12)
-        expected = float(np.ptp(other[start:stop])) * ratio / unit
-    if expected < 30.0:
+    if other is None or name not in ("theta_m", "theta_l"):
+        missed = start > 0 and _leaving_speed(values, start, stop) * length > 30.0 * _resolution(values)
+    else:
+        # The load may rest while the motor crosses the gap, so only more than any gap counts.
+        load, motor = arrays["theta_l"], arrays["theta_m"]
+        ratio = float(np.std(motor)) / max(float(np.std(load)), 1e-12)
+        moved = float(np.ptp(other[start:stop]))
+        missed = moved / (ratio if name == "theta_l" else 1.0) > LARGEST_GAP
+    if not missed:
         return
     at_end = values[start] in (values.max(), values.min())
     word = "saturated at an end of its range" if at_end else "stuck"
@@ -328,16 +317,17 @@ def _longest_constant(values: Array) -> tuple[int, int]:
 
 
 def _leaving_speed(values: Array, start: int, stop: int) -> float:
-    """Return the smaller of the mean speeds [units per row] over the ten rows before and after a run.
+    """Return the smaller of the mean speeds [units per row] over the rows just before and after a run.
 
-    A machine that comes to rest slows down first; an encoder that sticks does not.
+    A machine that comes to rest slows down first; an encoder that sticks does not. Speeds of a few counts tell nothing.
     """
     speeds = []
-    if start >= 10:
-        speeds.append(abs(values[start - 1] - values[start - 10]) / 9.0)
-    if stop + 10 <= values.size:
-        speeds.append(abs(values[stop + 9] - values[stop]) / 9.0)
-    return float(min(speeds)) if speeds else 0.0
+    if start >= 5:
+        speeds.append(abs(values[start] - values[start - 4]) / 4.0)
+    if stop + 5 <= values.size:
+        speeds.append(abs(values[stop + 3] - values[stop - 1]) / 4.0)
+    slowest = float(min(speeds)) if speeds else 0.0
+    return slowest if slowest > 3.0 * _resolution(values) else 0.0
 
 
 def _resolution(values: Array) -> float:

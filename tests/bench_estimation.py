@@ -102,7 +102,7 @@ def none(n: int) -> list[dict]:
 
 
 def online(n: int) -> list[dict]:
-    """The online estimator in a position loop, 4 s at 1 kHz, its estimate after 2 s of traversals; 5 % mismatch."""
+    """The online estimator in a position loop, 4 s at 1 kHz, judged after 2 s; 5 % mismatch."""
     from tests.support.online_loop import run_case
 
     return [run_case(600_000 + n, _size(n + 13_000))]

@@ -73,12 +73,17 @@ def _shade(axis, time: Array, contacts: Array) -> None:  # type: ignore[no-untyp
 def draw_profile(path: Path, profile: Profile, estimate: Estimate, limit: float) -> None:
     """Draw the profile likelihood with the interval that it gives."""
     figure, (axis,) = _figure(1, (6.5, 4.2))
-    axis.plot(profile.alpha, profile.drop, "o-", color=BLUE, markersize=4)
+    signed = np.sign(profile.alpha - estimate.alpha) * np.sqrt(np.maximum(profile.drop, 0.0))
+    fine = np.linspace(signed[0], signed[-1], 200)
+    offset = 1e6 * (np.interp(fine, signed, profile.alpha) - estimate.alpha)
+    axis.plot(offset, fine**2, "-", color=BLUE)
+    axis.plot(1e6 * (profile.alpha - estimate.alpha), profile.drop, "o", color=BLUE, markersize=4)
     axis.axhline(limit, color=GREY, linestyle="--", linewidth=0.9, label="95 % limit")
     low, high = estimate.interval
-    axis.axvspan(low, high if math.isfinite(high) else float(profile.alpha[-1]), color=ORANGE, alpha=0.18)
-    axis.axvline(estimate.alpha, color=ORANGE, linewidth=1.0, label=f"estimate {estimate.alpha:.6g} rad")
-    axis.set_xlabel("half-gap [rad]")
+    high = high if math.isfinite(high) else float(profile.alpha[-1])
+    axis.axvspan(1e6 * (low - estimate.alpha), 1e6 * (high - estimate.alpha), color=ORANGE, alpha=0.18)
+    axis.axvline(0.0, color=ORANGE, linewidth=1.0, label=f"estimate {estimate.alpha:.6g} rad")
+    axis.set_xlabel("half-gap minus estimate [microrad]")
     axis.set_ylabel("twice the drop of the log likelihood")
     axis.set_ylim(bottom=0.0, top=max(2.0 * limit, 1.0))
     axis.legend(fontsize=8)

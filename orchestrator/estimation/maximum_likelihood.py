@@ -217,15 +217,17 @@ def _verdict(
 ) -> tuple[bool, str]:
     """Return whether the gap is seen, and the sentence that says so."""
     words = []
-    visible = low > 0.0
-    if alpha > 0.0 and traversals == 0 and visible:
-        visible = False
+    visible = low > 0.0 and traversals > 0
+    if alpha > 0.0 and traversals == 0:
         words.append(
             "the gap cannot be seen: the record never traverses it (one flank is loaded throughout); "
             "an excitation that reverses the shaft torque would show it (--design)"
         )
     elif not visible and math.isfinite(high):
-        words.append(f"no gap is seen: with 95 % confidence the half-gap is below {high:.3g} rad")
+        words.append(
+            f"no gap is seen: with 95 % confidence the half-gap is below {high:.3g} rad; "
+            "--design proposes a record that would show a smaller one"
+        )
     elif not visible:
         words.append("the gap cannot be seen: every size fits the record; --design proposes an excitation")
     worst = max(abs(value) for value in diagnostics["innovation_autocorrelation"])  # type: ignore[attr-defined]

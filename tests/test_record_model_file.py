@@ -1,0 +1,76 @@
+"""Model files: values and uncertainties that are read, mistakes that are named with their place."""
+
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import ScenarioError
+from orchestrator.model_file import LINEAR, default_model, read_model
+
+GOOD = """
+fmu = "Drivetrain"
+[parameters.J_l]
+value = 5.0
+relative_uncertainty = 0.1
+[parameters.k]
+uncertainty = 33.0
+[encoders.theta_m]
+counts_per_rev = 10000
+noise = 3e-4
+[columns.theta_l]
+name = "q2"
+unit = "deg"
+"""
+
+
+def _read(tmp_path: Path, text: str):
+    path = tmp_path / "model.toml"
+    path.write_text(text)
+    return read_model(path)
+
+
+def test_the_default_model_knows_linear_parameters_to_five_per_cent() -> None:
+    model = default_model()
+    assert {p.name for p in model.uncertain} == set(LINEAR)
+    for parameter in model.uncertain:
+        assert parameter.uncertainty == pytest.approx(0.05 * parameter.value)
+        assert parameter.standard_deviation == pytest.approx(parameter.uncertainty / 3.0**0.5)
+    assert model.parameters["alpha"].value == 0.0
+    assert read_model(None) == model
+
+
+def test_a_model_file_is_read(tmp_path: Path) -> None:
+    model = _read(tmp_path, GOOD)
+    assert {p.name: round(p.uncertainty, 9) for p in model.uncertain} == {"J_l": 0.5, "k": 33.0}
+    assert model.values[1] == 5.0
+    assert model.encoder("theta_m").resolution == pytest.approx(6.283185e-4)
+    assert model.encoder("theta_l").noise is None
+    assert model.columns["theta_l"].name == "q2"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('fmu = "Gearbox"', "$.fmu must be one of Drivetrain, ServoAxis, but is 'Gearbox'"),
+        ("fmu = 3", "$.fmu"),
+        ("[parameters.J_q]\nvalue = 1", "$.parameters.J_q must be a parameter of Drivetrain"),
+        ("[parameters.J_m]\nvalue = nan", "$.parameters.J_m.value must be in"),
+        ("[parameters.J_m]\nvalue = -1", "$.parameters.J_m.value must be in"),
+        ("[parameters.J_m]\nuncertainty = -1", "$.parameters.J_m.uncertainty must be a finite number"),
+        ("[parameters.J_m]\nuncertainty = 1\nrelative_uncertainty = 1", "but has both"),
+        ("[parameters.J_m]\nvalu = 1", "unknown field `valu`"),
+        ("[encoders.x]", "must be `theta_m` or `theta_l`"),
+        ("[encoders.theta_m]\ncounts_per_rev = 0", "must be at least 1"),
+        ('[columns.theta_m]\nunit = "furlong"', "$.columns.theta_m.unit must be one of"),
+        ("a =", "must be TOML"),
+    ],
+)
+def test_mistakes_are_named(tmp_path: Path, text: str, expected: str) -> None:
+    with pytest.raises(ScenarioError) as caught:
+        _read(tmp_path, text)
+    assert expected in str(caught.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="cannot be read"):
+        read_model(tmp_path / "absent.toml")
