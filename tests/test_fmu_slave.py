@@ -26,7 +26,6 @@ from pyfmu_sources.lqr_slave import LqrController
 from pyfmu_sources.slave_base import SlaveBase
 
 OUTPUTS = [THETA_M, THETA_L, OMEGA_M, T_M, T_SHAFT]
-SLAVES = (Drivetrain, LqrController, KalmanEstimator)
 
 
 def reference(slave: SlaveBase, name: str) -> int:
@@ -267,7 +266,7 @@ def test_step_sizes_that_differ_by_rounding_count_as_one() -> None:
 
 
 def test_tables_list_one_value_reference_for_each_variable() -> None:
-    for kind in SLAVES:
+    for kind in (Drivetrain, LqrController, KalmanEstimator):
         names = [variable.name for variable in kind.table]
         assert len(set(names)) == len(names)
         for variable in kind.table:

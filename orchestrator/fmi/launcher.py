@@ -12,7 +12,8 @@ from pathlib import Path
 
 from orchestrator.errors import FmuError
 
-SOURCE = Path(__file__).parent / "native" / "launcher.c"
+NATIVE = Path(__file__).parent / "native"
+SOURCE = "launcher.c"
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
     """
     assert toolchain.compiler is not None
     with tempfile.TemporaryDirectory() as folder:
-        shutil.copy(SOURCE, folder)
+        shutil.copytree(NATIVE, folder, dirs_exist_ok=True)
         library = str(toolchain.libpython) if toolchain.libpython else ""
         command = [
             toolchain.compiler,
@@ -78,7 +79,7 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
             f'-DWRAPPER="{wrapper}"',
             f"-DPYTHON_LIBRARY={_quoted(library)}",
             f"-DPYTHON_PROGRAM=L{_quoted(toolchain.program if library else '')}",
-            *("-o", "launcher.so", SOURCE.name, "-ldl", "-lpthread"),
+            *("-o", "launcher.so", SOURCE, "-ldl", "-lpthread"),
         ]
         try:
             run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
@@ -86,7 +87,7 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
             raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
         if run.returncode != 0:
             reason = next((line for line in run.stderr.splitlines() if "error" in line), "no message")
-            raise FmuError(f"the C compiler {toolchain.compiler} failed on {SOURCE.name}: {reason}")
+            raise FmuError(f"the C compiler {toolchain.compiler} failed on {SOURCE}: {reason}")
         return (Path(folder) / "launcher.so").read_bytes()
 
 

@@ -106,5 +106,5 @@ def fingerprint(recipe: Recipe, launcher: str) -> str:
 def _builder_files() -> tuple[Path, ...]:
     names = ("archive", "documentation", "launcher", "reference_files", "reference_runs", "sources", "starts", "worker")
     files = [HERE / f"{name}.py" for name in names]
-    files += sorted(path for path in (*HERE.glob("native/*.c"), *HERE.glob("data/*")) if path.is_file())
+    files += sorted(path for path in (*HERE.glob("native/*.[ch]"), *HERE.glob("data/*")) if path.is_file())
     return tuple(path for path in (*files, HERE.parent / "design.py") if path.exists())
