@@ -253,3 +253,55 @@ def test_the_page_of_a_large_sweep_shows_part_of_it_and_says_so(tmp_path):
     assert 3000 <= len(plot.series[0].x) <= 4000
     assert plot.series[0].x[-1] > 0.999
     assert "The first 500 of 10000 rows" in write_report(tmp_path).read_text()
+
+
+def half_gap(alpha, **more):
+    entry = {"alpha": alpha, "standard_error": 1e-5, "cramer_rao": 9e-6, "interval": [0.9 * alpha, 1.1 * alpha]}
+    return (
+        entry | {"level": 0.95, "unit": "rad", "visible": True, "message": "", "diagnostics": {"traversals": 9}} | more
+    )
+
+
+def test_the_page_of_an_estimate_compares_methods_and_shows_the_fit(tmp_path):
+    parameters = {"k": {"value": 3310.0, "standard_error": 2.0, "nominal": 3300.0}}
+    best = half_gap(0.002, diagnostics={"parameters": parameters})
+    estimates = {"maximum_likelihood": best, "ekf": half_gap(0.0021), "torque_pulse": {"not_applicable": "no pulses"}}
+    record = {"rows": 4, "step": 0.01, "source": "r.csv"}
+    design = [{"name": "pulses", "bound": 1e-6, "peak_torque": 10.0, "peak_motor_speed": 2.0}]
+    results = {"record": record, "estimates": estimates, "method": "maximum_likelihood", "design": design} | best
+    write_result(tmp_path, "estimate", {}, None, results)
+    (tmp_path / "profile.csv").write_text("alpha,drop\n0.0019,4\n0.00195,1\n0.002,0\n0.00205,1\n0.0021,4\n")
+    (tmp_path / "online.csv").write_text("time,alpha,low,high\n0,0.1,0,0.3\n1,0.002,0.0019,0.0021\n")
+    (tmp_path / "estimate.csv").write_text(
+        "time,u,theta_m,theta_m_fitted,contact,one_step_error_m\n0,0,0,0,1,0\n1,1,1,1.5,0,1e-4\n2,1,2,2,-1,0\n"
+    )
+    (tmp_path / "design.csv").write_text("time,u\n0,1\n1,-1\n")
+    report = report_from_directory(tmp_path)
+    assert report.badge == ("good", "the gap is seen")
+    assert "The half-gap is 0.002 rad, with 95 % confidence between 0.0018 and 0.0022 rad" in report.summary
+    plots = {p.title: p for p in sections(report, Plot)}
+    assert plots["Estimates by method"].series[0].y == [0.002, 0.0021]
+    profile = plots["Profile likelihood"].series[0]
+    assert len(profile.x) > 100
+    assert profile.y == pytest.approx([((x - 0.002) / 5e-5) ** 2 for x in profile.x], abs=1e-9)
+    assert plots["Motor angle"].spans[0].start == 1.0
+    assert plots["Motor angle: simulated minus measured"].series[0].y == [0.0, 0.5, 0.0]
+    assert plots["One-step errors"].series[0].y == [0.0, 1e-4, 0.0]
+    assert plots["The best excitation"].series[0].kind == "steps"
+    tables = {t.title: t for t in sections(report, Table)}
+    assert tables["Estimates"].rows[2][-1] == "no pulses"
+    assert tables["Parameters fitted with the gap"].rows[0] == ("k", 3300.0, 3310.0, 2.0)
+
+
+def test_an_estimate_that_no_method_gives_says_so(tmp_path):
+    write_result(tmp_path, "estimate", {}, None, {"estimates": {"torque_pulse": {"not_applicable": "no pulses"}}})
+    report = report_from_directory(tmp_path)
+    assert report.badge == ("bad", "no estimate")
+
+
+def test_a_record_that_bounds_the_gap_on_one_side_only_is_a_page(tmp_path):
+    entry = half_gap(0.0, interval=[0.0, None], visible=False, message="the gap cannot be seen")
+    write_result(tmp_path, "estimate", {}, None, {"estimates": {"maximum_likelihood": entry}} | entry)
+    report = report_from_directory(tmp_path)
+    assert "between 0 and any size rad" in report.summary
+    assert report.badge == ("neutral", "no gap is seen")

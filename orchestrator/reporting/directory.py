@@ -6,7 +6,7 @@ from pathlib import Path
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
-from orchestrator.reporting.pages import check, diagnose, generic, simulate, sweep, thesis
+from orchestrator.reporting.pages import check, diagnose, estimate, generic, simulate, sweep, thesis
 from orchestrator.reporting.source import Source, load
 
 PAGE = "report.html"
@@ -14,6 +14,7 @@ COMMANDS = ("build", "check", "simulate", "sweep", "estimate", "diagnose", "thes
 _BUILDERS: dict[str, Callable[[Source], Report]] = {
     "check": check.build,
     "diagnose": diagnose.build,
+    "estimate": estimate.build,
     "simulate": simulate.build,
     "ssp": simulate.build,
     "sweep": sweep.build,

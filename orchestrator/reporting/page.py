@@ -27,6 +27,7 @@ from orchestrator.reporting.model import (
 from orchestrator.reporting.numbers import in_words, thinned
 
 EMBED_LIMIT = 1_000_000
+LONG_TEXT = 40
 SCRIPTS = ("scale.js", "svg.js", "plot.js", "page.js")
 _KINDS = {Text: "text", Facts: "facts", Table: "table", Plot: "plot", Findings: "findings"}
 
@@ -58,7 +59,12 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"words": in_words, "plot_data": _plot_data, "sort_key": _sort_key}
+    environment.filters |= {
+        "words": in_words,
+        "plot_data": _plot_data,
+        "sort_key": _sort_key,
+        "cell_class": _cell_class,
+    }
     environment.globals["kind"] = _kind
     return environment
 
@@ -76,6 +82,13 @@ def _sort_key(value: Cell) -> str:
     if value is None:
         return ""
     return repr(float(value)) if isinstance(value, (int, float)) else value
+
+
+def _cell_class(value: Cell) -> Markup:
+    """Return the class attribute of a table's cell: numbers are aligned, sentences get room."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return Markup(' class="number"')
+    return Markup(' class="long"') if isinstance(value, str) and len(value) > LONG_TEXT else Markup("")
 
 
 def _plot_data(plot: Plot) -> Markup:

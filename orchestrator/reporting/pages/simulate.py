@@ -1,11 +1,12 @@
 """The pages of ``simulate`` and ``ssp``: the paired loops, or any system's signals, against time."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from orchestrator.reporting.model import Cell, Facts, Plot, Report, Section, Series, Span
 from orchestrator.reporting.pages import generic
 from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.pages.record import out_of_contact
 from orchestrator.reporting.source import Source, numbers
 
 SIGNALS_PER_PLOT = 6
@@ -38,7 +39,7 @@ def _pair(results: Mapping[str, Any], table: Columns) -> tuple[list[Section], st
     else:
         summary = f"Two loops, one with a half-gap of {alpha:g} rad. No estimate: {results.get('no_estimate')}."
     time = numbers(table["time"])
-    spans = _out_of_contact(time, numbers(table["contact"])) if "contact" in table else ()
+    spans = out_of_contact(time, numbers(table["contact"])) if "contact" in table else ()
     gap = "Shaded: the teeth of the loop with backlash are not in contact."
     plots: list[Section] = []
     for title, label, names in (
@@ -66,21 +67,6 @@ def _difference(time: list[float | None], table: Columns, spans: tuple[Span, ...
     series = Series("estimated load angles, with minus without", time, difference)
     note = "S is the sum of the absolute values of this curve."
     return Plot("Difference of the loops", "time [s]", "difference [rad]", (series,), spans, note=note)
-
-
-def _out_of_contact(time: Sequence[float | None], contact: Sequence[float | None]) -> tuple[Span, ...]:
-    spans, start = [], None
-    for t, c in zip(time, contact, strict=True):
-        if t is None:
-            continue
-        if c == 0.0 and start is None:
-            start = t
-        elif c != 0.0 and start is not None:
-            spans.append(Span(start, t, "not in contact"))
-            start = None
-    if start is not None and time[-1] is not None:
-        spans.append(Span(start, time[-1], "not in contact"))
-    return tuple(spans)
 
 
 def _scenario(results: Mapping[str, Any], table: Columns) -> tuple[list[Section], str]:

@@ -1,0 +1,167 @@
+"""The page of ``estimate``: the half-gap by each method, the fit behind it, and a proposed experiment."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from orchestrator.reporting.model import Badge, Cell, Column, Facts, Plot, Report, Section, Series, Table, Text
+from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.pages.record import record_plots
+from orchestrator.reporting.source import Source, numbers, words
+
+Json = Mapping[str, Any]
+CURVE_POINTS = 121
+CHI_SQUARE_95 = 3.841458820694124  # of one degree of freedom
+ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
+
+
+def build(source: Source) -> Report:
+    """Return the page."""
+    results = source.results
+    estimates: Json = results.get("estimates") or {}
+    found = {name: e for name, e in estimates.items() if e.get("alpha") is not None}
+    sections: list[Section] = []
+    messages = [f"{words(name)}: {e['message']}" for name, e in found.items() if e.get("message")]
+    if messages:
+        sections.append(Text("Remarks", tuple(messages)))
+    if estimates:
+        sections += [_methods(estimates), *_comparison(found)]
+    sections += [*_profile(source), *_online(source), *record_plots(source, "estimate.csv"), *_errors(source)]
+    parameters = (results.get("diagnostics") or {}).get("parameters")
+    if parameters:
+        sections.append(_parameters(parameters))
+    sections += _design(source, results.get("design") or [])
+    sections += _diagnostics(found)
+    badge, summary = _answer(results)
+    return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads())
+
+
+def _answer(results: Json) -> tuple[tuple[Badge, str] | None, str]:
+    if results.get("alpha") is None:
+        if results.get("estimates"):
+            return ("bad", "no estimate"), "No method can be applied to this record."
+        return None, "An excitation that shows the gap."
+    low, high = _interval(results)
+    interval = f"with 95 % confidence between {_number(low)} and {_number(high)} rad"
+    record = results.get("record") or {}
+    source = f" (record {record['source']}, {record['rows']} rows)" if record.get("source") else ""
+    summary = f"The half-gap is {results['alpha']:.6g} rad, {interval}{source}."
+    badge: tuple[Badge, str] = ("good", "the gap is seen") if results.get("visible") else ("neutral", "no gap is seen")
+    return badge, " ".join(filter(None, [summary, results.get("message")]))
+
+
+def _interval(estimate: Json) -> tuple[float | None, float | None]:
+    low, high = estimate.get("interval") or (None, None)
+    return low, high
+
+
+def _number(value: float | None) -> str:
+    return "any size" if value is None else f"{value:.6g}"
+
+
+def _methods(estimates: Json) -> Table:
+    columns = (
+        Column("method"),
+        Column("half-gap", "rad", 6),
+        Column("standard error", "rad", 3),
+        Column("Cramér-Rao bound", "rad", 3),
+        Column("lower", "rad", 6),
+        Column("upper", "rad", 6),
+        Column("gap is seen"),
+        Column("note"),
+    )
+    rows = []
+    for name, e in estimates.items():
+        numbers_ = (e.get("alpha"), e.get("standard_error"), e.get("cramer_rao"), *_interval(e))
+        rows.append((words(name), *numbers_, e.get("visible"), e.get("not_applicable") or e.get("message") or None))
+    return Table("Estimates", columns, tuple(rows))
+
+
+def _comparison(found: Json) -> list[Section]:
+    if len(found) < 2:
+        return []
+    alpha = [float(e["alpha"]) for e in found.values()]
+    low, high = zip(*(_interval(e) for e in found.values()), strict=True)
+    series = Series("half-gap", list(range(len(found))), alpha, "points", low, high)
+    positive = [v for v in (*alpha, *low) if v is not None]
+    wide = min(positive) > 0.0 and max(alpha) > 30.0 * min(alpha)
+    names = tuple(words(name) for name in found)
+    return [Plot("Estimates by method", "method", "half-gap [rad]", (series,), log_y=wide, categories=names)]
+
+
+def _profile(source: Source) -> list[Section]:
+    """Return the profile; between its points the root of the drop, with its side's sign, is interpolated linearly."""
+    table = source.columns("profile.csv")
+    if not {"alpha", "drop"} <= set(table):
+        return []
+    points = zip(*(numbers(table[name]) for name in ("alpha", "drop")), strict=True)
+    alpha, drop = np.array([p for p in points if None not in p], dtype=float).T
+    signed = np.sign(alpha - alpha[np.argmin(drop)]) * np.sqrt(np.maximum(drop, 0.0))
+    fine = np.linspace(signed[0], signed[-1], CURVE_POINTS)
+    series = (
+        Series("profile", np.interp(fine, signed, alpha).tolist(), (fine**2).tolist()),
+        Series("computed", alpha.tolist(), drop.tolist(), "points"),
+        Series("95 % limit", [float(alpha[0]), float(alpha[-1])], [CHI_SQUARE_95, CHI_SQUARE_95]),
+    )
+    note = (
+        "Twice the drop of the log-likelihood, maximised over all else. The interval is where it stays below the limit."
+    )
+    return [Plot("Profile likelihood", "half-gap [rad]", "twice the drop", series, note=note)]
+
+
+def _online(source: Source) -> list[Section]:
+    table = source.columns("online.csv")
+    if not {"time", "alpha", "low", "high"} <= set(table):
+        return []
+    time = numbers(table["time"])
+    names = {"alpha": "estimate", "low": "lower end (95 %)", "high": "upper end (95 %)"}
+    curves = tuple(Series(label, time, numbers(table[name])) for name, label in names.items())
+    return [Plot("Online estimate", "time [s]", "half-gap [rad]", curves, log_y=True)]
+
+
+def _errors(source: Source) -> list[Section]:
+    table = source.columns("estimate.csv")
+    found = [name for name in ERRORS if name in table]
+    if not found:
+        return []
+    time = numbers(table["time"])
+    curves = tuple(Series(ERRORS[name], time, numbers(table[name])) for name in found)
+    note = "Measured minus predicted one sample ahead: noise when the model is right."
+    return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)]
+
+
+def _parameters(parameters: Json) -> Table:
+    columns = ("parameter", "nominal", "fitted", "standard error")
+    rows: list[tuple[Cell, ...]] = [
+        (name, p.get("nominal"), p.get("value"), p.get("standard_error")) for name, p in parameters.items()
+    ]
+    return Table("Parameters fitted with the gap", tuple(Column(c, "", 6) for c in columns), tuple(rows))
+
+
+def _design(source: Source, candidates: Sequence[Json]) -> list[Section]:
+    if not candidates:
+        return []
+    columns = (
+        Column("excitation"),
+        Column("bound on the half-gap", "rad", 3),
+        Column("peak torque", "N.m"),
+        Column("peak motor speed", "rad/s"),
+    )
+    rows = tuple((c["name"], c["bound"], c["peak_torque"], c["peak_motor_speed"]) for c in candidates)
+    note = "Best first: the smallest standard error of the half-gap that any estimator can have."
+    table = source.columns("design.csv")
+    made: list[Section] = [Table("Proposed excitations", columns, rows, note)]
+    if {"time", "u"} <= set(table):
+        torque = Series("requested torque", numbers(table["time"]), numbers(table["u"]), "steps")
+        made.append(Plot("The best excitation", "time [s]", "u [N.m]", (torque,)))
+    return made
+
+
+def _diagnostics(found: Json) -> list[Section]:
+    made: list[Section] = []
+    for name, estimate in found.items():
+        given = {k: v for k, v in (estimate.get("diagnostics") or {}).items() if k != "parameters"}
+        facts = [s for s in sections_of(f"Diagnostics of {words(name)}", given) if isinstance(s, Facts)]
+        made += facts[:1]
+    return made
