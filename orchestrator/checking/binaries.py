@@ -1,6 +1,7 @@
 """The shared libraries of an FMU, looked at without loading them."""
 
 import platform
+import posixpath
 import struct
 import sys
 from collections.abc import Iterator
@@ -80,7 +81,7 @@ def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
     folders = sorted({n.split("/")[1] for n in names if n.startswith("binaries/") and n.count("/") >= 2})
     for interface in d.interfaces:
         for element, source in interface.sources:
-            if f"sources/{source}" not in names:
+            if posixpath.normpath(f"sources/{source}") not in names:
                 message = f"a source file must be in sources/, but `{source}` is not"
                 yield Finding("file.source-missing", xpath(element, "name"), message)
     for folder in folders:

@@ -98,7 +98,7 @@ structure.duplicate | E | an entry is listed once | remove the repeated one
 structure.order | W | lists are sorted by index | sort them
 structure.dependencies | E | dependencies are indices of possible knowns | correct the list
 structure.dependencies-kind | E | dependenciesKind is as long as dependencies | give one kind per dependency
-file.source-missing | E | source files named are in sources/ | add the file, or remove it from SourceFiles
+file.source-missing | W | source files named are in sources/ | add the file, or remove it from SourceFiles
 file.documentation | W | documentation has its entry page | name the first page index.html
 file.icon | W | model.png is a PNG image | convert it
 layered.manifest | W | a layered standard's manifest is complete and in its folder | correct the attributes or the folder
@@ -133,10 +133,12 @@ value.not-finite | E | outputs are finite | look for a division by zero or a mis
 value.out-of-range | W | outputs stay within min and max | correct the bounds or the model
 value.start | W | start values of the XML are those of the binary | generate both from one source
 value.set | E | start values can be set before initialisation, and change nothing | accept what the XML says can be set
+value.set-initial | W | variables with initial exact accept their start value before initialisation | accept it, or write initial="calculated"
 value.string | E | strings are not null | return "" instead
 instances.second | E | a second instance can be made | set canBeInstantiatedOnlyOncePerProcess, or remove global state
 instances.interference | E | instances do not influence one another | move global variables into the instance
 run.reset | E | fmi2Reset returns the instance to its first state | restore every variable, hidden ones too
+run.inexact | W | runs that must be equal are so bit for bit, not only to a thousandth of the range | save and reset the memory of the solver too
 run.determinism | W | two equal runs are equal | seed random numbers, initialise memory
 state.status | E | the state functions work as the flags promise | implement them, or clear the flag
 state.restore | E | a restored state continues as before | save every variable, hidden ones too, by value

@@ -13,6 +13,7 @@ from orchestrator.checking.description import (
     Description,
     SimpleType,
     Variable,
+    number,
 )
 from orchestrator.checking.findings import Finding
 
@@ -178,10 +179,10 @@ def _aliases(d: Description) -> Iterator[Finding]:
             groups[v.base, v.reference].append(v)
     for (base, reference), group in groups.items():
         if len(group) > 1:
-            yield from _alias_group(base, reference, group)
+            yield from _alias_group(d, base, reference, group)
 
 
-def _alias_group(base: str, reference: int, group: list[Variable]) -> Iterator[Finding]:
+def _alias_group(d: Description, base: str, reference: int, group: list[Variable]) -> Iterator[Finding]:
     names = ", ".join(f"`{v.name}`" for v in group)
     what = f"the {base} variables with value reference {reference} ({names})"
     settable = [v for v in group if _settable(v)]
@@ -205,13 +206,21 @@ def _alias_group(base: str, reference: int, group: list[Variable]) -> Iterator[F
         message = f"{what} are constant and must have the same start value"
         yield Finding("variable.alias-start", constant[1].path("start"), message)
     units = {v.attributes.get("unit") for v in group}
-    if base == "Real" and len(units) > 1:
+    if base == "Real" and len({_base_unit(d, u) for u in units}) > 1:
         message = f"{what} must have the same unit, but have {', '.join(sorted(str(u) for u in units))}"
         yield Finding("variable.alias-unit", group[1].path("unit"), message)
     variabilities = {v.variability for v in group}
     if len(variabilities) > 1 and not (varying and constant) and variabilities <= set(VARIABILITIES):
         message = f"{what} should have the same variability, but have {', '.join(sorted(variabilities))}"
         yield Finding("variable.alias-variability", group[1].path("variability"), message)
+
+
+def _base_unit(d: Description, unit: str | None) -> object:
+    """What two units must share to be the same: the BaseUnit, or the name when there is none."""
+    element = None if unit is None or unit not in d.units else d.units[unit].find("BaseUnit")
+    if element is None:
+        return unit
+    return frozenset((k, number(v, "Real")) for k, v in element.attrib.items() if v not in ("0", "0.0"))
 
 
 def _settable(v: Variable) -> bool:

@@ -252,6 +252,9 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
         else if (vr[i] == VR_DAMPING) s->damping = value[i];
         else if (vr[i] == VR_STIFFNESS && before) s->stiffness = value[i];
         else if (vr[i] == VR_MASS && before && value[i] > 0.0) s->mass = value[i];
+#ifdef FAULT_set_output_refused
+        else if (vr[i] == VR_X) return refuse(self, "x is an output");
+#endif
         else if (vr[i] == VR_X && before) s->x = value[i];
         else if (vr[i] == VR_V && before) s->v = value[i];
         else return refuse(self, "fmi2SetReal: the variable cannot be set now");

@@ -211,6 +211,9 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
 #ifdef FAULT_state_not_restored
     self->s.v = v;
 #endif
+#ifdef FAULT_state_rounded
+    self->s.x = (float)self->s.x;
+#endif
     return fmi2OK;
 }
 

@@ -158,10 +158,38 @@ def same(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
-def first_difference(a: list[list[Any]], b: list[list[Any]], names: Sequence[str]) -> str | None:
-    """Where two runs first differ, in words, or None."""
+@dataclass(frozen=True)
+class Difference:
+    """How two runs differ.
+
+    Attributes:
+        text: where they first do, in words.
+        relative: the largest difference of a signal over the range of that signal.
+    """
+
+    text: str
+    relative: float
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def compare(a: list[list[Any]], b: list[list[Any]], names: Sequence[str]) -> Difference | None:
+    """Hold run ``b`` against run ``a``, both [step][output]; None when they are equal bit for bit."""
     for n, (x, y) in enumerate(zip(a, b, strict=True)):
         for name, p, q in zip(names, x, y, strict=True):
             if not same(p, q):
-                return f"`{name}` {n + 1} steps later is {q!r} instead of {p!r}"
+                return Difference(f"`{name}` in step {n + 1} is {q!r} instead of {p!r}", _largest(a, b))
     return None
+
+
+def _largest(a: list[list[Any]], b: list[list[Any]]) -> float:
+    worst = 0.0
+    for x, y in zip(zip(*a, strict=True), zip(*b, strict=True), strict=True):
+        if all(map(same, x, y)):
+            continue
+        if not all(isinstance(v, float) and math.isfinite(v) for v in (*x, *y)):
+            return math.inf
+        size = max(max(x) - min(x), 1e-6 * max(map(abs, x)), 1e-300)
+        worst = max(worst, max(abs(p - q) for p, q in zip(x, y, strict=True)) / size)
+    return worst
