@@ -17,7 +17,7 @@ STATISTICS = {
     "mean_percent": ("mean error", "%"),
     "worst_percent": ("worst error", "%"),
     "mse": ("mean squared error", "rad²"),
-    "coverage": ("intervals that hold the size", "%"),
+    "coverage": ("coverage of intervals", "%"),
 }
 
 
