@@ -26,20 +26,28 @@ from orchestrator.master.layout import Layout
 from orchestrator.master.pieces import CELLS, NODES, dense_matrix, piece_times, piece_weights
 from orchestrator.master.protocol import Signals, StepDiscardedError
 from orchestrator.master.result import Statistics
-from orchestrator.master.signals import Signal
+from orchestrator.master.signals import GRID_SLACK, Signal
 from orchestrator.master.wiring import Stage, Wiring
 
 Array = NDArray[np.float64]
 
-WHOLE_SWEEPS, HALF_SWEEPS = 2, 2
-SAFETY, SHRINK, GROW = 0.9, 0.1, 4.0
+SWEEPS = 2
+SAFETY, SHRINK, GROW = 0.9, 0.1, 8.0
+EVENT_SHARE = 0.03
+"""Error allowed over an event: halving the window does not reduce it much, as it does in a smooth window."""
+
+SUSPICIOUS = 100.0
+"""Error beyond which a window is taken to hold an event rather than to be too long."""
+
+HOPELESS = 30.0
+"""Error at the middle of a window beyond which its second half is not worth stepping."""
 ORDER = 5
 """Order, in a smooth window's length, of the error after it."""
 
 
 @dataclass
 class _Waveform:
-    """Outputs over a window as cubics; predicts the next window and fills in the recorded points between nodes."""
+    """Outputs at equidistant nodes of a window, and the polynomials through them."""
 
     start: float
     end: float
@@ -47,11 +55,50 @@ class _Waveform:
     coefficients: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        self.coefficients = dense_matrix() @ self.nodes
+        self.coefficients = dense_matrix(len(self.nodes)) @ self.nodes
 
     def at(self, times: Signals) -> Array:
         s = (times - self.start) / (self.end - self.start)
-        return np.vander(s, NODES, increasing=True) @ self.coefficients
+        return np.vander(s, len(self.nodes), increasing=True) @ self.coefficients
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """What came of one window.
+
+    Attributes:
+        outputs: over the window; ``None`` when it was undone.
+        guess: for the next window.
+        error: estimate as a multiple of the tolerance.
+        length: of the window [s].
+        trouble: time [s] by which the trouble has come, for a window that was undone.
+    """
+
+    outputs: _Waveform | None
+    guess: _Waveform | None
+    error: float
+    length: float
+    trouble: float
+
+
+@dataclass(frozen=True)
+class _Event:
+    """A jump or kink somewhere between ``start``, where a window failed, and ``end`` [s], with that window's error."""
+
+    start: float
+    end: float
+    error: float
+
+    def window_end(self, time: float) -> float:
+        """Return where to try next: across the event if it is near enough for its effect to pass, else half way."""
+        left, tried = self.end - time, self.end - self.start
+        across = math.isfinite(self.error) and self.error * left <= 0.5 * EVENT_SHARE * tried
+        return self.end if across else time + 0.5 * left
+
+    def was_none(self, attempt: _Attempt) -> bool:
+        """Whether a good window's error fits a smooth one, so that the failed window was merely too long."""
+        smooth = self.error * (attempt.length / (self.end - self.start)) ** ORDER
+        return attempt.error > 0.1 * smooth
 
 
 @dataclass
@@ -93,6 +140,13 @@ def _check(layout: Layout) -> None:
             raise ScenarioError(
                 f"$.connections[{k}].quantum: must be 0 under 'adaptive', but is {connection.quantum!r}"
             )
+
+
+def _window_end(time: float, length: float, target: float) -> float:
+    left = target - time
+    if left <= 1.01 * length:
+        return target
+    return time + (min(length, 0.5 * left) if left < 2.0 * length else length)
 
 
 class _Run:
@@ -138,29 +192,29 @@ class _Run:
         row = 1
         for target in self.breaks:
             guess: _Waveform | None = None
+            event: _Event | None = None
             while time < target:
-                end = self._window_end(time, length, target)
-                halves, guess, error = self._attempt(time, end, guess)
-                length = self._next_length(end - time, error)
-                if halves:
-                    for waveform in halves:
-                        row = self._write(waveform, row)
-                    self.counts.accepted += 1
-                    time = end
-                else:
+                end = _window_end(time, length, target) if event is None else event.window_end(time)
+                attempt = self._attempt(time, end, guess, EVENT_SHARE if event else 1.0)
+                guess = attempt.guess
+                if attempt.outputs is None:
                     self.counts.rejected += 1
-                    self._give_up(time, length)
+                    if event is not None or attempt.error > SUSPICIOUS:
+                        event = _Event(time, attempt.trouble, attempt.error)
+                    length = self._next_length(attempt)
+                    self._give_up(time, (event.window_end(time) - time) if event else length)
+                    continue
+                row = self._write(attempt.outputs, row)
+                self.counts.accepted += 1
+                length = self._next_length(attempt)
+                if event is not None and (end >= event.end or event.was_none(attempt)):
+                    event = None
+                time = end
         return Statistics(self.counts.accepted, self.counts.rejected, self.calls, self.counts.sweeps)
 
-    def _window_end(self, time: float, length: float, target: float) -> float:
-        left = target - time
-        if left <= 1.01 * length:
-            return target
-        return time + min(length, 0.5 * left) if left < 2.0 * length else time + length
-
-    def _next_length(self, length: float, error: float) -> float:
-        factor = SHRINK if not math.isfinite(error) else SAFETY * max(error, 1e-12) ** (-1.0 / ORDER)
-        return min(length * min(max(factor, SHRINK), GROW), self.settings.largest)
+    def _next_length(self, attempt: _Attempt) -> float:
+        factor = SAFETY * max(attempt.error, 1e-12) ** (-1.0 / ORDER) if math.isfinite(attempt.error) else SHRINK
+        return min(attempt.length * min(max(factor, SHRINK), GROW), self.settings.largest)
 
     def _give_up(self, time: float, length: float) -> None:
         if length < self.settings.smallest:
@@ -188,30 +242,38 @@ class _Run:
             for stage, state in states:
                 stage.slave.free_state(state)
 
-    def _attempt(
-        self, start: float, end: float, guess: _Waveform | None
-    ) -> tuple[tuple[_Waveform, ...], _Waveform | None, float]:
-        """Try one window; return its halves (none: undone), a guess for the next, the error over the tolerance."""
-        middle = 0.5 * (start + end)
+    def _attempt(self, start: float, end: float, guess: _Waveform | None, share: float) -> _Attempt:
+        """Try one window; leave the slaves at its end when its error is within ``share``, else at its start."""
+        middle, length = 0.5 * (start + end), end - start
         with self._saved() as restore:
             try:
-                whole = self._sweep(start, end, guess, WHOLE_SWEEPS)
+                whole = self._sweep(start, end, guess)
                 restore()
-                first = self._sweep(start, middle, whole, HALF_SWEEPS)
-                second = self._sweep(middle, end, whole, HALF_SWEEPS)
+                first = self._sweep(start, middle, whole)
+                error = self._difference(whole.nodes[CELLS // 2], first.nodes[-1])
+                if error > HOPELESS:
+                    restore()
+                    return _Attempt(None, first, error, length, end)
+                second = self._sweep(middle, end, whole)
             except StepDiscardedError:
                 restore()
-                return (), None, math.inf
-            found, estimate = second.nodes[-1][self.outputs], whole.nodes[-1][self.outputs]
-            scale = self.settings.tolerance * np.maximum(1.0, np.abs(found))
-            error = float(np.max(np.abs(found - estimate) / scale, initial=0.0))
-            if error <= 1.0:
-                return (first, second), second, error
+                return _Attempt(None, None, math.inf, length, end)
+            error = self._difference(whole.nodes[-1], second.nodes[-1])
+            if error <= share:
+                both = _Waveform(start, end, np.concatenate((first.nodes, second.nodes[1:])))
+                return _Attempt(both, second, error, length, end)
             restore()
-            return (), whole if math.isfinite(error) else None, error
+            return _Attempt(None, whole if math.isfinite(error) else None, error, length, end)
 
-    def _sweep(self, start: float, end: float, guess: _Waveform | None, sweeps: int) -> _Waveform:
-        """Step all slaves from ``start`` to ``end`` [s], ``sweeps`` times over, and return the outputs in between."""
+    def _difference(self, one: Array, other: Array) -> float:
+        """Return the largest difference of two sets of values as a multiple of the tolerance."""
+        a, b = one[self.outputs], other[self.outputs]
+        scale = self.settings.tolerance * np.maximum(1.0, np.abs(b))
+        error = float(np.max(np.abs(a - b) / scale, initial=0.0))
+        return error if math.isfinite(error) else math.inf
+
+    def _sweep(self, start: float, end: float, guess: _Waveform | None) -> _Waveform:
+        """Step all slaves from ``start`` to ``end`` [s], ``SWEEPS`` times over, and return the outputs in between."""
         times = start + (end - start) * np.arange(NODES) / CELLS
         initial = self.wiring.values.copy()
         nodes = np.tile(initial, (NODES, 1))
@@ -220,7 +282,7 @@ class _Run:
             nodes[1:, self.outputs] = guessed[1:] + (initial[self.outputs] - guessed[0])
         feeds = self._signal_nodes(times)
         with self._saved() as restore:
-            for sweep in range(sweeps):
+            for sweep in range(SWEEPS):
                 if sweep:
                     restore()
                 self.counts.sweeps += 1
@@ -232,7 +294,8 @@ class _Run:
         """Return what the sources add at the nodes, shape (rows, nodes): left limits at a window's end."""
         inside = times.copy()
         if times[-1] in self.breaks:
-            inside[-1] -= 1e-6 * (times[-1] - times[0])
+            # Signals take a time just before a jump for the jump itself, by up to GRID_SLACK of their period.
+            inside[-1] -= max(1e-6 * (times[-1] - times[0]), 4.0 * GRID_SLACK * max(1.0, abs(self.stop)))
         table = np.zeros((len(self.wiring.layout.signals), NODES))
         for k, parts in enumerate(self.wiring.layout.signals):
             for index, factor, offset, _ in parts:
@@ -282,7 +345,10 @@ class _Run:
         if row > first:
             times = np.minimum(self.start + step * np.arange(first, row), waveform.end)
             block = waveform.at(times)
-            node = np.floor((times - waveform.start) / (waveform.end - waveform.start) * CELLS + 1e-9).astype(np.int64)
+            last_node = len(waveform.nodes) - 1
+            node = np.floor((times - waveform.start) / (waveform.end - waveform.start) * last_node + 1e-9).astype(
+                np.int64
+            )
             block[:, self.held] = waveform.nodes[node][:, self.held]
             self.rows[first:row] = block[:, self.record]
         return row

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-CELLS = 3
+CELLS = 2
 NODES = CELLS + 1
 CLOSING = 1e-5
 """Length of the closing piece as a fraction of the cell: short beside the cell, long beside the rounding of time."""
@@ -31,13 +31,13 @@ def breakpoints(closing: bool) -> tuple[float, ...]:
     return (0.0, 0.5 * last, last, 1.0) if closing else (0.0, 0.5, 1.0)
 
 
-def node_basis() -> list[Polynomial]:
-    """Return, for each node of a window, the cubic in ``s`` over the window that its value is multiplied with."""
-    nodes = np.arange(NODES) / CELLS
+def node_basis(nodes: int) -> list[Polynomial]:
+    """Return, for each of equidistant nodes, the polynomial in ``s`` in [0, 1] that its value is multiplied with."""
+    places = np.linspace(0.0, 1.0, nodes)
     basis = []
-    for k in range(NODES):
-        polynomial = Polynomial.fromroots(np.delete(nodes, k))
-        basis.append(polynomial / polynomial(nodes[k]))
+    for k in range(nodes):
+        polynomial = Polynomial.fromroots(np.delete(places, k))
+        basis.append(polynomial / polynomial(places[k]))
     return basis
 
 
@@ -52,7 +52,7 @@ def piece_weights(closing: bool) -> Array:
         shape (pieces of the window, nodes).
     """
     columns = []
-    for polynomial in node_basis():
+    for polynomial in node_basis(NODES):
         constants: list[float] = []
         for cell in range(CELLS):
             local = polynomial(Polynomial([cell / CELLS, 1.0 / CELLS]))
@@ -80,9 +80,9 @@ def _integral(u: Polynomial) -> float:
 
 
 @cache
-def dense_matrix() -> Array:
-    """Return the matrix from values at the nodes to the coefficients of the cubic in ``s``; shape (4, nodes)."""
-    return np.array([p.coef for p in node_basis()]).T.copy()
+def dense_matrix(nodes: int) -> Array:
+    """Return the matrix from values at equidistant nodes to the coefficients of the polynomial in ``s``, square."""
+    return np.array([p.coef for p in node_basis(nodes)]).T.copy()
 
 
 def piece_times(start: float, end: float, closing: bool) -> tuple[list[float], list[bool]]:

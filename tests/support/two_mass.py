@@ -131,6 +131,7 @@ def solution(times: NDArray[np.float64], alpha: float, signal: Signal = TORQUE) 
                 method="DOP853",
                 rtol=1e-12,
                 atol=1e-14,
+                max_step=2e-3,  # a brief contact must not hide within one step
                 dense_output=True,
                 events=None if contact == 2 else _events(contact),
                 args=(signal, 0.5 * (begin + end), alpha, contact),
