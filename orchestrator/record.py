@@ -23,6 +23,8 @@ COLUMNS = ("time", "u", "theta_m", "theta_l")
 OPTIONAL = ("theta_l",)
 MINIMUM_ROWS = 200
 MAXIMUM_BYTES = 500_000_000
+LEAST_STEP = 1e-6  # s
+LARGEST_ANGLE = 1e7  # rad
 LARGEST_GAP = 0.3  # rad, load side: motion beyond it that one encoder misses is no gap
 UNIT_FACTORS = {
     "s": 1.0,
@@ -147,6 +149,7 @@ def record_from_columns(table: Mapping[str, Array], source: str, shown: Mapping[
     _check_time(arrays["time"], label["time"], source)
     for name in ("theta_m", "theta_l"):
         if name in arrays:
+            _check_range(arrays[name], label[name], source)
             _check_moving(arrays, name, label[name], source)
     rest = {name: values for name, values in arrays.items() if name not in COLUMNS}
     return Record(arrays["time"], arrays["u"], arrays["theta_m"], arrays.get("theta_l"), source, rest)
@@ -269,10 +272,19 @@ def _check_time(time: Array, name: str, source: str) -> None:
         lost = round(jump / step) - 1
         text = f"there is a gap of {jump:g} s ({lost} rows missing)" if lost > 0 else f"the step is {jump:g} s"
         raise RecordError(f"{where.format(row)} must be uniform with a step of {step:g} s, but {text}")
+    if step < LEAST_STEP:
+        raise RecordError(f"{source}: column `{name}` must step by at least {LEAST_STEP:g} s, but steps by {step:g}")
     if step >= 0.5:
         hint = "; this looks like milliseconds" if step < 100.0 else ""
         where = f"{source}: column `{name}`"
         raise RecordError(f"{where} must be in seconds with steps below 0.5 s, but steps by {step:g}{hint}")
+
+
+def _check_range(values: Array, name: str, source: str) -> None:
+    far = np.flatnonzero(np.abs(values) > LARGEST_ANGLE)
+    if far.size:
+        where = f"{source}: row {far[0] + 1}, column `{name}`"
+        raise RecordError(f"{where} must be an angle below {LARGEST_ANGLE:g} rad, but is {values[far[0]]:g}")
 
 
 def _check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str) -> None:

@@ -10,12 +10,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from scipy.stats import chi2
 
 from orchestrator.commands._console import print_table
-from orchestrator.errors import RecordError, ScenarioError
+from orchestrator.errors import ConvergenceError, RecordError, ScenarioError
 from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.design import Limits, design
 from orchestrator.estimation.protocol import LEVEL, METHODS, Estimate, NotApplicableError, estimator
@@ -102,14 +103,19 @@ def _estimate(record: Record, model: Model, names: list[str]) -> tuple[list[Esti
         for name in names:
             begun = time.perf_counter()
             try:
-                estimate = estimator(name)(record, model)
+                with np.errstate(all="ignore"):
+                    estimate = estimator(name)(record, model)
+                    bound = _bound(record, model, [*estimates, estimate])
+            except np.linalg.LinAlgError as error:
+                raise ConvergenceError(
+                    f"{record.source}: `{name}` finds no solution for this record: {error}"
+                ) from None
             except NotApplicableError as error:
                 rows.append([name, "not applicable", "", "", str(error), ""])
                 table[name] = {"not_applicable": str(error)}
             else:
                 estimates.append(estimate)
                 seconds = time.perf_counter() - begun
-                bound = _bound(record, model, estimates)
                 rows.append(_row(estimate, bound, seconds))
                 table[name] = _entry(estimate, bound, seconds)
             advance()
