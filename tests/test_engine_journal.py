@@ -82,8 +82,9 @@ def test_another_sweeps_journal_is_refused_and_told_apart(tmp_path):
     before = path.read_bytes()
     with pytest.raises(ScenarioError, match="differs in: cases"):
         Journal(path, DEFINITION | {"cases": {"seed": 2}}, 10, resume=True)
-    with pytest.raises(ScenarioError, match="differs in: cases"):
-        Journal(path, DEFINITION, 11, resume=True)
+    for total in (3, 11):
+        with pytest.raises(ScenarioError, match="differs in: cases"):
+            Journal(path, DEFINITION, total, resume=True)
     with pytest.raises(ScenarioError, match=r"unfinished sweep \(5 of 10 cases\): go on with --resume"):
         Journal(path, DEFINITION, 10, resume=False)
     assert path.read_bytes() == before
@@ -120,6 +121,16 @@ def test_a_place_that_cannot_be_written_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="file"):
         Journal(tmp_path / "file" / "j", DEFINITION, 10, resume=False)
+
+
+def test_a_disk_that_is_full_from_the_start_leaves_nothing(tmp_path, monkeypatch):
+    def full(descriptor, data, offset):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "pwrite", full)
+    with pytest.raises(OutputError, match="0 of 10 cases"):
+        Journal(tmp_path / "out" / "j", DEFINITION, 10, resume=False)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failed_write_leaves_the_lines_before_it(tmp_path, monkeypatch):

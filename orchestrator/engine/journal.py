@@ -58,6 +58,7 @@ class Journal:
             self._lock()
             self._end = self._read(definition, resume)
         except BaseException:
+            self._forget_if_empty()
             os.close(self._descriptor)
             raise
 
@@ -110,6 +111,11 @@ class Journal:
         os.close(self._descriptor)
         self._descriptor = -1
 
+    def _forget_if_empty(self) -> None:
+        if os.fstat(self._descriptor).st_size == 0:
+            self.path.unlink(missing_ok=True)
+            _remove_directories(self._made)
+
     def discard(self) -> None:
         """Remove the file: its content is in the published results now."""
         self.path.unlink(missing_ok=True)
@@ -139,18 +145,20 @@ class Journal:
         wanted = json.loads(json.dumps(definition))
         header: Any = None
         end = 0
+        ours = False
         for offset, line in self._lines():
             entry = _entry(line)
             if offset == 0:
                 header = entry
-            elif isinstance(entry, list) and entry[0] not in self:
+                ours = _is_header(header) and header["definition"] == wanted and header["cases"] == self.total
+            elif ours and isinstance(entry, list) and entry[0] not in self:
                 self._count(entry[0], Status(entry[1]))
+            elif not ours:
+                self.done += isinstance(entry, list)
             end = offset + len(line)
-            if offset == 0 and not _is_header(header):
-                break
         if end == 0 or (not resume and _is_header(header) and not self.done):
             return self._begin(wanted)
-        self._check(header, wanted, resume)
+        self._check(header, wanted, resume, ours)
         os.ftruncate(self._descriptor, end)
         return end
 
@@ -158,9 +166,10 @@ class Journal:
         os.ftruncate(self._descriptor, 0)
         self._end = 0
         self._write(_line({"format": FORMAT, "definition": definition, "cases": self.total}))
+        _sync_directory(self.path.parent)
         return self._end
 
-    def _check(self, header: Any, wanted: Mapping[str, Any], resume: bool) -> None:
+    def _check(self, header: Any, wanted: Mapping[str, Any], resume: bool, ours: bool) -> None:
         if not _is_header(header):
             raise ScenarioError(f"{self.path} must be the journal of a sweep, but is not: remove it to start anew")
         if not resume:
@@ -168,7 +177,7 @@ class Journal:
                 f"{self.path.parent} holds an unfinished sweep ({self.done} of {header['cases']} cases): "
                 f"go on with --resume, or remove {self.path} to start anew"
             )
-        if header["definition"] != wanted or header["cases"] != self.total:
+        if not ours:
             was = header["definition"]
             keys = sorted(k for k in {*was, *wanted} if was.get(k) != wanted.get(k)) or ["cases"]
             raise ScenarioError(
@@ -218,6 +227,15 @@ def _entry(line: bytes) -> Any:
 
 def _is_header(entry: Any) -> bool:
     return isinstance(entry, dict) and entry.get("format") == FORMAT
+
+
+def _sync_directory(directory: Path) -> None:
+    """Make a new file's name as durable as its content."""
+    descriptor = os.open(directory, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _make_directories(directory: Path) -> list[Path]:

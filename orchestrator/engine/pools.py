@@ -16,7 +16,7 @@ from orchestrator.cache import cache_directory
 from orchestrator.engine.blobs import BlobStore
 from orchestrator.engine.cases import Case, Outcome
 from orchestrator.engine.lane import Lane
-from orchestrator.engine.work import Work, file_hash
+from orchestrator.engine.work import Work
 from orchestrator.engine.worker import Assignment
 from orchestrator.errors import ScenarioError
 
@@ -71,8 +71,7 @@ class LocalProcesses:
         """Open the pool; processes start with their first case."""
         count = self.workers or len(os.sched_getaffinity(0))
         store = BlobStore(cache_directory("blobs"))
-        digests = {name: store.put(Path(path).read_bytes()) for name, path in work.files.items() if file_hash(path)}
-        paths = {name: store.path(digest) for name, digest in digests.items()}
+        paths = {name: store.path(store.put(Path(path).read_bytes())) for name, path in work.files.items()}
         return LocalPool(count, Assignment(pickled(work), paths, limits.time, limits.memory))
 
 
