@@ -28,6 +28,7 @@ FORGOTTEN = -30.0  # log weight below which a filter is no longer run
 ROOT_HALF = 0.7071067811865476
 ROOT_INVERSE_2PI = 0.3989422804014327
 LEAST_BLUR = 1e-8  # least variance [rad2] of the distance to a flank
+LAG_MEMORY = 0.6  # s over which the error of the lag acts in one direction
 LARGEST_ERROR = 1e3  # innovation [rad] at which a filter counts as diverged
 DEAD = -1e9  # log weight of such a filter
 LONGEST_PART = 0.06  # of the shaft's oscillation, in radians of its phase
@@ -44,6 +45,7 @@ class Settings(NamedTuple):
     alpha_walk: float = 0.0  # random walk of the half-gap, for wear [rad/s^0.5]
     stiffness_spread: float = 0.03  # relative error of the stiffness
     offset_spread: float = 0.01  # twist in mid-gap [rad]
+    lag_spread: float = 0.03  # relative error of the torque's lag
 
 
 def covariance(r: int, c: int) -> int:
@@ -94,7 +96,7 @@ def flank(distance, variance):  # type: ignore[no-untyped-def]
     return share, distance * share + sigma * bell
 
 
-def predict(f, m, u, h, torque_noise_m, torque_noise_l, load_walk, alpha_walk):  # type: ignore[no-untyped-def]
+def predict(f, m, u, h, s):  # type: ignore[no-untyped-def]
     """Advance a filter by ``h`` [s] with the torque request ``u`` [N.m] held.
 
     Args:
@@ -102,10 +104,7 @@ def predict(f, m, u, h, torque_noise_m, torque_noise_l, load_walk, alpha_walk): 
         m: model.
         u: requested torque [N.m].
         h: step [s], short beside the shaft's oscillation.
-        torque_noise_m: white torque noise at the motor [N.m.s^0.5], for what the model lacks.
-        torque_noise_l: the same at the load.
-        load_walk: random walk of the load torque [N.m/s^0.5].
-        alpha_walk: random walk of the half-gap [rad/s^0.5]: wear.
+        s: settings, in the order of :class:`Settings`.
     """
     J_m, J_l, k, c, b_m, b_l, i, tau = m
     mean = 1.0 / i
@@ -150,16 +149,18 @@ def predict(f, m, u, h, torque_noise_m, torque_noise_l, load_walk, alpha_walk): 
         -s_l * stiff,
     )
     keep = exp(-h / tau)
+    lag_error = s[8] * (u - f[4]) / tau
     f[0] += h * f[1] + 0.5 * h * h * a_m
     f[2] += h * f[3] + 0.5 * h * h * a_l
     f[1] += h * a_m
     f[3] += h * a_l
     f[4] = keep * f[4] + (1.0 - keep) * u
     _spread(f, row_m, row_l, h, keep)
-    f[covariance(1, 1)] += h * (torque_noise_m / J_m) ** 2
-    f[covariance(3, 3)] += h * (torque_noise_l / J_l) ** 2
-    f[covariance(5, 5)] += h * load_walk * load_walk
-    f[covariance(6, 6)] += h * alpha_walk * alpha_walk
+    f[covariance(1, 1)] += h * (s[2] / J_m) ** 2
+    f[covariance(3, 3)] += h * (s[3] / J_l) ** 2
+    f[covariance(4, 4)] += h * LAG_MEMORY * lag_error * lag_error
+    f[covariance(5, 5)] += h * s[4] * s[4]
+    f[covariance(6, 6)] += h * s[5] * s[5]
 
 
 def _spread(f, row_m, row_l, h, keep):  # type: ignore[no-untyped-def]
@@ -283,7 +284,7 @@ def advance(filters, m, s, u, h):  # type: ignore[no-untyped-def]
     for n in range(FILTERS):
         if filters[n][WEIGHT] > FORGOTTEN:
             for _ in range(parts):
-                predict(filters[n], m, u, h / parts, s[2], s[3], s[4], s[5])
+                predict(filters[n], m, u, h / parts, s)
 
 
 def measure(filters, s, theta_m, theta_l):  # type: ignore[no-untyped-def]

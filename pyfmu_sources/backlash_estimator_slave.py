@@ -11,7 +11,7 @@ from .sampled_slave import SampledSlave
 U, THETA_M, THETA_L, ALPHA_HAT, ALPHA_DEVIATION, CONTACT_HAT, FIRST_ESTIMATE = range(7)
 FIRST_MODEL = FIRST_ESTIMATE + 6
 FIRST_SETTING = FIRST_MODEL + 8
-SAMPLE_TIME = FIRST_SETTING + 8
+SAMPLE_TIME = FIRST_SETTING + 9
 
 _MEASURED = ("theta_m", "theta_l")
 _STATES = (
@@ -42,6 +42,7 @@ _SETTINGS = (
     ("alpha_walk", "rad", "Standard deviation of the half-gap's change in one second (wear)", 0.0),
     ("stiffness_spread", "1", "Relative standard deviation of the stiffness", 0.0),
     ("offset_spread", "rad", "Standard deviation of the twist in mid-gap", 0.0),
+    ("lag_spread", "1", "Relative standard deviation of the torque's time constant", 0.0),
 )
 _ZERO_ALLOWED = ("c", "b_m", "b_l")
 
@@ -79,7 +80,7 @@ class BacklashEstimator(SampledSlave):
         """Collect model, settings and sample time."""
         real = self.real
         self._model: Any = tuple(real[FIRST_MODEL + n] for n in range(8))
-        self._settings: Any = tuple(real[FIRST_SETTING + n] for n in range(8))
+        self._settings: Any = tuple(real[FIRST_SETTING + n] for n in range(9))
 
     def begin(self) -> None:
         """Start all filters at the first measurement."""

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-from scipy.stats import chi2
 
 from orchestrator.commands._console import print_table
 from orchestrator.errors import ConvergenceError, RecordError, ScenarioError
@@ -169,7 +168,7 @@ def _draw(directory: Path, record: Record, estimates: list[Estimate], model: Mod
             fitted = estimate.diagnostics["parameters"].get("i", {}).get("value", model.parameters["i"].value)
             draw_fit(directory / "estimate_fit.png", record, estimate, fitted)
             write_tables(directory, record, [estimate], fitted)
-            limit = float(chi2.ppf(LEVEL, 1))
+            limit = estimate.diagnostics["profile_limit"]
             draw_profile(directory / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
         elif estimate.method == "ekf":
             draw_online(directory / "estimate_online.png", record, estimate)

@@ -71,7 +71,13 @@ def default_settings(record: Record, model: Model) -> Settings:
     noise_l = UNMEASURED if record.theta_l is None else measurement_noise(record, model, "theta_l")
     stiffness = model.parameters["k"]
     spread = stiffness.standard_deviation / stiffness.value
-    return Settings(noise_m=noise_m, noise_l=noise_l, stiffness_spread=max(spread, 1e-6))
+    lag = model.parameters["tau"]
+    return Settings(
+        noise_m=noise_m,
+        noise_l=noise_l,
+        stiffness_spread=max(spread, 1e-6),
+        lag_spread=lag.standard_deviation / lag.value,
+    )
 
 
 def estimate(record: Record, model: Model) -> Estimate:

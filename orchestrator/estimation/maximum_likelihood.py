@@ -18,7 +18,15 @@ from scipy.stats import chi2
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.cramer_rao import bound_of_fit
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import LEAST_WITH_ONE_ENCODER, Fit, Likelihood, Point, make_problem, maximise
+from orchestrator.estimation.likelihood import (
+    LEAST_TORQUE_NOISE,
+    LEAST_WITH_ONE_ENCODER,
+    Fit,
+    Likelihood,
+    Point,
+    make_problem,
+    maximise,
+)
 from orchestrator.estimation.protocol import LEVEL, Estimate
 from orchestrator.model_file import Model
 from orchestrator.record import Record
@@ -39,6 +47,7 @@ MOTOR_ENCODER = (
 # likelihood ratio for a noise level at its bound, zero.
 ALLOWED_RISE = 2.7
 STEPS_PER_LEVEL = 10
+MISFIT_WIDENING = 1.3
 FLAT_INFORMATION = 0.3
 
 
@@ -147,7 +156,7 @@ def profile(likelihood: Likelihood, fit: Fit, level: float = LEVEL) -> Profile:
     deviation = math.sqrt(fit.covariance[column, column])
     slope = fit.covariance[:, column] / fit.covariance[column, column]
     best = float(fit.point.theta[place])
-    edge = math.sqrt(float(chi2.ppf(level, 1)))
+    edge = MISFIT_WIDENING * math.sqrt(float(chi2.ppf(level, 1)))
     entries = [(best, 0.0)]
     for side in (-1.0, 1.0):
         reach = 0.5 * edge * deviation
@@ -184,7 +193,11 @@ def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
     alpha = float(fit.point.theta[place])
     error = math.sqrt(fit.covariance[column, column])
     curve = profile(likelihood, fit)
-    low, high = curve.interval(alpha, float(chi2.ppf(LEVEL, 1)))
+    # Torque noise above the least means that the model is not exact; what it lacks is not white, as the likelihood
+    # takes it to be, so the interval is widened.
+    inexact = max(likelihood.noise(fit.point.theta).torque) > 10.0 * LEAST_TORQUE_NOISE
+    limit = float(chi2.ppf(LEVEL, 1)) * (MISFIT_WIDENING**2 if inexact else 1.0)
+    low, high = curve.interval(alpha, limit)
     kept = likelihood.run(fit.point.theta, keep=True)
     flanks = kept.contacts[kept.contacts != 0]
     traversals = int(np.count_nonzero(np.diff(flanks))) if alpha > 0.0 else 0
@@ -193,6 +206,7 @@ def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
         "converged": fit.converged,
         "iterations": fit.iterations,
         "traversals": traversals,
+        "profile_limit": limit,
         "cramer_rao": bound_of_fit(likelihood, fit),
         "deviance": fit.point.deviance,
         "parameters": _parameters(likelihood, fit),
