@@ -174,7 +174,10 @@ def main() -> None:
         with lines.open("a") as file:
             file.write(json.dumps(row) + "\n")
         mark = "ok" if row["right"] or (not case.right and not row["named"]) else "WRONG" if row["wrong"] else "miss"
-        print(f"{mark:>5} {case.kind} {case.seed} {row['verdict']} {row['named']} {row['truth']} {row['seconds']:.1f} s", flush=True)
+        print(
+            f"{mark:>5} {case.kind} {case.seed} {row['verdict']} {row['named']} {row['truth']} {row['seconds']:.1f} s",
+            flush=True,
+        )
     figures = report(rows)
     (args.out / "bench_diagnosis.json").write_text(json.dumps(figures, indent=1) + "\n")
 

@@ -6,7 +6,7 @@ must pay on both.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ PAYS = 22.0  # least gain that an effect must bring in all
 LEAST_DECIDED = 6.0  # and on the deciding part alone
 SHARE = 0.03  # and as a share of what earlier effects have gained
 MOST_EFFECTS = 4
+RESCUED = 60.0  # gain on the fitted part from which a candidate that fails on the other is fitted to both
 SHORTLIST = 6
 WORTH = 0.03  # a candidate is fitted only when it promises at least this share of the best promise
 
@@ -114,6 +115,7 @@ class Search:
         scene, guesses = self.screen(current)
         found = [self.extend(current, effect, guess, scene) for effect, guess in self.shortlist(guesses)]
         found += self.refined(found, current, base, scene)
+        found = [self.rescued(candidate, current, base) for candidate in found]
         found.sort(key=lambda candidate: candidate.score, reverse=True)
         accepted = bool(found) and found[0].pays_over(current, base)
         return Step(current, tuple(found), accepted)
@@ -158,6 +160,24 @@ class Search:
                 if simpler is not None and (source is current or simpler is source.effects[-1]):
                     refined.append(self.refine(source, simpler, effect, scene))
         return [candidate for candidate in refined if candidate is not None]
+
+    def rescued(self, candidate: Candidate, current: Candidate, base: Candidate) -> Candidate:
+        """Fit a candidate to both parts when it gains much on the first and fails on the second.
+
+        A law that holds where it was fitted may fail where the deciding part reaches further (a spring that hardens
+        faster than its cubic, a limit that is reached once); fitted to both, it shows what it is worth.
+        """
+        gained = candidate.fit.fitted - current.fit.fitted
+        if gained < RESCUED or candidate.pays_over(current, base):
+            return candidate
+        start, stop = (f(self.parts.fitted, self.parts.validated) for f in (_first, _last))
+        both = Parts(slice(start, stop), self.parts.validated, self.parts.held_out)
+        fitted = anneal(self.likelihood, candidate.fit.p, current.fit.q, candidate.fit.free, both, LEVELS)
+        self._tick(f"{candidate.effects[-1].label}, both parts")
+        whole = fitted.fitted
+        share = self.likelihood.log_likelihood(fitted.z, fitted.q, self.parts.validated)
+        retried = Candidate(candidate.effects, replace(fitted, fitted=whole - share, validated=share))
+        return max(candidate, retried, key=lambda c: c.score)
 
     def refine(self, source: Candidate, simpler: Effect, effect: Effect, scene: Scene) -> Candidate | None:
         """Return the best fit of ``effect`` in the place of ``simpler``, from several starts; None: not plausible."""
@@ -245,6 +265,14 @@ class Search:
         self.done += 1
         expected = max(self.done + 2, (len(self.steps) + 1) * (SHORTLIST + 2))
         self.progress(self.done, expected, what)
+
+
+def _first(a: slice, b: slice) -> int:
+    return int(min(a.start, b.start))
+
+
+def _last(a: slice, b: slice) -> int:
+    return int(max(a.stop, b.stop))
 
 
 def in_metres(model: Model) -> bool:
