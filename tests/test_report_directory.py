@@ -109,7 +109,7 @@ def test_the_page_of_a_scenario_groups_signals_by_unit(tmp_path, command):
     assert [[s.name for s in p.series] for p in plots] == [["a.x", "b.x"], ["a.v"]]
 
 
-@pytest.mark.parametrize("command", ["build", "ssp", "bench"])
+@pytest.mark.parametrize("command", ["build", "ssp"])
 def test_commands_without_a_page_of_their_own_get_facts_and_tables(tmp_path, command):
     results = {
         "count": 2,
@@ -305,3 +305,20 @@ def test_a_record_that_bounds_the_gap_on_one_side_only_is_a_page(tmp_path):
     report = report_from_directory(tmp_path)
     assert "between 0 and any size rad" in report.summary
     assert report.badge == ("neutral", "no gap is seen")
+
+
+def test_the_page_of_a_benchmark_shows_ratios_and_scaling(tmp_path):
+    tool = {"scheme": "gauss_seidel", "version": "1", "note": ""}
+    rows = [
+        {"title": "ours", "wall": 0.01, "cpu": 0.01} | tool,
+        {"title": "theirs", "wall": 0.04, "cpu": 0.05} | tool,
+        {"title": "absent", "wall": None, "cpu": None} | tool,
+    ]
+    scaling = [{"fmus": n, "steps": s, "microseconds": 2.0} for n in (2, 64) for s in (1000, 1000000)]
+    write_result(tmp_path, "bench", {}, None, {"rows": rows, "scaling": scaling})
+    report = report_from_directory(tmp_path)
+    tables = {t.title: t for t in sections(report, Table)}
+    assert [row[5] for row in tables["Tools"].rows] == [1.0, 0.25, None]
+    bars, growth = sections(report, Plot)
+    assert bars.categories == ("ours", "theirs")
+    assert [s.name for s in growth.series] == ["2 FMUs", "64 FMUs"]

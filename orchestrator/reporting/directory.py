@@ -6,12 +6,13 @@ from pathlib import Path
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
-from orchestrator.reporting.pages import check, diagnose, estimate, generic, simulate, sweep, thesis
+from orchestrator.reporting.pages import bench, check, diagnose, estimate, generic, simulate, sweep, thesis
 from orchestrator.reporting.source import Source, load
 
 PAGE = "report.html"
 COMMANDS = ("build", "check", "simulate", "sweep", "estimate", "diagnose", "thesis", "ssp", "bench")
 _BUILDERS: dict[str, Callable[[Source], Report]] = {
+    "bench": bench.build,
     "check": check.build,
     "diagnose": diagnose.build,
     "estimate": estimate.build,
