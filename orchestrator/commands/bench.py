@@ -14,6 +14,7 @@ from orchestrator.fmi.build import ensure_built
 from orchestrator.output import staged, write_result
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
+from orchestrator.reporting import write_report
 from orchestrator.ssp.pair import paired_scenario
 
 
@@ -48,6 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
             print_table("cost of this master", ("FMUs", "steps", "us per FMU and step"), cells)
         results = {"rows": [asdict(row) for row in rows], "scaling": [asdict(c) for c in costs]}
         write_result(directory, "bench", {"rounds": arguments.rounds, "tools": tools}, None, results)
+        write_report(directory, "bench")
     sys.stdout.write(f"Ratios: {base.title if base else 'nothing'} over the row's tool. Written to {arguments.out}\n")
     return 0
 

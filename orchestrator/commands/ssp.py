@@ -14,6 +14,7 @@ from orchestrator.master.signals import Constant, Signal
 from orchestrator.output import staged, write_result
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
+from orchestrator.reporting import write_report
 from orchestrator.scenario import load_scenario, simulate
 from orchestrator.ssp.pair import paired_scenario
 from orchestrator.ssp.read import opened_ssp
@@ -63,6 +64,7 @@ def _export(arguments: argparse.Namespace) -> int:
             "step": scenario.algorithm.step,
         }
         write_result(directory, "ssp", _words(arguments), None, results)
+        write_report(directory, "ssp")
     counts = f"{len(scenario.system.instances)} FMUs, {len(scenario.system.connections)} connections"
     sys.stdout.write(f"Written to {arguments.out / name}: {counts}\n")
     return 0
@@ -84,6 +86,7 @@ def _run(arguments: argparse.Namespace) -> int:
         print_table(f"{arguments.file.name}: {len(result.time) - 1} steps", head, rows)
         signals = [dict(zip(head, row, strict=True)) for row in rows]
         write_result(directory, "ssp", _words(arguments), None, {"signals": signals, "steps": len(result.time) - 1})
+        write_report(directory, "ssp")
     sys.stdout.write(f"Written to {arguments.out}: ssp.csv, ssp.json\n")
     return 0
 
