@@ -158,7 +158,9 @@ def _varied(effects: dict[str, float], rng: np.random.Generator) -> dict[str, fl
     if "grav_ph" in changed:
         changed["grav_ph"] = float(rng.uniform(-3, 3))
     if "w3" in changed:
-        changed["w3"] = float(rng.uniform(25, 110))
+        changed["w3"] = float(
+            rng.uniform(25, 70)
+        )  # higher ones, above the excited band, are load inertia to any record
     if "T0" in changed:
         changed["T0"] *= float(rng.choice([-1.0, 1.0]))
     return changed
