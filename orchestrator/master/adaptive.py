@@ -36,6 +36,9 @@ SAFETY, SHRINK, GROW = 0.9, 0.1, 8.0
 EVENT_SHARE = 0.03
 """Error allowed over an event: halving the window does not reduce it much, as it does in a smooth window."""
 
+SHORT = 0.02
+"""A window that is shorter than this part of the longest one is so because of an event."""
+
 SUSPICIOUS = 100.0
 """Error beyond which a window is taken to hold an event rather than to be too long."""
 
@@ -189,13 +192,14 @@ class _Run:
 
     def run(self) -> Statistics:
         time, length = self.start, min(self.settings.first, self.settings.largest)
-        row = 1
+        row, longest = 1, 0.0
         for target in self.breaks:
             guess: _Waveform | None = None
             event: _Event | None = None
             while time < target:
                 end = _window_end(time, length, target) if event is None else event.window_end(time)
-                attempt = self._attempt(time, end, guess, EVENT_SHARE if event else 1.0)
+                short = event is not None or end - time < SHORT * longest
+                attempt = self._attempt(time, end, guess, EVENT_SHARE if short else 1.0)
                 guess = attempt.guess
                 if attempt.outputs is None:
                     self.counts.rejected += 1
@@ -206,6 +210,7 @@ class _Run:
                     continue
                 row = self._write(attempt.outputs, row)
                 self.counts.accepted += 1
+                longest = max(longest, attempt.length)
                 length = self._next_length(attempt)
                 if event is not None and (end >= event.end or event.was_none(attempt)):
                     event = None

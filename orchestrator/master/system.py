@@ -375,9 +375,10 @@ def typed_value(variable: Variable, value: Value) -> tuple[Value | None, str | N
         if value not in literals:
             return None, f"must be one of {', '.join(literals)}, but is {value!r}{nearest(value, list(literals))}"
         return literals[value], None
-    if isinstance(value, (bool, str)) or not math.isfinite(value) or (kind != "Real" and value != int(value)):
-        need = "a finite number" if kind == "Real" else "an integer"
-        return None, f"must be {need}, but is {value!r}"
+    if not _is_number(value, whole=kind != "Real"):
+        need = "a finite number" if kind == "Real" else "an integer of 32 bits"
+        return None, f"must be {need}, but is {_short(value)}"
+    assert not isinstance(value, str)
     low, high = variable.minimum, variable.maximum
     if (low is not None and value < low) or (high is not None and value > high):
         text = (
@@ -389,3 +390,16 @@ def typed_value(variable: Variable, value: Value) -> tuple[Value | None, str | N
         )
         return None, f"{text}, but is {value!r}"
     return (float(value) if kind == "Real" else int(value)), None
+
+
+def _is_number(value: Value, whole: bool) -> bool:
+    if isinstance(value, (bool, str)):
+        return False
+    if isinstance(value, int):
+        return abs(value) <= (2**31 - 1 if whole else 2**1000)
+    return math.isfinite(value) and (not whole or (value.is_integer() and abs(value) <= 2**31 - 1))
+
+
+def _short(value: Value) -> str:
+    text = repr(value) if not isinstance(value, int) or abs(value) < 2**1000 else "an integer of hundreds of digits"
+    return text if len(text) <= 80 else f"{text[:77]}..."
