@@ -214,7 +214,7 @@ def test_archives_that_are_none_or_lead_outside(fmus, tmp_path: Path) -> None:
 
 def test_commands(fmus, tmp_path: Path, capsys) -> None:
     assert main(["ssp", "export", "--alpha", "0.01", "--out", str(tmp_path / "e")]) == 0
-    assert sorted(p.name for p in (tmp_path / "e").iterdir()) == ["paired.ssp", "ssp.json"]
+    assert sorted(p.name for p in (tmp_path / "e").iterdir()) == ["paired.ssp", "report.html", "ssp.json"]
     words = ["ssp", "run", str(tmp_path / "e" / "paired.ssp"), "--stop", "0.1", "--out", str(tmp_path / "r")]
     assert main(words) == 0
     assert "plant.theta_l" in capsys.readouterr().out
