@@ -42,15 +42,15 @@ def _tools(rows: Sequence[Json], measured: Sequence[Json]) -> Table:
         Column("scheme"),
         Column("wall", "ms"),
         Column("processor", "ms"),
-        Column("first tool over this one, wall", "", 3),
-        Column("first tool over this one, processor", "", 3),
+        Column("wall ratio", "", 3),
+        Column("processor ratio", "", 3),
         Column("note"),
     )
     base = measured[0] if measured else {}
     cells = tuple(
         (
             row["title"],
-            row.get("version"),
+            row.get("version") or None,
             row.get("scheme"),
             *(_milliseconds(row.get(name)) for name in ("wall", "cpu")),
             *(_ratio(base.get(name), row.get(name)) for name in ("wall", "cpu")),
@@ -58,7 +58,7 @@ def _tools(rows: Sequence[Json], measured: Sequence[Json]) -> Table:
         )
         for row in rows
     )
-    return Table("Tools", columns, cells, "Medians. The ratio tells how much of a tool's time the first one needs.")
+    return Table("Tools", columns, cells, "Medians. Ratio: the time of the first tool over that of the row's.")
 
 
 def _milliseconds(seconds: float | None) -> float | None:

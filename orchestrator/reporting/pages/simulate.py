@@ -81,6 +81,8 @@ def _scenario(results: Mapping[str, Any], table: Columns) -> tuple[list[Section]
         for start in range(0, len(names), SIGNALS_PER_PLOT):
             part = names[start : start + SIGNALS_PER_PLOT]
             series = tuple(Series(name, time, numbers(table[name])) for name in part)
-            plots.append(Plot(", ".join(part), "time [s]", f"value [{unit}]", series))
+            which = f", part {start // SIGNALS_PER_PLOT + 1}" if len(names) > SIGNALS_PER_PLOT else ""
+            title = f"Signals in {unit}{which}" if unit != "1" else f"Signals without unit{which}"
+            plots.append(Plot(title, "time [s]", f"value [{unit}]", series))
     summary = f"{results.get('steps')} communication steps, {len(signals)} recorded signals."
     return [*plots, *sections_of("Results", results)], summary
