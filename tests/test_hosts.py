@@ -1,6 +1,6 @@
 """Our FMUs in other people's hosts: the same trajectories under the same scheme.
 
-FMPy is always there; ecos and libcosim are tested when their packages are installed, programs when they are on PATH.
+FMPy is always there; ecos, libcosim and PyFMI are tested when installed, programs when they are on PATH.
 ``docs/hosts.md`` says how to get each and what was measured with it.
 """
 
@@ -223,6 +223,24 @@ for _ in range(job["steps"]):
     execution.step(step_count=1)
     rows.append([observer.last_real_values(index[a], [reference(a, name)])[0] for a, name in job["recorded"]])
 """
+PYFMI = """
+import os, tempfile
+from pyfmi import load_fmu
+from pyfmi.master import Master
+os.chdir(tempfile.mkdtemp())
+models = {name: load_fmu(job["fmus"][model]) for name, model in job["instances"].items()}
+for a, name, value in job["starts"]:
+    models[a].set(name, value)
+master = Master(list(models.values()), [(models[a], o, models[b], e) for a, o, b, e in job["connections"]])
+options = master.simulate_options()
+wanted = {"step_size": job["step"], "extrapolation_order": 0, "error_controlled": False}
+wanted |= {"linear_correction": False, "block_initialization": True, "result_handling": "memory"}
+for name, value in wanted.items():
+    options[name] = value
+result = master.simulate(0.0, job["steps"] * job["step"], options=options)
+columns = [list(result[models[a]][name]) for a, name in job["recorded"]]
+rows = [[float(value) for value in row] for row in list(zip(*columns))[1:]]
+"""
 AROUND = (
     "import json, sys\njob = json.load(open(sys.argv[1]))\nrows = []\n{}\njson.dump(rows, open(sys.argv[2], 'w'))\n"
 )
@@ -255,6 +273,13 @@ def run_in_package(code: str, package: str, fmus: dict[str, Path], folder: Path)
 def test_ecos_runs_the_paired_loops(fmus: dict[str, Path], tmp_path: Path) -> None:
     """Side by side; ecos reads the outputs once more after it has set the inputs."""
     rows = run_in_package(ECOS, "ecospy", fmus, tmp_path)
+    expected = paired_loop.jacobi(fmus, STEPS, read_again=True)
+    np.testing.assert_allclose(np.array(rows), np.array(expected), rtol=0.0, atol=1e-9)
+
+
+def test_pyfmi_runs_the_paired_loops(fmus: dict[str, Path], tmp_path: Path) -> None:
+    """Side by side; PyFMI too reads the outputs once more after it has set the inputs."""
+    rows = run_in_package(PYFMI, "pyfmi", fmus, tmp_path)
     expected = paired_loop.jacobi(fmus, STEPS, read_again=True)
     np.testing.assert_allclose(np.array(rows), np.array(expected), rtol=0.0, atol=1e-9)
 
