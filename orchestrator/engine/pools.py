@@ -152,8 +152,12 @@ def pickled(work: Work) -> bytes:
     """Return the work as bytes for a worker process; its files travel apart.
 
     Raises:
-        ScenarioError: ``prepare``, ``run`` or ``payload`` cannot be pickled.
+        ScenarioError: ``prepare``, ``run`` or ``payload`` cannot be pickled, or workers could not find the functions.
     """
+    if "__main__" in (work.prepare.__module__, work.run.__module__):
+        raise ScenarioError(
+            "the work of a sweep must be in a module that workers can import, but is in the main program"
+        )
     try:
         return pickle.dumps(replace(work, files={}))
     except (pickle.PicklingError, AttributeError, TypeError) as error:
