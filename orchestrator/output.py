@@ -14,6 +14,7 @@ from typing import Any
 from orchestrator import __version__
 from orchestrator.errors import OutputError
 
+STAGING = ".partial-"
 DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by writes, which name no file
 
 
@@ -32,7 +33,8 @@ def staged(directory: Path) -> Iterator[Path]:
         missing = [p for p in (directory, *directory.parents) if not p.exists()]
         directory.mkdir(parents=True, exist_ok=True)
         made = missing
-        staging = Path(tempfile.mkdtemp(prefix=".partial-", dir=directory))
+        _remove_abandoned(directory)
+        staging = Path(tempfile.mkdtemp(prefix=f"{STAGING}{os.getpid()}-", dir=directory))
     except OSError as error:
         _remove_empty(made)
         raise OutputError(f"`--out` must be a writable directory, but {directory} is not: {error.strerror}") from None
@@ -53,6 +55,14 @@ def write_text(path: Path, text: str) -> None:
     with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as part:
         part.write(text)
     os.replace(part.name, path)
+
+
+def _remove_abandoned(directory: Path) -> None:
+    """Remove the staging directories of processes that were killed."""
+    for path in directory.glob(f"{STAGING}*-*"):
+        owner = path.name.removeprefix(STAGING).partition("-")[0]
+        if owner.isdigit() and not Path(f"/proc/{owner}").exists():
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def _publish(staging: Path, directory: Path) -> None:
