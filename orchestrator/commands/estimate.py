@@ -97,7 +97,9 @@ def _require_linear(model: Model) -> None:
 
 def _estimate(record: Record, model: Model, names: list[str]) -> tuple[list[Estimate], dict[str, Any]]:
     """Run the methods, print their table and messages, and return estimates and results."""
-    estimates, rows, table = [], [], {}
+    estimates: list[Estimate] = []
+    rows: list[list[str]] = []
+    table: dict[str, Any] = {}
     with _progress(len(names)) as advance:
         for name in names:
             begun = time.perf_counter()
