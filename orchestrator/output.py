@@ -61,8 +61,12 @@ def _remove_abandoned(directory: Path) -> None:
     """Remove the staging directories of processes that were killed."""
     for path in directory.glob(f"{STAGING}*-*"):
         owner = path.name.removeprefix(STAGING).partition("-")[0]
-        if owner.isdigit() and not Path(f"/proc/{owner}").exists():
+        try:
+            os.kill(int(owner), 0)
+        except ProcessLookupError:
             shutil.rmtree(path, ignore_errors=True)
+        except (ValueError, OverflowError, PermissionError):
+            continue
 
 
 def _publish(staging: Path, directory: Path) -> None:

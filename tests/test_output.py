@@ -21,9 +21,13 @@ def test_files_appear_together_at_the_end(tmp_path):
 
 
 def test_an_error_leaves_nothing(tmp_path):
-    with pytest.raises(ValueError, match="bad"), staged(tmp_path / "x" / "out") as directory:
-        (directory / "a.txt").write_text("a")
-        raise ValueError("bad")
+    def fail():
+        with staged(tmp_path / "x" / "out") as directory:
+            (directory / "a.txt").write_text("a")
+            raise ValueError("bad")
+
+    with pytest.raises(ValueError, match="bad"):
+        fail()
     assert list(tmp_path.iterdir()) == []
 
 
