@@ -16,7 +16,7 @@ LAYERS = (
     {"errors"},
     {"output", "cache"},
     {"compiled", "design", "reference", "record"},
-    {"model_file"},
+    {"model_file", "record_plausibility"},
     {"master"},
     {"fmi"},
     {"scenario"},
@@ -96,7 +96,8 @@ def test_modules_and_functions_stay_small(path):
     assert len(text.splitlines()) <= MOST_LINES
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-            assert node.end_lineno - node.lineno < MOST_FUNCTION_LINES, f"{node.name} is too long"
+            first = node.body[1] if ast.get_docstring(node) and len(node.body) > 1 else node.body[0]
+            assert node.end_lineno - first.lineno < MOST_FUNCTION_LINES, f"{node.name} is too long"
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
