@@ -1,7 +1,8 @@
 """Does a record fit its model at all: units, signs, exchanged columns.
 
-Three numbers of the record are compared with the model's, each only where the motion is large enough for it to mean
-something: the slope of the load's angle over the motor's, the inertia that the torque seems to move, and their signs.
+The sampling rate must resolve the shaft's oscillation. Three numbers of the record are compared with the model's, each
+only where the motion is large enough for it to mean something: the slope of the load's angle over the motor's, the
+inertia that the torque seems to move, and their signs.
 """
 
 import math
@@ -15,6 +16,7 @@ from orchestrator.record import Record
 
 DEGREES = 180.0 / math.pi
 LARGE_TRAVEL = 0.5  # rad of the load, beyond which twist no longer disturbs the slope
+LONGEST_STEP = 1.5  # rad of the shaft's oscillation
 SMOOTHING_TIME = 0.05  # s
 NEEDED_FIT = 0.8
 
@@ -28,9 +30,20 @@ def check_plausible(record: Record, model: Model) -> None:
     if model.fmu != "Drivetrain":
         return
     parameters = {name: entry.value for name, entry in model.parameters.items()}
+    _check_rate(record, parameters)
     if record.theta_l is not None:
         _check_slope(record, record.theta_l, parameters["i"])
     _check_inertia(record, parameters)
+
+
+def _check_rate(record: Record, p: dict[str, float]) -> None:
+    """Refuse records that are too slow for the shaft's own oscillation."""
+    own = math.sqrt(p["k"] * (1.0 / p["J_l"] + 1.0 / (p["J_m"] * p["i"] ** 2)))
+    if own * record.step > LONGEST_STEP:
+        raise RecordError(
+            f"{record.source}: column `time` must step by at most {LONGEST_STEP / own:.3g} s to show a shaft that "
+            f"oscillates at {own:.3g} rad/s, but steps by {record.step:g} s"
+        )
 
 
 def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> None:

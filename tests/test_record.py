@@ -156,6 +156,12 @@ def test_units_and_signs_are_recognised(factors: dict[str, float], expected: str
     assert expected in str(caught.value)
 
 
+def test_a_record_too_slow_for_the_shaft_is_refused(columns: dict[str, np.ndarray]) -> None:
+    slow = record_from_columns(dict(columns) | {"time": 20.0 * columns["time"]}, "slow")
+    with pytest.raises(RecordError, match="must step by at most 0.045"):
+        check_plausible(slow, default_model())
+
+
 def test_exchanged_columns_are_recognised() -> None:
     columns = make_record({"alpha": 0.02}, seed=5, duration=20.0)[0]
     columns["theta_m"], columns["theta_l"] = columns["theta_l"], columns["theta_m"]
