@@ -158,7 +158,7 @@ def test_units_and_signs_are_recognised(factors: dict[str, float], expected: str
 
 def test_a_record_too_slow_for_the_shaft_is_refused(columns: dict[str, np.ndarray]) -> None:
     slow = record_from_columns(dict(columns) | {"time": 20.0 * columns["time"]}, "slow")
-    with pytest.raises(RecordError, match="must step by at most 0.045"):
+    with pytest.raises(RecordError, match=r"must step by at most 0\.045"):
         check_plausible(slow, default_model())
 
 
