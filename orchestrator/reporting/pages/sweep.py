@@ -28,15 +28,13 @@ def build(source: Source) -> Report:
     first, failures, table = _excerpts(source, total)
     statistics: list[Mapping[str, Any]] = list(results.get("statistics", []))
     units = {c["name"]: c["unit"] for c in results.get("columns", [])}
-    sections: list[Section] = []
+    sections: list[Section] = [_cases("Failed cases", failures, UNITS | units, failed)] if failed else []
     if statistics:
         sections.append(_statistics(statistics))
     if {"alpha", "noise", "estimate", "lower", "upper", "error_percent"} <= set(table):
         sections += _plots(table)
     else:
         sections += _signals(table, units)
-    if failed:
-        sections.append(_cases("Failed cases", failures, UNITS | units, failed))
     sections.append(_cases("Cases", first, UNITS | units, total))
     sections += _provenance(results)
     return Report(
@@ -132,7 +130,8 @@ def _excerpts(source: Source, total: int) -> tuple[Columns, Columns, Columns]:
 
 
 def _cases(title: str, table: Columns, units: Mapping[str, str], total: int) -> Table:
-    names = [n for n in dict.fromkeys((*FIRST, *table)) if n in table and (n != "message" or any(table[n]))]
+    """Return rows as a table, without the columns that are empty in all of them."""
+    names = [n for n in dict.fromkeys((*FIRST, *table)) if n in table and any(v is not None for v in table[n])]
     rows = zip(*(table[n] for n in names), strict=True)
     columns = tuple(Column(words(n), units.get(n, ""), 6) for n in names)
     return Table(title, columns, tuple(_row(names, row) for row in rows), total=total)
