@@ -181,14 +181,14 @@ def profile(likelihood: Likelihood, fit: Fit, level: float = LEVEL) -> Profile:
 
 
 def _constrained(likelihood: Likelihood, fit: Fit, place: int, alpha: float, slope: Array) -> Point:
-    """Return the best point found with alpha held: the linear prediction, then one or two scoring steps."""
+    """Return the best point found with alpha held: the linear prediction, then some scoring steps."""
     unknowns = likelihood.problem.unknowns
     theta = fit.point.theta.copy()
     theta[fit.free] += slope * (alpha - fit.point.theta[place])
     theta[place] = alpha
     theta = np.clip(theta, [u.lower for u in unknowns], [u.upper for u in unknowns])
     others = [n for n in fit.free if n != place]
-    return maximise(likelihood, theta, others, 2, tolerance=0.05).point
+    return maximise(likelihood, theta, others, 5, tolerance=0.05).point
 
 
 def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
@@ -204,6 +204,9 @@ def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
     inexact = max(likelihood.noise(fit.point.theta).torque) > 10.0 * LEAST_TORQUE_NOISE
     limit = float(chi2.ppf(LEVEL, 1)) * (MISFIT_WIDENING**2 if inexact else 1.0)
     low, high = curve.interval(alpha, limit)
+    # A profile point that is not quite the maximum makes the interval too short, never too long.
+    half = math.sqrt(limit) * error
+    low, high = min(low, max(alpha - half, 0.0)), max(high, alpha + half)
     kept = likelihood.run(fit.point.theta, keep=True)
     flanks = kept.contacts[kept.contacts != 0]
     traversals = int(np.count_nonzero(np.diff(flanks))) if alpha > 0.0 else 0
