@@ -8,6 +8,7 @@ is printed with the file that did it, and the exit code is 1. Nothing may be lef
 import math
 import random
 import re
+import signal
 import sys
 import tempfile
 import time
@@ -133,9 +134,14 @@ def outcome(path: Path) -> str:
         return type(error).__name__
 
 
+def _too_slow(*_: object) -> None:
+    raise TimeoutError(f"more than {SLOW:g} s of processor time")
+
+
 def main(arguments: list[str]) -> int:
     """Fuzz for some seconds and print the counts."""
     seconds, seed = float(arguments[0]), int(arguments[1]) if len(arguments) > 1 else 1
+    signal.signal(signal.SIGPROF, _too_slow)
     draw, counts, slowest, failures = random.Random(seed), Counter[str](), 0.0, 0
     end = time.monotonic() + seconds
     with tempfile.TemporaryDirectory() as name:
@@ -146,11 +152,13 @@ def main(arguments: list[str]) -> int:
             content = mutated(draw.choice(SEEDS), draw)
             path.write_bytes(content)
             begin = time.process_time()
+            signal.setitimer(signal.ITIMER_PROF, SLOW)
             try:
                 counts[outcome(path)] += 1
             except Exception as error:
                 failures += 1
                 print(f"FAILED {type(error).__name__}: {error}\n{content!r}\n", flush=True)
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
             slowest = max(slowest, time.process_time() - begin)
             left = sorted(p.name for p in folder.iterdir())
             assert left == ["scenario.toml", "torque.csv"], left

@@ -199,26 +199,28 @@ class _Run:
             while time < target:
                 end = _window_end(time, length, target) if event is None else event.window_end(time)
                 short = event is not None or end - time < SHORT * longest
-                attempt = self._attempt(time, end, guess, EVENT_SHARE if short else 1.0)
+                share = EVENT_SHARE if short else 1.0
+                attempt = self._attempt(time, end, guess, share)
                 guess = attempt.guess
                 if attempt.outputs is None:
                     self.counts.rejected += 1
                     if event is not None or attempt.error > SUSPICIOUS:
                         event = _Event(time, attempt.trouble, attempt.error)
-                    length = self._next_length(attempt)
+                    length = self._next_length(attempt, share)
                     self._give_up(time, (event.window_end(time) - time) if event else length)
                     continue
                 row = self._write(attempt.outputs, row)
                 self.counts.accepted += 1
                 longest = max(longest, attempt.length)
-                length = self._next_length(attempt)
+                length = self._next_length(attempt, share)
                 if event is not None and (end >= event.end or event.was_none(attempt)):
                     event = None
                 time = end
         return Statistics(self.counts.accepted, self.counts.rejected, self.calls, self.counts.sweeps)
 
-    def _next_length(self, attempt: _Attempt) -> float:
-        factor = SAFETY * max(attempt.error, 1e-12) ** (-1.0 / ORDER) if math.isfinite(attempt.error) else SHRINK
+    def _next_length(self, attempt: _Attempt, share: float) -> float:
+        excess = max(attempt.error / share, 1e-12)
+        factor = SAFETY * excess ** (-1.0 / ORDER) if math.isfinite(excess) else SHRINK
         return min(attempt.length * min(max(factor, SHRINK), GROW), self.settings.largest)
 
     def _give_up(self, time: float, length: float) -> None:

@@ -23,6 +23,9 @@ GRID_SLACK = 1e-9
 """A time that misses an instant of change by less than this fraction of the distance between such instants is on it."""
 
 
+MAXIMUM_DRAWS = 10_000_000
+
+
 class Signal(Protocol):
     """See the module."""
 
@@ -107,6 +110,8 @@ class Square:
 
     def breaks(self, start: float, stop: float) -> list[float]:
         half = 0.5 * self.period
+        if (stop - start) / half > MAXIMUM_DRAWS:
+            raise ScenarioError(f"`period` must leave at most {MAXIMUM_DRAWS:,} jumps, but is {self.period!r}")
         first = math.floor((start - self.delay) / half) + 1
         last = math.ceil((stop - self.delay) / half)
         found = (self.delay + k * half for k in range(first, last))
@@ -172,6 +177,10 @@ class Noise:
     def sample(self, times: Array) -> Array:
         index = np.floor((times - self.start) / self.period + GRID_SLACK).astype(np.int64)
         count = int(index.max(initial=0)) + 1
+        if not 0 < count <= MAXIMUM_DRAWS:
+            raise ScenarioError(
+                f"`period` of noise must leave at most {MAXIMUM_DRAWS:,} values, but is {self.period!r}"
+            )
         values = self.deviation * np.random.default_rng(self.seed).standard_normal(count)
         return values[np.clip(index, 0, None)]
 
