@@ -36,13 +36,14 @@ def build_parser(command: str | None) -> argparse.ArgumentParser:
             continue
         module = importlib.import_module(f"orchestrator.commands.{name}")
         module.add_arguments(sub)
-        sub.add_argument(
-            "--out",
-            type=Path,
-            default=Path("results") / name,
-            metavar="DIR",
-            help="where results go (default: %(default)s)",
-        )
+        if name != "report":  # it writes into the directory that it is given
+            sub.add_argument(
+                "--out",
+                type=Path,
+                default=Path("results") / name,
+                metavar="DIR",
+                help="where results go (default: %(default)s)",
+            )
         sub.set_defaults(run=module.run)
     return parser
 
