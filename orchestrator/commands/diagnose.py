@@ -86,13 +86,17 @@ def _print(diagnosis: Diagnosis, results: dict[str, Any]) -> None:
     gaps = [
         [gap.signal, name, f"{rms:.4g}", f"{rms / gap.noise:.2f}"] for gap in diagnosis.gap for name, rms in gap.stages
     ]
-    print_table("Gap on held-out data", ("signal", "model", "rms [rad]", "times noise"), gaps)
+    print_table("Gap on held-out data", ("signal", "model", f"rms [{diagnosis.gap[0].unit}]", "times noise"), gaps)
     if "validation" in results:
         rows = [
             [signal, f"{g['before']:.4g}", f"{g['after']:.4g}", f"{g['noise']:.4g}"]
             for signal, g in results["validation"].items()
         ]
-        print_table("Gap on the other record", ("signal", "before [rad]", "after [rad]", "noise [rad]"), rows)
+        print_table(
+            "Gap on the other record",
+            ("signal", *(f"{name} [{diagnosis.gap[0].unit}]" for name in ("before", "after", "noise"))),
+            rows,
+        )
 
 
 def summary(diagnosis: Diagnosis) -> Iterator[str]:

@@ -129,16 +129,21 @@ def _friction(site: str) -> tuple[Effect, Effect]:
     def falls(values: dict[str, float]) -> bool:
         return values["breakaway"] > 1.02 * values["coulomb"] > 0.0
 
-    shared = {"nuisances": {"presliding": f"presliding.{site}"}, "priors": lambda s: {"presliding": build_up(s)}}
+    nuisances = {"presliding": f"presliding.{site}"}
+
+    def priors(scene: Scene) -> dict[str, tuple[float, float]]:
+        return {"presliding": build_up(scene)}
+
     names = (f"{site}.coulomb", f"{site}.breakaway", f"{site}.stribeck_speed")
     coulomb = Effect(
         "coulomb_friction", site, _group("coulomb_friction", f"{site}.torque"), "torque", unit, start,
-        amplitudes=("torque",), scales=lambda s: {"presliding": 0.2}, family=f"dry friction of the {site}", **shared,
+        amplitudes=("torque",), scales=lambda s: {"presliding": 0.2},
+        family=f"dry friction of the {site}", nuisances=nuisances, priors=priors,
     )  # fmt: skip
     stribeck = Effect(
         "stribeck_friction", site, _group("stribeck_friction", *names), "coulomb", unit,
         refine=refine, plausible=falls, scales=lambda s: {"stribeck_speed": 0.02 * rms(s), "presliding": 0.2},
-        family=f"dry friction of the {site}", needs=f"coulomb_friction@{site}", **shared,
+        family=f"dry friction of the {site}", needs=f"coulomb_friction@{site}", nuisances=nuisances, priors=priors,
     )  # fmt: skip
     return coulomb, stribeck
 
@@ -219,12 +224,14 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: 0.01 * s.torque * s.ratio / s.speed_l**2, amplitudes=("coefficient",),
     ),
     Effect(
-        "sensor_offset", "motor", _group("sensor_offset", "motor.offset"), "offset", lambda s: 0.003 * s.twist * s.ratio,
-        amplitudes=("offset",), family="offset between the encoders", both_encoders=True,
+        "sensor_offset", "motor", _group("sensor_offset", "motor.offset"), "offset",
+        lambda s: 0.003 * s.twist * s.ratio, amplitudes=("offset",),
+        family="offset between the encoders", both_encoders=True,
     ),
     Effect(
         "sensor_offset", "load", _group("sensor_offset", "load.offset"), "offset", lambda s: 0.003 * s.twist,
-        amplitudes=("offset",), family="offset between the encoders", both_encoders=True,
+        amplitudes=("offset",),
+        family="offset between the encoders", both_encoders=True,
     ),
 )  # fmt: skip
 

@@ -107,7 +107,8 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     with Session(system, record, GaussSeidel(h), (length - 1) * h) as session:
         for start in starts:
             part = slice(start, start + length)
-            given, expected = {}, {}
+            given: dict[str, float] = {}
+            expected: dict[str, Array] = {}
             for model, p in models.items():
                 _, states = whole.innovations(p, w.final.q)
                 run = free_run(w.plant, p, states[start], signals, part, history=False)
@@ -120,7 +121,7 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
             difference = max(difference, float(np.max(np.abs(runs["after"][-1] - expected["after"]))))
     covered = slice(starts[0], starts[0] + length * len(starts))
     return BeforeAfter(
-        h * np.arange(signals.size)[covered],
+        np.asarray(h * np.arange(signals.size)[covered]),
         signals.u[covered],
         signals.y[covered, :m],
         np.concatenate(runs["before"]),

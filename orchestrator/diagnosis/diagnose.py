@@ -1,6 +1,6 @@
 """The diagnosis of one record: search, verdict, where, gap."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from orchestrator.diagnosis.likelihood import HEAD, Likelihood, Signals, signals
 from orchestrator.diagnosis.outcome import Diagnosis, Estimate, Gap, Named, Workings
 from orchestrator.diagnosis.plants import Plant, plant_of
 from orchestrator.diagnosis.remainder import Predictable, Remainder, remainder
-from orchestrator.diagnosis.search import LEVELS, Candidate, Search, Step
+from orchestrator.diagnosis.search import LEVELS, Candidate, Search, Step, in_metres
 from orchestrator.diagnosis.where import missing_torque, places
 from orchestrator.model_file import Model
 from orchestrator.record import Record
@@ -21,13 +21,14 @@ from orchestrator.record import Record
 Array = NDArray[np.float64]
 
 SEGMENT = 2.0  # s, length of a free run; the length of the thesis's tests
-LEAST_EXPLAINED = 0.5  # share of the missing log-likelihood that named effects must recover
-ENOUGH_SHRINKAGE = 4.0  # factor on the gap from which less is enough: real machines rarely reach the noise floor
-LEAST_EXPLAINED_IF_SHRUNK = 0.3
+LEAST_EXPLAINED = 0.4  # share of the missing log-likelihood that named effects must recover
 LEAST_MISSING = 0.05  # per sample: missing log-likelihood below which nothing is left to explain
 GROWN = 3.0  # innovations that grow this much on the held-out part speak of something that changes with time
 ALIKE = 0.05  # share of the gain within which effects of a family cannot be told apart
 EXPLAINED_BY_NOMINAL = 3.0  # per parameter: log-likelihood that re-fitting gains when the nominal values hold
+
+# Units of a plant's table when its position is a length.
+METRIC = {"rad": "m", "rad/s": "m/s", "N.m": "N", "kg.m2": "kg", "N.m.s/rad": "N.s/m", "N.m.s2/rad2": "N.s2/m2"}
 
 Progress = Callable[[int, int, str], None]
 
@@ -59,11 +60,12 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
         found = found if again.unknown else again
     search, best, base_fit, final, left = found.search, found.best, found.base, found.final, found.left
     unknown, floor_off = found.unknown, found.floor_off
-    named = tuple(_name(plant, effect, final, search.steps) for effect in best.effects)
+    units = METRIC if in_metres(model) else {}
+    named = tuple(_name(plant, effect, final, search.steps, units) for effect in best.effects)
     chosen = base_fit if unknown else final
     verdict = "unknown" if unknown else "effects" if named else _plain_verdict(likelihood, nominal, base_fit, parts)
-    before = missing_torque(likelihood, plant, Fit(nominal, base_fit.q, base_fit.z, base_fit.free, base_fit.covariance, 0.0, 0.0)
-                            if verdict in ("none", "parameters") else base_fit)  # fmt: skip
+    untouched = replace(base_fit, p=nominal)
+    before = missing_torque(likelihood, plant, untouched if verdict in ("none", "parameters") else base_fit)
     after = missing_torque(likelihood, plant, chosen)
     stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
     return Diagnosis(
@@ -72,9 +74,9 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
         suspects=named if unknown else (),
         parameters=_parameters(plant, model, chosen),
         where=places(before, signals.h),
-        gap=held_out_gap(plant, signals, nominal, chosen.q, stages, parts.held_out),
+        gap=held_out_gap(plant, signals, nominal, chosen.q, stages, parts.held_out, units.get("rad", "rad")),
         remainder=left,
-        warnings=_warnings(unknown, left, named, search.steps, floor_off, signals.channels),
+        warnings=_warnings(unknown, left, named, search.steps, floor_off, signals.channels, len(plant.measured)),
         corrected={name: float(chosen.p[plant.index(name)]) for name in _changed(plant, nominal, chosen.p)},
         workings=Workings(
             plant, likelihood, parts, nominal, base_fit, chosen, best, tuple(search.steps), before, after
@@ -109,9 +111,7 @@ def _search(
     growth = _growth(plant, signals, nominal, final, whole)
     left = replace(left, growth=growth if best.effects else max(growth, left.growth))
     floor_off = left.missing > LEAST_MISSING * (parts.validated.stop - HEAD)
-    shrunk = _shrinkage(plant, signals, nominal, base_fit, final, parts) if best.effects else 1.0
-    enough = LEAST_EXPLAINED if shrunk < ENOUGH_SHRINKAGE else LEAST_EXPLAINED_IF_SHRUNK
-    unknown = (floor_off and left.explained < enough) or left.growth > GROWN
+    unknown = (floor_off and left.explained < LEAST_EXPLAINED) or left.growth > GROWN
     return _Found(search, best, base_fit, final, left, floor_off, unknown)
 
 
@@ -121,15 +121,14 @@ def _growth(plant: Plant, signals: Signals, nominal: Array, final: Fit, whole: P
     return float(np.max(np.std(z[whole.held_out], axis=0) / np.maximum(np.std(z[whole.fitted], axis=0), 1e-300)))
 
 
-def _shrinkage(plant: Plant, signals: Signals, nominal: Array, base: Fit, final: Fit, parts: Parts) -> float:
-    """Return by which factor the effects shrink the gap on the deciding part, smallest over the encoders."""
-    stages = (("parameters", base.p), ("effects", final.p))
-    gaps = held_out_gap(plant, signals, nominal, final.q, stages, parts.validated)
-    return min(gap.before / max(gap.after, 1e-300) for gap in gaps)
-
-
 def held_out_gap(
-    plant: Plant, signals: Signals, nominal: Array, q: float, stages: Sequence[tuple[str, Array]], part: slice
+    plant: Plant,
+    signals: Signals,
+    nominal: Array,
+    q: float,
+    stages: Sequence[tuple[str, Array]],
+    part: slice,
+    unit: str = "rad",
 ) -> tuple[Gap, ...]:
     """Return the gap of each model over free runs of ``SEGMENT`` seconds that cover a part of a record.
 
@@ -140,6 +139,7 @@ def held_out_gap(
         q: process noise of the filter that guesses each segment's initial state.
         stages: name and parameters of each model, in the order of the report.
         part: the samples, which no fit has touched.
+        unit: of the measured positions.
     """
     length = max(round(SEGMENT / signals.h), 40)
     begin, end, _ = part.indices(signals.size)
@@ -151,7 +151,7 @@ def held_out_gap(
         squares = [free_run(plant, p, states[s], signals, slice(s, min(s + length, end))).rms ** 2 for s in starts]
         rows.append((name, np.sqrt(np.mean(squares, axis=0))))
     return tuple(
-        Gap(signal, "rad", float(signals.noise[n]), tuple((name, float(rms[n])) for name, rms in rows))
+        Gap(signal, unit, float(signals.noise[n]), tuple((name, float(rms[n])) for name, rms in rows))
         for n, signal in enumerate(("theta_m", "theta_l")[: signals.channels])
     )
 
@@ -173,7 +173,7 @@ def _plain_verdict(likelihood: Likelihood, nominal: Array, base: Fit, parts: Par
     return "none" if gained < EXPLAINED_BY_NOMINAL * len(base.free) else "parameters"
 
 
-def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step]) -> Named:
+def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step], units: Mapping[str, str]) -> Named:
     step = next(s for s in reversed(steps) if any(effect in c.effects[-1:] for c in s.candidates))
     own = next(c for c in step.candidates if c.effects[-1] is effect)
     others = [c for c in step.candidates if c is not own]
@@ -186,7 +186,11 @@ def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step]) -> Na
     ]
     family = (effect.label, *alike) if alike else ()
     parameters = {
-        short: Estimate(float(final.p[place]), final.standard_error(place), plant.table[place].unit)
+        short: Estimate(
+            float(final.p[place]),
+            final.standard_error(place),
+            units.get(plant.table[place].unit, plant.table[place].unit),
+        )
         for short, place in effect.places(plant).items()
         if place < len(plant.table)
     }
@@ -200,7 +204,7 @@ def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, dict[str, f
             "nominal": u.value,
             "value": float(final.p[plant.index(u.name)]),
             "standard_error": final.standard_error(plant.index(u.name)),
-            "unit": u.unit,
+            "unit": METRIC.get(u.unit, u.unit) if in_metres(model) else u.unit,
         }
         for u in model.uncertain
     }
@@ -224,7 +228,13 @@ def _stages(
 
 
 def _warnings(
-    unknown: bool, left: Remainder, named: Sequence[Named], steps: Sequence[Step], floor_off: bool, channels: int
+    unknown: bool,
+    left: Remainder,
+    named: Sequence[Named],
+    steps: Sequence[Step],
+    floor_off: bool,
+    channels: int,
+    encoders: int,
 ) -> tuple[str, ...]:
     found = []
     if unknown:
@@ -237,7 +247,7 @@ def _warnings(
     for effect in named:
         if effect.family:
             found.append(f"this record cannot tell {' from '.join(effect.family)}; {_experiment(effect)}")
-    if channels == 1:
+    if channels < encoders:
         found.append("one encoder: an effect of the shaft and one of the load are harder to tell apart")
     return tuple(found)
 

@@ -1,5 +1,6 @@
 """Figures of a diagnosis: signals and residuals, innovations, candidates, missing torque with the fitted law on top."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,7 +97,7 @@ def draw_candidates(path: Path, diagnosis: Diagnosis) -> None:
 
 
 def draw_missing(path: Path, diagnosis: Diagnosis) -> bool:
-    """Draw, for each named (or suspected) effect, the torque missing without it and its fitted law; False: no effect."""
+    """Draw, for each named or suspected effect, the torque missing without it and its law; False: no effect."""
     named = diagnosis.effects or diagnosis.suspects
     if not named:
         return False
@@ -120,9 +121,7 @@ def _draw_law(axis: Axes, diagnosis: Diagnosis, effect: Effect, fit: Fit) -> Non
     without = fit.p.copy()
     for place in effect.places(w.plant).values():
         without[place] = w.nominal[place]
-    missing = missing_torque(
-        w.likelihood, w.plant, Fit(without, w.base.q, w.base.z, fit.free, fit.covariance, 0.0, 0.0)
-    )
+    missing = missing_torque(w.likelihood, w.plant, replace(w.base, p=without))
     _, states = w.likelihood.innovations(fit.p, fit.q)
     signal = SITES[effect.site] if SITES[effect.site] in missing.torque else "torque of the motor"
     torque = missing.torque[signal]

@@ -120,7 +120,7 @@ def fit(
             new = (z_moved[part] @ root.T).ravel()
             cost_moved = 0.5 * new @ new - log_prior(moved, free)
             if np.isfinite(cost_moved) and cost_moved < cost:
-                gain = cost - cost_moved
+                gain = float(cost - cost_moved)
                 p, z, damping = moved, z_moved, damping / 10.0
                 break
             damping = max(damping * 10.0, 1e-4)
@@ -128,7 +128,7 @@ def fit(
             break
     if not np.all(np.isfinite(z)):
         return Fit(p, q, z, tuple(free), np.zeros((len(free), len(free))), -np.inf, -np.inf)
-    covariance = np.linalg.pinv(hessian) * np.outer(scales, scales)
+    covariance: Array = np.asarray(np.linalg.pinv(hessian) * np.outer(scales, scales))
     fitted = likelihood.log_likelihood(z, q, part) + log_prior(p, free)
     return Fit(p, q, z, tuple(free), covariance, fitted, likelihood.log_likelihood(z, q, parts.validated))
 

@@ -112,7 +112,7 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
     return out
 
 
-def _requests(u: Array, at: Array, first: int) -> Array:
+def _requests(u: Array, at: NDArray[np.int64], first: int) -> Array:
     """Return the requests at samples ``at``; there were none before ``first``."""
     return np.where(at >= first, u[np.maximum(at, 0)], u[0] if first == 0 else 0.0)
 

@@ -12,4 +12,4 @@ def gap_on(record: Record, diagnosis: Diagnosis) -> tuple[Gap, ...]:
     tau = float(w.nominal[w.plant.index("tau")])
     signals = signals_of(record, tau)
     stages = (("nominal", w.nominal), ("parameters", w.base.p), ("final", w.final.p))
-    return held_out_gap(w.plant, signals, w.nominal, w.final.q, stages, slice(10, signals.size))
+    return held_out_gap(w.plant, signals, w.nominal, w.final.q, stages, slice(10, signals.size), diagnosis.gap[0].unit)

@@ -86,7 +86,7 @@ def missing_torque(likelihood: Likelihood, plant: Plant, model: Fit) -> Missing:
     total = sum(energy.values())
     weights = {name: value / total if total > 0.0 else 0.0 for name, value in energy.items()}
     regimes = {name: _regimes(likelihood, plant, x[settled], name, model) for name in sites}
-    return Missing(torque, weights, regimes, h * np.arange(len(x))[settled])
+    return Missing(torque, weights, regimes, np.asarray(h * np.arange(len(x))[settled]))
 
 
 def places(missing: Missing, h: float) -> tuple[Place, ...]:
@@ -125,7 +125,7 @@ def _band(signal: str, torque: Array, weight: float, h: float) -> list[Place]:
     size = min(1024, torque.size)
     panes = torque[: torque.size // size * size].reshape(-1, size) * np.hanning(size)
     power = np.mean(np.abs(np.fft.rfft(panes, axis=1)) ** 2, axis=0)[1:]
-    frequency = np.fft.rfftfreq(size, h)[1:]
+    frequency: Array = np.asarray(np.fft.rfftfreq(size, h)[1:])
     interval, share, samples = _concentration(frequency, power)
     if share > 0.5 and samples < NARROW and share * weight > SMALL:
         return [Place(signal, "frequency", interval, "Hz", share * weight)]

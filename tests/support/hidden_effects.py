@@ -1,7 +1,8 @@
 """Records with hidden effects for tests and the benchmark of the diagnosis: what is hidden, how large, its right name.
 
-The smallest size of an effect is where it changes the response by three times the noise: the rms, over windows of one
-second with a straight line removed (angle and speed matched, so that old drift does not count), of the difference between the simulations with and
+The smallest size of an effect is where it changes the response by three times the noise: the rms, over windows of
+one second with a straight line removed (angle and speed
+matched, so that old drift does not count), of the difference between the simulations with and
 without it, in the encoder that shows it better.
 """
 
@@ -22,8 +23,10 @@ SINGLE: dict[str, tuple[dict[str, float], str, tuple[str, ...]]] = {
     "backlash": ({"alpha": 0.02}, "alpha", ("backlash@shaft",)),
     "coulomb_motor": ({"Fc_m": 1.2}, "Fc_m", ("coulomb_friction@motor", "stribeck_friction@motor")),
     "coulomb_load": ({"Fc_l": 5.0}, "Fc_l", ("coulomb_friction@load", "stribeck_friction@load")),
-    "stribeck_motor": ({"Fc_m": 0.8, "Fs_m": 0.6, "vs": 0.6}, "Fc_m", ("stribeck_friction@motor", "coulomb_friction@motor")),
-    "stribeck_load": ({"Fc_l": 3.0, "Fs_l": 2.5, "vs_l": 0.15}, "Fc_l", ("stribeck_friction@load", "coulomb_friction@load")),
+    "stribeck_motor": (
+        {"Fc_m": 0.8, "Fs_m": 0.6, "vs": 0.6}, "Fc_m", ("stribeck_friction@motor", "coulomb_friction@motor")),
+    "stribeck_load": (
+        {"Fc_l": 3.0, "Fs_l": 2.5, "vs_l": 0.15}, "Fc_l", ("stribeck_friction@load", "coulomb_friction@load")),
     "delay": ({"delay": 0.03}, "delay", ("input_delay@actuator",)),
     "saturation": ({"sat": 0.7}, "sat", ("torque_saturation@actuator",)),
     "hardening": ({"hard": 0.04}, "hard", ("hardening_stiffness@shaft",)),
