@@ -14,7 +14,7 @@ from orchestrator.record import Column, Record, quantisation_step, read_record, 
 from orchestrator.record_plausibility import check_plausible
 from tests.support.independent_plant import make_record, write_csv
 
-SHARED = Path("/work/shared/data/hidden-effects")
+SHARED = Path(__file__).resolve().parents[2] / "shared" / "data" / "hidden-effects"
 
 
 @pytest.fixture(scope="module")
