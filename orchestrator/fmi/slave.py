@@ -17,6 +17,7 @@ import numpy as np
 
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.extraction import content_hash, extracted
+from orchestrator.fmi.farewell import ends_cleanly
 from orchestrator.fmi.messages import logging_callbacks
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.master.protocol import Model, NativeCalls, Signals, StepDiscardedError, Transfer, Value
@@ -85,6 +86,8 @@ class FmuSlave:
         except BaseException:
             self._release()
             raise
+        if self._description.python:
+            ends_cleanly(Path(self._fmu.dll._name).parent)
         loader = ctypes.PyDLL if self._description.python else ctypes.CDLL
         self._library: Any = loader(self._fmu.dll._name, handle=self._fmu.dll._handle)
         self._component = ctypes.c_void_p(self._fmu.component)
