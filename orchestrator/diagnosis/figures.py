@@ -36,13 +36,13 @@ def draw_signals(path: Path, runs: BeforeAfter, diagnosis: Diagnosis) -> None:
         upper.plot(runs.time, runs.measured[:, n], color="black", linewidth=1.6, label="measured")
         upper.plot(runs.time, runs.before[:, n], color=ORANGE, linewidth=1.0, label="nominal FMU")
         upper.plot(runs.time, runs.after[:, n], color=BLUE, linewidth=1.0, linestyle="--", label="corrected FMU")
-        upper.set_ylabel(f"{names[n]} [rad]")
+        upper.set_ylabel(f"{names[n]} [{diagnosis.gap[n].unit}]")
         noise = diagnosis.gap[n].noise
         lower.axhspan(-2.0 * noise, 2.0 * noise, color=GREY, alpha=0.25, label="noise, two standard deviations")
         lower.plot(runs.time, runs.before[:, n] - runs.measured[:, n], color=ORANGE, linewidth=0.9, label="nominal")
         lower.plot(runs.time, runs.after[:, n] - runs.measured[:, n], color=BLUE, linewidth=0.7, label="corrected")
         lower.set_yscale("symlog", linthresh=5.0 * noise)
-        lower.set_ylabel("simulated - measured [rad]")
+        lower.set_ylabel(f"simulated - measured [{diagnosis.gap[n].unit}]")
     axes[0].set_title("Held-out part of the record: free runs of two seconds")
     axes[-1].set_xlabel("time [s]")
     _finish(list(axes))
@@ -129,6 +129,8 @@ def _draw_law(axis: Axes, diagnosis: Diagnosis, effect: Effect, fit: Fit) -> Non
     x, label = _abscissa(effect, fit.p, diagnosis, states[20 : 20 + torque.size], missing.time)
     if label.startswith("time"):
         shown = slice(0, min(torque.size, round(4.0 / w.likelihood.signals.h)))
+        width = max(1, round(0.02 / w.likelihood.signals.h))
+        torque = np.convolve(torque, np.ones(width) / width, "same")
         axis.plot(x[shown], torque[shown], color=GREY, linewidth=1.2, label="missing torque, smoothed")
         axis.plot(x[shown], law[shown], color=BLUE, linewidth=1.0, label="fitted effect")
     else:
@@ -142,8 +144,9 @@ def _draw_law(axis: Axes, diagnosis: Diagnosis, effect: Effect, fit: Fit) -> Non
         axis.plot(x[order], law[order], ".", color=BLUE, markersize=2.5, label="fitted effect")
         axis.errorbar(centre, mean, spread, color=ORANGE, fmt="o", markersize=3.5, linewidth=0.8,
                       label="missing torque, mean and spread")  # fmt: skip
-    axis.set_xlabel(label)
-    axis.set_ylabel(f"{signal} [N.m]")
+    metric = diagnosis.gap[0].unit == "m"
+    axis.set_xlabel(label.replace("rad", "m") if metric else label)
+    axis.set_ylabel(f"{signal.replace('torque', 'force')} [N]" if metric else f"{signal} [N.m]")
 
 
 def _law(diagnosis: Diagnosis, effect: Effect, p: Array, without: Array, states: Array, signal: str) -> Array:

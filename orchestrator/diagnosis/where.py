@@ -67,7 +67,9 @@ def missing_torque(likelihood: Likelihood, plant: Plant, model: Fit) -> Missing:
     response = error_response(likelihood, plant, model)
     m, h = likelihood.signals.channels, likelihood.signals.h
     effort = -back_propagated(response, raw[:, :m])
-    variance = (model.q * likelihood.signals.torque) ** 2 / h
+    # The filter's noise levels are known up to the factor that its innovations show.
+    level = float(np.mean(np.var(model.z, axis=0)))
+    variance = level * (model.q * likelihood.signals.torque) ** 2 / h
     ratio = float(model.p[plant.index("i")]) if "i" in plant.names else 1.0
     settled = slice(20, None)
     sites = {"torque of the motor": (0, variance)}

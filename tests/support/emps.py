@@ -59,3 +59,19 @@ def force_error(p: Array, which: str) -> float:
 def r_squared(simulated: Array, measured: Array) -> float:
     """Return the coefficient of determination."""
     return 1.0 - float(np.sum((simulated - measured) ** 2) / np.sum((measured - measured.mean()) ** 2))
+
+
+def open_loop(p: Array, which: str) -> float:
+    """Return R2 of the free run over a whole record, driven by its force; the initial state lies closest to it."""
+    from orchestrator.diagnosis.free_run import free_run
+    from orchestrator.diagnosis.likelihood import signals_of
+    from orchestrator.diagnosis.plants import SERVO_AXIS
+    from orchestrator.record import record_from_columns
+
+    data = read(which)
+    columns = {"time": data["time"], "u": data["force"], "theta_m": data["position"]}
+    signals = signals_of(record_from_columns(columns, which), 0.0)
+    first = np.zeros(8)
+    first[0] = data["position"][0]
+    run = free_run(SERVO_AXIS, p, first, signals, slice(0, signals.size))
+    return r_squared(run.outputs[:, 0], data["position"])

@@ -1,0 +1,129 @@
+"""The diagnosis on records of the independent simulator: right names, no false ones, honest rest."""
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.diagnose import diagnose
+from orchestrator.diagnosis.fitting import split
+from orchestrator.diagnosis.free_run import simulate
+from orchestrator.diagnosis.likelihood import Likelihood, signals_of
+from orchestrator.diagnosis.outcome import Diagnosis
+from orchestrator.diagnosis.plants import DRIVETRAIN, plant_of
+from orchestrator.diagnosis.remainder import play
+from orchestrator.errors import ScenarioError
+from orchestrator.model_file import default_model, read_model
+from orchestrator.record import Record, record_from_columns
+from tests.support.independent_plant import NOMINAL, make_record
+
+MODEL = default_model()
+
+
+def record_of(effects: dict[str, float], seed: int, duration: float = 12.0, **options: object) -> Record:
+    columns, _ = make_record(effects, seed, duration, substeps=50, **options)
+    return record_from_columns(columns, f"record-{seed}")
+
+
+def labels(found: Diagnosis) -> list[str]:
+    return [f"{effect.name}@{effect.site}" for effect in found.effects]
+
+
+def test_predictor_without_correction_is_the_exact_plant() -> None:
+    record = record_of({}, 1, 3.0, mismatch=0.0, noise=(0.0, 0.0), counts=None)
+    signals = signals_of(record, 1.0)
+    p = DRIVETRAIN.extended(MODEL.values)
+    for name, value in (("effects.gravity_load.amplitude", 5.0), ("effects.torque_ripple.amplitude", 0.4)):
+        p[DRIVETRAIN.index(name)] = value
+    exact = simulate(DRIVETRAIN, p, np.zeros(8), signals, slice(0, signals.size))
+    likelihood = Likelihood(DRIVETRAIN, signals, p, signals.size)
+    likelihood.gains(1.0).gains[:] = 0.0
+    _, states = likelihood.innovations(p, 1.0)
+    np.testing.assert_allclose(states[:, [0, 2]], exact, rtol=0.0, atol=3e-5)  # a tenth of the noise
+    assert np.ptp(exact[:, 0]) > 1.0
+
+
+def test_innovations_of_the_true_model_are_the_noise() -> None:
+    columns, truth = make_record({}, 5, 12.0, substeps=50)
+    record = record_from_columns(columns, "record")
+    p = DRIVETRAIN.extended(MODEL.values)
+    for name in NOMINAL:
+        p[DRIVETRAIN.index(name)] = truth["linear"][name]
+    signals = signals_of(record, 1.0)
+    z = Likelihood(DRIVETRAIN, signals, p, signals.size).whitened(p, 1e-5)[200:]
+    np.testing.assert_allclose(np.std(z, axis=0), 1.0, atol=0.06)
+    correlation = np.mean(z[1:] * z[:-1], axis=0)
+    assert np.all(np.abs(correlation) < 0.08)
+
+
+def test_nothing_hidden_is_parameters_and_the_gap_is_noise() -> None:
+    found = diagnose(record_of({}, 11), MODEL)
+    assert found.verdict == "parameters"
+    assert found.effects == ()
+    for gap in found.gap:
+        assert gap.after < 1.3 * gap.noise < gap.before / 3.0
+
+
+def test_exact_parameters_are_none() -> None:
+    assert diagnose(record_of({}, 12, mismatch=0.0), MODEL).verdict == "none"
+
+
+@pytest.mark.parametrize(
+    ("effects", "label", "parameter", "value", "tolerance"),
+    [
+        ({"alpha": 0.004}, "backlash@shaft", "alpha", 0.004, 0.02),
+        ({"Fc_l": 2.0}, "coulomb_friction@load", "torque", 2.0, 0.02),
+        ({"delay": 0.008}, "input_delay@actuator", "delay", 0.008, 0.01),
+        ({"rip": 0.5, "rip_n": 4.0}, "torque_ripple@motor", "amplitude", 0.5, 0.02),
+    ],
+)
+def test_one_effect_is_named_with_its_value(effects, label, parameter, value, tolerance) -> None:
+    found = diagnose(record_of(effects, 21, 16.0), MODEL)
+    assert found.verdict == "effects"
+    assert labels(found) == [label]
+    estimate = found.effects[0].parameters[parameter]
+    assert abs(estimate.value - value) < tolerance * value
+    assert found.effects[0].margin > 20.0
+    for gap in found.gap:
+        assert gap.after < 0.1 * gap.before
+
+
+def test_two_effects_in_a_closed_loop() -> None:
+    found = diagnose(record_of({"alpha": 0.004, "delay": 0.01}, 31, 20.0, excitation="closed_loop"), MODEL)
+    assert sorted(labels(found)) == ["backlash@shaft", "input_delay@actuator"]
+    stages = [name for name, _ in found.gap[0].stages]
+    assert stages[:2] == ["nominal", "parameters"]
+    assert len(stages) == 4
+
+
+def test_one_encoder_and_an_initial_state_that_is_not_zero() -> None:
+    x0 = {"theta_m": 2.0, "theta_l": 2.0 / 3.984, "omega_m": 4.0, "omega_l": 4.0 / 3.984}
+    record = record_of({"Fc_m": 0.8}, 41, 16.0, x0=x0).without_load_encoder()
+    found = diagnose(record, MODEL)
+    assert {"coulomb_friction@motor", "stribeck_friction@motor"} & set(labels(found))
+    assert [gap.signal for gap in found.gap] == ["theta_m"]
+    assert any("one encoder" in warning for warning in found.warnings)
+
+
+@pytest.mark.parametrize("effects", [{"jvar": 0.15}, {"bw": 45.0, "bw_x": 0.01}, {"late_Fc": 0.6}])
+def test_what_the_library_lacks_is_unknown(effects) -> None:
+    found = diagnose(record_of(effects, 51, 16.0), MODEL)
+    assert found.verdict == "unknown"
+    assert found.effects == ()
+    assert "nothing in the library explains" in found.warnings[0]
+
+
+def test_parts_do_not_overlap() -> None:
+    parts = split(1000, 10)
+    assert (parts.fitted.stop, parts.validated.stop) == (parts.validated.start, parts.held_out.start)
+    assert parts.held_out.stop == 1000
+
+
+def test_play_remembers() -> None:
+    values = np.array([0.0, 2.0, 1.5, 0.5, -3.0])
+    np.testing.assert_allclose(play(values, 1.0), [0.0, 1.0, 1.0, 1.0, -2.0])
+
+
+def test_rigid_backlash_model_is_refused(tmp_path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text("[parameters.backlash_model]\nvalue = 4\n")
+    with pytest.raises(ScenarioError, match="backlash_model"):
+        plant_of(read_model(path))

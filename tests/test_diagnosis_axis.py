@@ -1,0 +1,86 @@
+"""``ServoAxis``: its equations against closed forms, its FMU against its equations, its diagnosis."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.checking.check import check_fmu
+from orchestrator.diagnosis.diagnose import diagnose
+from orchestrator.diagnosis.simulation_fit import refit_to_simulation
+from orchestrator.fmi.build import ensure_built
+from orchestrator.fmi.slave import fmu_instance
+from orchestrator.master.algorithms import GaussSeidel
+from orchestrator.master.session import Session
+from orchestrator.master.signals import Samples
+from orchestrator.master.system import Source, System
+from orchestrator.model_file import read_model
+from orchestrator.record import read_record
+from pyfmu_sources import servo_axis as axis
+from tests.support import emps
+
+MODEL = Path(__file__).resolve().parents[1] / "docs" / "examples" / "emps.toml"
+
+
+def parameters(**values: float) -> tuple[float, ...]:
+    p = list(axis.DEFAULTS)
+    for name, value in values.items():
+        p[getattr(axis, name)] = value
+    return tuple(p)
+
+
+def test_viscous_axis_follows_its_closed_form() -> None:
+    p = parameters(P_J=2.0, P_B=3.0)
+    x, _ = axis.advance((0.0, 0.0, 0.0), 1, p, 6.0, 0.0, 0.8)
+    assert x[1] == pytest.approx(2.0 * (1.0 - np.exp(-1.2)), rel=1e-7)
+    assert x[0] == pytest.approx(2.0 * 0.8 - 4.0 / 3.0 * (1.0 - np.exp(-1.2)), rel=1e-7)
+
+
+def test_dry_friction_stops_the_axis_where_energy_says_and_holds_it() -> None:
+    p = parameters(P_J=2.0, P_B=0.0, P_COULOMB=5.0)
+    x, mode = axis.advance((0.0, 3.0, 0.0), 1, p, 0.0, 0.0, 4.0)
+    assert mode == 0
+    assert x[1] == 0.0
+    assert x[0] == pytest.approx(0.5 * 2.0 * 9.0 / 5.0, rel=1e-9)
+    held, mode = axis.advance(x, mode, p, 4.99, 0.0, 1.0)
+    assert (held[0], mode) == (x[0], 0)
+    slid, mode = axis.advance(x, mode, p, 5.01, 0.0, 1.0)
+    assert mode == 1
+    assert slid[1] == pytest.approx(0.01 / 2.0, rel=1e-6)
+
+
+def test_fmu_passes_check_and_repeats_the_equations() -> None:
+    path = ensure_built(["ServoAxis"])["ServoAxis"]
+    report = check_fmu(path)
+    assert report.ok, report.findings
+    u = 4.0 * np.sin(np.arange(100))
+    start = {"J": 1.5, "b": 0.7, "effects.coulomb_friction.motor.torque": 1.0}
+    system = System((fmu_instance("axis", path, start),), (), (Source("axis.u", Samples(u, 0.01)),))
+    with Session(system, ("axis.theta_m",), GaussSeidel(0.01), 0.99) as session:
+        simulated = session.run()["axis.theta_m"]
+    p = parameters(P_J=1.5, P_B=0.7, P_COULOMB=1.0)
+    x, mode, expected = (0.0, 0.0, 0.0), axis.initial_mode((0.0, 0.0, 0.0), p, float(u[0])), []
+    for value in u:
+        expected.append(x[0])
+        x, mode = axis.advance(x, mode, p, float(value), 0.0, 0.01)
+    np.testing.assert_allclose(simulated, expected, rtol=0.0, atol=1e-13)
+    assert np.ptp(expected) > 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not emps.available(), reason="the EMPS records are not here")
+def test_emps_lacks_dry_friction_first(tmp_path) -> None:
+    model = read_model(MODEL)
+    emps.write_csv(tmp_path / "estimation.csv", "estimation")
+    found = diagnose(read_record(tmp_path / "estimation.csv", model.columns), model)
+    assert found.verdict == "effects"
+    assert [effect.name for effect in found.effects][:2] == ["coulomb_friction", "load_torque"]
+    friction = found.effects[0].parameters["torque"]
+    assert friction.unit == "N"
+    assert friction.value == pytest.approx(20.39, rel=0.03)
+    assert found.effects[1].parameters["torque"].value == pytest.approx(-3.16, rel=0.05)
+    p = found.workings.final.p
+    assert emps.force_error(p, "estimation") <= 0.041
+    assert emps.force_error(p, "test") <= 0.060
+    assert emps.open_loop(refit_to_simulation(found), "test") >= 0.995
+    assert emps.open_loop(found.workings.base.p, "test") < 0.6
