@@ -118,6 +118,15 @@ def test_no_gap_is_called_no_gap() -> None:
     assert "no gap is seen" in result.message
 
 
+@pytest.mark.parametrize("torque", [0.0, 1e-3])
+def test_a_gap_below_the_noise_is_not_measured(torque: float) -> None:
+    record, _ = _record(0.02, 3, 5.0, torque=torque)
+    result = estimator("maximum_likelihood")(record, MODEL)
+    assert not result.visible
+    assert result.interval == (0.0, math.inf)
+    assert "cannot be seen" in result.message
+
+
 def test_a_gap_that_is_never_traversed_is_not_measured() -> None:
     time = np.arange(800) * 0.005
     torque = 40.0 + 20.0 * np.sin(9.0 * time)

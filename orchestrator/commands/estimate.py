@@ -70,7 +70,12 @@ def run(args: argparse.Namespace) -> int:
         if record is not None:
             _draw(directory, record, estimates, model)
         if args.design:
-            size = args.size or next((e.alpha for e in estimates if e.visible and e.alpha > 0.0), 0.005)
+            chosen = args.size
+            size = (
+                chosen
+                if chosen is not None
+                else next((e.alpha for e in estimates if e.visible and e.alpha > 0.0), 0.005)
+            )
             results["design"] = _design(directory, args, model, size)
         given = {k: str(v) if isinstance(v, Path) else v for k, v in vars(args).items() if k not in ("run", "command")}
         write_result(directory, "estimate", given, None, results)

@@ -54,6 +54,7 @@ MISFIT_WIDENING = 1.3
 # of the drive's torque, and autocorrelation of the one-step errors.
 NOTABLE_TORQUE_NOISE = 1e-3  # s^0.5
 NOTABLE_AUTOCORRELATION = 0.15
+LEAST_TRAVEL_M, LEAST_TRAVEL_L = 100.0, 30.0  # in standard deviations of the encoder's noise
 FLAT_INFORMATION = 0.3
 
 
@@ -224,8 +225,11 @@ def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
         "measurement_noise": list(likelihood.noise(fit.point.theta).measured[: white.shape[1]]),
     }
     visible, message = _verdict(alpha, low, high, traversals)
+    still = _standing_still(problem.outputs, likelihood.noise(fit.point.theta).measured)
+    if still:
+        visible, message, error, low, high = False, still, math.inf, 0.0, math.inf
     drive = float(np.sqrt(np.mean(kept.states[:, 4] ** 2)))
-    lacking = _lacking(diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I])
+    lacking = _lacking(diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I], problem.record.size)
     message = "; ".join(text for text in (message, lacking) if text)
     curves = {"states": kept.states, "contacts": kept.contacts, "errors": kept.errors, "profile": curve}
     curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
@@ -256,17 +260,32 @@ def _verdict(alpha: float, low: float, high: float, traversals: int) -> tuple[bo
     return False, "the gap cannot be seen: every size fits the record; --design proposes an excitation"
 
 
-def _lacking(diagnostics: dict[str, Any], drive: float, ratio: float) -> str:
+def _standing_still(outputs: Array, noise: tuple[float, float]) -> str:
+    """Return the sentence that says which side does not move beyond its noise, or nothing."""
+    for n, (name, least) in enumerate((("motor", LEAST_TRAVEL_M), ("load", LEAST_TRAVEL_L))[: outputs.shape[1]]):
+        travel = float(np.ptp(outputs[:, n])) / noise[n]
+        if travel < least:
+            return (
+                f"the gap cannot be seen: the {name} moves by only {travel:.2g} standard deviations of its encoder's "
+                f"noise, and must by {least:g}; --design proposes an excitation"
+            )
+    return ""
+
+
+def _lacking(diagnostics: dict[str, Any], drive: float, ratio: float, rows: int) -> str:
     """Return the warning that the model lacks something, or nothing.
 
     Args:
         diagnostics: of the fit.
         drive: effective value of the motor's torque [N.m].
         ratio: gear ratio.
+        rows: of the record.
     """
     worst = max(abs(value) for value in diagnostics["innovation_autocorrelation"])
     motor, load = diagnostics["torque_noise"]
-    if max(motor, load / ratio) < NOTABLE_TORQUE_NOISE * drive and worst < NOTABLE_AUTOCORRELATION:
+    if max(motor, load / ratio) < NOTABLE_TORQUE_NOISE * drive and worst < max(
+        NOTABLE_AUTOCORRELATION, 4.0 / math.sqrt(rows)
+    ):
         return ""
     return (
         f"the model does not explain the record (torque noise {motor:.2g} and {load:.2g} N.m.s^0.5 at motor and load, "
