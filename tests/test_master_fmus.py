@@ -14,7 +14,7 @@ from orchestrator.fmi.build import ensure_built
 from orchestrator.fmi.extraction import extracted, unpack
 from orchestrator.fmi.model_description import parse_description, read_description
 from orchestrator.fmi.slave import FmuSlave, fmu_instance
-from orchestrator.master.algorithms import GaussSeidel, Jacobi
+from orchestrator.master.algorithms import Adaptive, GaussSeidel, Jacobi
 from orchestrator.master.result import Result
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Noise, Samples, Sine
@@ -212,3 +212,22 @@ def test_an_fmu_without_a_binary_for_this_platform(tmp_path: Path, fmus) -> None
         archive(path, {"modelDescription.xml": source.read("modelDescription.xml")})
     with pytest.raises(FmuError, match="must have a binary for"):
         FmuSlave("plant", path)
+
+
+def test_error_controlled_master_rolls_fmus_back(fmus) -> None:
+    """A plant under a smooth torque: ever smaller fixed steps converge to what the adaptive master gives."""
+    instances = (fmu_instance("plant", fmus["Drivetrain"], {"alpha": 0.02}),)
+    system = System(instances, (), (Source("plant.u", Sine(200.0, 2.0)),))
+    record = ("plant.theta_m", "plant.theta_l", "plant.contact")
+
+    def at(algorithm: GaussSeidel | Adaptive) -> Result:
+        with Session(system, record, algorithm, 0.4) as session:
+            return session.run()
+
+    smooth = at(Adaptive(1e-2, 1e-9))
+    coarse, fine = (at(GaussSeidel(h)).values[:2, :: round(1e-2 / h)] for h in (1e-4, 5e-5))
+    expected = 2.0 * fine - coarse
+    assert np.abs(expected).max() > 0.1
+    np.testing.assert_allclose(smooth.values[:2], expected, rtol=0.0, atol=1e-6)
+    assert set(smooth["plant.contact"]) <= {-1.0, 0.0, 1.0}
+    assert smooth.statistics.steps < 1000

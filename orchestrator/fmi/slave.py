@@ -146,6 +146,8 @@ class FmuSlave:
         if status in (OK, WARNING):
             return
         self._worst = max(self._worst, status if status != PENDING else ERROR)
+        if "KeyboardInterrupt" in self._said():  # Ctrl-C reached the Python inside the FMU
+            raise KeyboardInterrupt
         label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
         text = f"{self.name}: {what} returned {label}{self._said()}"
         if status == DISCARD:
