@@ -4,6 +4,7 @@
 
     protocol    what a slave is: variables, a handful of calls, their order
     system      instances, connections, sources, start values: structure, checked, never run
+    values      what a variable takes
     graph       execution order and algebraic loops from direct feedthrough
     signals     time signals that the master itself feeds in
     session     slaves bound to one system, run as often as needed

@@ -9,6 +9,7 @@ from orchestrator.master import units
 from orchestrator.master.graph import components
 from orchestrator.master.protocol import NUMERIC, READABLE, Model, Slave, Unit, Value, Variable
 from orchestrator.master.signals import Signal
+from orchestrator.master.values import nearest, typed_value, types_fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,60 +347,3 @@ class System:
             return f"must start with an instance's name ({known}), but is {address!r}"
         close = nearest(variable, list(instance.model.variables))
         return f"must name a variable of {name} ({instance.model.name}), but {variable!r} is none{close}"
-
-
-def nearest(name: str, known: list[str]) -> str:
-    """Return a hint such as ``; did you mean 'theta_m'?``, or nothing when no name is near."""
-    import difflib
-
-    close = difflib.get_close_matches(name, known, n=1)
-    return f"; did you mean {close[0]!r}?" if close else ""
-
-
-def types_fit(source: Variable, target: Variable) -> bool:
-    """Return whether a value of ``source`` is one of ``target``: the same type, or an Integer into a Real."""
-    if source.type == "Enumeration" and target.type == "Enumeration":
-        return not source.items or not target.items or source.items == target.items
-    return source.type == target.type or (source.type == "Integer" and target.type == "Real")
-
-
-def typed_value(variable: Variable, value: Value) -> tuple[Value | None, str | None]:
-    """Return ``value`` as ``variable`` takes it, or ``None`` and what is wrong with it."""
-    kind = variable.type
-    if kind == "String":
-        return (value, None) if isinstance(value, str) else (None, f"must be a string, but is {value!r}")
-    if kind == "Boolean":
-        return (value, None) if isinstance(value, bool) else (None, f"must be true or false, but is {value!r}")
-    if kind == "Enumeration" and isinstance(value, str):
-        literals = dict(variable.items)
-        if value not in literals:
-            return None, f"must be one of {', '.join(literals)}, but is {value!r}{nearest(value, list(literals))}"
-        return literals[value], None
-    if not _is_number(value, whole=kind != "Real"):
-        need = "a finite number" if kind == "Real" else "an integer of 32 bits"
-        return None, f"must be {need}, but is {_short(value)}"
-    assert not isinstance(value, str)
-    low, high = variable.minimum, variable.maximum
-    if (low is not None and value < low) or (high is not None and value > high):
-        text = (
-            f"must be at least {low:g}"
-            if high is None
-            else f"must be at most {high:g}"
-            if low is None
-            else f"must lie in [{low:g}, {high:g}]"
-        )
-        return None, f"{text}, but is {value!r}"
-    return (float(value) if kind == "Real" else int(value)), None
-
-
-def _is_number(value: Value, whole: bool) -> bool:
-    if isinstance(value, (bool, str)):
-        return False
-    if isinstance(value, int):
-        return abs(value) <= (2**31 - 1 if whole else 2**1000)
-    return math.isfinite(value) and (not whole or (value.is_integer() and abs(value) <= 2**31 - 1))
-
-
-def _short(value: Value) -> str:
-    text = repr(value) if not isinstance(value, int) or abs(value) < 2**1000 else "an integer of hundreds of digits"
-    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -10,7 +10,8 @@ from lxml import etree
 from orchestrator.errors import ScenarioError
 from orchestrator.master import units
 from orchestrator.master.protocol import Model, Unit, Value
-from orchestrator.master.system import Problem, nearest
+from orchestrator.master.system import Problem
+from orchestrator.master.values import nearest
 from orchestrator.ssp.common import EXPONENTS, parse, tag
 
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
