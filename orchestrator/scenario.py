@@ -23,6 +23,7 @@ from orchestrator.master.protocol import Value
 from orchestrator.master.result import Result
 from orchestrator.master.session import Session
 from orchestrator.master.system import Connection, Instance, Problem, Quantity, Source, System, raise_problems
+from orchestrator.master.values import one_line
 
 MAXIMUM_BYTES = 16 * 2**20
 
@@ -274,7 +275,7 @@ class _Reader:
             try:
                 found.append(fmu_instance(name, self._fmu(instance.fmu), start))
             except FmuError as error:
-                raise FmuError(f"{self.path}: {path}.fmu: {error}") from None
+                raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
         return tuple(found)
 
     def _parameter(self, value: Any, path: str) -> Value | Quantity | None:

@@ -81,6 +81,8 @@ def test_units_of_parameters_are_converted(tmp_path: Path) -> None:
         (('kind = "square"', 'kind = "sqare"'), ScenarioError, "$.sources[0].kind"),
         (("amplitude = 20.0", "amplitude = inf"), ScenarioError, "$.sources[0].amplitude: must be finite"),
         (("stop = 0.05", "stop = '"), ScenarioError, "must be TOML"),
+        (('"plant.theta_m",', '"plant.\\nx",'), ScenarioError, "$.record[0]: must name a variable of plant"),
+        (('fmu = "Drivetrain"', 'fmu = "a\\nb"'), FmuError, "a\\nb"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, change: tuple[str, str], error: type, expected: str) -> None:

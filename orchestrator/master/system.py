@@ -9,7 +9,7 @@ from orchestrator.master import units
 from orchestrator.master.graph import components
 from orchestrator.master.protocol import NUMERIC, READABLE, Model, Slave, Unit, Value, Variable
 from orchestrator.master.signals import Signal
-from orchestrator.master.values import nearest, typed_value, types_fit
+from orchestrator.master.values import nearest, one_line, typed_value, types_fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ def raise_problems(problems: list[Problem], origin: str = "") -> None:
     """
     if not problems:
         return
-    text = (f"{origin}: " if origin else "") + "; ".join(str(p) for p in problems)
+    text = one_line((f"{origin}: " if origin else "") + "; ".join(str(p) for p in problems))
     raise ConnectionMismatchError(text) if all(p.mismatch for p in problems) else ScenarioError(text)
 
 
