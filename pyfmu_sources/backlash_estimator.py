@@ -39,8 +39,8 @@ class Settings(NamedTuple):
 
     noise_m: float = 3.5e-4  # of the motor's angle, rounding included [rad]
     noise_l: float = 1.75e-4  # of the load's angle [rad]
-    torque_noise_m: float = 0.08  # white torque at the motor, for what the model lacks [N.m.s^0.5]
-    torque_noise_l: float = 0.25  # the same at the load [N.m.s^0.5]
+    torque_noise_m: float = 0.1  # white torque at the motor, for what the model lacks [N.m.s^0.5]
+    torque_noise_l: float = 0.3  # the same at the load [N.m.s^0.5]
     load_walk: float = 2.0  # random walk of the load torque [N.m/s^0.5]
     alpha_walk: float = 1e-5  # random walk of the half-gap, for wear [rad/s^0.5]
     stiffness_spread: float = 0.03  # relative error of the stiffness
