@@ -83,7 +83,7 @@ def test_one_effect_is_named_with_its_value(effects, label, parameter, value, to
     assert abs(estimate.value - value) < tolerance * value
     assert found.effects[0].margin > 20.0
     for gap in found.gap:
-        assert gap.after < 0.1 * gap.before
+        assert gap.after < min(0.2 * gap.before, 3.0 * gap.noise)
 
 
 def test_two_effects_in_a_closed_loop() -> None:
@@ -103,6 +103,7 @@ def test_one_encoder_and_an_initial_state_that_is_not_zero() -> None:
     assert any("one encoder" in warning for warning in found.warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effects", [{"jvar": 0.15}, {"bw": 45.0, "bw_x": 0.01}, {"late_Fc": 0.6}])
 def test_what_the_library_lacks_is_unknown(effects) -> None:
     found = diagnose(record_of(effects, 51, 16.0), MODEL)

@@ -153,14 +153,14 @@ def _fractions(scene: Scene) -> tuple[float, ...]:
 
 
 def _limits(scene: Scene) -> tuple[float, ...]:
-    return tuple(
-        float(v)
-        for v in np.quantile(np.abs(scene.u), (0.3, 0.5, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995, 0.998, 0.9992))
-    )
+    asked = np.abs(scene.u)
+    shares = (0.3, 0.5, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995, 0.998)
+    near_largest = (0.8, 0.84, 0.88, 0.91, 0.94, 0.97, 0.99)
+    return tuple(float(v) for v in np.quantile(asked, shares)) + tuple(f * float(asked.max()) for f in near_largest)
 
 
 def _delays(scene: Scene) -> tuple[float, ...]:
-    return tuple(scene.h * f for f in (0.3, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0))
+    return tuple(scene.h * f for f in (0.04, 0.12, 0.3, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0))
 
 
 def _frequencies(scene: Scene) -> tuple[float, ...]:
