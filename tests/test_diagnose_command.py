@@ -14,7 +14,8 @@ from tests.support.independent_plant import make_record, write_csv
 def result(tmp_path_factory) -> tuple[Path, dict]:
     folder = tmp_path_factory.mktemp("diagnose")
     for name, seed in (("loose gear", 61), ("other", 62)):
-        columns, _ = make_record({"alpha": 0.005}, seed, 12.0, substeps=50, mismatch=0.0, linear={"k": 3400.0, "J_l": 5.4})
+        linear = {"k": 3400.0, "J_l": 5.4}
+        columns, _ = make_record({"alpha": 0.005}, seed, 12.0, substeps=50, mismatch=0.0, linear=linear)
         write_csv(folder / f"{name}.csv", columns)
     out = folder / "out"
     arguments = ["diagnose", str(folder / "loose gear.csv"), "--validate", str(folder / "other.csv"), "--out", str(out)]
