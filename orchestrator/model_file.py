@@ -152,9 +152,7 @@ def read_model(path: Path | None) -> Model:
     table = _table(raw.fmu, 0.0 if stated else DEFAULT_SPREAD, where)
     for name, entry in raw.parameters.items():
         if name not in table:
-            raise ScenarioError(
-                f"{where}: $.parameters.{name} must be a parameter of {raw.fmu}{_nearest(name, table)}"
-            )
+            raise ScenarioError(f"{where}: $.parameters.{name} must be a parameter of {raw.fmu}{_nearest(name, table)}")
         table[name] = _merge(table[name], entry, f"{where}: $.parameters.{name}")
     encoders = {name: _encoder(name, entry, where) for name, entry in raw.encoders.items()}
     columns = {name: _column(name, entry, where) for name, entry in raw.columns.items()}
@@ -192,9 +190,7 @@ def _merge(parameter: ModelParameter, entry: _Parameter, where: str) -> ModelPar
         uncertainty = _positive(entry.uncertainty, f"{where}.uncertainty")
     elif entry.relative_uncertainty is not None:
         uncertainty = _positive(entry.relative_uncertainty, f"{where}.relative_uncertainty") * abs(value)
-    return ModelParameter(
-        parameter.name, value, uncertainty, parameter.unit, parameter.minimum, parameter.maximum
-    )
+    return ModelParameter(parameter.name, value, uncertainty, parameter.unit, parameter.minimum, parameter.maximum)
 
 
 def _positive(value: float, where: str) -> float:
