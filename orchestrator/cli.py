@@ -5,6 +5,7 @@ import importlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from orchestrator import __version__
 from orchestrator.errors import InputError, OrchestratorError
@@ -23,11 +24,17 @@ COMMANDS = {
 }
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaints are one line, like all others."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where help is, and exit with 2."""
+        self.exit(2, f"error: {message}; see {self.prog} --help\n")
+
+
 def build_parser(command: str | None) -> argparse.ArgumentParser:
     """Return the parser; only the module of ``command`` is imported, so that start-up stays quick."""
-    parser = argparse.ArgumentParser(
-        prog="python -m orchestrator", description=importlib.import_module("orchestrator").__doc__
-    )
+    parser = _Parser(prog="python -m orchestrator", description=importlib.import_module("orchestrator").__doc__)
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, summary in COMMANDS.items():

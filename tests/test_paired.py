@@ -93,6 +93,8 @@ def test_sweep_command_is_reproducible_and_complete(tmp_path, capsys):
         (["--noise", "-1"], "not negative"),
         (["--noise", "a"], "numbers"),
         (["--seeds", "0"], "at least"),
+        (["--seed", "-1"], "not be negative"),
+        (["--scenario", "loop.toml"], "left out"),
         (["--experiment", "x"], "must be one of"),
         (["--backlash-model", "x"], "must be one of"),
         (["--vary", "plant.nothing=1,2"], "plant.nothing"),
@@ -105,6 +107,15 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path, capsys, words, complain
     assert complaint in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_word_that_is_no_number_is_one_line(capsys):
+    with pytest.raises(SystemExit) as ending:
+        main(["simulate", "--alpha", "abc"])
+    assert ending.value.code == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: argument --alpha: invalid float value: 'abc'")
+    assert error.count("\n") == 1
 
 
 def test_unwritable_output(tmp_path, capsys):

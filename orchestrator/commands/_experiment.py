@@ -33,6 +33,18 @@ def chosen_experiment(arguments: argparse.Namespace) -> Experiment:
     return with_settings(named_experiment(arguments.experiment), backlash_model=arguments.backlash_model)
 
 
+def refuse_with_scenario(arguments: argparse.Namespace, defaults: dict[str, object]) -> None:
+    """Refuse options of the pair that differ from their ``defaults``: beside ``--scenario`` they would do nothing.
+
+    Raises:
+        ScenarioError: one does.
+    """
+    for name, default in (defaults | {"experiment": "default", "backlash_model": "dead_zone"}).items():
+        if getattr(arguments, name) != default:
+            option = "--" + name.replace("_", "-")
+            raise ScenarioError(f"`{option}` must be left out with `--scenario`, which it does not change")
+
+
 def require_not_negative(name: str, value: float) -> float:
     """Return ``value`` if it is finite and not negative.
 

@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     with staged(args.out) as directory:
         write_result(directory, "check", arguments, None, as_results(reports))
         write_report(directory, "check")
-    _write_extra(args, reports)
+        _write_extra(args, reports)
     return 0 if all(r.ok for r in reports) else 1
 
 

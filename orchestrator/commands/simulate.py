@@ -10,7 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.commands._console import print_table
-from orchestrator.commands._experiment import add_experiment_arguments, chosen_experiment, require_not_negative
+from orchestrator.commands._experiment import (
+    add_experiment_arguments,
+    chosen_experiment,
+    refuse_with_scenario,
+    require_not_negative,
+)
 from orchestrator.errors import ScenarioError
 from orchestrator.fmi.build import ensure_built
 from orchestrator.master.result import Result
@@ -27,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_experiment_arguments(parser)
     parser.add_argument("--alpha", type=float, default=0.02, metavar="RAD", help="half-gap (default: %(default)s)")
     parser.add_argument("--noise", type=float, default=0.0, metavar="RAD", help="encoder noise (default: none)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the noise")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the noise (default: %(default)s)")
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="run this TOML scenario instead of the pair")
 
 
@@ -39,6 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _scenario(arguments: argparse.Namespace) -> int:
+    refuse_with_scenario(arguments, {"alpha": 0.02, "noise": 0.0, "seed": 0})
     scenario = load_scenario(arguments.scenario)
     with staged(arguments.out) as directory:
         result = run_scenario(scenario)

@@ -4,7 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from orchestrator.commands._experiment import add_experiment_arguments
+from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
 from orchestrator.commands._paired_sweep import run_paired_sweep
 from orchestrator.commands._progress import add_engine_arguments
 from orchestrator.commands._scenario_sweep import run_scenario_sweep
@@ -20,8 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="half-gaps [rad]: 0.01,0.02 or range:LOW:HIGH:N or logrange:LOW:HIGH:N or random:N (default: %(default)s)",
     )
     parser.add_argument("--noise", default="0,1e-4", metavar="LIST", help="encoder noise [rad] (default: %(default)s)")
-    parser.add_argument("--seeds", type=int, default=1, metavar="N", help="runs of each size and noise level")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of random sizes and of all noise")
+    parser.add_argument(
+        "--seeds", type=int, default=1, metavar="N", help="runs of each size and noise level (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="seed of random sizes and of all noise (default: %(default)s)"
+    )
     parser.add_argument(
         "--vary",
         action="append",
@@ -31,7 +35,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scenario", type=Path, metavar="FILE", help="sweep this TOML scenario instead of the pair")
     parser.add_argument(
-        "--samples", type=int, default=16, metavar="N", help="draws of random and sobol (with --scenario)"
+        "--samples",
+        type=int,
+        default=16,
+        metavar="N",
+        help="draws of random and sobol (with --scenario; default: %(default)s)",
     )
     parser.add_argument("--parquet", action="store_true", help="write the table as Parquet too (extra [parquet])")
     add_engine_arguments(parser)
@@ -40,6 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the sweep, print the table, write the results; 1 when a case failed."""
     chosen = run_paired_sweep if arguments.scenario is None else run_scenario_sweep
+    if arguments.scenario is not None:
+        refuse_with_scenario(arguments, {"sizes": "random:20", "noise": "0,1e-4", "seeds": 1})
     failed = chosen(arguments)
     sys.stdout.write(f"Written to {arguments.out}: report.html, sweep.csv, sweep.json\n")
     return 1 if failed else 0

@@ -307,8 +307,10 @@ def parse_design(specifications: Sequence[str], samples: int, seed: int) -> Desi
     all Sobol ones; each grid point is combined with every draw.
 
     Raises:
-        ScenarioError: a specification that cannot be read; the text names it.
+        ScenarioError: a specification that cannot be read; the text names it; or a negative seed.
     """
+    if seed < 0:
+        raise ScenarioError(f"`--seed` must not be negative, but is {seed}")
     axes: list[Design] = []
     drawn: dict[str, list[Bounds]] = {"random": [], "sobol": []}
     for text in specifications:
