@@ -96,11 +96,19 @@ def test_the_definition_is_plain_json_and_tells_designs_apart():
         ("a=logrange:0:1:3", "positive"),
         ("a=lograndom:-1:1", "positive"),
         ("a=range:0:1:0", "at least one"),
+        ("a=range:0:1:1e300", "at most 1,000,000,000 values"),
     ],
 )
 def test_bad_specifications_are_named(text, said):
     with pytest.raises(ScenarioError, match=said):
         parse_design([text], 4, 0)
+
+
+def test_the_number_of_cases_is_bounded():
+    with pytest.raises(ScenarioError, match="at most 1,000,000,000 cases, but has 10,000,000,000"):
+        parse_design(["a=range:0:1:100000", "b=range:0:1:100000"], 4, 0)
+    with pytest.raises(ScenarioError, match="seed"):
+        parse_design(["a=random:0:1"], 4, -1)
 
 
 def test_a_parameter_is_varied_once():

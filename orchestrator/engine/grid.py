@@ -16,7 +16,7 @@ from orchestrator.engine.cases import Case, Value
 from orchestrator.errors import ScenarioError
 
 SOBOL_BLOCK = 1024
-SOBOL_MAX_COUNT = 2**30
+MAX_CASES = 10**9  # a Sobol sequence has 2**30 points
 
 
 class Design(Protocol):
@@ -178,10 +178,6 @@ class Sobol:
 
     def __post_init__(self) -> None:
         _positive_count("samples", self.count)
-        if self.count > SOBOL_MAX_COUNT:
-            raise ScenarioError(
-                f"`samples` must be at most {SOBOL_MAX_COUNT} for a Sobol sequence, but is {self.count}"
-            )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -218,6 +214,9 @@ class Product:
         for name in names:
             if names.count(name) > 1:
                 raise ScenarioError(f"`{name}` must be varied once, but is varied {names.count(name)} times")
+        count = math.prod(len(d) for d in self.designs)
+        if count > MAX_CASES:
+            raise ScenarioError(f"a sweep must have at most {MAX_CASES:,} cases, but has {count:,}")
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -291,6 +290,8 @@ def _finite(name: str, value: Value) -> None:
 def _positive_count(name: str, count: int) -> None:
     if count < 1:
         raise ScenarioError(f"`{name}` must have at least one value, but its count is {count}")
+    if count > MAX_CASES:
+        raise ScenarioError(f"`{name}` must have at most {MAX_CASES:,} values, but its count is {count:,}")
 
 
 def parse_design(specifications: Sequence[str], samples: int, seed: int) -> Design:
