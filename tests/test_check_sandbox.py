@@ -56,6 +56,13 @@ def test_signals_are_told(tmp_path: Path) -> None:
     assert ending.describe() == "the process was ended by SIGABRT"
 
 
+def test_the_memory_of_the_parent_is_not_the_childs(tmp_path: Path) -> None:
+    large = b"x" * (2 * QUICK.memory)
+    ending, _ = child(tmp_path, QUICK, "abort")
+    assert len(large) > QUICK.memory
+    assert ending.reason == "signal"
+
+
 def test_grandchildren_are_killed_and_told(tmp_path: Path) -> None:
     ending, lines = child(tmp_path, Limits(), "fork")
     assert ending.left

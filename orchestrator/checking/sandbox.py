@@ -179,13 +179,22 @@ def _finish(process: subprocess.Popen[bytes], reason: str, limits: Limits) -> En
         _kill(process)
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = code = os.waitstatus_to_exitcode(status)
-    peak = usage.ru_maxrss * (1 if sys.platform == "darwin" else 1024)
     if not reason and code < 0:
-        reason = "memory" if peak > limits.memory else "signal"
+        reason = "memory" if _peak(usage) > limits.memory else "signal"
     if code == -signal.SIGXCPU:
         reason = "time"
     left = reason in ("", "signal") and _kill(process)
     return Ending(reason or "exit", abs(code), left)
+
+
+def _peak(usage: Any) -> int:
+    """Largest resident memory of an ended child in bytes; 0 when that figure may be this process's own."""
+    import resource
+
+    # Linux counts what the child had between fork and exec, which is the memory of its parent.
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    unit = 1 if sys.platform == "darwin" else 1024
+    return usage.ru_maxrss * unit if usage.ru_maxrss > own else 0
 
 
 def _kill(process: subprocess.Popen[bytes]) -> bool:

@@ -80,6 +80,53 @@ def stage_of(plant: str) -> tuple[Any, Any, Any]:
     return _STAGES[plant]()
 
 
+@njit(error_model="numpy")
+def _turned(bristle: float, speed: float, level: float, rest: float, distance: float, h: float) -> Any:
+    """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre)."""
+    if level <= 1e-9 * rest or rest == 0.0:
+        return 0.0, 0.0
+    reach = distance * level / rest
+    settled = reach if speed > 0.0 else -reach
+    new = settled + (bristle - settled) * math.exp(-abs(speed) * h / reach)
+    return new, 0.5 * (bristle + new) / reach
+
+
+@njit(error_model="numpy")
+def _near_rest(speed: float, acceleration: float, distance: float, h: float) -> Any:
+    """Whether dry friction may turn round within ``h``."""
+    return abs(speed) * h < 1.5 * h * h * abs(acceleration) + NEAR * distance
+
+
+@njit(error_model="numpy")
+def _along(x: Any, rate: Any, h: float) -> Any:
+    """Return the state after a straight step; the last entry, relaxed shaft twist, is not used here."""
+    return (
+        x[0] + h * rate[0],
+        x[1] + h * rate[1],
+        x[2] + h * rate[2],
+        x[3] + h * rate[3],
+        x[4] + h * rate[4],
+        x[5] + h * rate[5],
+        x[6] + h * rate[6],
+        0.0,
+    )
+
+
+@njit(error_model="numpy")
+def _corrected(x: Any, g: Array, a: float, b: float) -> Any:
+    """Return the state corrected by the innovations ``a`` (motor) and ``b`` (load)."""
+    return (
+        x[0] + g[0, 0] * a + g[0, 1] * b,
+        x[1] + g[1, 0] * a + g[1, 1] * b,
+        x[2] + g[2, 0] * a + g[2, 1] * b,
+        x[3] + g[3, 0] * a + g[3, 1] * b,
+        x[4] + g[4, 0] * a + g[4, 1] * b,
+        x[5] + g[5, 0] * a + g[5, 1] * b,
+        x[6] + g[6, 0] * a + g[6, 1] * b,
+        0.0,
+    )
+
+
 @cache
 def predictor_of(plant: str) -> Any:
     """Return ``predict(y, u, p, h, substeps, gains, offsets, start, innovations, states)`` of a plant, compiled.
@@ -89,33 +136,6 @@ def predictor_of(plant: str) -> Any:
     """
     friction, stage, nuisance = stage_of(plant)
     at_m, at_l = nuisance
-
-    @njit(error_model="numpy")
-    def turned(bristle: float, speed: float, level: float, rest: float, distance: float, h: float) -> Any:
-        """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre)."""
-        if level <= 1e-9 * rest or rest == 0.0:
-            return 0.0, 0.0
-        reach = distance * level / rest
-        settled = reach if speed > 0.0 else -reach
-        new = settled + (bristle - settled) * math.exp(-abs(speed) * h / reach)
-        return new, 0.5 * (bristle + new) / reach
-
-    @njit(error_model="numpy")
-    def near_rest(speed: float, acceleration: float, distance: float, h: float) -> Any:
-        return abs(speed) * h < 1.5 * h * h * abs(acceleration) + NEAR * distance
-
-    @njit(error_model="numpy")
-    def along(x: Any, rate: Any, h: float) -> Any:
-        return (
-            x[0] + h * rate[0],
-            x[1] + h * rate[1],
-            x[2] + h * rate[2],
-            x[3] + h * rate[3],
-            x[4] + h * rate[4],
-            x[5] + h * rate[5],
-            x[6] + h * rate[6],
-            0.0,
-        )
 
     @njit(error_model="numpy")
     def predict(
@@ -134,37 +154,27 @@ def predictor_of(plant: str) -> Any:
             b = y[n, 1] - x[2] - offsets[1]
             innovations[n, 0] = a
             innovations[n, 1] = b
-            g = gains[n]
-            x = (
-                x[0] + g[0, 0] * a + g[0, 1] * b,
-                x[1] + g[1, 0] * a + g[1, 1] * b,
-                x[2] + g[2, 0] * a + g[2, 1] * b,
-                x[3] + g[3, 0] * a + g[3, 1] * b,
-                x[4] + g[4, 0] * a + g[4, 1] * b,
-                x[5] + g[5, 0] * a + g[5, 1] * b,
-                x[6] + g[6, 0] * a + g[6, 1] * b,
-                0.0,
-            )
+            x = _corrected(x, gains[n], a, b)
             for j in range(8):
                 states[n, j] = x[j]
             steps = substeps
             if rest[0] > 0.0 or rest[1] > 0.0:
                 rate = stage(x, signs, p, u[n])
-                turning_m = rest[0] > 0.0 and near_rest(x[1], rate[1], reach_m, h)
-                turning_l = rest[1] > 0.0 and near_rest(x[3], rate[3], reach_l, h)
+                turning_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach_m, h)
+                turning_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach_l, h)
                 if turning_m or turning_l:
                     steps = substeps * FINER
             step = h / steps
             for _ in range(steps):
                 if rest[0] > 0.0 or rest[1] > 0.0:
                     level = friction(x, p)
-                    bristle_m, sign_m = turned(bristle_m, x[1], level[0], rest[0], reach_m, step)
-                    bristle_l, sign_l = turned(bristle_l, x[3], level[1], rest[1], reach_l, step)
+                    bristle_m, sign_m = _turned(bristle_m, x[1], level[0], rest[0], reach_m, step)
+                    bristle_l, sign_l = _turned(bristle_l, x[3], level[1], rest[1], reach_l, step)
                     signs = (sign_m, sign_l)
                 k1 = stage(x, signs, p, u[n])
-                k2 = stage(along(x, k1, 0.5 * step), signs, p, u[n])
-                k3 = stage(along(x, k2, 0.5 * step), signs, p, u[n])
-                k4 = stage(along(x, k3, step), signs, p, u[n])
-                x = along(along(along(along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
+                k2 = stage(_along(x, k1, 0.5 * step), signs, p, u[n])
+                k3 = stage(_along(x, k2, 0.5 * step), signs, p, u[n])
+                k4 = stage(_along(x, k3, step), signs, p, u[n])
+                x = _along(_along(_along(_along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
 
     return predict
