@@ -5,9 +5,9 @@ import importlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from orchestrator import __version__
+from orchestrator.commands._parser import Parser, one_line
 from orchestrator.errors import InputError, OrchestratorError
 
 COMMANDS = {
@@ -24,17 +24,9 @@ COMMANDS = {
 }
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, like all others."""
-
-    def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where help is, and exit with 2."""
-        self.exit(2, f"error: {message}; see {self.prog} --help\n")
-
-
 def build_parser(command: str | None) -> argparse.ArgumentParser:
     """Return the parser; only the module of ``command`` is imported, so that start-up stays quick."""
-    parser = _Parser(prog="python -m orchestrator", description=importlib.import_module("orchestrator").__doc__)
+    parser = Parser(prog="python -m orchestrator", description=importlib.import_module("orchestrator").__doc__)
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, summary in COMMANDS.items():
@@ -63,10 +55,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return int(arguments.run(arguments))
     except InputError as error:
-        sys.stderr.write(f"error: {error}\n")
+        sys.stderr.write(f"error: {one_line(str(error))}\n")
         return 2
     except OrchestratorError as error:
-        sys.stderr.write(f"error: {error}\n")
+        sys.stderr.write(f"error: {one_line(str(error))}\n")
         return 1
     except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
         sys.stderr.write(f"interrupted: {interruption}\n" if str(interruption) else "interrupted\n")

@@ -37,7 +37,7 @@ def one_case(rng: random.Random, folder: Path, run_share: float = 0.25) -> tuple
         words.append("--static")
     began = time.monotonic()
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as errors:
-        code = run([*words, "--timeout", "10"])
+        code = run([*words, "--time-limit", "10"])
     duration = time.monotonic() - began
     assert code in (0, 1), f"exit code {code}: {errors.getvalue()}"
     results = json.loads((out / "check.json").read_text(encoding="utf-8"))["results"]

@@ -87,6 +87,10 @@ def test_the_definition_is_plain_json_and_tells_designs_apart():
     [
         ("plant.alpha", "NAME=SPECIFICATION"),
         ("=1", "NAME=SPECIFICATION"),
+        (" = ", "NAME=SPECIFICATION"),
+        ("a=1,,2", "before and after each comma"),
+        ("a=", "NAME=SPECIFICATION"),
+        ("a=rnage:0:1:3", "of a kind among range"),
         ("a=range:0:1", "LOW:HIGH:COUNT"),
         ("a=range:0:1:2.5", "LOW:HIGH:COUNT"),
         ("a=random:0:x", "LOW:HIGH"),
@@ -95,8 +99,8 @@ def test_the_definition_is_plain_json_and_tells_designs_apart():
         ("a=nan", "finite"),
         ("a=logrange:0:1:3", "positive"),
         ("a=lograndom:-1:1", "positive"),
-        ("a=range:0:1:0", "at least one"),
-        ("a=range:0:1:1e300", "at most 1,000,000,000 values"),
+        ("a=range:0:1:0", "the count of `a` must be 1 to 1,000,000,000, but is 0"),
+        ("a=range:0:1:1e300", r"but is 1e\+300"),
     ],
 )
 def test_bad_specifications_are_named(text, said):
@@ -114,6 +118,6 @@ def test_the_number_of_cases_is_bounded():
 def test_a_parameter_is_varied_once():
     with pytest.raises(ScenarioError, match="varied 2 times"):
         parse_design(["a=1,2", "a=random:0:1"], 4, 0)
-    with pytest.raises(ScenarioError, match="at least one parameter"):
+    with pytest.raises(ScenarioError, match="`--vary` must name at least one parameter"):
         parse_design([], 4, 0)
     assert Product(()).names == ()

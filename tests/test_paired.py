@@ -87,9 +87,17 @@ def test_sweep_command_is_reproducible_and_complete(tmp_path, capsys):
     [
         (["--sizes", "0.5"], "within the calibrated 0.002 to 0.1 rad"),
         (["--sizes", "0.01,nan"], "finite"),
-        (["--sizes", "-0.01"], "finite positive"),
-        (["--sizes", "random:x"], "random:COUNT"),
-        (["--sizes", "random:0"], "at least one"),
+        (["--sizes", "-0.01"], "finite and positive"),
+        (["--sizes", "random:x"], "`--sizes` must be numbers such as"),
+        (["--sizes", ""], "`--sizes` must be numbers such as"),
+        (["--sizes", "0.01,,0.02"], "but is '0.01,,0.02'"),
+        (["--sizes", "range:0.01:0.02"], "but is 'range:0.01:0.02'"),
+        (["--sizes", "range:0.01:0.2:1000000000"], "within the calibrated 0.002 to 0.1 rad"),
+        (["--sizes", "random:0"], "`--sizes` must have a count of at least 1, but is 'random:0'"),
+        (["--samples", "3"], "`--samples` must be left out where `--vary` makes nothing random"),
+        (["--sizes", "random:2", "--samples", "3"], "`--samples` must be left out with random `--sizes`"),
+        (["--vary", "plant.J_l=random:5.4:5.8", "--samples", "0"], "`--samples` must be at least 1, but is 0"),
+        (["--vary", "plant.J_l=rnage:1:2:3"], "`--vary` must be a list or of a kind among"),
         (["--noise", "-1"], "not negative"),
         (["--noise", "a"], "numbers"),
         (["--seeds", "0"], "at least"),
@@ -114,7 +122,7 @@ def test_a_word_that_is_no_number_is_one_line(capsys):
         main(["simulate", "--alpha", "abc"])
     assert ending.value.code == 2
     error = capsys.readouterr().err
-    assert error.startswith("error: argument --alpha: invalid float value: 'abc'")
+    assert error.startswith("error: `--alpha` must be a number, but is 'abc'")
     assert error.count("\n") == 1
 
 

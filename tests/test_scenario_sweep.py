@@ -51,7 +51,7 @@ def test_a_grid_over_any_parameter(scenario, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        ([], "must vary at least one parameter"),
+        ([], "`--vary` must name at least one parameter"),
         (["--vary", "plant.k=-1"], "plant.k"),
         (["--vary", "plant.nothing=1"], "plant.nothing"),
         (["--vary", "engine.k=1"], "engine"),

@@ -38,7 +38,7 @@ archive.case-clash | W | paths differ by more than upper and lower case | rename
 archive.encrypted | E | no entry is encrypted | store the entry without a password
 archive.compression | E | entries are stored or deflated | pack with deflate
 archive.bomb-ratio | E | no file unpacks to absurdly more than its packed size | if you trust the file, repack it without compression
-archive.too-large | E | the files stay within the size limit | if you trust the file, raise --max-size
+archive.too-large | E | the files stay within the size limit | if you trust the file, raise --size-limit
 archive.too-many-files | E | the number of files stays within the limit | pack resources into fewer files
 archive.overlap | E | entries do not share bytes | do not unpack this archive; it is built as a bomb
 xml.too-large | E | an XML file stays within the size limit | split arrays or shorten descriptions
@@ -116,8 +116,8 @@ binary.python-symbols | W | a library that uses Python names libpython as needed
 """  # noqa: E501
 
 _DYNAMIC = """
-limits.time | E | no call takes longer than --timeout | look for an endless loop; raise --timeout for a slow model
-limits.memory | E | memory stays below --memory | look for a leak; raise --memory for a large model
+limits.time | E | no call takes longer than --time-limit | look for an endless loop; raise --time-limit for a slow model
+limits.memory | E | memory stays below --memory-limit | look for a leak; raise --memory-limit for a large model
 limits.output | E | printed text and files stay small | print only when logging is on
 run.crash | E | no call ends the process | run the call named under a debugger
 run.failed | E | the checks can be carried out | report this with the FMU

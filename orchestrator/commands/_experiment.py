@@ -27,6 +27,8 @@ def chosen_experiment(arguments: argparse.Namespace) -> Experiment:
     Raises:
         ScenarioError: a name is unknown.
     """
+    if arguments.experiment not in EXPERIMENTS:
+        raise ScenarioError(f"`--experiment` must be one of {', '.join(EXPERIMENTS)}, but is {arguments.experiment!r}")
     if arguments.backlash_model not in BACKLASH_MODELS:
         known = ", ".join(BACKLASH_MODELS)
         raise ScenarioError(f"`--backlash-model` must be one of {known}, but is {arguments.backlash_model!r}")

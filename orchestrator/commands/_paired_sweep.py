@@ -8,7 +8,7 @@ import numpy as np
 
 from orchestrator.commands._console import print_table, say
 from orchestrator.commands._experiment import chosen_experiment
-from orchestrator.commands._progress import swept
+from orchestrator.commands._progress import samples_of, swept
 from orchestrator.engine import DesignCases, Row, Status, Sweep
 from orchestrator.engine.work import file_hash
 from orchestrator.errors import ScenarioError
@@ -34,6 +34,7 @@ def run_paired_sweep(arguments: argparse.Namespace) -> int:
         arguments.seeds,
         arguments.seed,
         tuple(arguments.vary),
+        samples_of(arguments),
     )
     cases = plan.cases()
     with staged(arguments.out) as directory:

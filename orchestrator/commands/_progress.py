@@ -21,14 +21,17 @@ from orchestrator.engine import (
     Sweep,
     Work,
     choose_pool,
+    draws,
     run_cases,
     write_csv,
     write_parquet,
 )
+from orchestrator.errors import ScenarioError
 from orchestrator.output import write_result
 from orchestrator.reporting import write_report
 
 SECONDS_BETWEEN_LINES = 60.0
+DEFAULT_SAMPLES = 16
 MIB = 1024**2
 # Where and how a sweep ran does not change what it found.
 NOT_PART_OF_THE_RESULT = frozenset({"run", "command", "out", "resume", "workers", "scheduler"})
@@ -54,6 +57,23 @@ def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MIB",
         help="memory that a case may take, 0 for any (default: %(default)s)",
     )
+
+
+def samples_of(args: argparse.Namespace) -> int:
+    """Return how often random and Sobol parameters are drawn.
+
+    Raises:
+        ScenarioError: ``--samples`` is given where it says nothing, or is below 1.
+    """
+    if args.samples is None:
+        return DEFAULT_SAMPLES
+    if args.scenario is None and args.sizes.startswith("random"):
+        raise ScenarioError("`--samples` must be left out with random `--sizes`, whose number is that of all draws")
+    if not draws(args.vary):
+        raise ScenarioError("`--samples` must be left out where `--vary` makes nothing random or sobol")
+    if args.samples < 1:
+        raise ScenarioError(f"`--samples` must be at least 1, but is {args.samples}")
+    return int(args.samples)
 
 
 def engine_options(args: argparse.Namespace) -> tuple[OpenPool, Limits]:

@@ -3,7 +3,7 @@
 import argparse
 
 from orchestrator.commands._console import print_table
-from orchestrator.commands._progress import swept
+from orchestrator.commands._progress import samples_of, swept
 from orchestrator.engine import DesignCases, Row, Status, parse_design
 from orchestrator.output import staged
 from orchestrator.scenario import load_scenario
@@ -14,7 +14,7 @@ MOST_ROWS_PRINTED = 40
 
 def run_scenario_sweep(arguments: argparse.Namespace) -> int:
     """Run a scenario over a design; return the number of failed cases."""
-    cases = DesignCases(parse_design(arguments.vary, arguments.samples, arguments.seed), arguments.seed)
+    cases = DesignCases(parse_design(arguments.vary, samples_of(arguments), arguments.seed), arguments.seed)
     with staged(arguments.out) as directory:
         scenario = load_scenario(arguments.scenario)
         work = scenario_work(scenario, cases)

@@ -16,6 +16,7 @@ from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.checking.findings import Report
 from orchestrator.checking.sandbox import Limits
 from orchestrator.checking.writing import as_junit, as_lines, as_results
+from orchestrator.commands._parser import number
 from orchestrator.errors import FmuError, OutputError
 from orchestrator.output import staged, write_result
 from orchestrator.reporting import write_report
@@ -32,26 +33,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     limits = Limits()
     archive = ArchiveLimits()
     parser.add_argument(
-        "--timeout",
-        type=_positive,
-        default=limits.time,
-        metavar="S",
-        help="seconds for one call (default: %(default)g)",
-    )
-    parser.add_argument(
-        "--memory", type=_positive, default=limits.memory / MEBIBYTE, metavar="MIB",
-        help="memory of the running FMU (default: %(default)g)",
+        "--time-limit", type=_positive, default=limits.time, metavar="S",
+        help="wall time that one call may take (default: %(default)g)",
     )  # fmt: skip
     parser.add_argument(
-        "--max-size", type=_positive, default=archive.total / MEBIBYTE, metavar="MIB",
-        help="size of the unpacked FMU (default: %(default)g)",
+        "--memory-limit", type=_positive, default=limits.memory / MEBIBYTE, metavar="MIB",
+        help="memory that the running FMU may take (default: %(default)g)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--size-limit", type=_positive, default=archive.total / MEBIBYTE, metavar="MIB",
+        help="size that the unpacked FMU may have (default: %(default)g)",
     )  # fmt: skip
 
 
 def _positive(text: str) -> float:
-    value = float(text)
+    value = number(text)
     if not 0 < value < 1e9:
-        raise argparse.ArgumentTypeError(f"must be positive, but is {text}")
+        raise argparse.ArgumentTypeError(f"must be positive and below 1e9, but is {text}")
     return value
 
 
@@ -59,8 +57,8 @@ def run(args: argparse.Namespace) -> int:
     """Check every FMU; 1 when any has an error."""
     options = CheckOptions(
         static=args.static,
-        archive=ArchiveLimits(total=int(args.max_size * MEBIBYTE)),
-        limits=Limits(time=args.timeout, memory=int(args.memory * MEBIBYTE)),
+        archive=ArchiveLimits(total=int(args.size_limit * MEBIBYTE)),
+        limits=Limits(time=args.time_limit, memory=int(args.memory_limit * MEBIBYTE)),
     )
     paths = find_fmus(args.fmus) if args.fmus else _own()
     reports = []
@@ -70,9 +68,9 @@ def run(args: argparse.Namespace) -> int:
     arguments = {
         "fmus": [str(p) for p in paths],
         "static": args.static,
-        "timeout": args.timeout,
-        "memory": args.memory,
-        "max_size": args.max_size,
+        "time_limit": args.time_limit,
+        "memory_limit": args.memory_limit,
+        "size_limit": args.size_limit,
     }
     with staged(args.out) as directory:
         write_result(directory, "check", arguments, None, as_results(reports))

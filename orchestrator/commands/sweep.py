@@ -6,7 +6,7 @@ from pathlib import Path
 
 from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
 from orchestrator.commands._paired_sweep import run_paired_sweep
-from orchestrator.commands._progress import add_engine_arguments
+from orchestrator.commands._progress import DEFAULT_SAMPLES, add_engine_arguments
 from orchestrator.commands._scenario_sweep import run_scenario_sweep
 
 
@@ -37,9 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--samples",
         type=int,
-        default=16,
         metavar="N",
-        help="draws of random and sobol (with --scenario; default: %(default)s)",
+        help=f"draws of what --vary makes random or sobol (default: {DEFAULT_SAMPLES})",
     )
     parser.add_argument("--parquet", action="store_true", help="write the table as Parquet too (extra [parquet])")
     add_engine_arguments(parser)

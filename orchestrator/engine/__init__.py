@@ -4,10 +4,11 @@ See ``docs/sweeps.md``. The entry point is ``run_cases``.
 """
 
 from orchestrator.engine.cases import Case, Cases, Column, Outcome, Progress, Row, Status
-from orchestrator.engine.grid import DesignCases, parse_design
+from orchestrator.engine.grid import DesignCases
 from orchestrator.engine.journal import JournalFullError
 from orchestrator.engine.pools import Limits, LocalProcesses, OpenPool, choose_pool
 from orchestrator.engine.run import Interrupted, Sweep, run_cases
+from orchestrator.engine.specification import draws, parse_design
 from orchestrator.engine.table import write_csv, write_parquet
 from orchestrator.engine.work import Work
 
@@ -28,6 +29,7 @@ __all__ = [
     "Sweep",
     "Work",
     "choose_pool",
+    "draws",
     "parse_design",
     "run_cases",
     "write_csv",

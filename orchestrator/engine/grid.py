@@ -5,10 +5,10 @@ Every design computes its row ``i`` from ``i`` alone, so a sweep of any size nee
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -135,15 +135,16 @@ class Bounds:
 
 
 @dataclass(frozen=True)
-class Randomised:
-    """``count`` independent uniform draws over all ``bounds`` together."""
+class _Drawn:
+    """``count`` points over all ``bounds`` together, determined by ``seed``."""
 
     bounds: tuple[Bounds, ...]
     count: int
     seed: int
+    kind: ClassVar[str]
 
     def __post_init__(self) -> None:
-        _positive_count("samples", self.count)
+        _positive_count("--samples", self.count)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -154,53 +155,37 @@ class Randomised:
         return self.count
 
     def row(self, index: int) -> tuple[Value, ...]:
-        """Return draw ``index``, a function of (seed, index) only."""
-        draws = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(1, index))).random(len(self.bounds))
-        return tuple(b.at(float(f)) for b, f in zip(self.bounds, draws, strict=True))
+        """Return point ``index``, a function of (seed, index) only."""
+        return tuple(b.at(float(f)) for b, f in zip(self.bounds, self._fractions(index), strict=True))
+
+    def _fractions(self, index: int) -> np.ndarray:
+        """Return where point ``index`` lies within the bounds, each in [0, 1)."""
+        raise NotImplementedError
 
     def definition(self) -> Mapping[str, Any]:
         """Return kind, bounds, count and seed."""
-        return {
-            "kind": "random",
-            "bounds": [b.definition() for b in self.bounds],
-            "count": self.count,
-            "seed": self.seed,
-        }
+        bounds = [b.definition() for b in self.bounds]
+        return {"kind": self.kind, "bounds": bounds, "count": self.count, "seed": self.seed}
 
 
-@dataclass(frozen=True)
-class Sobol:
-    """``count`` points of a scrambled Sobol sequence over all ``bounds`` together (Owen scrambling from ``seed``)."""
+class Randomised(_Drawn):
+    """Independent uniform draws."""
 
-    bounds: tuple[Bounds, ...]
-    count: int
-    seed: int
+    kind = "random"
 
-    def __post_init__(self) -> None:
-        _positive_count("samples", self.count)
+    def _fractions(self, index: int) -> np.ndarray:
+        generator = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(1, index)))
+        return generator.random(len(self.bounds))
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names in the order of the bounds."""
-        return tuple(b.name for b in self.bounds)
 
-    def __len__(self) -> int:
-        return self.count
+class Sobol(_Drawn):
+    """Points of a Sobol sequence with Owen scrambling."""
 
-    def row(self, index: int) -> tuple[Value, ...]:
-        """Return point ``index`` of the sequence."""
+    kind = "sobol"
+
+    def _fractions(self, index: int) -> np.ndarray:
         block, offset = divmod(index, SOBOL_BLOCK)
-        points = _sobol_block(len(self.bounds), self.seed, block)
-        return tuple(b.at(float(f)) for b, f in zip(self.bounds, points[offset], strict=True))
-
-    def definition(self) -> Mapping[str, Any]:
-        """Return kind, bounds, count and seed."""
-        return {
-            "kind": "sobol",
-            "bounds": [b.definition() for b in self.bounds],
-            "count": self.count,
-            "seed": self.seed,
-        }
+        return np.asarray(_sobol_block(len(self.bounds), self.seed, block)[offset])
 
 
 @dataclass(frozen=True)
@@ -288,69 +273,5 @@ def _finite(name: str, value: Value) -> None:
 
 
 def _positive_count(name: str, count: int) -> None:
-    if count < 1:
-        raise ScenarioError(f"`{name}` must have at least one value, but its count is {count}")
-    if count > MAX_CASES:
-        raise ScenarioError(f"`{name}` must have at most {MAX_CASES:,} values, but its count is {count:,}")
-
-
-def parse_design(specifications: Sequence[str], samples: int, seed: int) -> Design:
-    """Read a design from its text form, one ``NAME=SPECIFICATION`` per varied parameter.
-
-    ======================== ==========================================================
-    ``0.01,0.02,0.05``       these values (numbers or words)
-    ``range:LOW:HIGH:COUNT`` evenly spaced, ends included; ``logrange`` for log-evenly
-    ``random:LOW:HIGH``      drawn uniformly; ``lograndom`` for log-uniformly
-    ``sobol:LOW:HIGH``       low-discrepancy points; ``logsobol`` for log-evenly
-    ======================== ==========================================================
-
-    Lists and ranges make a full grid. All random parameters are drawn together, ``samples`` times, and so are
-    all Sobol ones; each grid point is combined with every draw.
-
-    Raises:
-        ScenarioError: a specification that cannot be read; the text names it; or a negative seed.
-    """
-    if seed < 0:
-        raise ScenarioError(f"`--seed` must not be negative, but is {seed}")
-    axes: list[Design] = []
-    drawn: dict[str, list[Bounds]] = {"random": [], "sobol": []}
-    for text in specifications:
-        name, equals, body = text.partition("=")
-        if not (name and equals and body):
-            raise ScenarioError(f"`--vary` must be NAME=SPECIFICATION, but is {text!r}")
-        kind, _, rest = body.partition(":")
-        plain = kind.removeprefix("log")
-        if plain == "range":
-            low, high, count = _numbers(text, rest, 3)
-            axes.append(Ranged(name, low, high, int(count), kind != plain))
-        elif plain in drawn:
-            low, high = _numbers(text, rest, 2)
-            drawn[plain].append(Bounds(name, low, high, kind != plain))
-        else:
-            axes.append(Listed(name, tuple(_number_or_word(word) for word in body.split(","))))
-    if drawn["random"]:
-        axes.append(Randomised(tuple(drawn["random"]), samples, seed))
-    if drawn["sobol"]:
-        axes.append(Sobol(tuple(drawn["sobol"]), samples, seed))
-    if not axes:
-        raise ScenarioError("a sweep must vary at least one parameter, but none is given")
-    return Product(tuple(axes))
-
-
-def _numbers(text: str, body: str, count: int) -> list[float]:
-    words = body.split(":")
-    try:
-        numbers = [float(word) for word in words]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or (count == 3 and not numbers[2].is_integer()):
-        wanted = "LOW:HIGH:COUNT" if count == 3 else "LOW:HIGH"
-        raise ScenarioError(f"`--vary` must have {wanted} after its kind, but is {text!r}")
-    return numbers
-
-
-def _number_or_word(word: str) -> Value:
-    try:
-        return float(word)
-    except ValueError:
-        return word.strip()
+    if not 1 <= count <= MAX_CASES:
+        raise ScenarioError(f"the count of `{name}` must be 1 to {MAX_CASES:,}, but is {count:g}")

@@ -33,9 +33,9 @@ class Limits:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.time < 1e9:
-            raise ScenarioError(f"the time limit must be positive and finite, but is {self.time} s")
+            raise ScenarioError(f"`--time-limit` must be positive and below 1e9 s, but is {self.time:g}")
         if self.memory < 0:
-            raise ScenarioError(f"the memory limit must not be negative, but is {self.memory}")
+            raise ScenarioError(f"`--memory-limit` must not be negative, but is {self.memory / 1024**2:g} MiB")
 
 
 class Pool(Protocol):

@@ -19,6 +19,7 @@ from orchestrator.paired.cosimulation import LoopSession
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, difference_sum, error_statistics
 from orchestrator.paired.pair import with_settings
+from orchestrator.paired.sizes import read_sizes
 
 Array = NDArray[np.float64]
 COLUMNS = (
@@ -29,7 +30,6 @@ COLUMNS = (
     Column("error", "rad"),
     Column("error_percent", "%"),
 )
-THESIS_RANGE = (1.2, 4.8)
 OWN_PARAMETERS = frozenset({"alpha", "noise", "repetition"})
 
 
@@ -39,11 +39,12 @@ class SweepPlan:
 
     Attributes:
         experiment: what all cases share; its encoder noise is replaced by each of ``noise``.
-        sizes: ``0.01,0.02``, ``range:LOW:HIGH:N``, ``logrange:LOW:HIGH:N`` or ``random:N``.
+        sizes: as ``read_sizes`` takes them.
         noise: encoder noise levels [rad].
         repetitions: runs of each size and noise level, each with noise of its own.
         seed: of random sizes and of all noise.
         vary: further parameters, ``NAME=SPECIFICATION`` as the engine reads them.
+        samples: draws of those that are random; not used with random sizes, which are drawn together with them.
     """
 
     experiment: Experiment
@@ -52,6 +53,7 @@ class SweepPlan:
     repetitions: int = 1
     seed: int = 0
     vary: tuple[str, ...] = ()
+    samples: int = 1
 
     def cases(self) -> DesignCases:
         """Return the cases, checked against the range that the experiment claims.
@@ -65,35 +67,14 @@ class SweepPlan:
         for level in self.noise:
             if not (np.isfinite(level) and level >= 0.0):
                 raise ScenarioError(f"`--noise` must be finite and not negative, but is {level}")
-        sizes, samples = self._sizes()
+        sizes = read_sizes(self.sizes, self.experiment)
         specifications = [
-            f"alpha={sizes}",
+            f"alpha={sizes.specification}",
             "noise=" + ",".join(repr(level) for level in self.noise),
             f"repetition=range:1:{self.repetitions}:{self.repetitions}",
             *self.vary,
         ]
-        cases = DesignCases(parse_design(specifications, samples, self.seed), self.seed)
-        if not sizes.startswith(("random", "lograndom")):
-            for index in range(len(cases)):
-                self._require(cases[index].parameters["alpha"])
-        return cases
-
-    def _require(self, alpha: Value) -> None:
-        if not isinstance(alpha, float) or not np.isfinite(alpha) or alpha <= 0.0:
-            raise ScenarioError(f"`--sizes` must be finite positive numbers, but one is {alpha}")
-        self.experiment.require_size(alpha)
-
-    def _sizes(self) -> tuple[str, int]:
-        kind, _, rest = self.sizes.partition(":")
-        if kind != "random":
-            return self.sizes, 1
-        try:
-            count = int(rest)
-        except ValueError:
-            raise ScenarioError(f"`--sizes` must be random:COUNT, but is {self.sizes!r}") from None
-        if self.experiment.name == "thesis":
-            return "random:{}:{}".format(*THESIS_RANGE), count
-        return f"lograndom:{self.experiment.smallest}:{self.experiment.largest}", count
+        return DesignCases(parse_design(specifications, sizes.count or self.samples, self.seed), self.seed)
 
     def calibrations(self, progress: Callable[[str], None] | None = None) -> dict[float, Calibration]:
         """Return the calibration of each noise level; ``progress`` is told of those that must be made.

@@ -1,0 +1,79 @@
+"""A parser of command lines whose complaints read like all others: "`--alpha` must ..., but is ...", on one line."""
+
+import argparse
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+LARGEST_WHOLE_NUMBER = 10**18
+# What argparse says of an argument, and how that is said here.
+_REWORDED = (
+    (
+        r"invalid choice: (.*) \(choose from (.*)\)",
+        lambda m: f"must be one of {m[2].replace(chr(39), '')}, but is {m[1]}",
+    ),
+    (r"expected (one|at least one) arguments?", lambda m: "must be followed by a value, but is not"),
+    (r"ignored explicit argument (.*)", lambda m: f"must be given without a value, but has {m[1]}"),
+)
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser of which ``type=int``, ``float`` and ``Path`` take finite numbers and paths that are not empty."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        readers: tuple[tuple[type, Callable[[str], object]], ...] = ((int, whole), (float, number), (Path, path))
+        for kind, reader in readers:
+            self.register("type", kind, reader)
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where help is, and exit with 2."""
+        self.exit(2, f"error: {one_line(_worded(message))}; see {self.prog} --help\n")
+
+
+def whole(text: str) -> int:
+    """Return a whole number of a size that everything can handle."""
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a whole number, but is {text!r}") from None
+    if abs(value) > LARGEST_WHOLE_NUMBER:
+        raise argparse.ArgumentTypeError(f"must be a whole number of at most 18 digits, but is {text!r}")
+    return value
+
+
+def number(text: str) -> float:
+    """Return a finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a number, but is {text!r}") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"must be finite, but is {text!r}")
+    return value
+
+
+def path(text: str) -> Path:
+    """Return a path; an empty one, which would mean the working directory, is a mistake of a script."""
+    if not text:
+        raise argparse.ArgumentTypeError("must be a path, but is empty")
+    return Path(text)
+
+
+def one_line(message: str) -> str:
+    """Return a message whose line breaks and control characters are written out."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
+
+
+def _worded(message: str) -> str:
+    named = re.fullmatch(r"argument (.+?): (.*)", message, re.DOTALL)
+    if named is None:
+        return re.sub(r"^the following arguments are required: (.*)", r"`\1` must be given, but is not", message)
+    name, complaint = named.groups()
+    for pattern, reworded in _REWORDED:
+        match = re.fullmatch(pattern, complaint, re.DOTALL)
+        if match is not None:
+            complaint = reworded(match)
+    return f"`{name}` {complaint}"

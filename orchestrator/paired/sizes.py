@@ -1,0 +1,74 @@
+"""The sizes of a sweep in their text form, checked against what the experiment claims."""
+
+import math
+from dataclasses import dataclass
+
+from orchestrator.errors import ScenarioError
+from orchestrator.paired.experiment import Experiment
+
+THESIS_RANGE = (1.2, 4.8)
+RANGES = ("range", "logrange")
+FORMS = "numbers such as 0.01,0.02, or range:LOW:HIGH:N, logrange:LOW:HIGH:N or random:N"
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Half-gaps as the engine's designs take them; ``count`` is the number of random ones, 0 where none is."""
+
+    specification: str
+    count: int = 0
+
+
+def read_sizes(text: str, experiment: Experiment) -> Sizes:
+    """Return half-gaps [rad]: ``0.01,0.02``, ``range:LOW:HIGH:N``, ``logrange:LOW:HIGH:N`` or ``random:N``.
+
+    Random sizes are drawn from all that the experiment claims, evenly in the logarithm; those of the thesis's
+    experiment evenly from 1.2 to 4.8 rad, as the thesis did.
+
+    Raises:
+        ScenarioError: the text has none of these forms, or a size that is not finite and positive.
+        CalibrationError: a size that the experiment does not claim.
+    """
+    kind, _, rest = text.strip().partition(":")
+    if kind == "random":
+        count = _count(text, rest)
+        if experiment.name == "thesis":
+            return Sizes("random:{}:{}".format(*THESIS_RANGE), count)
+        return Sizes(f"lograndom:{experiment.smallest}:{experiment.largest}", count)
+    if kind in RANGES:
+        words = rest.split(":")
+        if len(words) != 3:
+            raise _unreadable(text)
+        _count(text, words.pop())
+    else:
+        words = text.split(",")
+    for word in words:
+        _require(_number(text, word), experiment)
+    return Sizes(text.strip())
+
+
+def _unreadable(text: str) -> ScenarioError:
+    return ScenarioError(f"`--sizes` must be {FORMS}, but is {text!r}")
+
+
+def _count(text: str, word: str) -> int:
+    try:
+        count = int(word)
+    except ValueError:
+        raise _unreadable(text) from None
+    if count < 1:
+        raise ScenarioError(f"`--sizes` must have a count of at least 1, but is {text!r}")
+    return count
+
+
+def _number(text: str, word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        raise _unreadable(text) from None
+
+
+def _require(alpha: float, experiment: Experiment) -> None:
+    if not (math.isfinite(alpha) and alpha > 0.0):
+        raise ScenarioError(f"`--sizes` must be finite and positive, but one is {alpha:g}")
+    experiment.require_size(alpha)

@@ -1,0 +1,53 @@
+"""The command line as such: wrong words are one line that names the argument, and exit code 2."""
+
+import pytest
+
+from orchestrator.cli import COMMANDS, main
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["sweep", "--seeds", "two"], "`--seeds` must be a whole number, but is 'two'"),
+        (["sweep", "--seed", "1e3"], "`--seed` must be a whole number, but is '1e3'"),
+        (["sweep", "--seed", "9" * 30], "`--seed` must be a whole number of at most 18 digits"),
+        (["sweep", "--time-limit", "nan"], "`--time-limit` must be finite, but is 'nan'"),
+        (["sweep", "--out", ""], "`--out` must be a path, but is empty"),
+        (["sweep", "--seeds"], "`--seeds` must be followed by a value, but is not"),
+        (["sweep", "--resume=yes"], "`--resume` must be given without a value, but has 'yes'"),
+        (["sweep", "--nothing", "new\nline"], r"unrecognized arguments: --nothing new\nline"),
+        (["check", "--memory-limit", "0"], "`--memory-limit` must be positive"),
+        (["check", ""], "`FMU` must be a path, but is empty"),
+        (["estimate", "--method", "guess"], "`--method` must be one of maximum_likelihood, ekf"),
+        (["diagnose"], "`DATA.csv` must be given"),
+        (["report", "--command", "x"], "`DIR` must be given"),
+        (["swep"], "`COMMAND` must be one of build, check"),
+        ([], "`COMMAND` must be given"),
+    ],
+)
+def test_wrong_words_are_one_line(capsys, words, complaint):
+    with pytest.raises(SystemExit) as ending:
+        main(words)
+    assert ending.value.code == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.startswith("error: ")
+    assert complaint in told.err
+    assert told.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(capsys, command):
+    with pytest.raises(SystemExit) as ending:
+        main([command, "--help"])
+    assert ending.value.code == 0
+    assert COMMANDS[command] in " ".join(capsys.readouterr().out.split())
+
+
+def test_limits_have_the_same_names_everywhere(capsys):
+    for command in ("check", "sweep"):
+        with pytest.raises(SystemExit):
+            main([command, "--help"])
+        told = capsys.readouterr().out
+        assert "--time-limit S" in told
+        assert "--memory-limit MIB" in told
