@@ -9,8 +9,9 @@
     python -m tests.bench_estimation none 200         # alpha = 0
     python -m tests.bench_estimation online 60        # the online estimator in a running loop
 
-Each family has its own seeds, none of which any test or default uses. ``--append FILE`` keeps one JSON line per
-case, so that a long run can be looked at, and goes on after the lines that are there.
+Each family has its own seeds, none of which any test or default uses; ``--set N`` chooses among disjoint sets of
+them (set 0 was looked at while settings were chosen). ``--append FILE`` keeps one JSON line per case, so that a long
+run can be looked at, and goes on after the lines that are there.
 """
 
 import argparse
@@ -31,6 +32,7 @@ from orchestrator.record import Record, record_from_columns
 from tests.support.independent_plant import make_record
 
 EXCITATIONS = ("multisine", "levels", "closed_loop")
+SEEDS_IN_A_SET = 1_000_000
 
 
 def _size(seed: int) -> float:
@@ -60,8 +62,7 @@ def _row(record: Record, alpha: float, method: str) -> dict:
 
 def exact(n: int) -> list[dict]:
     """Exact twin, noise 1e-4 rad, no rounding, no mismatch prior to speak of: 10 s of the position loop or torque."""
-    alpha, seed = _size(n), 100_000 + n
-    excitation = EXCITATIONS[n % 3]
+    alpha, seed, excitation = _size(n), 100_000 + n, EXCITATIONS[n % 3]
     columns, truth = make_record(
         {"alpha": alpha}, seed, 10.0, contact="dead_zone", noise=(1e-4, 1e-4), counts=None, excitation=excitation
     )
@@ -142,6 +143,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("family", choices=FAMILIES)
     parser.add_argument("count", type=int)
+    parser.add_argument("--set", type=int, default=0, help="of seeds")
     parser.add_argument("--append", type=Path)
     arguments = parser.parse_args()
     rows: list[dict] = []
@@ -149,7 +151,9 @@ def main() -> None:
         rows = [json.loads(line) for line in arguments.append.read_text().splitlines()]
     done = len({row["case"] for row in rows})
     for n in range(done, arguments.count):
-        new = [row | {"case": n} for row in FAMILIES[arguments.family](n)]
+        # A whole number of rounds through excitations and sizes, so that they alternate alike in every set.
+        seed = n + 6 * (arguments.set * SEEDS_IN_A_SET // 6)
+        new = [row | {"case": n} for row in FAMILIES[arguments.family](seed)]
         rows += new
         if arguments.append:
             with arguments.append.open("a") as file:
