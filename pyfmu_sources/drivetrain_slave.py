@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import Any, ClassVar
 
 from . import drivetrain
+from .dead_time import Requests, split_step
 from .drivetrain_parameters import P_DELAY, P_LIMIT, P_MODEL, P_OFFSET_L, P_OFFSET_M, PARAMETERS, Parameter
 from .effects import saturated
 from .fmu_variables import LARGEST, Variable
@@ -99,7 +100,7 @@ class Drivetrain(SlaveBase):
         self._x = drivetrain.consistent_start(x, self._p)
         self._mode = drivetrain.initial_mode(self._x, self._p)
         self._tables: dict[float, drivetrain.Table] = {}
-        self._requests: tuple[tuple[float, float], ...] = ()
+        self._requests: Requests = ()
         self._write()
 
     def _take_parameters(self) -> None:
@@ -116,15 +117,15 @@ class Drivetrain(SlaveBase):
         real = self.real
         p = self._p
         T_l = real[T_L]
+        u = saturated(real[U], self._limit)
         x, mode, requests = self._x, self._mode, self._requests
         if self._delay == 0.0:
-            u = saturated(real[U], self._limit)
             table = self._tables.get(step)
             if table is None:
                 step, table = self._table(time, step)
             x, mode = drivetrain.advance(x, mode, p, u, T_l, step, table)
         else:
-            requests, pieces = self._split(time, step)
+            requests, pieces = split_step(requests, u, self._delay, time, step)
             for u, piece in pieces:
                 length, table = self._table(time, piece)
                 x, mode = drivetrain.advance(x, mode, p, u, T_l, length, table)
@@ -132,28 +133,6 @@ class Drivetrain(SlaveBase):
             raise StepRefusedError(f"the state must stay finite, but is {x!r} after a step of {step!r} s")
         self._x, self._mode, self._requests = x, mode, requests
         self._write()
-
-    def _split(self, time: float, step: float) -> tuple[tuple[tuple[float, float], ...], list[tuple[float, float]]]:
-        """Return the requests that still matter and the step's pieces ``(delayed torque, length)``."""
-        u = saturated(self.real[U], self._limit)
-        requests = self._requests
-        if not requests or requests[-1][1] != u:
-            requests = (*requests, (time, u))
-        least = 1e-9 * step
-        pieces: list[tuple[float, float]] = []
-        begin, acting, first = time, 0.0, 0
-        for n, (asked, value) in enumerate(requests):
-            switch = asked + self._delay
-            if switch >= time + step - least:
-                break
-            if switch <= time + least:
-                first = n
-            else:
-                pieces.append((acting, switch - begin))
-                begin = switch
-            acting = value
-        pieces.append((acting, time + step - begin))
-        return requests[first:], pieces
 
     def _table(self, time: float, step: float) -> tuple[float, drivetrain.Table]:
         """Return the table of a step size, and the size it was made for.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from . import servo_axis
+from .dead_time import Requests, split_step
 from .effects import saturated
 from .fmu_variables import LARGEST, Variable
 from .servo_axis import P_DELAY, P_LIMIT, P_OFFSET, PARAMETERS
@@ -38,15 +39,15 @@ class ServoAxis(SlaveBase):
         self._p = tuple(self.real[FIRST_PARAMETER + n] for n in range(len(PARAMETERS)))
         self._x = (self.real[FIRST_START], self.real[FIRST_START + 1], self.real[FIRST_START + 2])
         self._mode: int | None = None
-        self._requests: tuple[tuple[float, float], ...] = ()
+        self._requests: Requests = ()
         self._acting = 0.0
         self._write()
 
     def advance(self, time: float, step: float) -> None:
         """Integrate with the inputs held; a dead time splits the step where an older request takes over."""
         x, mode = self._x, self._mode
-        requests, pieces = self._split(time, step)
-        u = 0.0
+        u = saturated(self.real[U], self._p[P_LIMIT])
+        requests, pieces = split_step(self._requests, u, self._p[P_DELAY], time, step)
         for u, piece in pieces:
             if mode is None:
                 mode = servo_axis.initial_mode(x, self._p, u)
@@ -55,30 +56,6 @@ class ServoAxis(SlaveBase):
             raise StepRefusedError(f"the state must stay finite, but is {x!r} after a step of {step!r} s")
         self._x, self._mode, self._requests, self._acting = x, mode, requests, u
         self._write()
-
-    def _split(self, time: float, step: float) -> tuple[tuple[tuple[float, float], ...], list[tuple[float, float]]]:
-        """Return the requests that still matter and the step's pieces ``(delayed torque, length)``."""
-        u, delay = saturated(self.real[U], self._p[P_LIMIT]), self._p[P_DELAY]
-        if delay == 0.0:
-            return (), [(u, step)]
-        requests = self._requests
-        if not requests or requests[-1][1] != u:
-            requests = (*requests, (time, u))
-        least = 1e-9 * step
-        pieces: list[tuple[float, float]] = []
-        begin, acting, first = time, 0.0, 0
-        for n, (asked, value) in enumerate(requests):
-            switch = asked + delay
-            if switch >= time + step - least:
-                break
-            if switch <= time + least:
-                first = n
-            else:
-                pieces.append((acting, switch - begin))
-                begin = switch
-            acting = value
-        pieces.append((acting, time + step - begin))
-        return requests[first:], pieces
 
     def _write(self) -> None:
         self.real[THETA_M] = self._x[0] + self._p[P_OFFSET]
