@@ -3,11 +3,16 @@
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from orchestrator.record import read_record
+from tests.support.example_record import FILE, FRICTION, HALF_GAP, example_record
 
 ROOT = Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -35,10 +40,21 @@ def test_there_are_commands_to_test():
 @pytest.mark.parametrize("line", COMMANDS)
 def test_command_of_the_readme(line, tmp_path, fmus):
     words = shlex.split(line)
+    shutil.copytree(ROOT / "docs" / "examples", tmp_path / "docs" / "examples")
     done = run([sys.executable, *words[1:]], tmp_path)
     assert done.returncode == 0, done.stderr
     command = words[3]
     assert (tmp_path / "results" / command / f"{command}.json").exists()
+
+
+def test_the_example_record_is_what_its_simulator_makes():
+    columns, truth = example_record()
+    record = read_record(FILE)
+    for name, counts in zip(("theta_m", "theta_l"), truth["counts"], strict=True):
+        assert np.abs(getattr(record, name) - columns[name]).max() <= 1.01 * 2.0 * np.pi / counts
+    assert np.abs(record.u - columns["u"]).max() < 1e-3
+    said = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"The truth: {HALF_GAP:g} rad of half-gap, {FRICTION:g} N.m of friction at the motor" in said
 
 
 @pytest.mark.parametrize("page", PROGRAMS)
