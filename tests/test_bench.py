@@ -4,11 +4,12 @@ import importlib.util
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from orchestrator.bench.job import Job, job_of, read_job
-from orchestrator.bench.tools import TOOLS
+from orchestrator.bench.job import Job, read_job
+from orchestrator.bench.measure import compare
+from orchestrator.bench.of_scenario import job_of
+from orchestrator.bench.reference import SCHEMES, reference_ends
 from orchestrator.cli import main
 from orchestrator.fmi.build import ensure_built
 from orchestrator.paired.experiment import Experiment
@@ -17,7 +18,7 @@ from orchestrator.ssp.pair import paired_scenario
 
 @pytest.fixture(scope="module")
 def job() -> Job:
-    return job_of(paired_scenario(Experiment(), ensure_built(), 0.02, 0.5))
+    return job_of(paired_scenario(Experiment(), ensure_built(), 0.02, 0.5), ["plant.theta_l"])
 
 
 def test_job_is_plain_data(job, tmp_path: Path) -> None:
@@ -33,6 +34,7 @@ def test_command(tmp_path: Path, capsys) -> None:
     assert main(words) == 0
     rows = {row["tool"]: row for row in json.loads((tmp_path / "bench.json").read_text())["results"]["rows"]}
     assert all(rows[name]["runs"] == 3 and rows[name]["cpu"] > 0.0 for name in ("ours", "floor", "fmpy"))
+    assert all(rows[name]["deviation"] <= 1e-12 for name in ("ours", "floor", "fmpy"))  # the same work
     if importlib.util.find_spec("pyfmi") is None:
         assert rows["pyfmi"]["note"] == "not installed"
     assert rows["ours"]["cpu"] < 0.7 * rows["fmpy"]["cpu"]
@@ -42,29 +44,25 @@ def test_command(tmp_path: Path, capsys) -> None:
 def test_bad_arguments(tmp_path: Path, capsys) -> None:
     assert main(["bench", "--tools", "ours,magic", "--out", str(tmp_path / "x")]) == 2
     assert main(["bench", "--rounds", "0", "--out", str(tmp_path / "x")]) == 2
-    assert capsys.readouterr().err.count("\n") == 2
+    assert main(["bench", "--python", "pyfmi", "--out", str(tmp_path / "x")]) == 2
+    assert main(["bench", "--python", "pyfmi=/no/such/python", "--out", str(tmp_path / "x")]) == 2
+    assert capsys.readouterr().err.count("\n") == 4
     assert not (tmp_path / "x").exists()
 
 
-def test_floor_computes_the_same_loop(job) -> None:
-    """The slaves called directly and through FMI go the same way, so that the floor is a floor of the same work."""
-    from orchestrator.bench import tools
+@pytest.mark.parametrize(("name", "package"), [("ecos", "ecospy"), ("libcosim", "libcosimpy")])
+def test_other_masters_did_the_work_that_they_are_timed_for(job, name: str, package: str) -> None:
+    if importlib.util.find_spec(package) is None:
+        pytest.skip(f"{package} is not installed (`pip install .[hosts]`)")
+    (row,) = compare(job, [name], 1)
+    if "cannot open shared object file" in row.note:
+        pytest.skip(row.note)
+    assert row.note == ""
+    assert row.deviation is not None
+    assert row.deviation <= 1e-12
 
-    slaves: dict = {}
-    original = tools._python_slaves
 
-    def keep(job):
-        slaves.update(original(job))
-        return slaves
-
-    tools._python_slaves = keep
-    try:
-        run = TOOLS["floor"].prepare(job)
-    finally:
-        tools._python_slaves = original
-    run()
-    direct = slaves["plant"].get_real([job.references["plant"]["theta_l"]])[0]
-    scenario = paired_scenario(Experiment(), ensure_built(), 0.02, 0.5)
-    with scenario.session() as session:
-        through = session.run()["plant.theta_l"][-1]
-    np.testing.assert_allclose(direct, through, rtol=0.0, atol=1e-12)
+def test_deviation_shows_another_order_of_exchange(job) -> None:
+    """What ends where Gauss-Seidel ends did not run side by side: the check tells schemes apart."""
+    ends = {scheme: reference_ends(job, scheme)["plant.theta_l"] for scheme in SCHEMES}
+    assert len({round(end, 6) for end in ends.values()}) == len(SCHEMES)

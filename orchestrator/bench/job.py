@@ -5,11 +5,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator.fmi.slave import FmuFactory
-from orchestrator.master.signals import Constant
-from orchestrator.master.system import split
-from orchestrator.scenario import Scenario
-
 
 @dataclass(frozen=True)
 class Job:
@@ -20,6 +15,7 @@ class Job:
         starts: ``[instance, variable, type, value]``.
         connections: ``[instance, output, instance, input]``.
         references: value reference by instance and variable.
+        watched: ``[instance, output]`` whose ends show that a tool did the work.
         step: communication step [s].
         steps: number of steps.
     """
@@ -28,6 +24,7 @@ class Job:
     starts: list[list[Any]]
     connections: list[list[str]]
     references: dict[str, dict[str, int]]
+    watched: list[list[str]]
     step: float
     steps: int
 
@@ -39,29 +36,3 @@ class Job:
 def read_job(path: Path) -> Job:
     """Read what ``Job.write`` wrote."""
     return Job(**json.loads(path.read_text(encoding="utf-8")))
-
-
-def job_of(scenario: Scenario) -> Job:
-    """Return a scenario of FMUs, whose sources are constant, as a job."""
-    system = scenario.system
-    fmus: dict[str, str] = {}
-    starts: list[list[Any]] = []
-    references: dict[str, dict[str, int]] = {}
-    for name in system.execution_order():
-        instance = system.instance(name)
-        assert instance is not None
-        assert isinstance(instance.create, FmuFactory)
-        fmus[name] = str(instance.create.path.absolute())
-        variables = instance.model.variables
-        references[name] = {v.name: v.reference for v in variables.values()}
-        values = dict(instance.start)
-        for source in system.sources:
-            if split(source.target)[0] == name and isinstance(source.signal, Constant):
-                values[split(source.target)[1]] = source.signal.value
-        for variable, raw in values.items():
-            value = system.start_value(f"{name}.{variable}", raw)[0]
-            kind = "Integer" if variables[variable].type == "Enumeration" else variables[variable].type
-            starts.append([name, variable, kind, value])
-    connections = [[*split(c.source), *split(c.target)] for c in system.connections]
-    steps = round((scenario.stop - scenario.start) / scenario.algorithm.step)
-    return Job(fmus, starts, connections, references, scenario.algorithm.step, steps)

@@ -6,11 +6,12 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.bench.job import Job
+from orchestrator.bench.reference import reference_ends
 from orchestrator.bench.tools import TOOLS
 
 TIMEOUT = 900.0
@@ -23,12 +24,14 @@ class Row:
     Attributes:
         tool: key of ``TOOLS``.
         title: for the table.
-        version: of its package; ``None`` when it is not installed.
-        scheme: order of execution.
+        version: of the tool; ``None`` when it did not run.
+        scheme: order in which values are exchanged.
         wall: median wall time of a run [s]; ``None`` when there was none.
-        cpu: median processor time of a run [s].
+        cpu: median processor time of a run [s]; ``None`` also when the tool has a clock of its own.
         runs: number of runs.
         peak: largest memory of its process [MiB].
+        deviation: largest difference between the ends of the watched outputs and those of plain FMI calls in the
+            same scheme, in the outputs' unit.
         note: why there are no times.
     """
 
@@ -40,52 +43,84 @@ class Row:
     cpu: float | None
     runs: int
     peak: float | None
+    deviation: float | None
     note: str
 
 
+@dataclass
+class _Found:
+    """What the processes of one tool have reported so far."""
+
+    note: str = ""
+    times: list[tuple[float, float | None]] = field(default_factory=list)
+    ends: dict[str, float] = field(default_factory=dict)
+    version: str | None = None
+    peak: float | None = None
+
+
 def compare(
-    job: Job, tools: Sequence[str], rounds: int, progress: Callable[[str], None] = lambda text: None
+    job: Job,
+    tools: Sequence[str],
+    rounds: int,
+    pythons: Mapping[str, str] | None = None,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> list[Row]:
-    """Run every tool ``rounds`` times in turn and return one row each."""
-    times: dict[str, list[tuple[float, float]]] = {name: [] for name in tools}
-    peaks: dict[str, float] = {}
-    notes: dict[str, str] = {name: "not installed" for name in tools if TOOLS[name].version is None}
+    """Run every tool ``rounds`` times in turn and return one row each.
+
+    Args:
+        job: what is run.
+        tools: keys of ``TOOLS``.
+        rounds: turns that every tool gets; each is a process with ``runner.RUNS`` runs.
+        pythons: interpreter by tool, for tools that live in an environment of their own.
+        progress: is told what runs.
+    """
+    found = {name: _Found() for name in tools}
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
-        path = Path(folder) / "job.json"
+        path, result = Path(folder) / "job.json", Path(folder) / "result.json"
         job.write(path)
         for number in range(rounds):
             for name in tools:
-                if name in notes:
+                if found[name].note:
                     continue
+                python = (pythons or {}).get(name, sys.executable)
+                words = [python, "-m", "orchestrator.bench.runner", name, str(path), str(result)]
                 progress(f"round {number + 1} of {rounds}: {TOOLS[name].title}")
                 try:
-                    found, peak = _one(name, path, Path(folder) / "result.json")
-                    times[name] += found
-                    peaks[name] = max(peak, peaks.get(name, 0.0))
+                    _one(words, result, found[name])
                 except RuntimeError as error:
-                    notes[name] = str(error)
-    return [_row(name, times[name], peaks.get(name), notes.get(name, "")) for name in tools]
+                    found[name].note = str(error)
+    expected = {s: reference_ends(job, s) for s in {TOOLS[n].scheme for n in tools if found[n].ends}}
+    return [_row(name, found[name], expected.get(TOOLS[name].scheme, {})) for name in tools]
 
 
-def _one(name: str, job: Path, result: Path) -> tuple[list[tuple[float, float]], float]:
+def _one(words: list[str], result: Path, found: _Found) -> None:
     result.unlink(missing_ok=True)
     root = str(Path(__file__).resolve().parents[2])
     paths = [root, *([os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else [])]
-    words = [sys.executable, "-m", "orchestrator.bench.runner", name, str(job), str(result)]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
     try:
         run = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+    except OSError as error:
+        raise RuntimeError(f"failed: {error.strerror}: {words[0]}") from None
     except subprocess.TimeoutExpired:
         raise RuntimeError(f"took more than {TIMEOUT:g} s") from None
     if not result.exists():
         lines = run.stderr.strip().splitlines() or [f"exit code {run.returncode}"]
         raise RuntimeError(f"failed: {lines[-1][:200]}")
     content = json.loads(result.read_text(encoding="utf-8"))
-    return [(wall, cpu) for wall, cpu in content["times"]], content["peak_kib"] / 1024.0
+    if not content:
+        found.note = "not installed"
+        return
+    found.times += [(wall, cpu) for wall, cpu in content["times"]]
+    found.peak = max(content["peak_kib"] / 1024.0, found.peak or 0.0)
+    found.ends, found.version = content["ends"], content["version"]
 
 
-def _row(name: str, times: list[tuple[float, float]], peak: float | None, note: str) -> Row:
+def _row(name: str, found: _Found, expected: dict[str, float]) -> Row:
     tool = TOOLS[name]
-    wall = statistics.median(t[0] for t in times) if times else None
-    cpu = statistics.median(t[1] for t in times) if times else None
-    return Row(name, tool.title, tool.version, tool.scheme, wall, cpu, len(times), peak, note)
+    cpus = [cpu for _, cpu in found.times if cpu is not None]
+    wall = statistics.median(wall for wall, _ in found.times) if found.times else None
+    cpu = statistics.median(cpus) if cpus else None
+    deviation = max((abs(value - expected[key]) for key, value in found.ends.items()), default=None)
+    runs = len(found.times)
+    return Row(name, tool.title, found.version, tool.scheme, wall, cpu, runs, found.peak, deviation, found.note)

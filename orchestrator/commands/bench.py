@@ -1,11 +1,13 @@
 """``bench``: masters on the same FMUs and the same scenario, as ratios measured in one run."""
 
 import argparse
+import shutil
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 
-from orchestrator.bench.job import job_of
 from orchestrator.bench.measure import Row, compare
+from orchestrator.bench.of_scenario import job_of
 from orchestrator.bench.scaling import scaling
 from orchestrator.bench.tools import TOOLS
 from orchestrator.commands._console import print_table
@@ -17,12 +19,22 @@ from orchestrator.paired.experiment import Experiment
 from orchestrator.reporting import write_report
 from orchestrator.ssp.pair import paired_scenario
 
+WATCHED = ("plant.theta_l", "twin_plant.theta_l")
+NUMBERS = ("wall [ms]", "cpu [ms]", "us per step", "wall ratio", "cpu ratio", "deviation [rad]")
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what the benchmark takes."""
     parser.add_argument("--rounds", type=int, default=3, metavar="N", help="turns that every tool gets (default: 3)")
     parser.add_argument(
         "--tools", default=",".join(TOOLS), metavar="A,B", help="which tools (default: all, installed or not)"
+    )
+    parser.add_argument(
+        "--python",
+        action="append",
+        default=[],
+        metavar="TOOL=PATH",
+        help="run this tool with another interpreter, since some cannot share an environment; may be repeated",
     )
     parser.add_argument("--scaling", action="store_true", help="also cost against number of FMUs and of steps")
 
@@ -35,13 +47,14 @@ def run(arguments: argparse.Namespace) -> int:
         raise ScenarioError(f"`--tools` must be among {', '.join(TOOLS)}, but has {unknown[0]!r}")
     if not 1 <= arguments.rounds <= 1000:
         raise ScenarioError(f"`--rounds` must lie in [1, 1000], but is {arguments.rounds}")
+    pythons = _interpreters(arguments.python)
     fmus = ensure_built(FMUS)
-    job = job_of(paired_scenario(Experiment(), fmus, 0.02, 0.5))
+    job = job_of(paired_scenario(Experiment(), fmus, 0.02, 0.5), WATCHED)
     with staged(arguments.out) as directory:
-        rows = compare(job, tools, arguments.rounds, _say)
+        rows = compare(job, tools, arguments.rounds, pythons, _say)
         base = next((row for row in rows if row.wall is not None), None)
         title = f"{len(job.fmus)} FMUs, {job.steps} steps of {job.step:g} s, medians of {3 * arguments.rounds} runs"
-        head = ("tool", "version", "scheme", "wall [ms]", "cpu [ms]", "us per step", "wall ratio", "cpu ratio", "note")
+        head = ("tool", "version", "scheme", *NUMBERS, "note")
         print_table(title, head, [_cells(row, base, job.steps) for row in rows])
         costs = scaling(fmus["Drivetrain"], progress=_say) if arguments.scaling else []
         if costs:
@@ -59,17 +72,34 @@ def _say(text: str) -> None:
         sys.stderr.write(f"\r\x1b[K{text}")
 
 
+def _interpreters(words: Sequence[str]) -> dict[str, str]:
+    pythons = {}
+    for word in words:
+        tool, _, path = word.partition("=")
+        if tool not in TOOLS or not path:
+            raise ScenarioError(f"`--python` must be TOOL=PATH with a tool among {', '.join(TOOLS)}, but is {word!r}")
+        if shutil.which(path) is None:
+            raise ScenarioError(f"`--python {tool}` must name an interpreter, but there is no program {path!r}")
+        pythons[tool] = path
+    return pythons
+
+
 def _cells(row: Row, base: Row | None, steps: int) -> list[str]:
-    version = "" if row.version is None else row.version
-    if row.wall is None or row.cpu is None or base is None or base.wall is None or base.cpu is None:
-        return [row.title, version, row.scheme, "", "", "", "", "", row.note]
-    numbers = [f"{1e3 * row.wall:.1f}", f"{1e3 * row.cpu:.1f}", f"{1e6 * row.cpu / steps:.1f}"]
+    names = [row.title, row.version or "", row.scheme]
+    if row.wall is None or base is None or base.wall is None:
+        return [*names, *[""] * len(NUMBERS), row.note]
+    cpu, ratio = "", ""
+    if row.cpu is not None and base.cpu is not None:
+        cpu, ratio = f"{1e3 * row.cpu:.1f}", f"{base.cpu / row.cpu:.2f}"
+    step = 1e6 * (row.wall if row.cpu is None else row.cpu) / steps
+    deviation = "" if row.deviation is None else f"{row.deviation:.1g}"
     return [
-        row.title,
-        version,
-        row.scheme,
-        *numbers,
+        *names,
+        f"{1e3 * row.wall:.1f}",
+        cpu,
+        f"{step:.1f}",
         f"{base.wall / row.wall:.2f}",
-        f"{base.cpu / row.cpu:.2f}",
+        ratio,
+        deviation,
         row.note,
     ]

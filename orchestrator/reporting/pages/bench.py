@@ -44,6 +44,7 @@ def _tools(rows: Sequence[Json], measured: Sequence[Json]) -> Table:
         Column("processor", "ms"),
         Column("wall ratio", "", 3),
         Column("processor ratio", "", 3),
+        Column("deviation", "rad", 1),
         Column("note"),
     )
     base = measured[0] if measured else {}
@@ -54,6 +55,7 @@ def _tools(rows: Sequence[Json], measured: Sequence[Json]) -> Table:
             row.get("scheme"),
             *(_milliseconds(row.get(name)) for name in ("wall", "cpu")),
             *(_ratio(base.get(name), row.get(name)) for name in ("wall", "cpu")),
+            row.get("deviation"),
             row.get("note") or None,
         )
         for row in rows
