@@ -97,7 +97,8 @@ def _one(words: list[str], result: Path, found: _Found) -> None:
     result.unlink(missing_ok=True)
     root = str(Path(__file__).resolve().parents[2])
     paths = [root, *([os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else [])]
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
+    # What tools extract and log goes away with the folder.
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "TMPDIR": str(result.parent)}
     try:
         run = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=TIMEOUT, check=False)
     except OSError as error:

@@ -93,7 +93,16 @@ def pyfmi(job: Job) -> Prepared:
 
 
 def omsimulator(job: Job) -> Prepared:
-    """OMSimulator, weakly coupled system, fixed step, no result file."""
+    """OMSimulator, weakly coupled system, fixed step, recording what is watched."""
+    return _omsimulator(job, everything=False)
+
+
+def omsimulator_as_it_comes(job: Job) -> Prepared:
+    """The same with all signals in a result file, which is its default."""
+    return _omsimulator(job, everything=True)
+
+
+def _omsimulator(job: Job, everything: bool) -> Prepared:
     from OMSimulator.capi import Capi, Status
     from OMSimulator.instantiated_model import SolverType, SystemType
 
@@ -117,7 +126,11 @@ def omsimulator(job: Job) -> Prepared:
     do(Capi.instantiate(model))
     do(Capi.setStartTime(model, 0.0))
     do(Capi.setStopTime(model, job.step * job.steps))
-    do(Capi.setResultFile(model, ""))
+    do(Capi.setResultFile(model, str(Path(tempfile.mkdtemp(prefix="oms-")) / "result.mat")))
+    if not everything:
+        do(Capi.removeSignalsFromResults(model, ".*"))
+        for a, b in job.watched:
+            do(Capi.addSignalsToResults(model, rf".*\.{a}\.{b}"))
     do(Capi.initialize(model))
 
     def run() -> None:
@@ -159,6 +172,12 @@ def cofmupy(job: Job) -> Prepared:
     with contextlib.redirect_stdout(io.StringIO()):
         setup = {"fmus": fmus, "connections": links, "cosim_method": "gauss_seidel", "iterative": False}
         coordinator.start(setup)
+    # It starts with all inputs at zero, and lists a loop's FMUs in an order that changes from process to process.
+    for a, b, c, d in job.connections:
+        coordinator.master.set_inputs({c: {d: coordinator.get_variable((a, b))}})
+    place = {name: k for k, name in enumerate(job.fmus)}
+    for loop in coordinator.master.sequence_order:
+        loop.sort(key=place.__getitem__)
 
     def run() -> None:
         for _ in range(job.steps):

@@ -2,7 +2,9 @@
 
 import importlib.metadata
 import importlib.util
+import re
 import shutil
+import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -60,7 +62,12 @@ class Tool:
 
     def version(self) -> str:
         """Return the version; to be called once the tool was used, since what is built from sources must be asked."""
-        if not self.needs or ":" in self.needs:
+        kind, _, program = self.needs.rpartition(":")
+        if kind == "program":
+            words = subprocess.run([program, "--version"], capture_output=True, text=True, check=False).stdout
+            found = re.search(r"\d+(\.\d+)+", words)
+            return found.group() if found else ""
+        if not self.needs:
             return ""
         try:
             return importlib.metadata.version(self.package or self.needs)

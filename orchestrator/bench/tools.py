@@ -95,7 +95,14 @@ TOOLS: dict[str, Tool] = {
     "libcosim": Tool("libcosim", "libcosimpy", others.libcosim, False, JACOBI),
     "pyfmi": Tool("PyFMI", "pyfmi", others.pyfmi, False, JACOBI),
     # Steps side by side, then passes values on in the order of the declared dependencies: the same trajectories.
-    "omsimulator": Tool("OMSimulator", "OMSimulator", others.omsimulator, False, GAUSS_SEIDEL),
+    "omsimulator": Tool("OMSimulator, two signals", "OMSimulator", others.omsimulator, False, GAUSS_SEIDEL),
+    "omsimulator_all": Tool(
+        "OMSimulator, all signals (its default)",
+        "OMSimulator",
+        others.omsimulator_as_it_comes,
+        False,
+        GAUSS_SEIDEL,
+    ),
     "cofmupy": Tool("cofmupy", "cofmupy", others.cofmupy, False, GAUSS_SEIDEL),
     "mastersim": Tool("MasterSim (its own clock)", "program:mastersim", others.mastersim, True, GAUSS_SEIDEL),
 }
