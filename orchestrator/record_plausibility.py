@@ -111,6 +111,11 @@ def _check_inertia(record: Record, p: dict[str, float]) -> None:
             f"{record.source}: column `theta_m` must be in radians, but seems to be in degrees (the torque would move "
             f"only {relative:.2g} of the model's inertia)"
         )
+    if relative > DEGREES / 3.0:
+        raise RecordError(
+            f"{record.source}: column `u` must be in N.m and `theta_m` in radians, but the torque would move "
+            f"{relative:.3g} times the model's inertia: wrong units, or a wrong model"
+        )
 
 
 def _lagged(u: NDArray[np.float64], tau: float, step: float) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from orchestrator.cli import main
@@ -55,6 +56,56 @@ def test_corrected_fmu_has_the_corrected_start_values(result) -> None:
     assert document["results"]["cosimulation"]["largest_difference_from_compiled"] < 1e-9
     for name in ("signals", "innovations", "candidates", "missing_torque"):
         assert (out / f"diagnose_{name}.png").stat().st_size > 10_000
+
+
+@pytest.fixture(scope="module")
+def columns() -> dict:
+    return make_record({}, 63, 4.0, substeps=25)[0]
+
+
+NOISE = np.random.default_rng(0).standard_normal((800, 2)) * [3e-4, 1e-4]
+SPOILED = {
+    "zero": (lambda c: {name: np.zeros(800) for name in ("u", "theta_m", "theta_l")}, "`u` must drive the machine"),
+    "still": (lambda c: {"theta_m": NOISE[:, 0], "theta_l": NOISE[:, 1]}, "nothing moves"),
+    "constant": (lambda c: {"u": np.ones(800), "theta_m": np.ones(800), "theta_l": np.ones(800)}, "nothing moves"),
+    "stuck": (lambda c: {"theta_l": np.full(800, 0.2)}, "stuck"),
+    "sign": (lambda c: {"u": -c["u"]}, "sign"),
+    "degrees": (lambda c: {"theta_m": np.degrees(c["theta_m"]), "theta_l": np.degrees(c["theta_l"])}, "degrees"),
+    "nan": (lambda c: {"theta_m": np.where(np.arange(800) == 9, np.nan, c["theta_m"])}, "row 10"),
+    "huge": (lambda c: {"theta_m": 1e200 * c["theta_m"]}, "row 2"),
+    "huge torque": (lambda c: {"u": 1e9 * c["u"]}, "wrong units"),
+}
+
+
+@pytest.mark.parametrize("name", SPOILED)
+def test_spoiled_records_are_refused_in_one_line(tmp_path, capsys, columns, name) -> None:
+    write_csv(tmp_path / "good.csv", columns)
+    write_csv(tmp_path / "spoiled.csv", columns | SPOILED[name][0](columns))
+    good, spoiled, out = (str(tmp_path / n) for n in ("good.csv", "spoiled.csv", "out"))
+    for arguments in ([spoiled], [good, "--validate", spoiled]):
+        assert main(["diagnose", *arguments, "--out", out]) == 2
+        error = capsys.readouterr().err
+        assert error.startswith("error: spoiled.csv: ")
+        assert error.count("\n") == 1
+        assert SPOILED[name][1] in error
+        assert not Path(out).exists()
+
+
+def test_place_that_cannot_be_written_is_refused_before_the_computation(tmp_path, capsys, columns, monkeypatch) -> None:
+    write_csv(tmp_path / "good.csv", columns)
+    (tmp_path / "file").write_text("here\n")
+    monkeypatch.setattr("orchestrator.commands.diagnose.diagnose", lambda *_: pytest.fail("computed"))
+    assert main(["diagnose", str(tmp_path / "good.csv"), "--out", str(tmp_path / "file")]) == 2
+    assert "`--out` must be a writable directory" in capsys.readouterr().err
+    assert (tmp_path / "file").read_text() == "here\n"
+
+
+def test_model_that_is_too_fast_for_the_record_is_refused(tmp_path, capsys, columns) -> None:
+    write_csv(tmp_path / "good.csv", columns)
+    (tmp_path / "model.toml").write_text("[parameters.tau]\nvalue = 1e-6\n")
+    arguments = [str(tmp_path / "good.csv"), "--model", str(tmp_path / "model.toml"), "--out", str(tmp_path / "out")]
+    assert main(["diagnose", *arguments]) == 2
+    assert "time constants" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["missing.csv", "short.csv"])

@@ -112,6 +112,14 @@ def test_what_the_library_lacks_is_unknown(effects) -> None:
     assert "nothing in the library explains" in found.warnings[0]
 
 
+def test_model_without_uncertainty_is_diagnosed(tmp_path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text("[parameters.J_l]\nrelative_uncertainty = 0.0\n")
+    found = diagnose(record_of({"alpha": 0.004}, 71, 8.0, mismatch=0.0), read_model(path))
+    assert labels(found) == ["backlash@shaft"]
+    assert found.parameters == {}
+
+
 def test_parts_do_not_overlap() -> None:
     parts = split(1000, 10)
     assert (parts.fitted.stop, parts.validated.stop) == (parts.validated.start, parts.held_out.start)

@@ -9,18 +9,22 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from orchestrator.commands._console import print_table
+from orchestrator.diagnosis.admission import check_comparable
 from orchestrator.diagnosis.corrected import BeforeAfter, before_and_after, build_corrected
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.figures import draw_candidates, draw_innovations, draw_missing, draw_signals
 from orchestrator.diagnosis.outcome import Diagnosis, Gap
 from orchestrator.diagnosis.validate import gap_on
-from orchestrator.model_file import read_model
+from orchestrator.errors import ConvergenceError
+from orchestrator.model_file import Model, read_model
 from orchestrator.output import staged, write_result
-from orchestrator.record import read_record
+from orchestrator.record import Record, read_record
+from orchestrator.record_plausibility import check_plausible
 from orchestrator.reporting import write_report
 
 SHOWN = 5
@@ -36,18 +40,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU."""
     model = read_model(args.model)
-    record = read_record(args.record, model.columns)
-    other = read_record(args.validate, model.columns) if args.validate else None
+    record = _read(args.record, model)
+    other = _read(args.validate, model) if args.validate else None
     begun = time.monotonic()
-    with _shown() as progress:
-        diagnosis = diagnose(record, model, progress)
-    with staged(args.out) as directory:
-        fmu = build_corrected(diagnosis, args.record.name, directory)
-        runs = before_and_after(diagnosis, fmu)
-        results = diagnosis.as_json() | {"model": str(args.out / fmu.name)}
-        results["cosimulation"] = {"largest_difference_from_compiled": runs.difference, "unit": "rad"}
-        if other is not None:
-            results["validation"] = {gap.signal: _gap(gap) for gap in gap_on(other, diagnosis)}
+    with staged(args.out) as directory, np.errstate(all="ignore"):
+        try:
+            with _shown() as progress:
+                diagnosis = diagnose(record, model, progress)
+            fmu = build_corrected(diagnosis, args.record.name, directory)
+            runs = before_and_after(diagnosis, fmu)
+            results = diagnosis.as_json() | {"model": str(args.out / fmu.name)}
+            results["cosimulation"] = {"largest_difference_from_compiled": runs.difference, "unit": "rad"}
+            if other is not None:
+                results["validation"] = {gap.signal: _gap(gap) for gap in gap_on(other, diagnosis)}
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(f"{record.source}: no model can be fitted to this record: {error}") from None
         results["seconds"] = time.monotonic() - begun
         _write_csv(directory / "diagnose.csv", runs)
         draw_signals(directory / "diagnose_signals.png", runs, diagnosis)
@@ -61,6 +68,14 @@ def run(args: argparse.Namespace) -> int:
     _print(diagnosis, results)
     sys.stdout.write(f"Corrected FMU: {results['model']}\nWritten to {args.out}: report.html, diagnose.json, figures\n")
     return 0
+
+
+def _read(path: Path, model: Model) -> Record:
+    """Return a record that the model can be compared with."""
+    record = read_record(path, model.columns)
+    check_comparable(record)
+    check_plausible(record, model)
+    return record
 
 
 def _gap(gap: Gap) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.admission import check_comparable, check_resolved
 from orchestrator.diagnosis.bank import Effect
 from orchestrator.diagnosis.fitting import Fit, Parts, anneal, split
 from orchestrator.diagnosis.free_run import free_run
@@ -42,10 +43,14 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
         progress: called with (fits done, expected, what was fitted).
 
     Raises:
-        ScenarioError: the model's backlash model cannot be diagnosed.
+        ScenarioError: the model's backlash model cannot be diagnosed, or it is too fast for the record.
+        RecordError: nothing moves, or nothing drives.
     """
     plant = plant_of(model)
+    check_comparable(record)
+    record = record if len(plant.measured) > 1 else record.without_load_encoder()
     nominal = plant.extended(model.values)
+    check_resolved(plant, nominal, record.step, model.source)
     tau = float(nominal[plant.index("tau")])
     signals = signals_of(record, tau)
     parts = split(signals.size, HEAD)

@@ -61,7 +61,7 @@ def draw_innovations(path: Path, diagnosis: Diagnosis) -> None:
         z = w.likelihood.whitened(fit.p, lowest)[:, 0]
         time = h * np.arange(z.size)
         left.plot(time[20:], z[20:], color=colour, linewidth=0.5, label=label)
-        size = min(1024, z.size)
+        size = min(1024, z.size - 20)
         panes = z[20:][: (z.size - 20) // size * size].reshape(-1, size) * np.hanning(size)
         power = np.mean(np.abs(np.fft.rfft(panes, axis=1)) ** 2, axis=0)
         right.loglog(np.fft.rfftfreq(size, h)[1:], power[1:], color=colour, linewidth=1.0, label=label)

@@ -102,7 +102,7 @@ def fit(
     for _ in range(iterations):
         root = _whitening(z[part])
         residual = (z[part] @ root.T).ravel()
-        if not np.all(np.isfinite(root)):
+        if not free or not np.all(np.isfinite(root)):
             break
         J = (root @ jacobian(likelihood, p, q, free, z, part)).reshape(residual.size, len(free))
         pull = np.array([(p[f.place] - f.prior[0]) / f.prior[1] if f.prior else 0.0 for f in free])
@@ -128,7 +128,7 @@ def fit(
             break
     if not np.all(np.isfinite(z)):
         return Fit(p, q, z, tuple(free), np.zeros((len(free), len(free))), -np.inf, -np.inf)
-    covariance: Array = np.asarray(np.linalg.pinv(hessian) * np.outer(scales, scales))
+    covariance: Array = np.asarray(np.linalg.pinv(hessian) * np.outer(scales, scales)) if free else hessian
     fitted = likelihood.log_likelihood(z, q, part) + log_prior(p, free)
     return Fit(p, q, z, tuple(free), covariance, fitted, likelihood.log_likelihood(z, q, parts.validated))
 
@@ -177,7 +177,10 @@ def _whitening(e: Array) -> Array:
     covariance = e.T @ e / len(e)
     if not np.all(np.isfinite(covariance)):
         return np.full_like(covariance, np.nan)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+    try:
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+    except np.linalg.LinAlgError:  # a model that lets the innovations of one channel vanish, or follow the other's
+        return np.full_like(covariance, np.nan)
 
 
 def _moved(p: Array, step: Array, free: Sequence[Free]) -> Array:

@@ -102,12 +102,12 @@ def _out_of_sample(white: Array, columns: Array, nuisance: Array, cut: int) -> t
     errors = []
     for design in (nuisance, columns):
         k = design.shape[2]
-        left = design[:cut].reshape(-1, k)
+        left = design[:cut].reshape(cut * design.shape[1], k)
         scale = np.sqrt(np.mean(left**2, axis=0)) + 1e-300
         left = left / scale
         H = left.T @ left
         coefficients = np.linalg.solve(H + RIDGE * np.trace(H) * np.eye(k) / k, left.T @ white[:cut].reshape(-1))
-        after = white[cut:].reshape(-1) - (design[cut:].reshape(-1, k) / scale) @ coefficients
+        after = white[cut:].reshape(-1) - (design[cut:].reshape(white[cut:].size, k) / scale) @ coefficients
         errors.append(float(after @ after))
     before, after_all = errors
     n = white[cut:].size

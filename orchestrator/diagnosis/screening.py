@@ -42,7 +42,7 @@ class Screen:
         e = model.z[parts.fitted]
         self._root = np.linalg.inv(np.linalg.cholesky(e.T @ e / len(e)))
         J = jacobian(likelihood, model.p, model.q, model.free, model.z, parts.fitted)
-        columns = (self._root @ J).reshape(-1, len(model.free))
+        columns = (self._root @ J).reshape(J.shape[0] * J.shape[1], len(model.free))
         prior = np.diag([f.scale / f.prior[1] if f.prior else 0.0 for f in model.free])
         self._basis, _ = np.linalg.qr(np.vstack([columns, prior]))
         self._basis = self._basis[: columns.shape[0]]
