@@ -1,7 +1,6 @@
-"""What record and model must have before they can be compared: motion, a torque, time constants that the record shows."""
+"""What record and model must have before they are compared: motion, a torque, time constants that the record shows."""
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.likelihood import noise_level
