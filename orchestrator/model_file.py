@@ -21,19 +21,23 @@ at all. Without a file, the model is ``Drivetrain`` with the thesis's values, no
 parameter known to 5 %.
 """
 
+import difflib
 import importlib
 import math
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-
-import msgspec
+from typing import Any
 
 from orchestrator.errors import ScenarioError
 from orchestrator.record import COLUMNS, UNIT_FACTORS, Column
 
 LINEAR = ("J_m", "J_l", "k", "c", "b_m", "b_l", "i", "tau")
 DEFAULT_SPREAD = 0.05
+ENCODERS = ("theta_m", "theta_l")
+MAXIMUM_BYTES = 16 * 2**20
+LARGEST_WHOLE_NUMBER = 10**18
 TABLES = {"Drivetrain": "pyfmu_sources.drivetrain_parameters", "ServoAxis": "pyfmu_sources.servo_axis"}
 
 
@@ -98,33 +102,32 @@ class Model:
         return self.encoders.get(column, Encoder())
 
 
-class _Parameter(msgspec.Struct, forbid_unknown_fields=True):
-    value: float | None = None
-    relative_uncertainty: float | None = None
-    uncertainty: float | None = None
+# What a file may hold: in each table of named tables, the keys and their kinds.
+_ENTRIES: dict[str, dict[str, type]] = {
+    "parameters": {"value": float, "relative_uncertainty": float, "uncertainty": float},
+    "encoders": {"resolution": float, "counts_per_rev": float, "noise": float},
+    "columns": {"name": str, "unit": str},
+}
+_KINDS = {float: "a number", str: "text", dict: "a table", bool: "true or false", list: "a list"}
+Entry = Mapping[str, Any]
 
 
-class _Encoder(msgspec.Struct, forbid_unknown_fields=True):
-    resolution: float | None = None
-    counts_per_rev: float | None = None
-    noise: float | None = None
+@dataclass(frozen=True)
+class _Content:
+    """A file whose keys and kinds are right; ``where`` is its path."""
 
+    where: str
+    fmu: str
+    entries: Mapping[str, Mapping[str, Entry]]
 
-class _Column(msgspec.Struct, forbid_unknown_fields=True):
-    name: str | None = None
-    unit: str = ""
-
-
-class _File(msgspec.Struct, forbid_unknown_fields=True):
-    fmu: str = "Drivetrain"
-    parameters: dict[str, _Parameter] = {}
-    encoders: dict[str, _Encoder] = {}
-    columns: dict[str, _Column] = {}
+    def wrong(self, key: str, must: str) -> ScenarioError:
+        """Return the error that says what ``key`` must be."""
+        return ScenarioError(f"`{key}` in {self.where} must {must}")
 
 
 def default_model() -> Model:
     """Return ``Drivetrain`` with the thesis's values, no backlash, each linear parameter known to 5 %."""
-    return Model("Drivetrain", _table("Drivetrain", DEFAULT_SPREAD, "default model"))
+    return Model("Drivetrain", _defaults("Drivetrain", DEFAULT_SPREAD))
 
 
 def read_model(path: Path | None) -> Model:
@@ -135,38 +138,79 @@ def read_model(path: Path | None) -> Model:
     """
     if path is None:
         return default_model()
+    content = _content(_decoded(path), str(path))
+    parameters, encoders, columns = (content.entries[name] for name in _ENTRIES)
+    stated = any("uncertainty" in entry or "relative_uncertainty" in entry for entry in parameters.values())
+    table = _table(content, 0.0 if stated else DEFAULT_SPREAD)
+    for name, entry in parameters.items():
+        if name not in table:
+            raise content.wrong(f"parameters.{name}", f"be a parameter of {content.fmu}{_nearest(name, table)}")
+        table[name] = _merge(table[name], entry, f"parameters.{name}", content)
+    return Model(
+        content.fmu,
+        table,
+        {name: _encoder(name, entry, content) for name, entry in encoders.items()},
+        {name: _column(name, entry, content) for name, entry in columns.items()},
+        path.name,
+    )
+
+
+def _decoded(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file."""
     try:
-        raw = msgspec.toml.decode(path.read_bytes(), type=_File)
+        if path.stat().st_size > MAXIMUM_BYTES:
+            raise ScenarioError(f"{path}: must be at most {MAXIMUM_BYTES >> 20} MB, but is larger")
+        return tomllib.loads(path.read_bytes().decode("utf-8"))
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise ScenarioError(f"{path}: must be UTF-8 text, but byte {error.start} is not") from None
-    except msgspec.ValidationError as error:
-        raise ScenarioError(f"{path}: {error}") from None
-    except msgspec.DecodeError as error:
+    except RecursionError:
+        raise ScenarioError(f"{path}: must be TOML, but is nested too deeply") from None
+    except ValueError as error:  # of which TOMLDecodeError is one
         raise ScenarioError(f"{path}: must be TOML, but is not: {error}") from None
-    except ValueError as error:
-        raise ScenarioError(f"{path}: must be a readable TOML file: {error}") from None
-    where = str(path)
-    stated = any(_is_stated(entry) for entry in raw.parameters.values())
-    table = _table(raw.fmu, 0.0 if stated else DEFAULT_SPREAD, where)
-    for name, entry in raw.parameters.items():
-        if name not in table:
-            raise ScenarioError(f"{where}: $.parameters.{name} must be a parameter of {raw.fmu}{_nearest(name, table)}")
-        table[name] = _merge(table[name], entry, f"{where}: $.parameters.{name}")
-    encoders = {name: _encoder(name, entry, where) for name, entry in raw.encoders.items()}
-    columns = {name: _column(name, entry, where) for name, entry in raw.columns.items()}
-    return Model(raw.fmu, table, encoders, columns, path.name)
 
 
-def _is_stated(entry: _Parameter) -> bool:
-    return entry.relative_uncertainty is not None or entry.uncertainty is not None
+def _content(raw: dict[str, Any], where: str) -> _Content:
+    """Return the file's content once every key is known and every value is of its kind."""
+    fmu = raw.get("fmu", "Drivetrain")
+    entries = {name: raw.get(name, {}) for name in _ENTRIES}
+    content = _Content(where, fmu, entries)
+    _check_keys(raw, ("fmu", *_ENTRIES), "", content)
+    _check_kind(fmu, str, "fmu", content)
+    for group, kinds in _ENTRIES.items():
+        _check_kind(entries[group], dict, group, content)
+        for name, entry in entries[group].items():
+            path = f"{group}.{name}"
+            _check_kind(entry, dict, path, content)
+            _check_keys(entry, tuple(kinds), f"{path}.", content)
+            for key, value in entry.items():
+                _check_kind(value, kinds[key], f"{path}.{key}", content)
+    return content
 
 
-def _table(fmu: str, spread: float, where: str) -> dict[str, ModelParameter]:
+def _check_keys(table: Entry, known: tuple[str, ...], prefix: str, content: _Content) -> None:
+    for key in table:
+        if key not in known:
+            raise content.wrong(f"{prefix}{key}", f"be one of {', '.join(prefix + name for name in known)}")
+
+
+def _check_kind(value: object, kind: type, key: str, content: _Content) -> None:
+    found = float if type(value) is int else type(value)
+    if found is not kind:
+        raise content.wrong(key, f"be {_KINDS[kind]}, but is {_KINDS.get(found, 'a date or time')}")
+    if type(value) is int and abs(value) > LARGEST_WHOLE_NUMBER:
+        raise content.wrong(key, "be a number of at most 18 digits, but is longer")
+
+
+def _table(content: _Content, spread: float) -> dict[str, ModelParameter]:
     """Return the FMU's parameters; linear ones get the relative ``spread``."""
-    if fmu not in TABLES:
-        raise ScenarioError(f"{where}: $.fmu must be one of {', '.join(TABLES)}, but is {fmu!r}")
+    if content.fmu not in TABLES:
+        raise content.wrong("fmu", f"be one of {', '.join(TABLES)}, but is {content.fmu!r}")
+    return _defaults(content.fmu, spread)
+
+
+def _defaults(fmu: str, spread: float) -> dict[str, ModelParameter]:
     module = importlib.import_module(TABLES[fmu])
     relative = dict.fromkeys(LINEAR, spread) if fmu == "Drivetrain" else {}
     return {
@@ -177,57 +221,54 @@ def _table(fmu: str, spread: float, where: str) -> dict[str, ModelParameter]:
     }
 
 
-def _merge(parameter: ModelParameter, entry: _Parameter, where: str) -> ModelParameter:
-    value = parameter.value if entry.value is None else entry.value
+def _merge(parameter: ModelParameter, entry: Entry, key: str, content: _Content) -> ModelParameter:
+    value = float(entry.get("value", parameter.value))
     if not math.isfinite(value) or not parameter.minimum <= value <= parameter.maximum:
         bounds = f"[{parameter.minimum:g}, {parameter.maximum:g}] {parameter.unit}"
-        raise ScenarioError(f"{where}.value must be in {bounds}, but is {value:g}")
-    if entry.uncertainty is not None and entry.relative_uncertainty is not None:
-        raise ScenarioError(f"{where} must have `uncertainty` or `relative_uncertainty`, but has both")
+        raise content.wrong(f"{key}.value", f"be in {bounds}, but is {value:g}")
+    if "uncertainty" in entry and "relative_uncertainty" in entry:
+        raise content.wrong(key, "have `uncertainty` or `relative_uncertainty`, but has both")
     share = parameter.uncertainty / abs(parameter.value) if parameter.value != 0.0 else 0.0
     uncertainty = share * abs(value)
-    if entry.uncertainty is not None:
-        uncertainty = _positive(entry.uncertainty, f"{where}.uncertainty")
-    elif entry.relative_uncertainty is not None:
-        uncertainty = _positive(entry.relative_uncertainty, f"{where}.relative_uncertainty") * abs(value)
+    if "uncertainty" in entry:
+        uncertainty = _not_negative(entry, "uncertainty", key, content)
+    elif "relative_uncertainty" in entry:
+        uncertainty = _not_negative(entry, "relative_uncertainty", key, content) * abs(value)
     return ModelParameter(parameter.name, value, uncertainty, parameter.unit, parameter.minimum, parameter.maximum)
 
 
-def _positive(value: float, where: str) -> float:
+def _not_negative(entry: Entry, name: str, key: str, content: _Content) -> float:
+    value = float(entry[name])
     if not (math.isfinite(value) and value >= 0.0):
-        raise ScenarioError(f"{where} must be a finite number that is not negative, but is {value:g}")
+        raise content.wrong(f"{key}.{name}", f"be a finite number that is not negative, but is {value:g}")
     return value
 
 
-def _encoder(name: str, entry: _Encoder, where: str) -> Encoder:
-    path = f"{where}: $.encoders.{name}"
-    if name not in ("theta_m", "theta_l"):
-        raise ScenarioError(f"{path} must be `theta_m` or `theta_l`")
-    if entry.resolution is not None and entry.counts_per_rev is not None:
-        raise ScenarioError(f"{path} must have `resolution` or `counts_per_rev`, but has both")
-    resolution = entry.resolution
-    if resolution is not None:
-        _positive(resolution, f"{path}.resolution")
-    if entry.counts_per_rev is not None:
-        if _positive(entry.counts_per_rev, f"{path}.counts_per_rev") < 1.0:
-            raise ScenarioError(f"{path}.counts_per_rev must be at least 1, but is {entry.counts_per_rev:g}")
-        resolution = 2.0 * math.pi / entry.counts_per_rev
-    if entry.noise is not None:
-        _positive(entry.noise, f"{path}.noise")
-    return Encoder(resolution, entry.noise)
+def _encoder(name: str, entry: Entry, content: _Content) -> Encoder:
+    key = f"encoders.{name}"
+    if name not in ENCODERS:
+        raise content.wrong(key, f"be one of {', '.join(f'encoders.{known}' for known in ENCODERS)}")
+    if "resolution" in entry and "counts_per_rev" in entry:
+        raise content.wrong(key, "have `resolution` or `counts_per_rev`, but has both")
+    resolution = _not_negative(entry, "resolution", key, content) if "resolution" in entry else None
+    if "counts_per_rev" in entry:
+        counts = _not_negative(entry, "counts_per_rev", key, content)
+        if counts < 1.0:
+            raise content.wrong(f"{key}.counts_per_rev", f"be at least 1, but is {counts:g}")
+        resolution = 2.0 * math.pi / counts
+    return Encoder(resolution, _not_negative(entry, "noise", key, content) if "noise" in entry else None)
 
 
-def _column(name: str, entry: _Column, where: str) -> Column:
-    path = f"{where}: $.columns.{name}"
+def _column(name: str, entry: Entry, content: _Content) -> Column:
+    key = f"columns.{name}"
     if name not in COLUMNS:
-        raise ScenarioError(f"{path} must be one of {', '.join(COLUMNS)}")
-    if entry.unit and entry.unit not in UNIT_FACTORS:
-        raise ScenarioError(f"{path}.unit must be one of {', '.join(UNIT_FACTORS)}, but is {entry.unit!r}")
-    return Column(entry.name or name, entry.unit)
+        raise content.wrong(key, f"be one of {', '.join(f'columns.{known}' for known in COLUMNS)}")
+    unit = entry.get("unit", "")
+    if unit and unit not in UNIT_FACTORS:
+        raise content.wrong(f"{key}.unit", f"be one of {', '.join(UNIT_FACTORS)}, but is {unit!r}")
+    return Column(entry.get("name") or name, unit)
 
 
 def _nearest(name: str, table: Mapping[str, ModelParameter]) -> str:
-    import difflib
-
     close = difflib.get_close_matches(name, table, 1, 0.6)
     return f", but no such name exists; `{close[0]}` does" if close else ", but no such name exists"

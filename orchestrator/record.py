@@ -24,6 +24,7 @@ OPTIONAL = ("theta_l",)
 MINIMUM_ROWS = 200
 MAXIMUM_BYTES = 500_000_000
 LEAST_STEP = 1e-6  # s
+LARGEST_VALUE = 1e12  # of any number in a record
 LARGEST_ANGLE = 1e7  # rad
 LARGEST_GAP = 0.3  # rad, load side: motion beyond it that one encoder misses is no gap
 UNIT_FACTORS = {
@@ -249,11 +250,12 @@ def _short(text: str, length: int = 60) -> str:
 
 
 def _check_finite(values: Array, name: str, source: str) -> None:
-    bad = np.flatnonzero(~np.isfinite(values) | (np.abs(values) > 1e12))
+    bad = np.flatnonzero(~np.isfinite(values) | (np.abs(values) > LARGEST_VALUE))
     if bad.size:
         more = f" (and {bad.size - 1} more rows)" if bad.size > 1 else ""
-        where = f"{source}: row {bad[0] + 1}, column `{name}`"
-        raise RecordError(f"{where} must be a finite number, but is {values[bad[0]]:g}{more}")
+        value = float(values[bad[0]])
+        must = f"between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}" if math.isfinite(value) else "a finite number"
+        raise RecordError(f"{source}: row {bad[0] + 1}, column `{name}` must be {must}, but is {value:g}{more}")
 
 
 def _check_time(time: Array, name: str, source: str) -> None:

@@ -30,15 +30,20 @@ def check_plausible(record: Record, model: Model) -> None:
     if model.fmu != "Drivetrain":
         return
     parameters = {name: entry.value for name, entry in model.parameters.items()}
-    _check_rate(record, parameters)
+    _check_rate(record, own_frequency(model))
     if record.theta_l is not None:
         _check_slope(record, record.theta_l, parameters["i"])
     _check_inertia(record, parameters)
 
 
-def _check_rate(record: Record, p: dict[str, float]) -> None:
+def own_frequency(model: Model) -> float:
+    """Return how fast [rad/s] the shaft of a ``Drivetrain`` oscillates, its motor free to turn."""
+    p = {name: entry.value for name, entry in model.parameters.items()}
+    return math.sqrt(p["k"] * (1.0 / p["J_l"] + 1.0 / (p["J_m"] * p["i"] ** 2)))
+
+
+def _check_rate(record: Record, own: float) -> None:
     """Refuse records that are too slow for the shaft's own oscillation."""
-    own = math.sqrt(p["k"] * (1.0 / p["J_l"] + 1.0 / (p["J_m"] * p["i"] ** 2)))
     if own * record.step > LONGEST_STEP:
         raise RecordError(
             f"{record.source}: column `time` must step by at most {LONGEST_STEP / own:.3g} s to show a shaft that "

@@ -221,9 +221,16 @@ def test_the_command_writes_everything(csv_file: Path, tmp_path: Path, capsys: p
     ("words", "expected"),
     [
         (["absent.csv"], "cannot be read"),
-        ([], "a record must be given"),
-        (["--design", "--torque-limit", "-3"], "`torque` must be a positive finite number"),
-        (["--design", "--duration", "0.1"], "200 to 200000 samples"),
+        ([], "`DATA.csv` must be given, unless `--design` is"),
+        (["--design", "--method", "ekf"], "`--method` must come with a record, but none is given"),
+        (["absent.csv", "--size", "0.01"], "`--size` must come with `--design`, but that is not given"),
+        (["absent.csv", "--rate", "100"], "`--rate` must come with `--design`, but that is not given"),
+        (["--design", "--size", "1e300"], "`--size` must be between 1e-05 and 0.5, but is 1e+300"),
+        (["--design", "--size", "0"], "`--size` must be between 1e-05 and 0.5, but is 0"),
+        (["--design", "--torque-limit", "-3"], "`--torque-limit` must be between 0.001 and 1e+06, but is -3"),
+        (["--design", "--speed-limit", "1e9"], "`--speed-limit` must be between 0.001 and 100000, but is 1e+09"),
+        (["--design", "--duration", "0.1"], "`--duration` times `--rate` must be 200 to 200000 samples, but is 20"),
+        (["--design", "--rate", "5", "--duration", "100"], "`--rate` must be at least 22.2 to show a shaft"),
         (["--design", "--model", "absent.toml"], "cannot be read"),
     ],
 )
@@ -236,6 +243,25 @@ def test_bad_input_ends_with_one_line(
     assert expected in error
     assert error.count("\n") == 1
     assert not out.exists()
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_computed(
+    csv_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    out.write_text("a file")
+    monkeypatch.setattr("orchestrator.commands.estimate.estimator", lambda name: pytest.fail("computed"))
+    assert main(["estimate", str(csv_file), "--out", str(out)]) == 2
+    assert "`--out` must be a writable directory" in capsys.readouterr().err
+    assert out.read_text() == "a file"
+
+
+def test_help_says_every_default(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["estimate", "--help"])
+    shown = " ".join(capsys.readouterr().out.split())
+    for default in ("maximum_likelihood", "250", "50", "10", "200", "results/estimate"):
+        assert f"(default: {default})" in shown
 
 
 def test_nonlinear_models_are_sent_to_diagnose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

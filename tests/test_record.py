@@ -98,6 +98,7 @@ def _hold(column: int, first: int, last: int):
         (_cell(700, 0, "0.005"), "row 700, column `time` must increase, but goes back"),
         (_cell(41, 2, "nan"), "row 41, column `theta_m` must be a finite number, but is nan"),
         (_cell(41, 3, "-inf"), "row 41, column `theta_l` must be a finite number, but is -inf"),
+        (_cell(41, 1, "1e308"), "row 41, column `u` must be between -1e+12 and 1e+12, but is 1e+308"),
         (_cell(9, 1, ""), "row 9, column `u` must be a number, but is empty"),
         (_cell(9, 1, "12,5"), "row 9 must have 4 fields like the header, but has 5"),
         (_cell(9, 1, "n/a"), "row 9, column `u` must be a number, but is `n/a`"),

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,73 +16,135 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orchestrator.commands._console import print_table
-from orchestrator.errors import ConvergenceError, RecordError, ScenarioError
+from orchestrator.errors import ConvergenceError, ScenarioError
 from orchestrator.estimation import cramer_rao
-from orchestrator.estimation.design import Limits, design
+from orchestrator.estimation.design import LONGEST, Limits, design
 from orchestrator.estimation.protocol import LEVEL, METHODS, Estimate, NotApplicableError, estimator
 from orchestrator.estimation.tables import write_tables
 from orchestrator.model_file import Model, read_model
 from orchestrator.output import staged, write_result
-from orchestrator.record import Record, read_record
-from orchestrator.record_plausibility import check_plausible
+from orchestrator.record import MINIMUM_ROWS, Record, read_record
+from orchestrator.record_plausibility import LONGEST_STEP, check_plausible, own_frequency
 from orchestrator.reporting import write_report
 
+
+@dataclass(frozen=True)
+class DesignOption:
+    """A number that ``--design`` takes: flag, unit, default, range and what it means."""
+
+    flag: str
+    unit: str
+    default: float
+    least: float
+    most: float
+    meaning: str
+
+
 DEFAULT_METHOD = "maximum_likelihood"
+DEFAULT_SIZE = 0.005  # rad
+SIZES = (1e-5, 0.5)  # rad, half-gaps that a record can be designed for
+DESIGN_OPTIONS = (
+    DesignOption("--torque-limit", "N.m", 250.0, 1e-3, 1e6, "largest torque to ask for"),
+    DesignOption("--speed-limit", "RAD/S", 50.0, 1e-3, 1e5, "largest speed of the motor"),
+    DesignOption("--duration", "S", 10.0, 1e-2, 1e4, "length of the proposed record"),
+    DesignOption("--rate", "HZ", 200.0, 1.0, 1e5, "its samples per second"),
+)
 UNSEEN = 1.0  # rad, bound from which on a record says nothing
 HEAD = ("method", "half-gap [rad]", "standard error", "Cramer-Rao", "95 % interval", "s")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    parser.add_argument("record", type=Path, nargs="?", metavar="DATA.csv", help="record: time,u,theta_m[,theta_l]")
-    parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the model it is compared with")
-    listed = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
     parser.add_argument(
-        "--method", choices=[*METHODS, "all"], default=DEFAULT_METHOD, help=f"{listed} (default: %(default)s)"
+        "record", type=Path, nargs="?", metavar="DATA.csv", help="measured record: time,u,theta_m[,theta_l]"
     )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        metavar="FILE.toml",
+        help="the model it is compared with (default: the thesis's values, 5 %% each)",
+    )
+    listed = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
+    parser.add_argument("--method", choices=[*METHODS, "all"], help=f"{listed} (default: {DEFAULT_METHOD})")
     parser.add_argument("--motor-only", action="store_true", help="leave the load encoder out")
     group = parser.add_argument_group("design of an experiment")
     group.add_argument("--design", action="store_true", help="propose a torque record that shows the gap best")
     group.add_argument(
-        "--size", type=float, metavar="RAD", help="half-gap to be seen (default: 0.005, or the estimate)"
+        "--size", type=float, metavar="RAD", help=f"half-gap to be seen (default: the estimate, or {DEFAULT_SIZE:g})"
     )
-    group.add_argument("--torque-limit", type=float, default=250.0, metavar="N.m", help="default: %(default)g")
-    group.add_argument("--speed-limit", type=float, default=50.0, metavar="RAD/S", help="motor speed (%(default)g)")
-    group.add_argument("--duration", type=float, default=10.0, metavar="S", help="of the proposal (%(default)g)")
-    group.add_argument("--rate", type=float, default=200.0, metavar="HZ", help="samples per second (%(default)g)")
+    for option in DESIGN_OPTIONS:
+        text = f"{option.meaning} (default: {option.default:g})"
+        group.add_argument(option.flag, type=float, metavar=option.unit, help=text)
 
 
 def run(args: argparse.Namespace) -> int:
     """Estimate or design, print tables, write JSON, CSV, figures and report."""
-    if args.record is None and not args.design:
-        raise RecordError("a record must be given, unless --design is")
+    options = _design_options(args)
     model = read_model(args.model)
     _require_linear(model)
-    results: dict[str, Any] = {}
-    estimates: list[Estimate] = []
-    record = None
-    if args.record is not None:
-        record = read_record(args.record, model.columns)
-        record = record.without_load_encoder() if args.motor_only else record
-        check_plausible(record, model)
-        names = list(METHODS) if args.method == "all" else [args.method]
-        estimates, results = _estimate(record, model, names)
+    record = None if args.record is None else _read(args, model)
+    if args.design:
+        _require_rate(options["--rate"], model)
     with staged(args.out) as directory:
+        results: dict[str, Any] = {}
+        estimates: list[Estimate] = []
         if record is not None:
+            method = args.method or DEFAULT_METHOD
+            estimates, results = _estimate(record, model, list(METHODS) if method == "all" else [method])
             _draw(directory, record, estimates, model)
         if args.design:
-            chosen = args.size
-            size = (
-                chosen
-                if chosen is not None
-                else next((e.alpha for e in estimates if e.visible and e.alpha > 0.0), 0.005)
-            )
-            results["design"] = _design(directory, args, model, size)
+            seen = next((e.alpha for e in estimates if e.visible and e.alpha > 0.0), DEFAULT_SIZE)
+            size = args.size if args.size is not None else min(max(seen, SIZES[0]), SIZES[-1])
+            results["design"] = _design(directory, options, model, size, args.motor_only)
         given = {k: str(v) if isinstance(v, Path) else v for k, v in vars(args).items() if k not in ("run", "command")}
         write_result(directory, "estimate", given, None, results)
         write_report(directory, "estimate")
     sys.stdout.write(f"Written to {args.out}\n")
     return 0
+
+
+def _design_options(args: argparse.Namespace) -> dict[str, float]:
+    """Return the value of each of ``DESIGN_OPTIONS``, by flag; refuse options that would have no effect.
+
+    Raises:
+        ScenarioError: an option is out of its range, or given where nothing reads it.
+    """
+    if args.record is None:
+        if not args.design:
+            raise ScenarioError("`DATA.csv` must be given, unless `--design` is, but neither is")
+        if args.method is not None:
+            raise ScenarioError("`--method` must come with a record, but none is given")
+    values = {"--size": (args.size, *SIZES)}
+    values |= {o.flag: (getattr(args, o.flag[2:].replace("-", "_")), o.least, o.most) for o in DESIGN_OPTIONS}
+    for flag, (value, least, most) in values.items():
+        if value is None:
+            continue
+        if not args.design:
+            raise ScenarioError(f"`{flag}` must come with `--design`, but that is not given")
+        if not least <= value <= most:
+            raise ScenarioError(f"`{flag}` must be between {least:g} and {most:g}, but is {value:g}")
+    chosen = {o.flag: o.default if values[o.flag][0] is None else values[o.flag][0] for o in DESIGN_OPTIONS}
+    rows = chosen["--duration"] * chosen["--rate"]
+    if not MINIMUM_ROWS <= round(rows) <= LONGEST:
+        raise ScenarioError(f"`--duration` times `--rate` must be {MINIMUM_ROWS} to {LONGEST} samples, but is {rows:g}")
+    return chosen
+
+
+def _require_rate(rate: float, model: Model) -> None:
+    own = own_frequency(model)
+    if rate * LONGEST_STEP < own:
+        raise ScenarioError(
+            f"`--rate` must be at least {own / LONGEST_STEP:.3g} to show a shaft that oscillates at {own:.3g} rad/s, "
+            f"but is {rate:g}"
+        )
+
+
+def _read(args: argparse.Namespace, model: Model) -> Record:
+    """Return the record, which must fit the model at all."""
+    record = read_record(args.record, model.columns)
+    record = record.without_load_encoder() if args.motor_only else record
+    check_plausible(record, model)
+    return record
 
 
 def _require_linear(model: Model) -> None:
@@ -182,16 +245,19 @@ def _draw(directory: Path, record: Record, estimates: list[Estimate], model: Mod
             write_tables(directory, record, [estimate], model.parameters["i"].value)
 
 
-def _design(directory: Path, args: argparse.Namespace, model: Model, size: float) -> list[dict[str, Any]]:
+def _design(
+    directory: Path, options: dict[str, float], model: Model, size: float, motor_only: bool
+) -> list[dict[str, Any]]:
     """Choose an excitation, print the candidates, write the record to run."""
     from orchestrator.estimation.figures import draw_design
 
-    limits = Limits(args.torque_limit, args.speed_limit)
+    limits = Limits(options["--torque-limit"], options["--speed-limit"])
+    duration, rate = options["--duration"], options["--rate"]
     with _progress(None) as advance:
-        grid, candidates = design(model, size, limits, args.duration, args.rate, lambda done, total: advance())
+        grid, candidates = design(model, size, limits, duration, rate, motor_only, lambda done, total: advance())
     rows = [[c.name, f"{c.bound:.2g}", f"{c.torque:.4g}", f"{c.speed:.4g}"] for c in candidates]
     head = ("excitation", "bound on the half-gap [rad]", "peak torque [N.m]", "peak motor speed [rad/s]")
-    print_table(f"To see a half-gap of {size:g} rad in {args.duration:g} s", head, rows)
+    print_table(f"To see a half-gap of {size:g} rad in {duration:g} s", head, rows)
     with (directory / "design.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(("time", "u"))

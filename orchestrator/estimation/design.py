@@ -16,7 +16,7 @@ from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.innovations import Array, affine_model, simulate
 from orchestrator.estimation.likelihood import make_problem
 from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.record import MINIMUM_ROWS, Record
 from pyfmu_sources.drivetrain_parameters import P_ALPHA
 
 TORQUE_NOISE = 1e-2  # N.m.s^0.5
@@ -24,6 +24,7 @@ DEFAULT_NOISE = (3.5e-4, 1.75e-4)  # rad
 PULSE_PERIODS = (0.3, 0.5, 0.8, 1.2, 2.0, 3.0)  # s
 BANDS = (1.0, 2.0, 4.0, 8.0)  # Hz
 SEED = 20
+LONGEST = 200_000  # samples
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ def design(
     limits: Limits,
     duration: float = 10.0,
     rate: float = 200.0,
+    motor_only: bool = False,
     tell: Callable[[int, int], None] | None = None,
 ) -> tuple[Array, list[Candidate]]:
     """Return the time grid (n,) [s] and all candidates, the best first.
@@ -61,6 +63,7 @@ def design(
         limits: of torque and speed.
         duration: of the record [s].
         rate: samples per second.
+        motor_only: whether there is no load encoder.
         tell: called with candidates done and in all.
 
     Raises:
@@ -70,14 +73,15 @@ def design(
         if not (math.isfinite(value) and value > 0.0):
             raise DesignError(f"`{name}` must be a positive finite number, but is {value:g}")
     n = round(duration * rate)
-    if not 200 <= n <= 200_000:
-        raise DesignError(f"`duration` times `rate` must be 200 to 200000 samples, but is {duration * rate:g}")
+    if not MINIMUM_ROWS <= n <= LONGEST:
+        must = f"{MINIMUM_ROWS} to {LONGEST} samples"
+        raise DesignError(f"`duration` times `rate` must be {must}, but is {duration * rate:g}")
     time = np.arange(n) / rate
     shapes = [(f"square pulses, period {period:g} s", _pulses(time, period)) for period in PULSE_PERIODS]
     shapes += [(f"multisine to {top:g} Hz", _multisine(time, top)) for top in BANDS]
     candidates = []
     for k, (name, shape) in enumerate(shapes):
-        candidates.append(_judge(name, shape, time, model, alpha, limits))
+        candidates.append(_judge(name, shape, time, model, alpha, limits, motor_only))
         if tell is not None:
             tell(k + 1, len(shapes))
     return time, sorted(candidates, key=lambda candidate: candidate.bound)
@@ -98,7 +102,9 @@ def _multisine(time: Array, top: float) -> Array:
     return np.asarray(wave / np.max(np.abs(wave)))
 
 
-def _judge(name: str, shape: Array, time: Array, model: Model, alpha: float, limits: Limits) -> Candidate:
+def _judge(
+    name: str, shape: Array, time: Array, model: Model, alpha: float, limits: Limits, motor_only: bool
+) -> Candidate:
     values = list(model.values)
     values[P_ALPHA] = alpha
     plant = affine_model(tuple(values))
@@ -112,7 +118,7 @@ def _judge(name: str, shape: Array, time: Array, model: Model, alpha: float, lim
         scale *= 0.98 * limits.speed / fastest
         states = simulate(plant, scale * shape, step, np.zeros(5))
     u = np.round(scale * shape, 4)
-    record = Record(time, u, states[:, 0].copy(), states[:, 2].copy(), name)
+    record = Record(time, u, states[:, 0].copy(), None if motor_only else states[:, 2].copy(), name)
     noise = tuple(_noise(model, column, k) for k, column in enumerate(("theta_m", "theta_l")))
     truth = cramer_rao.truth_values({}, alpha, np.zeros(5))
     bound = cramer_rao.bound(make_problem(record, model), truth, (noise[0], noise[1]), TORQUE_NOISE)
