@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.bench import alone
 from orchestrator.bench.job import Job, read_job
 from orchestrator.bench.measure import compare
 from orchestrator.bench.of_scenario import job_of
 from orchestrator.bench.reference import SCHEMES, reference_ends
 from orchestrator.cli import main
 from orchestrator.fmi.build import ensure_built
+from orchestrator.master import session
 from orchestrator.paired.experiment import Experiment
 from orchestrator.ssp.pair import paired_scenario
 
@@ -66,3 +68,15 @@ def test_deviation_shows_another_order_of_exchange(job) -> None:
     """What ends where Gauss-Seidel ends did not run side by side: the check tells schemes apart."""
     ends = {scheme: reference_ends(job, scheme)["plant.theta_l"] for scheme in SCHEMES}
     assert len({round(end, 6) for end in ends.values()}) == len(SCHEMES)
+
+
+def test_growth_is_measured(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(alone, "CASE_STEPS", 10)
+    monkeypatch.setattr(alone, "RECORD_STEPS", 2000)
+    monkeypatch.setattr(session, "COMPILED_FROM", session.COMPILED_FROM)
+    found = []
+    for what, count in (("sweep", 4), ("record", 3)):
+        assert alone.main([what, str(count), str(tmp_path / "point.json")]) == 0
+        found.append(json.loads((tmp_path / "point.json").read_text()))
+    assert alone.SweepCost(**found[0]).per_case > 0.0
+    assert alone.RecordCost(**found[1]).expected == pytest.approx(4 * 8 * 2001 / 2**20)

@@ -1,4 +1,7 @@
-"""Cost of our master against the number of FMUs and of steps: it should be flat per FMU and step."""
+"""Cost of our master against the number of FMUs and of steps: it should be flat per FMU and step.
+
+What is measured in a process of its own is in ``alone``.
+"""
 
 import time
 from collections.abc import Callable, Sequence

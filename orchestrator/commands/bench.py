@@ -5,10 +5,12 @@ import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
+from typing import Any
 
+from orchestrator.bench.alone import CASE_STEPS, RECORD_STEPS, RecordCost, SweepCost, growth
 from orchestrator.bench.measure import Row, compare
 from orchestrator.bench.of_scenario import job_of
-from orchestrator.bench.scaling import scaling
+from orchestrator.bench.scaling import Cost, scaling
 from orchestrator.bench.tools import TOOLS
 from orchestrator.commands._console import print_table
 from orchestrator.errors import ScenarioError
@@ -36,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="TOOL=PATH",
         help="run this tool with another interpreter, since some cannot share an environment; may be repeated",
     )
-    parser.add_argument("--scaling", action="store_true", help="also cost against number of FMUs and of steps")
+    parser.add_argument("--scaling", action="store_true", help="also cost against FMUs, steps, cases; memory")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -56,11 +58,13 @@ def run(arguments: argparse.Namespace) -> int:
         title = f"{len(job.fmus)} FMUs, {job.steps} steps of {job.step:g} s, medians of {3 * arguments.rounds} runs"
         head = ("tool", "version", "scheme", *NUMBERS, "note")
         print_table(title, head, [_cells(row, base, job.steps) for row in rows])
-        costs = scaling(fmus["Drivetrain"], progress=_say) if arguments.scaling else []
-        if costs:
-            cells = [[str(c.fmus), f"{c.steps:,}", f"{c.microseconds:.2f}"] for c in costs]
-            print_table("cost of this master", ("FMUs", "steps", "us per FMU and step"), cells)
-        results = {"rows": [asdict(row) for row in rows], "scaling": [asdict(c) for c in costs]}
+        results: dict[str, Any] = {"rows": [asdict(row) for row in rows], "scaling": [], "sweeps": [], "records": []}
+        if arguments.scaling:
+            costs = scaling(fmus["Drivetrain"], progress=_say)
+            sweeps, records = growth(_say)
+            _print_scaling(costs, sweeps, records)
+            results["scaling"] = [asdict(c) for c in costs]
+            results |= {"sweeps": [asdict(s) for s in sweeps], "records": [asdict(r) for r in records]}
         write_result(directory, "bench", {"rounds": arguments.rounds, "tools": tools}, None, results)
         write_report(directory, "bench")
     sys.stdout.write(f"Ratios: {base.title if base else 'nothing'} over the row's tool. Written to {arguments.out}\n")
@@ -70,6 +74,16 @@ def run(arguments: argparse.Namespace) -> int:
 def _say(text: str) -> None:
     if sys.stderr.isatty():
         sys.stderr.write(f"\r\x1b[K{text}")
+
+
+def _print_scaling(costs: Sequence[Cost], sweeps: Sequence[SweepCost], records: Sequence[RecordCost]) -> None:
+    cells = [[str(c.fmus), f"{c.steps:,}", f"{c.microseconds:.2f}"] for c in costs]
+    print_table("cost of this master", ("FMUs", "steps", "us per FMU and step"), cells)
+    title = f"sweeps of six FMUs, {CASE_STEPS} steps a case, one worker"
+    cells = [[f"{s.cases:,}", f"{s.total:.1f}", f"{1e3 * s.per_case:.2f}", f"{s.peak:.0f}"] for s in sweeps]
+    print_table(title, ("cases", "in all [s]", "one more case [ms]", "peak memory [MiB]"), cells)
+    cells = [[str(r.signals), f"{r.growth:.1f}", f"{r.expected:.1f}"] for r in records]
+    print_table(f"memory of {RECORD_STEPS:,} steps", ("recorded signals", "added [MiB]", "8 bytes each [MiB]"), cells)
 
 
 def _interpreters(words: Sequence[str]) -> dict[str, str]:

@@ -20,6 +20,7 @@ def build(source: Source) -> Report:
         series = Series("wall time", list(range(len(measured))), wall, "bars")
         sections.append(Plot("Wall time of one run", "tool", "time [ms]", (series,), categories=names))
     sections += _scaling(list(source.results.get("scaling") or []))
+    sections += _growth(list(source.results.get("sweeps") or []), list(source.results.get("records") or []))
     return Report(
         title="Benchmark",
         summary=_summary(rows, measured),
@@ -92,3 +93,14 @@ def _scaling(costs: Sequence[Json]) -> list[Section]:
         Plot("Cost per FMU and step", "steps", "cost [µs]", series, log_x=True),
         table_of("Cost of our master", [{words(k): v for k, v in c.items()} for c in costs], units=units),
     ]
+
+
+def _growth(sweeps: Sequence[Json], records: Sequence[Json]) -> list[Section]:
+    sections: list[Section] = []
+    if sweeps:
+        units = {"total": "s", "per_case": "s", "peak": "MiB"}
+        sections.append(table_of("Sweeps", sweeps, units=units))
+    if records:
+        units = {"growth": "MiB", "expected": "MiB"}
+        sections.append(table_of("Memory of records", records, units=units))
+    return sections
