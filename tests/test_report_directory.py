@@ -14,7 +14,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.output import write_result
 from orchestrator.paired.metric import ErrorStatistics
 from orchestrator.paired.sweep import COLUMNS
-from orchestrator.reporting import Findings, Plot, Table, report_from_directory, write_report
+from orchestrator.reporting import Bars, Facts, Findings, Picture, Plot, Table, report_from_directory, write_report
 from orchestrator.reporting.directory import COMMANDS
 
 SWEEP = """case,noise,repetition,alpha,status,S,estimate,lower,upper,error,error_percent,message
@@ -187,13 +187,13 @@ def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
     effect = {
         "name": "coulomb_friction",
         "site": "motor",
-        "parameters": {"torque": estimate(1.5)},
+        "parameters": {"torque": estimate(1.5) | {"interval": [1.4, 1.6]}},
         "score": 120.0,
         "runner_up": "stribeck_friction (motor)",
         "margin": 15.0,
         "family": ["coulomb_friction", "stribeck_friction"],
     }
-    stages = [{"model": "nominal", "rms": 0.1}, {"model": "+ coulomb_friction", "rms": 0.001}]
+    stages = [{"model": "nominal", "rms": 0.1}, {"model": "+ coulomb_friction@motor", "rms": 0.001}]
     results = {
         "verdict": "effects",
         "effects": [effect],
@@ -205,20 +205,39 @@ def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
         "gap": {"theta_m": {"before": 0.1, "after": 0.001, "noise": 0.0009, "unit": "rad", "stages": stages}},
         "model": "Corrected.fmu",
         "warnings": ["the record is short"],
+        "validation": {"theta_m": {"before": 0.1, "after": 0.01, "noise": 0.0009, "unit": "rad"}},
+        "remainder": {
+            "explained": 0.95,
+            "predictable": [{"site": "shaft", "kind": "speed", "gain": 12.0, "share": 0.02}],
+        },
         "candidates": [
             {"on_top_of": [], "accepted": True, "tried": [{"effect": "delay", "gain": -1.0, "decided": 0.0}]}
         ],
     }
     write_result(tmp_path, "diagnose", {"data": "record.csv"}, None, results)
+    (tmp_path / "diagnose_missing_torque.png").write_bytes(b"png")
     (tmp_path / "diagnose.csv").write_text("time,theta_m,theta_m_before,theta_m_after\n0,0,0,0\n1,1,1.1,1.001\n")
     report = report_from_directory(tmp_path)
-    assert "The record shows coulomb friction (motor)." in report.summary
-    assert "theta_m from 0.1 to 0.001 rad" in report.summary
+    assert "The model lacks Coulomb friction at the motor." in report.summary
+    assert "of the motor angle falls from 0.1 to 0.001 rad (noise: 0.0009)" in report.summary
+    (left,) = sections(report, Facts)
+    assert left.items[0][1] == "95 %"
     tables = {t.title: t for t in sections(report, Table)}
-    assert tables["Missing effects"].rows[0][2] == "torque 1.5 ± 0.015 N.m"
+    lacking = tables["What the model lacks"].rows
+    assert lacking == (("Coulomb friction at the motor", "torque", "1.5 N.m (95 %: 1.4 to 1.6)"),)
+    assert tables["Why these effects"].rows[0][-1] == "stribeck friction"
+    assert tables["Gap on the other record"].rows[0][-1] == pytest.approx(10.0)
+    assert tables["What the rest follows"].rows == (("shaft", "speed", 12.0, 2.0),)
     assert tables["Parameters"].rows[0][4] == pytest.approx(5.0)
     plots = {p.title: p for p in sections(report, Plot)}
-    assert plots["Gap of each model in turn"].categories == ("nominal", "+ coulomb_friction")
+    (bars,) = sections(report, Bars)
+    assert [(b.name, b.length) for b in bars.items] == [
+        ("model as given", 1.0),
+        ("and Coulomb friction at the motor", pytest.approx(0.01)),
+    ]
+    assert bars.items[1].text == "1.11 times noise"
+    assert [p.path.name for p in sections(report, Picture)] == ["diagnose_missing_torque.png"]
+    assert "data:image/png;base64,cG5n" in write_report(tmp_path).read_text()
     assert [s.name for s in plots["Motor angle"].series] == ["measured", "before", "after"]
     before, after = plots["Motor angle: simulated minus measured"].series
     assert before.y == [0.0, pytest.approx(0.1)]

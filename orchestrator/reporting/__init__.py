@@ -2,10 +2,13 @@
 
 from orchestrator.reporting.directory import report_from_directory, write_report
 from orchestrator.reporting.model import (
+    Bar,
+    Bars,
     Column,
     Facts,
     Finding,
     Findings,
+    Picture,
     Plot,
     Report,
     Series,
@@ -16,10 +19,13 @@ from orchestrator.reporting.model import (
 from orchestrator.reporting.page import render
 
 __all__ = [
+    "Bar",
+    "Bars",
     "Column",
     "Facts",
     "Finding",
     "Findings",
+    "Picture",
     "Plot",
     "Report",
     "Series",

@@ -123,7 +123,34 @@ class Findings:
     empty: str = "Nothing was found."
 
 
-Section = Text | Facts | Table | Plot | Findings
+@dataclass(frozen=True)
+class Bar:
+    """One bar: its ``length`` as a fraction of the longest possible, and ``text`` that says how much it is."""
+
+    name: str
+    length: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Bars below each other, such as one quantity from model to model."""
+
+    title: str
+    items: tuple[Bar, ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture that a command has drawn; it becomes part of the page."""
+
+    title: str
+    path: Path
+    note: str = ""
+
+
+Section = Text | Facts | Table | Plot | Findings | Bars | Picture
 
 
 @dataclass(frozen=True)

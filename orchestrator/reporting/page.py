@@ -13,10 +13,12 @@ from markupsafe import Markup
 
 from orchestrator.reporting.model import (
     POINT_LIMIT,
+    Bars,
     Cell,
     Facts,
     Findings,
     Numbers,
+    Picture,
     Plot,
     Report,
     Section,
@@ -29,14 +31,22 @@ from orchestrator.reporting.numbers import in_words, thinned
 EMBED_LIMIT = 1_000_000
 LONG_TEXT = 40
 SCRIPTS = ("scale.js", "svg.js", "plot.js", "page.js")
-_KINDS = {Text: "text", Facts: "facts", Table: "table", Plot: "plot", Findings: "findings"}
+_KINDS = {
+    Text: "text",
+    Facts: "facts",
+    Table: "table",
+    Plot: "plot",
+    Findings: "findings",
+    Bars: "bars",
+    Picture: "picture",
+}
 
 
 def render(report: Report) -> str:
     """Return the page. It depends on the report and the files named in ``downloads`` only, never on the date.
 
     Raises:
-        OSError: a file of ``downloads`` cannot be read.
+        OSError: a file of ``downloads``, or a picture, cannot be read.
     """
     return (
         _environment()
@@ -64,6 +74,7 @@ def _environment() -> jinja2.Environment:
         "plot_data": _plot_data,
         "sort_key": _sort_key,
         "cell_class": _cell_class,
+        "embedded": _embedded,
     }
     environment.globals["kind"] = _kind
     return environment
@@ -127,5 +138,10 @@ def _download(path: Path) -> dict[str, str]:
     size = f"{len(content) / 1000:.1f} kB" if len(content) < 1_000_000 else f"{len(content) / 1e6:.1f} MB"
     if len(content) > EMBED_LIMIT:
         return {"name": path.name, "size": f"{size}, beside this page", "href": path.name}
+    return {"name": path.name, "size": size, "href": _embedded(path)}
+
+
+def _embedded(path: Path) -> str:
+    """Return a file as an address that holds all of it."""
     kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
-    return {"name": path.name, "size": size, "href": f"data:{kind};base64,{base64.b64encode(content).decode()}"}
+    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"

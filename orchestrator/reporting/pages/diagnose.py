@@ -1,25 +1,42 @@
-"""The page of ``diagnose``: what is missing in the model, where, and how much of the gap the corrected model closes."""
+"""The page of ``diagnose``: what the model lacks, how far the gap shrinks, where, and what is left."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from orchestrator.reporting.model import Badge, Cell, Column, Plot, Report, Section, Series, Table, Text
+from orchestrator.reporting.model import (
+    Badge,
+    Bar,
+    Bars,
+    Cell,
+    Column,
+    Facts,
+    Picture,
+    Report,
+    Section,
+    Table,
+    Text,
+)
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import Source, words
 
 Json = Mapping[str, Any]
-OWN = frozenset({"verdict", "effects", "parameters", "where", "gap", "model", "suspects", "warnings", "candidates"})
+PLACED = "verdict effects parameters where gap model suspects warnings candidates validation remainder cosimulation"
+SHOWN_ELSEWHERE = frozenset((*PLACED.split(), "seconds"))
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "none": ("good", "nothing is missing", "The model explains the record to its noise."),
     "parameters": (
-        "neutral",
-        "other parameter values",
+        "good",
+        "nothing is missing; some values are off",
         "The model explains the record once its parameters are re-fitted.",
     ),
     "effects": ("neutral", "effects are missing", ""),
     "unknown": ("bad", "unexplained", "A gap is left that nothing in the library explains."),
 }
+SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the actuator"}
+SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
+STAGES = {"nominal": "model as given", "parameters": "with re-fitted parameters"}
+HELD_OUT = "Root mean square of simulated minus measured, on the part of the record that no fit has seen."
 
 
 def build(source: Source) -> Report:
@@ -27,93 +44,126 @@ def build(source: Source) -> Report:
     results = source.results
     badge, label, sentence = VERDICTS[results["verdict"]]
     effects: list[Json] = list(results.get("effects") or [])
+    suspects: list[Json] = list(results.get("suspects") or [])
     gap: Json = results.get("gap") or {}
     sections: list[Section] = []
-    if results.get("warnings"):
-        sections.append(Text("Warnings", tuple(str(w) for w in results["warnings"])))
     if effects:
-        sections.append(_effects("Missing effects", effects))
-    if results.get("suspects"):
-        sections.append(_effects("Suspects", list(results["suspects"])))
-    sections += _gap(gap)
+        sections.append(_lacking(effects))
+    if results.get("warnings"):
+        sections.append(Text("Take note", tuple(_sentence(str(w)) for w in results["warnings"])))
+    sections += [*_shrinking(gap), *_gap_table("Gap before and after", gap, HELD_OUT)]
+    note = "Root mean square of simulated minus measured, over the whole of the other record."
+    sections += _gap_table("Gap on the other record", results.get("validation") or {}, note)
+    sections += _missing_torque(source)
     sections += record_plots(source, "diagnose.csv")
     sections += _where(list(results.get("where") or []))
+    sections += [_evidence("Why these effects", effects)] if effects else []
+    sections += [_evidence("What came nearest, too little to be named", suspects)] if suspects else []
     sections.append(_parameters(results.get("parameters") or {}))
-    sections += _candidates(list(results.get("candidates") or []))
-    rest = {name: value for name, value in results.items() if name not in OWN}
-    sections += sections_of("Further results", rest)
+    sections += [*_candidates(list(results.get("candidates") or [])), *_remainder(results)]
+    sections += sections_of("More", {n: v for n, v in results.items() if n not in SHOWN_ELSEWHERE})
     return Report(
         title="Diagnosis",
         summary=" ".join(filter(None, [sentence, _found(effects), _closed(gap)])),
         badge=(badge, label),
         sections=tuple(sections),
-        origin=(*source.origin(), *((("corrected model", results["model"]),) if results.get("model") else ())),
+        origin=(*source.origin(), *_made(results)),
         downloads=source.downloads(),
     )
 
 
+def _made(results: Json) -> list[tuple[str, Cell]]:
+    names = {"model": "corrected model", "seconds": "time taken [s]"}
+    return [(name, results[key]) for key, name in names.items() if results.get(key) is not None]
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def _place(effect: Json) -> str:
+    name = words(effect["name"]).replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
+    return f"{name} {SITES.get(effect['site'], effect['site'])}"
+
+
 def _found(effects: Sequence[Json]) -> str:
-    if not effects:
-        return ""
-    named = [f"{words(e['name'])} ({e['site']})" for e in effects]
-    return f"The record shows {', '.join(named)}."
+    named = [_place(e) for e in effects]
+    listed = " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]]))
+    return f"The model lacks {listed}." if named else ""
 
 
 def _closed(gap: Json) -> str:
-    parts = [
-        f"{signal} from {g['before']:.3g} to {g['after']:.3g} {g['unit']}"
-        for signal, g in gap.items()
-        if g.get("before") is not None and g.get("after") is not None
-    ]
-    return f"On held-out data the rms gap falls: {'; '.join(parts)}." if parts else ""
+    parts = []
+    for signal, g in gap.items():
+        before, after = g.get("before"), g.get("after")
+        if before is None or after is None:
+            continue
+        way = "falls" if after < before else "goes"
+        noise = f" (noise: {g['noise']:.3g})" if g.get("noise") is not None else ""
+        parts.append(f"of the {SIGNALS.get(signal, signal)} {way} from {before:.3g} to {after:.3g} {g['unit']}{noise}")
+    return f"On data that no fit has seen, the rms gap {'; that '.join(parts)}." if parts else ""
 
 
-def _effects(title: str, effects: Sequence[Json]) -> Table:
-    columns = ("effect", "site", "parameters", "score", "runner-up", "margin", "cannot be told from")
-    rows = tuple(
-        (
-            words(e["name"]),
-            e["site"],
-            "; ".join(_quantity(name, p) for name, p in e["parameters"].items()),
-            e.get("score"),
-            e.get("runner_up"),
-            e.get("margin"),
-            ", ".join(e.get("family") or ()) or None,
-        )
-        for e in effects
-    )
-    shown = [i for i in range(len(columns)) if i < 6 or any(row[i] for row in rows)]
-    note = "Score: the gain in log-likelihood when the effect was added. Margin: how much less the runner-up gained."
-    return Table(
-        title, tuple(Column(columns[i]) for i in shown), tuple(tuple(row[i] for i in shown) for row in rows), note
-    )
+def _lacking(effects: Sequence[Json]) -> Table:
+    rows = tuple((_place(e), words(name), _quantity(p)) for e in effects for name, p in e["parameters"].items())
+    return Table("What the model lacks", (Column("effect"), Column("quantity"), Column("value")), rows)
 
 
-def _quantity(name: str, p: Json) -> str:
+def _quantity(p: Json) -> str:
     if p.get("value") is None:
-        return f"{name} unknown"
-    error = f" ± {p['standard_error']:.2g}" if p.get("standard_error") is not None else ""
+        return "unknown"
     unit = "" if p.get("unit") in (None, "1") else f" {p['unit']}"
-    return f"{name} {p['value']:.5g}{error}{unit}"
+    low, high = p.get("interval") or (None, None)
+    if low is not None and high is not None:
+        return f"{p['value']:.5g}{unit} (95 %: {low:.5g} to {high:.5g})"
+    error = f" ± {p['standard_error']:.2g}" if p.get("standard_error") is not None else ""
+    return f"{p['value']:.5g}{error}{unit}"
 
 
-def _gap(gap: Json) -> list[Section]:
+def _shrinking(gap: Json) -> list[Section]:
+    """Return bars of the gap from model to model, as multiples of the noise."""
+    made: list[Section] = []
+    for signal, g in gap.items():
+        stages, noise = list(g.get("stages") or []), g.get("noise")
+        if not stages or not noise:
+            continue
+        largest = max(stage["rms"] for stage in stages)
+        items = tuple(
+            Bar(_stage(s["model"]), s["rms"] / largest if largest > 0.0 else 0.0, f"{s['rms'] / noise:.3g} times noise")
+            for s in stages
+        )
+        made.append(Bars(f"Gap of the {SIGNALS.get(signal, signal)}, from model to model", items))
+    return made
+
+
+def _stage(model: str) -> str:
+    if not model.startswith("+ "):
+        return STAGES.get(model, model)
+    name, _, site = model.removeprefix("+ ").partition("@")
+    return f"and {_place({'name': name, 'site': site})}".rstrip()
+
+
+def _gap_table(title: str, gap: Json, note: str) -> list[Section]:
     if not gap:
         return []
-    columns = (Column("signal"), Column("before"), Column("after"), Column("noise"), Column("unit"))
-    rows = tuple((s, g.get("before"), g.get("after"), g.get("noise"), g.get("unit")) for s, g in gap.items())
-    note = "Root mean square of simulated minus measured on the part of the record that no fit has seen."
-    made: list[Section] = [Table("Gap before and after", columns, rows, note)]
-    stages = {s: list(g.get("stages") or []) for s, g in gap.items()}
-    names = [stage["model"] for stage in next(iter(stages.values()))]
-    if names:
-        series = tuple(
-            Series(f"{s} [{gap[s]['unit']}]", list(range(len(found))), [stage["rms"] for stage in found], "points")
-            for s, found in stages.items()
-        )
-        title = "Gap of each model in turn"
-        made.append(Plot(title, "model", "rms gap", series, log_y=True, categories=tuple(names)))
-    return made
+    columns = tuple(Column(n) for n in ("signal", "before", "after", "noise", "unit", "times smaller"))
+    rows = tuple(
+        (s, *(g.get(n) for n in ("before", "after", "noise", "unit")), _quotient(g.get("before"), g.get("after")))
+        for s, g in gap.items()
+    )
+    return [Table(title, columns, rows, note)]
+
+
+def _quotient(before: float | None, after: float | None) -> float | None:
+    return before / after if before is not None and after else None
+
+
+def _missing_torque(source: Source) -> list[Section]:
+    path = source.directory / "diagnose_missing_torque.png"
+    if not path.is_file():
+        return []
+    note = "For each effect: the torque that the model misses without it, and the law that was fitted."
+    return [Picture("Missing torque", path, note)]
 
 
 def _where(places: Sequence[Json]) -> list[Section]:
@@ -124,13 +174,7 @@ def _where(places: Sequence[Json]) -> list[Section]:
         (p["signal"], p["regime"], *_interval(p.get("interval")), p.get("unit"), 100.0 * p["share_of_gap"])
         for p in places
     )
-    labels = tuple(f"{p['signal'].removeprefix('torque of the ')}: {p['regime']}" for p in places)
-    share: list[float | None] = [100.0 * float(p["share_of_gap"]) for p in places]
-    series = Series("share of the gap", list(range(len(places))), share, "bars")
-    return [
-        Table("Where model and record disagree", tuple(Column(n) for n in names), rows),
-        Plot("Share of the gap", "place", "share [%]", (series,), categories=labels),
-    ]
+    return [Table("Where model and record disagree", tuple(Column(n) for n in names), rows)]
 
 
 def _interval(interval: Any) -> tuple[Cell, Cell]:
@@ -139,13 +183,23 @@ def _interval(interval: Any) -> tuple[Cell, Cell]:
     return interval, None
 
 
+def _evidence(title: str, effects: Sequence[Json]) -> Table:
+    columns = ("effect", "gain in log-likelihood", "runner-up", "which gains less by", "cannot be told from")
+    rows = []
+    for e in effects:
+        family = ", ".join(words(name) for name in e.get("family") or () if name != e["name"])
+        rows.append((_place(e), e.get("score"), e.get("runner_up"), e.get("margin"), family or None))
+    shown = [i for i in range(len(columns)) if i < 4 or any(row[i] for row in rows)]
+    return Table(title, tuple(Column(columns[i]) for i in shown), tuple(tuple(row[i] for i in shown) for row in rows))
+
+
 def _parameters(parameters: Json) -> Table:
     columns = ("parameter", "nominal", "value", "standard error", "change [%]", "unit")
     rows = tuple(
         (name, p.get("nominal"), p.get("value"), p.get("standard_error"), _change(p), p.get("unit"))
         for name, p in parameters.items()
     )
-    return Table("Parameters", tuple(Column(c, "", 6) for c in columns), rows)
+    return Table("Parameters", tuple(Column(c, "", 3 if c in columns[3:5] else 6) for c in columns), rows)
 
 
 def _change(p: Json) -> float | None:
@@ -156,15 +210,30 @@ def _change(p: Json) -> float | None:
 def _candidates(steps: Sequence[Json]) -> list[Section]:
     rows: list[tuple[Cell, ...]] = []
     for number, step in enumerate(steps, start=1):
-        base = ", ".join(step.get("on_top_of") or ()) or "the model as given"
+        base = ", ".join(step.get("on_top_of") or ()) or "re-fitted parameters"
         rows += [(number, base, t.get("effect"), t.get("gain"), t.get("decided")) for t in step.get("tried") or ()]
     if not rows:
         return []
-    columns = (
-        Column("step"),
-        Column("on top of"),
-        Column("tried"),
-        Column("gain in log-likelihood"),
-        Column("gain on data that decide"),
-    )
-    return [Table("What was tried", columns, tuple(rows), limit=200)]
+    columns = ("step", "on top of", "tried", "gain in log-likelihood", "gain on data that decide")
+    return [Table("What was tried", tuple(Column(c) for c in columns), tuple(rows), limit=200)]
+
+
+def _remainder(results: Json) -> list[Section]:
+    """Return what the final model leaves, and of which kind it is."""
+    remainder: Json = results.get("remainder") or {}
+    facts: list[tuple[str, Cell]] = []
+    if remainder.get("explained") is not None:
+        facts.append(("explained of what re-fitted parameters leave", f"{100.0 * remainder['explained']:.3g} %"))
+    if remainder.get("growth") is not None:
+        facts.append(("innovations on held-out data over those on fitted data", remainder["growth"]))
+    difference = (results.get("cosimulation") or {}).get("largest_difference_from_compiled")
+    if difference is not None:
+        unit = results["cosimulation"].get("unit", "")
+        facts.append(("corrected FMU against the compiled equations", f"{difference:.2g} {unit}".strip()))
+    made: list[Section] = [Facts("What is left", tuple(facts))] if facts else []
+    follows = list(remainder.get("predictable") or [])
+    if follows:
+        columns = (Column("site"), Column("follows"), Column("gain in log-likelihood"), Column("share of the rest [%]"))
+        rows = tuple((p["site"], p["kind"], p["gain"], 100.0 * p["share"]) for p in follows)
+        made.append(Table("What the rest follows", columns, rows))
+    return made

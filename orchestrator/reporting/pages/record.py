@@ -14,6 +14,7 @@ SIGNALS = {
     "u": ("Requested torque", "N.m"),
     "T_m": ("Motor torque", "N.m"),
 }
+GIVEN = {"u": "requested"}  # what is not measured
 MOST_SPANS = 1000
 Table = Mapping[str, list[Cell]]
 Numbers = Sequence[float | None]
@@ -22,7 +23,7 @@ Numbers = Sequence[float | None]
 def record_plots(source: Source, name: str) -> list[Section]:
     """Return plots against ``time`` of a file with measured columns (``theta_m``) and simulated (``theta_m_after``).
 
-    For each signal with simulated columns there is a second plot of simulated minus measured. Empty where there is no
+    For each signal with simulated columns a plot of simulated minus measured comes first. Empty where there is no
     such file, or no column ``time``.
     """
     table = source.columns(name)
@@ -36,13 +37,13 @@ def _plots(table: Table) -> Iterator[Plot]:
     for signal, (title, unit) in SIGNALS.items():
         simulated = {_words(c, signal): numbers(v) for c, v in table.items() if c.startswith(f"{signal}_")}
         measured = numbers(table[signal]) if signal in table else None
-        found = ({"measured": measured} if measured is not None else {}) | simulated
-        if found:
-            curves = tuple(Series(name, time, values) for name, values in found.items())
-            yield Plot(title, "time [s]", f"{signal} [{unit}]", curves, spans, note=note)
+        found = ({GIVEN.get(signal, "measured"): measured} if measured is not None else {}) | simulated
         if measured is not None and simulated:
             gaps = tuple(Series(name, time, _difference(values, measured)) for name, values in simulated.items())
             yield Plot(f"{title}: simulated minus measured", "time [s]", f"difference [{unit}]", gaps)
+        if found:
+            curves = tuple(Series(name, time, values) for name, values in found.items())
+            yield Plot(title, "time [s]", f"{signal} [{unit}]", curves, spans, note=note)
 
 
 def _words(column: str, signal: str) -> str:
