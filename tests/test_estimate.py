@@ -13,8 +13,9 @@ from orchestrator.estimation import cramer_rao, ekf
 from orchestrator.estimation.design import Limits, design
 from orchestrator.estimation.innovations import NoiseLevels, affine_model, innovations, simulate
 from orchestrator.estimation.likelihood import Likelihood, make_problem
+from orchestrator.estimation.paired_sum import twin
 from orchestrator.estimation.protocol import METHODS, NotApplicableError, estimator
-from orchestrator.model_file import default_model
+from orchestrator.model_file import default_model, read_model
 from orchestrator.record import Record, record_from_columns
 from pyfmu_sources.drivetrain_parameters import DEFAULTS, with_values
 from tests.support.independent_plant import make_record, write_csv
@@ -151,6 +152,17 @@ def test_the_paired_sum_needs_an_exact_twin() -> None:
     assert estimator("paired_sum")(exact, MODEL).alpha == pytest.approx(0.05, rel=0.05)
     real, _ = _record(0.005, 37, 20.0)
     assert abs(estimator("paired_sum")(real, MODEL).alpha / 0.005 - 1.0) > 0.5
+
+
+def test_the_twin_is_the_fmu(tmp_path: Path) -> None:
+    record, _ = _record(0.02, 41, 4.0)
+    file = tmp_path / "model.toml"
+    file.write_text('[parameters]\nJ_l.value = 5.0\nalpha.value = 0.01\n"effects.load_torque.torque".value = 3.0\n')
+    model = read_model(file)
+    angle = twin(record, model, {"theta_m_start": 0.04, "theta_l_start": 0.01})
+    plant = affine_model(with_values(model.values, {"alpha": 0.0}))
+    expected = simulate(plant, record.u, record.step, np.array([0.04, 0.0, 0.01, 0.0, 0.0]))
+    np.testing.assert_allclose(angle, expected[:, 2], atol=1e-9)
 
 
 @pytest.mark.parametrize("method", ["paired_sum", "speed_difference", "torque_pulse", "operating_data"])

@@ -1,20 +1,28 @@
 """The thesis's method on a measured record: the sum of differences to a twin without backlash.
 
-The twin is the nominal plant fed with the record's torque. S = mean |theta_l(record) - theta_l(twin)|; the map from S
-to alpha comes from the same twin with known gaps. It has no way to tell a gap from any other difference between the
-machine and the twin, so on a real machine it is far off: it is here for comparison.
+The twin is the ``Drivetrain`` FMU with the nominal values and no gap, run by the master algorithm and fed with the
+record's torque. S = mean |theta_l(record) - theta_l(twin)|; the map from S to alpha comes from the same plant with
+known gaps (compiled). The method has no way to tell a gap from any other difference between the machine and the twin,
+so on a real machine it is far off: it is here for comparison.
 """
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from orchestrator.estimation.innovations import affine_model, simulate
+from orchestrator.estimation.innovations import Array, affine_model, simulate
 from orchestrator.estimation.likelihood import measurement_noise
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
+from orchestrator.fmi.build import ensure_built
+from orchestrator.fmi.slave import fmu_instance
+from orchestrator.master.algorithms import GaussSeidel
+from orchestrator.master.session import Session
+from orchestrator.master.signals import Samples
+from orchestrator.master.system import Source, System
 from orchestrator.model_file import Model
 from orchestrator.record import Record
-from pyfmu_sources.drivetrain_parameters import P_ALPHA
+from pyfmu_sources.drivetrain_parameters import P_ALPHA, PARAMETERS
 
 SIZES = (0.0, *(3e-4 * 1.25**n for n in range(34)))  # to half a radian
 
@@ -27,15 +35,17 @@ def estimate(record: Record, model: Model) -> Estimate:
     """
     if record.theta_l is None:
         raise NotApplicableError("this method needs the load's angle `theta_l`")
+    start = {"theta_m_start": float(record.theta_m[0]), "theta_l_start": float(record.theta_l[0])}
+    without = twin(record, model, start)
     x0 = np.array([record.theta_m[0], 0.0, record.theta_l[0], 0.0, 0.0])
-    runs = []
-    for alpha in SIZES:
+    runs = [without]
+    for alpha in SIZES[1:]:
         p = list(model.values)
         p[P_ALPHA] = alpha
         runs.append(simulate(affine_model(tuple(p)), record.u, record.step, x0)[:, 2])
-    sums = np.array([float(np.mean(np.abs(run - runs[0]))) for run in runs])
+    sums = np.array([float(np.mean(np.abs(run - without))) for run in runs])
     monotone = np.maximum.accumulate(sums)
-    measured = float(np.mean(np.abs(record.theta_l - runs[0])))
+    measured = float(np.mean(np.abs(record.theta_l - without)))
     beyond = measured > monotone[-1]
     alpha = float(np.interp(measured, monotone, SIZES))
     slope = float(np.interp(measured, monotone, np.gradient(monotone, SIZES)))
@@ -45,3 +55,22 @@ def estimate(record: Record, model: Model) -> Estimate:
     diagnostics = {"sum": measured, "largest_sum": float(monotone[-1])}
     low, high = max(alpha - 1.96 * error, 0.0), alpha + 1.96 * error
     return Estimate("paired_sum", alpha, error, (low, high), not beyond, message, diagnostics)
+
+
+def twin(record: Record, model: Model, start: Mapping[str, float]) -> Array:
+    """Return the load angle (n,) [rad] of the ``Drivetrain`` FMU without a gap, fed with the record's torque.
+
+    Args:
+        record: gives the torque, held from row to row.
+        model: gives the FMU's parameters.
+        start: initial state, by name of the FMU's start parameter.
+
+    Raises:
+        SlaveError: the FMU fails on these values.
+    """
+    nominal = {entry.name: entry.default for entry in PARAMETERS if entry.name not in ("alpha", "backlash_model")}
+    named = {name: model.parameters[name].value for name in nominal if model.parameters[name].value != nominal[name]}
+    fmu = fmu_instance("twin", ensure_built(["Drivetrain"])["Drivetrain"], {**named, **start})
+    system = System((fmu,), (), (Source("twin.u", Samples(record.u, record.step)),))
+    with Session(system, ("twin.theta_l",), GaussSeidel(record.step), (record.size - 1) * record.step) as session:
+        return session.run()["twin.theta_l"]
