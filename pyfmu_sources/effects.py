@@ -52,6 +52,15 @@ def quadratic_drag(omega_l: float, coefficient: float) -> float:
     return coefficient * omega_l * abs(omega_l)
 
 
+def directional_friction(speed: float, difference: float) -> float:
+    """Return the torque against the axis [N.m] that makes its viscous friction differ by direction.
+
+    Half of what the coefficients of the two directions differ by is ``difference`` [N.m.s/rad]: a torque
+    ``b speed + difference |speed|`` is ``(b + difference) speed`` forward and ``(b - difference) speed`` backward.
+    """
+    return difference * abs(speed)
+
+
 def resonance_torque(angle: float, speed: float, inertia: float, frequency: float, damping_ratio: float) -> float:
     """Return the torque [N.m] that drives a sprung inertia which lags the load by ``angle`` and ``speed``."""
     return inertia * frequency * (frequency * angle + 2.0 * damping_ratio * speed)

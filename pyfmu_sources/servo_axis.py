@@ -7,14 +7,14 @@ same, the model file states the unit.
 ::
 
     J speed' = drive + ripple(position) - b speed - sign(speed) friction(|speed|) - drag speed |speed|
-               - load_torque - gravity(position) - T_l
+               - difference |speed| - load_torque - gravity(position) - T_l
     tau drive' = u - drive          (tau = 0: drive = u)
 """
 
 from math import exp, sqrt
 
 from .drivetrain_parameters import BIG, TINY, Parameter
-from .effects import gravity_torque, quadratic_drag, sliding_friction, torque_ripple
+from .effects import directional_friction, gravity_torque, quadratic_drag, sliding_friction, torque_ripple
 
 PARAMETERS = (
     Parameter("J", "kg.m2", 1.0, TINY, BIG, "Inertia (or mass)"),
@@ -33,6 +33,14 @@ PARAMETERS = (
     Parameter("effects.gravity_load.amplitude", "N.m", 0.0, -BIG, BIG, "Amplitude of the gravity torque"),
     Parameter("effects.gravity_load.phase", "rad", 0.0, -BIG, BIG, "Gravity phase at position zero"),
     Parameter("effects.quadratic_drag.coefficient", "N.m.s2/rad2", 0.0, 0.0, BIG, "Drag"),
+    Parameter(
+        "effects.directional_friction.motor.difference",
+        "N.m.s/rad",
+        0.0,
+        -BIG,
+        BIG,
+        "Viscous friction, forward minus b",
+    ),
     Parameter("effects.sensor_offset.motor.offset", "rad", 0.0, -BIG, BIG, "Offset of the encoder"),
 )
 
@@ -57,6 +65,7 @@ COUNT = len(PARAMETERS)
     P_GRAVITY,
     P_GRAVITY_PHASE,
     P_DRAG,
+    P_DIRECTION,
     P_OFFSET,
 ) = range(COUNT)
 
@@ -78,6 +87,7 @@ def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
     """Return the torque on the axis [N.m] of all but dry friction."""
     torque = drive_torque(x, p, u) + torque_ripple(x[0], p[P_RIPPLE], p[P_RIPPLE_N], p[P_RIPPLE_PHASE])
     torque -= p[P_B] * x[1] + quadratic_drag(x[1], p[P_DRAG]) + p[P_LOAD_TORQUE] + T_l
+    torque -= directional_friction(x[1], p[P_DIRECTION])
     return torque - gravity_torque(x[0], p[P_GRAVITY], p[P_GRAVITY_PHASE])
 
 
@@ -121,7 +131,7 @@ def initial_mode(x: State, p: Parameters, u: float) -> int:
 
 def longest_step(x: State, p: Parameters, h: float) -> float:
     """Return a step [s] that resolves damping, lag and ripple well (a Runge-Kutta step errs by its 5th power)."""
-    rate = (p[P_B] + 2.0 * p[P_DRAG] * abs(x[1])) / p[P_J]
+    rate = (p[P_B] + abs(p[P_DIRECTION]) + 2.0 * p[P_DRAG] * abs(x[1])) / p[P_J]
     if p[P_TAU] > 0.0:
         rate = max(rate, 1.0 / p[P_TAU])
     if p[P_RIPPLE] != 0.0:

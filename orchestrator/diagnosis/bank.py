@@ -238,6 +238,11 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
 _AXIS = ("coulomb_friction@motor", "stribeck_friction@motor", "input_delay@actuator", "torque_saturation@actuator",
          "torque_ripple@motor", "load_torque@load", "gravity_load@load", "quadratic_drag@load")  # fmt: skip
 
-SERVO_AXIS_BANK = tuple(effect for effect in DRIVETRAIN_BANK if effect.label in _AXIS)
+_DIRECTIONAL = Effect(
+    "directional_friction", "motor", _group("directional_friction", "motor.difference"), "difference",
+    lambda s: 0.01 * s.torque / max(s.speed_m, 1e-12), amplitudes=("difference",),
+)  # fmt: skip
+
+SERVO_AXIS_BANK = (*(effect for effect in DRIVETRAIN_BANK if effect.label in _AXIS), _DIRECTIONAL)
 
 BANKS = {"Drivetrain": DRIVETRAIN_BANK, "ServoAxis": SERVO_AXIS_BANK}
