@@ -79,6 +79,18 @@ def test_the_page_of_a_check_lists_what_was_found(tmp_path):
     assert [row[0] for row in table.rows] == ["bad.fmu", "good.fmu"]
 
 
+def test_the_page_of_a_check_puts_findings_of_one_rule_together(tmp_path):
+    first, second = (name for name, rule in list(RULES.items())[:2] if rule.severity == "error")
+    found = [CheckFinding(rule, f"place {n}", f"what {n}") for n, rule in enumerate((first, second, first, first))]
+    write_result(tmp_path, "check", {}, None, as_results([CheckReport("bad.fmu", tuple(found))]))
+    (findings,) = sections(report_from_directory(tmp_path), Findings)
+    assert [(f.text, f.more) for f in findings.items] == [
+        ("what 0", ("place 2: what 2", "place 3: what 3")),
+        ("what 1", ()),
+    ]
+    assert "and 2 more like this" in write_report(tmp_path).read_text()
+
+
 def test_the_page_of_a_pair_shades_the_time_out_of_contact(tmp_path):
     results = {"alpha": 0.02, "S": 1.0, "estimate": None, "no_estimate": "S is too large", "crossings": 1}
     write_result(tmp_path, "simulate", {"alpha": 0.02}, 0, results)
@@ -254,11 +266,27 @@ def test_a_diagnosis_without_effects_is_a_page_too(tmp_path, verdict):
 
 def test_the_page_of_a_sweep_of_any_scenario_plots_its_results(tmp_path):
     results = {"cases": 2, "failed": 0, "columns": [{"name": "a.y.last", "unit": "rad"}], "scenario": {"name": "s"}}
-    write_result(tmp_path, "sweep", {}, 0, results)
+    write_result(tmp_path, "sweep", {"vary": ["a.k=1,2", "a.model=x,y"]}, 0, results)
     (tmp_path / "sweep.csv").write_text("case,a.k,a.model,status,a.y.last,message\n0,1,x,done,5,\n1,2,y,done,,\n")
-    (plot,) = sections(report_from_directory(tmp_path), Plot)
-    assert (plot.x_label, plot.y_label) == ("a.k", "a.y.last [rad]")
-    assert (plot.series[0].x, plot.series[0].y) == ([1.0, 2.0], [5.0, None])
+    report = report_from_directory(tmp_path)
+    assert (report.title, report.summary) == ("Sweep of s", "2 of 2 cases are done, over a.k=1,2, a.model=x,y.")
+    by_number, by_word = sections(report, Plot)
+    assert (by_number.x_label, by_number.y_label) == ("a.k", "a.y [rad]")
+    assert [s.name for s in by_number.series] == ["last"]
+    assert (by_number.series[0].x, by_number.series[0].y) == ([1.0, 2.0], [5.0, None])
+    assert by_number.series[0].labels == ["case 0, a.model x", "case 1, a.model y"]
+    assert (by_word.x_label, by_word.categories, by_word.series[0].x) == ("a.model", ("x", "y"), [0.0, 1.0])
+
+
+def test_the_page_of_a_paired_sweep_shows_what_another_parameter_does_to_the_error(tmp_path):
+    results = {"cases": 2, "failed": 0, "columns": [asdict(c) | {"kind": ""} for c in COLUMNS]}
+    write_result(tmp_path, "sweep", {}, 0, results)
+    rows = ["0,0.0,1,5.5,0.02,done,1,0.019,0.018,0.02,1e-3,5.0,", "1,0.0,1,5.7,0.02,done,1,0.022,0.02,0.03,2e-3,10.0,"]
+    head = "case,noise,repetition,plant.J_l,alpha,status,S,estimate,lower,upper,error,error_percent,message"
+    (tmp_path / "sweep.csv").write_text("\n".join([head, *rows, ""]))
+    plots = {p.title: p for p in sections(report_from_directory(tmp_path), Plot)}
+    (series,) = plots["Error against plant.J_l"].series
+    assert (series.x, series.y) == ([5.5, 5.7], [pytest.approx(-5.0), pytest.approx(10.0)])
 
 
 def test_the_page_of_a_large_sweep_shows_part_of_it_and_says_so(tmp_path):
@@ -283,7 +311,7 @@ def half_gap(alpha, **more):
 
 def test_the_page_of_an_estimate_compares_methods_and_shows_the_fit(tmp_path):
     parameters = {"k": {"value": 3310.0, "standard_error": 2.0, "nominal": 3300.0}}
-    best = half_gap(0.002, diagnostics={"parameters": parameters})
+    best = half_gap(0.002, diagnostics={"parameters": parameters, "profile_limit": 6.5})
     estimates = {"maximum_likelihood": best, "ekf": half_gap(0.0021), "torque_pulse": {"not_applicable": "no pulses"}}
     record = {"rows": 4, "step": 0.01, "source": "r.csv"}
     design = [{"name": "pulses", "bound": 1e-6, "peak_torque": 10.0, "peak_motor_speed": 2.0}]
@@ -302,6 +330,7 @@ def test_the_page_of_an_estimate_compares_methods_and_shows_the_fit(tmp_path):
     assert plots["Estimates by method"].series[0].y == [0.002, 0.0021]
     profile = plots["Profile likelihood"].series[0]
     assert len(profile.x) > 100
+    assert plots["Profile likelihood"].series[2].y == [6.5, 6.5]
     assert profile.y == pytest.approx([((x - 0.002) / 5e-5) ** 2 for x in profile.x], abs=1e-9)
     assert plots["Motor angle"].spans[0].start == 1.0
     assert plots["Motor angle: simulated minus measured"].series[0].y == [0.0, 0.5, 0.0]
@@ -322,7 +351,7 @@ def test_a_record_that_bounds_the_gap_on_one_side_only_is_a_page(tmp_path):
     entry = half_gap(0.0, interval=[0.0, None], visible=False, message="the gap cannot be seen")
     write_result(tmp_path, "estimate", {}, None, {"estimates": {"maximum_likelihood": entry}} | entry)
     report = report_from_directory(tmp_path)
-    assert "between 0 and any size rad" in report.summary
+    assert report.summary.startswith("No gap is seen: it is with 95 % confidence between 0 and any size rad.")
     assert report.badge == ("neutral", "no gap is seen")
 
 

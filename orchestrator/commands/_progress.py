@@ -35,6 +35,8 @@ DEFAULT_SAMPLES = 16
 MIB = 1024**2
 # Where and how a sweep ran does not change what it found.
 NOT_PART_OF_THE_RESULT = frozenset({"run", "command", "out", "resume", "workers", "scheduler"})
+# What `--scenario` leaves without a meaning.
+PAIR_ONLY = frozenset({"experiment", "backlash_model", "sizes", "noise", "seeds"})
 
 
 def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
@@ -177,6 +179,7 @@ def swept(
         columns = [{"name": c.name, "unit": c.unit} for c in work.columns]
         results: dict[str, Any] = {"cases": len(cases), "failed": sweep.failed, "columns": columns}
         yield sweep, results
-        given = {name: value for name, value in vars(args).items() if name not in NOT_PART_OF_THE_RESULT}
+        unused = NOT_PART_OF_THE_RESULT | (PAIR_ONLY if args.scenario is not None else frozenset())
+        given = {name: value for name, value in vars(args).items() if name not in unused}
         write_result(directory, "sweep", given, args.seed, results)
         write_report(directory, "sweep")

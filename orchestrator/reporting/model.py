@@ -8,6 +8,7 @@ from typing import Literal
 Cell = float | int | str | bool | None
 Numbers = Sequence[float | None]
 Badge = Literal["good", "bad", "neutral"]
+Severity = Literal["error", "warning", "info"]
 
 ROW_LIMIT = 500
 POINT_LIMIT = 4000
@@ -106,12 +107,13 @@ class Plot:
 
 @dataclass(frozen=True)
 class Finding:
-    """One problem or remark."""
+    """One problem or remark; ``more`` says where else the same was found, one line each."""
 
-    severity: Literal["error", "warning", "info"]
+    severity: Severity
     where: str
     text: str
     advice: str = ""
+    more: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,23 @@ from orchestrator.reporting.model import Cell, Column, Table
 
 DATA_SUFFIXES = (".csv", ".json", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")
 
+UNITS = {  # of arguments
+    "alpha": "rad",
+    "noise": "rad",
+    "size": "rad",
+    "sizes": "rad",
+    "reference": "rad",
+    "time_limit": "s",
+    "memory_limit": "MiB",
+    "size_limit": "MiB",
+    "torque_limit": "N.m",
+    "speed_limit": "rad/s",
+    "duration": "s",
+    "rate": "Hz",
+    "step": "s",
+    "stop": "s",
+}
+
 
 @dataclass(frozen=True)
 class Source:
@@ -60,9 +77,9 @@ class Source:
     def origin(self) -> tuple[tuple[str, Cell], ...]:
         """Return what was run and with what."""
         arguments = self.document.get("arguments") or {}
-        given = {name: plain(value) for name, value in arguments.items() if value not in (None, False, [], {})}
+        given = {n: plain(v) for n, v in arguments.items() if n != "out" and v not in (None, False, [], {})}
         head = {"command": self.command, "version": self.document.get("version"), "seed": self.document.get("seed")}
-        return tuple((words(name), value) for name, value in (head | given).items() if value is not None)
+        return tuple((_with_unit(name), value) for name, value in (head | given).items() if value is not None)
 
     def downloads(self) -> tuple[Path, ...]:
         """Return the data files of the directory, by name."""
@@ -122,9 +139,13 @@ def _short(value: Cell) -> str:
 
 
 def words(name: str) -> str:
-    """Return an identifier as words; a symbol with an index, such as ``J_m``, stays as it is."""
+    """Return an identifier as words; a symbol with an index, such as ``J_m``, and a path stay as they are."""
     parts = name.split("_")
-    return name if any(len(part) < 2 for part in parts) else " ".join(parts)
+    return name if "." in name or any(len(part) < 2 for part in parts) else " ".join(parts)
+
+
+def _with_unit(name: str) -> str:
+    return f"{words(name)} [{UNITS[name]}]" if name in UNITS else words(name)
 
 
 def numbers(values: Sequence[Any]) -> list[float | None]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from orchestrator.reporting.model import Column, Finding, Findings, Report, Section, Table
+from orchestrator.reporting.model import Column, Finding, Findings, Report, Section, Severity, Table
 from orchestrator.reporting.source import Source, plain, words
 
 
@@ -44,9 +44,19 @@ def _overview(fmus: list[Mapping[str, Any]]) -> Table:
 
 
 def _findings(fmu: Mapping[str, Any]) -> Findings:
+    """Return the findings of an FMU, those of one rule together."""
+    alike: dict[tuple[Severity, str, str], list[Mapping[str, Any]]] = {}
+    for f in fmu["findings"]:
+        alike.setdefault((f["severity"], f["rule"], f.get("advice", "")), []).append(f)
     items = tuple(
-        Finding(f["severity"], f"{f['rule']}  {f['path']}".strip(), f["message"], f.get("advice", ""))
-        for f in fmu["findings"]
+        Finding(
+            severity,
+            f"{rule}  {first['path']}".strip(),
+            first["message"],
+            advice,
+            tuple(f"{f['path']}: {f['message']}" for f in others),
+        )
+        for (severity, rule, advice), (first, *others) in alike.items()
     )
     return Findings(_name(fmu), items)
 

@@ -46,9 +46,14 @@ def _answer(results: Json) -> tuple[tuple[Badge, str] | None, str]:
     interval = f"with 95 % confidence between {_number(low)} and {_number(high)} rad"
     record = results.get("record") or {}
     source = f" (record {record['source']}, {record['rows']} rows)" if record.get("source") else ""
+    message = str(results.get("message") or "")
+    if not results.get("visible"):
+        said = f"{message[:1].upper()}{message[1:]}"
+        if "confidence" not in message:
+            said = f"No gap is seen: it is {interval}. {said}".strip()
+        return ("neutral", "no gap is seen"), f"{said}{source}."
     summary = f"The half-gap is {results['alpha']:.6g} rad, {interval}{source}."
-    badge: tuple[Badge, str] = ("good", "the gap is seen") if results.get("visible") else ("neutral", "no gap is seen")
-    return badge, " ".join(filter(None, [summary, results.get("message")]))
+    return ("good", "the gap is seen"), " ".join(filter(None, [summary, message]))
 
 
 def _interval(estimate: Json) -> tuple[float | None, float | None]:
@@ -84,8 +89,8 @@ def _comparison(found: Json) -> list[Section]:
     alpha = [float(e["alpha"]) for e in found.values()]
     low, high = zip(*(_interval(e) for e in found.values()), strict=True)
     series = Series("half-gap", list(range(len(found))), alpha, "points", low, high)
-    positive = [v for v in (*alpha, *low) if v is not None]
-    wide = min(positive) > 0.0 and max(alpha) > 30.0 * min(alpha)
+    positive = [v for v in alpha if v > 0.0]
+    wide = bool(positive) and max(positive) > 30.0 * min(positive)
     names = tuple(words(name) for name in found)
     return [Plot("Estimates by method", "method", "half-gap [rad]", (series,), log_y=wide, categories=names)]
 
@@ -99,14 +104,15 @@ def _profile(source: Source) -> list[Section]:
     alpha, drop = np.array([p for p in points if None not in p], dtype=float).T
     signed = np.sign(alpha - alpha[np.argmin(drop)]) * np.sqrt(np.maximum(drop, 0.0))
     fine = np.linspace(signed[0], signed[-1], CURVE_POINTS)
+    limit = (source.results.get("diagnostics") or {}).get("profile_limit") or CHI_SQUARE_95
     series = (
         Series("profile", np.interp(fine, signed, alpha).tolist(), (fine**2).tolist()),
         Series("computed", alpha.tolist(), drop.tolist(), "points"),
-        Series("95 % limit", [float(alpha[0]), float(alpha[-1])], [CHI_SQUARE_95, CHI_SQUARE_95]),
+        Series("95 % limit", [float(alpha[0]), float(alpha[-1])], [limit, limit]),
     )
-    note = (
-        "Twice the drop of the log-likelihood, maximised over all else. The interval is where it stays below the limit."
-    )
+    note = "Twice the drop of the log-likelihood, maximised over all else. The interval is where it is below the limit."
+    if limit != CHI_SQUARE_95:
+        note += f" The limit is widened from {CHI_SQUARE_95:.3g}, since the model is not exact."
     return [Plot("Profile likelihood", "half-gap [rad]", "twice the drop", series, note=note)]
 
 

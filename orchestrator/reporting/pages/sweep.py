@@ -5,11 +5,13 @@ from typing import Any
 
 from orchestrator.reporting.model import POINT_LIMIT, ROW_LIMIT, Cell, Column, Plot, Report, Section, Series, Table
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.source import Source, by_column, numbers, table_of, words
+from orchestrator.reporting.source import Source, by_column, numbers, plain, table_of, words
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
 MOST_PLOTS = 12
+OWN = frozenset({"alpha", "noise", "repetition"})
+SUMMARIES = frozenset({"last", "min", "max", "mean", "rms"})
 FIRST = ("case", "alpha", "estimate", "lower", "upper", "error_percent", "noise")
 STATISTICS = {
     "noise": ("noise", "rad"),
@@ -27,24 +29,31 @@ def build(source: Source) -> Report:
     failed, total = int(results["failed"]), int(results["cases"])
     first, failures, table = _excerpts(source, total)
     statistics: list[Mapping[str, Any]] = list(results.get("statistics", []))
+    name = (results.get("scenario") or {}).get("name")
     units = {c["name"]: c["unit"] for c in results.get("columns", [])}
     sections: list[Section] = [_cases("Failed cases", failures, UNITS | units, failed)] if failed else []
     if statistics:
         sections.append(_statistics(statistics))
     if {"alpha", "noise", "estimate", "lower", "upper", "error_percent"} <= set(table):
-        sections += _plots(table)
+        sections += [*_plots(table), *_influences(table, units)]
     else:
         sections += _signals(table, units)
     sections.append(_cases("Cases", first, UNITS | units, total))
     sections += _provenance(results)
     return Report(
-        title="Backlash sweep" if statistics else "Sweep",
-        summary=_summary(statistics, total, failed) if statistics else f"{total - failed} of {total} cases are done.",
+        title="Backlash sweep" if statistics else f"Sweep of {name}" if name else "Sweep",
+        summary=_summary(statistics, total, failed) if statistics else _count(source.document, total, failed),
         badge=("bad", f"{failed} of {total} cases failed") if failed else ("good", f"all {total} cases done"),
         sections=tuple(sections),
         origin=source.origin(),
         downloads=source.downloads(),
     )
+
+
+def _count(document: Mapping[str, Any], total: int, failed: int) -> str:
+    """Return how many cases are done, and over what."""
+    varied = ", ".join(str(text) for text in (document.get("arguments") or {}).get("vary") or ())
+    return f"{total - failed} of {total} cases are done" + (f", over {varied}." if varied else ".")
 
 
 def _summary(statistics: Sequence[Mapping[str, Any]], total: int, failed: int) -> str:
@@ -77,8 +86,8 @@ def _plots(table: Columns) -> list[Section]:
         low, high = [lower[i] for i in rows], [upper[i] for i in rows]
         estimates.append(Series(name, x, [estimate[i] for i in rows], "points", low, high, labels))
         errors.append(Series(name, x, [percent[i] for i in rows], "points", labels=labels))
-    known = [v for v in (*alpha, *lower) if v is not None]
-    wide = bool(known) and min(known) > 0.0 and max(known) / min(known) > 10.0
+    known = [v for v in (*alpha, *estimate) if v is not None and v > 0.0]
+    wide = bool(known) and max(known) / min(known) > 10.0
     return [
         Plot(
             "Estimated against actual half-gap",
@@ -94,20 +103,57 @@ def _plots(table: Columns) -> list[Section]:
     ]
 
 
+def _influences(table: Columns, units: Mapping[str, str]) -> list[Section]:
+    """Return the error of the estimate against each parameter that was varied beside the size."""
+    alpha, estimate, noise = (numbers(table[n]) for n in ("alpha", "estimate", "noise"))
+    error = [None if a is None or e is None else 100.0 * (e - a) / a for a, e in zip(alpha, estimate, strict=True)]
+    found: list[Section] = []
+    for name in _varied(table, units):
+        if name in OWN:
+            continue
+        x, categories = _axis(table[name])
+        series = []
+        for level in sorted({n for n in noise if n is not None}):
+            rows = [i for i, n in enumerate(noise) if n == level]
+            labels = [f"case {_whole(table['case'][i])}, half-gap {alpha[i]} rad" for i in rows]
+            title = f"noise {level:g} rad" if level else "no noise"
+            series.append(Series(title, [x[i] for i in rows], [error[i] for i in rows], "points", labels=labels))
+        note = "Estimated minus actual half-gap, in percent of the actual one."
+        found.append(Plot(f"Error against {name}", name, "error [%]", tuple(series), categories=categories, note=note))
+    return found[:MOST_PLOTS]
+
+
 def _signals(table: Columns, units: Mapping[str, str]) -> list[Section]:
-    """Return each result against the parameter that was varied first, for sweeps of any scenario."""
-    varied = [n for n in table if n not in units and n not in {"case", "status", "message"}]
-    numeric = [n for n in varied if any(v is not None for v in numbers(table[n]))]
-    if not numeric:
-        return []
-    name = numeric[0]
-    x = numbers(table[name])
-    others = [n for n in varied if n != name]
-    labels = [", ".join(f"{n} {table[n][i]}" for n in ("case", *others)) for i in range(len(x))]
-    shown = [n for n in units if n in table][:MOST_PLOTS]
-    return [
-        Plot(n, name, f"{n} [{units[n]}]", (Series(n, x, numbers(table[n]), "points", labels=labels),)) for n in shown
-    ]
+    """Return each signal's results against each varied parameter, for sweeps of any scenario."""
+    varied = _varied(table, units)
+    signals: dict[str, list[str]] = {}
+    for column in (n for n in units if n in table):
+        head, _, what = column.rpartition(".")
+        signals.setdefault(head if what in SUMMARIES and head else column, []).append(column)
+    made: list[Section] = []
+    for signal, columns in signals.items():
+        for name in varied:
+            x, categories = _axis(table[name])
+            others = [n for n in varied if n != name]
+            labels = [", ".join(f"{n} {plain(_whole(table[n][i]))}" for n in ("case", *others)) for i in range(len(x))]
+            series = tuple(
+                Series(c.removeprefix(f"{signal}."), x, numbers(table[c]), "points", labels=labels) for c in columns
+            )
+            label = f"{signal} [{units[columns[0]]}]"
+            made.append(Plot(f"{signal} against {name}", name, label, series, categories=categories))
+    return made[:MOST_PLOTS]
+
+
+def _varied(table: Columns, units: Mapping[str, str]) -> list[str]:
+    return [n for n in table if n not in units and n not in {"case", "status", "message"}]
+
+
+def _axis(values: Sequence[Cell]) -> tuple[list[float | None], tuple[str, ...]]:
+    """Return numbers to plot against, and what they stand for where the values are words."""
+    if any(isinstance(v, str) for v in values):
+        words_ = list(dict.fromkeys(str(v) for v in values))
+        return [float(words_.index(str(v))) for v in values], tuple(words_)
+    return numbers(values), ()
 
 
 def _excerpts(source: Source, total: int) -> tuple[Columns, Columns, Columns]:
@@ -152,9 +198,13 @@ def _provenance(results: Mapping[str, Any]) -> list[Section]:
         made.append(
             table_of("Calibrations", [{"noise [rad]": n, **c} for n, c in calibrations.items()], note=CALIBRATION_NOTE)
         )
-    for name in ("experiment", "fmus"):
-        if isinstance(results.get(name), Mapping):
-            made += sections_of({"fmus": "FMUs by content"}.get(name, name.capitalize()), results[name])
+    if isinstance(results.get("experiment"), Mapping):
+        settings = dict(results["experiment"])
+        plant = settings.pop("values", None)
+        made += sections_of("Experiment", settings)
+        made += sections_of("Plant", plant) if plant else []
+    if isinstance(results.get("fmus"), Mapping):
+        made += sections_of("FMUs by content", results["fmus"])
     return made
 
 

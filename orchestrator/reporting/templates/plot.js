@@ -198,8 +198,9 @@ class Plot {
   whiskers(series) {
     let path = "";
     for (let n = 0; n < series.x.length; n++) {
-      const [x, low, high] = [series.x[n], series.low[n], series.high[n]];
-      if (x === null || low === null || high === null || (this.data.logY && low <= 0)) continue;
+      const [x, end, high] = [series.x[n], series.low[n], series.high[n]];
+      if (x === null || end === null || high === null || (this.data.logY && high <= 0)) continue;
+      const low = this.data.logY && end <= 0 ? this.y.low : end; // a logarithmic axis has no zero to reach down to
       path += `M${this.x.pixel(x).toFixed(1)} ${this.y.pixel(low).toFixed(1)}V${this.y.pixel(high).toFixed(1)}`;
     }
     return path;
