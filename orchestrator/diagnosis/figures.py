@@ -157,7 +157,7 @@ def _law(diagnosis: Diagnosis, effect: Effect, p: Array, without: Array, states:
 
         tau, h = float(p[w.plant.index("tau")]), w.likelihood.signals.h
         pole = np.exp(-h / tau) if tau > 0.0 else 0.0
-        change = w.likelihood.delivered(p) - w.likelihood.delivered(without)
+        change = _mean_delivered(diagnosis, p) - _mean_delivered(diagnosis, without)
         return np.asarray(lfilter([1.0 - pole], [1.0, -pole], change))
     _, stage, _ = stage_of(w.plant.name)
     speeds = {
@@ -174,6 +174,13 @@ def _law(diagnosis: Diagnosis, effect: Effect, p: Array, without: Array, states:
         signs = (float(np.sign(x[1])), float(np.sign(x[3])))
         out[n] = stage(x, signs, flat, u[n])[place] - stage(x, signs, bare, u[n])[place]
     return out * float(p[w.plant.index(inertia)])
+
+
+def _mean_delivered(diagnosis: Diagnosis, p: Array) -> Array:
+    """Return the mean torque (n,) that reaches the drive in each sample."""
+    signals = diagnosis.workings.likelihood.signals
+    early, late, first = diagnosis.workings.likelihood.delivered(p, signals.size)
+    return late + (early - late) * first / signals.h
 
 
 def _abscissa(effect: Effect, p: Array, diagnosis: Diagnosis, x: Array, time: Array) -> tuple[Array, str]:

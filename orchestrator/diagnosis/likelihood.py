@@ -151,7 +151,7 @@ class Likelihood:
         raw, states = np.empty((n, 2)), np.empty((n, 8))
         offsets = [p[place] for place in self._offsets] + [0.0]
         self._predict(
-            self.signals.y, self.delivered(p)[:n], tuple(p.tolist()), self.signals.h, self.substeps(p),
+            self.signals.y, *self.delivered(p, n), tuple(p.tolist()), self.signals.h, self.substeps(p),
             self.gains(q).gains, (offsets[0], offsets[1]), self._start, raw, states,
         )  # fmt: skip
         return raw, states
@@ -163,16 +163,22 @@ class Likelihood:
         m = self.signals.channels
         return np.asarray((roots @ raw[:, :m, None])[:, :, 0])
 
-    def delivered(self, p: Array) -> Array:
-        """Return the torque (n,) that reaches the drive: limited, then delayed (mean over each sample)."""
-        u = self.signals.u
-        limit, delay = p[self._places["limit"]], p[self._places["delay"]]
+    def delivered(self, p: Array, stop: int) -> tuple[Array, Array, float]:
+        """Return the torque that reaches the drive in each of the first ``stop`` samples: limited, then delayed.
+
+        Returns:
+            torque (stop,) in the first part of each sample, torque (stop,) in the rest, length of the first part [s].
+        """
+        u, h = self.signals.u, self.signals.h
+        limit, delay = p[self._places["limit"]], float(p[self._places["delay"]])
         if limit < 1e11:
             u = np.clip(u, -limit, limit)
-        if delay != 0.0:
-            n = np.arange(u.size)
-            u = np.interp(n - delay / self.signals.h, n, u)
-        return u
+        if delay <= 0.0:
+            return u[:stop], u[:stop], 0.0
+        whole = math.floor(delay / h)
+        late = u[np.maximum(np.arange(stop) - whole, 0)]
+        early = u[np.maximum(np.arange(stop) - whole - 1, 0)]
+        return early, late, delay - whole * h
 
     def substeps(self, p: Array) -> int:
         """Return Runge-Kutta steps per sample; an extra resonance may need more than the plant alone."""

@@ -129,18 +129,27 @@ def _corrected(x: Any, g: Array, a: float, b: float) -> Any:
 
 @cache
 def predictor_of(plant: str) -> Any:
-    """Return ``predict(y, u, p, h, substeps, gains, offsets, start, innovations, states)`` of a plant, compiled.
+    """Return ``predict(y, early, late, first, p, h, substeps, gains, offsets, start, innovations, states)``, compiled.
 
-    Shapes: y (n, 2), u (n,), gains (n, 8, 2), offsets (2,), start (8,), innovations (n, 2) out, states (n, 8) out:
-    the corrected states. ``p`` is the plant's tuple followed by ``NUISANCES``.
+    In each sample the torque ``early`` acts for ``first`` [s], then ``late`` (a dead time is no multiple of ``h``).
+    Shapes: y (n, 2), early and late (n,), gains (n, 8, 2), offsets (2,), start (8,), innovations (n, 2) out,
+    states (n, 8) out: the corrected states. ``p`` is the plant's tuple followed by ``NUISANCES``.
     """
     friction, stage, nuisance = stage_of(plant)
     at_m, at_l = nuisance
 
     @njit(error_model="numpy")
+    def advanced(x: Any, signs: Any, p: Any, torque: float, step: float) -> Any:
+        k1 = stage(x, signs, p, torque)
+        k2 = stage(_along(x, k1, 0.5 * step), signs, p, torque)
+        k3 = stage(_along(x, k2, 0.5 * step), signs, p, torque)
+        k4 = stage(_along(x, k3, step), signs, p, torque)
+        return _along(_along(_along(_along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
+
+    @njit(error_model="numpy")
     def predict(
-        y: Array, u: Array, p: Any, h: float, substeps: int, gains: Array, offsets: Any, start: Any,
-        innovations: Array, states: Array,
+        y: Array, early: Array, late: Array, first: float, p: Any, h: float, substeps: int, gains: Array, offsets: Any,
+        start: Any, innovations: Array, states: Array,
     ) -> None:  # fmt: skip
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
         at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
@@ -149,7 +158,7 @@ def predictor_of(plant: str) -> Any:
         reach_m, reach_l = math.exp(p[at_m]), math.exp(p[at_l])
         bristle_m, bristle_l = 0.0, 0.0
         signs = (0.0, 0.0)
-        for n in range(u.size):
+        for n in range(late.size):
             a = y[n, 0] - x[0] - offsets[0]
             b = y[n, 1] - x[2] - offsets[1]
             innovations[n, 0] = a
@@ -159,22 +168,23 @@ def predictor_of(plant: str) -> Any:
                 states[n, j] = x[j]
             steps = substeps
             if rest[0] > 0.0 or rest[1] > 0.0:
-                rate = stage(x, signs, p, u[n])
+                rate = stage(x, signs, p, late[n])
                 turning_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach_m, h)
                 turning_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach_l, h)
                 if turning_m or turning_l:
                     steps = substeps * FINER
-            step = h / steps
-            for _ in range(steps):
-                if rest[0] > 0.0 or rest[1] > 0.0:
-                    level = friction(x, p)
-                    bristle_m, sign_m = _turned(bristle_m, x[1], level[0], rest[0], reach_m, step)
-                    bristle_l, sign_l = _turned(bristle_l, x[3], level[1], rest[1], reach_l, step)
-                    signs = (sign_m, sign_l)
-                k1 = stage(x, signs, p, u[n])
-                k2 = stage(_along(x, k1, 0.5 * step), signs, p, u[n])
-                k3 = stage(_along(x, k2, 0.5 * step), signs, p, u[n])
-                k4 = stage(_along(x, k3, step), signs, p, u[n])
-                x = _along(_along(_along(_along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
+            for piece in range(2):
+                span, torque = (first, early[n]) if piece == 0 else (h - first, late[n])
+                if span <= 1e-9 * h:
+                    continue
+                count = math.ceil(steps * span / h - 1e-9)
+                step = span / count
+                for _ in range(count):
+                    if rest[0] > 0.0 or rest[1] > 0.0:
+                        level = friction(x, p)
+                        bristle_m, sign_m = _turned(bristle_m, x[1], level[0], rest[0], reach_m, step)
+                        bristle_l, sign_l = _turned(bristle_l, x[3], level[1], rest[1], reach_l, step)
+                        signs = (sign_m, sign_l)
+                    x = advanced(x, signs, p, torque, step)
 
     return predict

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from orchestrator.record import Record, record_from_columns
-from tests.support.independent_plant import NOISE, make_record
+from tests.support.independent_plant import NOISE, SUBSTEPS, make_record
 
 TIMES_NOISE = 3.0
+RATE = 200.0  # samples per second
 EXCITATIONS = ("multisine", "multisine", "levels", "closed_loop")
 
 # Kind -> (effects of the independent plant at the largest size, name of the size, labels that are right).
@@ -184,4 +185,7 @@ def _case(
     duration: float, ratio: float = 0.0,
 ) -> Case:  # fmt: skip
     columns, truth = make_record(effects, seed, duration, excitation=excitation)
+    if "delay" in effects:
+        # The simulator applies a dead time in whole internal steps.
+        truth["effects"]["delay"] = round(effects["delay"] * RATE * SUBSTEPS) / (RATE * SUBSTEPS)
     return Case(kind, seed, record_from_columns(columns, f"{kind}-{seed}"), truth, right, ratio)
