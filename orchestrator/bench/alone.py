@@ -9,9 +9,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from orchestrator.bench.runner import peak_memory
 from orchestrator.bench.scaling import chain
@@ -81,7 +82,7 @@ def growth(progress: Callable[[str], None] = lambda text: None) -> tuple[list[Sw
     return sweeps, records
 
 
-def _child(what: str, count: int) -> Mapping[str, float]:
+def _child(what: str, count: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         result = Path(folder) / "result.json"
         words = [sys.executable, "-m", "orchestrator.bench.alone", what, str(count), str(result)]
@@ -92,7 +93,7 @@ def _child(what: str, count: int) -> Mapping[str, float]:
         if not result.exists():
             lines = run.stderr.strip().splitlines() or [f"exit code {run.returncode}"]
             raise SimulationError(f"the measurement of {count} in `{what}` failed: {lines[-1]}")
-        found: Mapping[str, float] = json.loads(result.read_text(encoding="utf-8"))
+        found: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
     return found
 
 
