@@ -5,7 +5,7 @@
 One case is one pair of loops of 2 s at 1 ms. Rounds are interleaved, the table gives medians. "in all" is a whole run
 with the start of the worker processes; "a pair" is what one more pair costs, between the first fifth of the cases and
 the last one; "cpu" is the processor time of the whole run in all processes, per pair. The script makes one FMPy call
-per variable on the same FMUs (``tests/support/fmpy_pairs.py``), extracts and instantiates once and resets for each pair;
+per variable on the same FMUs (``tests/support/fmpy_pairs.py``), extracts and instantiates once and resets for each;
 that it computes the same S is checked.
 """
 
