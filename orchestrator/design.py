@@ -8,7 +8,6 @@ input is held over a sample.
 import warnings
 from dataclasses import dataclass
 
-import control
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
@@ -169,6 +168,8 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
     Raises:
         DesignError: ``model`` is not stabilisable, or the Riccati equation has no solution.
     """
+    import control  # takes a second to import, which every command would pay
+
     report = rank_report(model)
     if not report.stabilisable:
         modes = ", ".join(f"{mode:.3g}" for mode in report.uncontrollable)

@@ -91,7 +91,16 @@ def _print_rows(sweep: Sweep, cases: DesignCases) -> None:
     if len(cases) > len(shown):
         title += f", the first {len(shown)}; all of them are in sweep.csv"
     extra = [name for name in cases.names if name not in OWN_PARAMETERS]
-    head = ["actual [rad]", "noise [rad]", *extra, "S [rad]", "estimate [rad]", "interval [rad]", "error [rad]", "[%]"]
+    head = [
+        "actual [rad]",
+        "noise [rad]",
+        *extra,
+        "S [rad]",
+        "estimate [rad]",
+        "interval [rad]",
+        "error [rad]",
+        "error [%]",
+    ]
     print_table(title, head, shown)
 
 
@@ -102,8 +111,8 @@ def _cells(row: Row, names: tuple[str, ...]) -> list[str]:
     if row.outcome.status is not Status.DONE:
         return [*start, row.outcome.status.value, row.outcome.message, "", "", ""]
     total, estimate, lower, upper, error, percent = (float(v or 0.0) for v in row.outcome.values)
-    interval = f"{lower:.6g} .. {upper:.6g}"
-    return [*start, f"{total:.6g}", f"{estimate:.6g}", interval, f"{error:.2e}", f"{percent:.4f}"]
+    interval = f"{lower:.8g} .. {upper:.8g}"
+    return [*start, f"{total:.6g}", f"{estimate:.8g}", interval, f"{error:.2e}", f"{percent:.4f}"]
 
 
 def _print_statistics(statistics: dict[float, ErrorStatistics], total: int, failed: int) -> None:

@@ -3,8 +3,10 @@
 import argparse
 from pathlib import Path
 
+from orchestrator.errors import FmuError, OutputError
 from orchestrator.fmi.build import ROOT, default_directory, ensure_built
 from orchestrator.fmi.launcher import find_toolchain
+from orchestrator.fmi.sources import catalogue
 from orchestrator.output import staged, write_result
 
 
@@ -24,14 +26,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Build what is missing or stale and say what this machine cannot give."""
     directory = default_directory() if args.directory is None else args.directory
-    names = args.names or None
-    paths = ensure_built(names, directory, force=args.force)
-    for name, path in paths.items():
-        print(f"{name:<20}{_shown(path)}  {path.stat().st_size / 1024:.0f} kB")
-    remark = find_toolchain().remark
-    if remark is not None:
-        print(f"note: {remark}")
+    if directory.exists() and not directory.is_dir():
+        raise OutputError(f"`--directory` must be a folder, but {directory} is a file")
+    unknown = [name for name in args.names if name not in catalogue()]
+    if unknown:
+        raise FmuError(f"`FMU` must be one of {', '.join(catalogue())}, but is {unknown[0]!r}")
     with staged(args.out) as folder:
+        paths = ensure_built(args.names or None, directory, force=args.force)
+        for name, path in paths.items():
+            print(f"{name:<20}{_shown(path)}  {path.stat().st_size / 1024:.0f} kB")
+        remark = find_toolchain().remark
+        if remark is not None:
+            print(f"note: {remark}")
         results = {"fmus": {name: str(path) for name, path in paths.items()}, "remark": remark}
         arguments = {"names": list(paths), "directory": str(directory), "force": args.force}
         write_result(folder, "build", arguments, None, results)

@@ -61,10 +61,8 @@ def run(args: argparse.Namespace) -> int:
         limits=Limits(time=args.time_limit, memory=int(args.memory_limit * MEBIBYTE)),
     )
     paths = find_fmus(args.fmus) if args.fmus else _own()
-    reports = []
-    for path in _shown(paths):
-        reports.append(check_fmu(path, options))
-        _print("\n".join(as_lines(reports[-1])))
+    for option, target in (("--json", args.json), ("--junit", args.junit)):
+        _require_place(target, option)
     arguments = {
         "fmus": [str(p) for p in paths],
         "static": args.static,
@@ -72,7 +70,11 @@ def run(args: argparse.Namespace) -> int:
         "memory_limit": args.memory_limit,
         "size_limit": args.size_limit,
     }
+    reports = []
     with staged(args.out) as directory:
+        for path in _shown(paths):
+            reports.append(check_fmu(path, options))
+            _print("\n".join(as_lines(reports[-1])))
         write_result(directory, "check", arguments, None, as_results(reports))
         write_report(directory, "check")
         _write_extra(args, reports)
@@ -96,6 +98,13 @@ def _write_extra(args: argparse.Namespace, reports: Sequence[Report]) -> None:
         _write(args.json, json.dumps(as_results(reports), indent=1) + "\n", "--json")
     if args.junit is not None:
         _write(args.junit, as_junit(reports), "--junit")
+
+
+def _require_place(path: Path | None, option: str) -> None:
+    """Refuse a file that cannot be written before the work starts, not after it."""
+    if path is not None and (path.is_dir() or not os.access(path.parent, os.W_OK)):
+        reason = "a folder" if path.is_dir() else "in no folder that can be written"
+        raise OutputError(f"`{option}` must be a file that can be written, but {path} is {reason}")
 
 
 def _write(path: Path, text: str, option: str) -> None:

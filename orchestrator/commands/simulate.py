@@ -118,7 +118,7 @@ def _print_pair(pair: PairRun, alpha: float) -> None:
         rows.append(["estimate", f"none: {pair.no_estimate}", ""])
     else:
         e = pair.estimate
-        rows.append(["estimated half-gap", f"{e.alpha:.6g}  (95 %: {e.lower:.6g} .. {e.upper:.6g})", "rad"])
+        rows.append(["estimated half-gap", f"{e.alpha:.8g}  (95 %: {e.lower:.8g} .. {e.upper:.8g})", "rad"])
         if alpha > 0.0 and math.isfinite(e.alpha):
             rows.append(["error", f"{100.0 * abs(e.alpha - alpha) / alpha:.4f}", "%"])
     print_table("Paired run", ("", "value", "unit"), rows)

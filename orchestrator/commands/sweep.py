@@ -50,5 +50,6 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.scenario is not None:
         refuse_with_scenario(arguments, {"sizes": "random:20", "noise": "0,1e-4", "seeds": 1})
     failed = chosen(arguments)
-    sys.stdout.write(f"Written to {arguments.out}: report.html, sweep.csv, sweep.json\n")
+    figures = ", estimates.png, errors.png, loops.png" if arguments.scenario is None else ""
+    sys.stdout.write(f"Written to {arguments.out}: report.html, sweep.csv, sweep.json{figures}\n")
     return 1 if failed else 0

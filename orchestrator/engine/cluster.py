@@ -49,7 +49,7 @@ class DaskCluster:
         except (OSError, ValueError, TimeoutError) as error:
             reason = " ".join(str(error).split()) or type(error).__name__
             raise ScenarioError(
-                f"`--scheduler` must be a Dask scheduler, but {self.address} is not: {reason}"
+                f"`--scheduler` must be a Dask scheduler, but {self.address!r} is not: {reason}"
             ) from None
         try:
             return ClusterPool(client, work, limits)

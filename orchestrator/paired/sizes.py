@@ -3,7 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from orchestrator.errors import ScenarioError
+from orchestrator.engine.grid import MAX_CASES
+from orchestrator.errors import CalibrationError, ScenarioError
 from orchestrator.paired.experiment import Experiment
 
 THESIS_RANGE = (1.2, 4.8)
@@ -56,8 +57,8 @@ def _count(text: str, word: str) -> int:
         count = int(word)
     except ValueError:
         raise _unreadable(text) from None
-    if count < 1:
-        raise ScenarioError(f"`--sizes` must have a count of at least 1, but is {text!r}")
+    if not 1 <= count <= MAX_CASES:
+        raise ScenarioError(f"`--sizes` must have a count of 1 to {MAX_CASES:,}, but is {text!r}")
     return count
 
 
@@ -71,4 +72,8 @@ def _number(text: str, word: str) -> float:
 def _require(alpha: float, experiment: Experiment) -> None:
     if not (math.isfinite(alpha) and alpha > 0.0):
         raise ScenarioError(f"`--sizes` must be finite and positive, but one is {alpha:g}")
-    experiment.require_size(alpha)
+    if not experiment.smallest <= alpha <= experiment.largest:
+        raise CalibrationError(
+            f"`--sizes` must lie within the calibrated {experiment.smallest:g} to {experiment.largest:g} rad of the "
+            f"{experiment.name} experiment, but one is {alpha:g}"
+        )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.engine import Case, Column, DesignCases, Row, Status, Work, parse_design
 from orchestrator.engine.cases import Value
+from orchestrator.engine.grid import MAX_CASES
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import Calibration, estimate_gap, load_or_calibrate
 from orchestrator.paired.cosimulation import LoopSession
@@ -62,8 +63,8 @@ class SweepPlan:
             ScenarioError: a specification that cannot be read, or a count below 1.
             CalibrationError: a size outside the calibrated range.
         """
-        if self.repetitions < 1:
-            raise ScenarioError(f"`--seeds` must be at least 1, but is {self.repetitions}")
+        if not 1 <= self.repetitions <= MAX_CASES:
+            raise ScenarioError(f"`--seeds` must be 1 to {MAX_CASES:,}, but is {self.repetitions:g}")
         for level in self.noise:
             if not (np.isfinite(level) and level >= 0.0):
                 raise ScenarioError(f"`--noise` must be finite and not negative, but is {level}")
