@@ -7,6 +7,7 @@ With the process noise at zero this is the output-error likelihood of the determ
 is the likelihood in innovation form, in which an imperfect model does not drift away from the record.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +19,7 @@ from pyfmu_sources.equations import rates
 
 Array = NDArray[np.float64]
 STATES = 5
+FADING = 1e-3  # rad, half-gap below which the impulse of a contact fades
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class AffineModel:
         normal: (5,) twist = normal . x.
         alpha: half gap [rad].
         mobility: (2,) what a torque at motor or load does to the speed beside it, 1/inertia.
+        jump: (5,) sudden change of the state when the teeth touch at flank +1.
     """
 
     matrices: Array
@@ -39,10 +42,16 @@ class AffineModel:
     normal: Array
     alpha: float
     mobility: Array
+    jump: Array
 
 
-def affine_model(p: tuple[float, ...]) -> AffineModel:
-    """Return the smooth modes of the dead-zone plant with parameters ``p``; nonlinear effects are not seen."""
+def affine_model(p: tuple[float, ...], impulse: float = 0.0) -> AffineModel:
+    """Return the smooth modes of the dead-zone plant with parameters ``p``; nonlinear effects are not seen.
+
+    ``impulse`` [N.m.s] is what the shaft lacks at the load when the teeth touch, and has too much when they part,
+    beside a damper ``c`` that acts from the first moment of contact on: half of ``c`` times the depth within which a
+    real contact's damping sets in (Hunt and Crossley 1975). It fades with the gap: without one, nothing touches.
+    """
     chosen = list(p)
     chosen[P_MODEL] = float(DEAD_ZONE)
     p = tuple(chosen)
@@ -61,7 +70,9 @@ def affine_model(p: tuple[float, ...]) -> AffineModel:
         inputs = np.array([moved[m] - base[m] for m in range(STATES)])
     normal = np.array([1.0 / p[P_I], 0.0, -1.0, 0.0, 0.0])
     mobility = np.array([1.0 / p[P_J_M], 1.0 / p[P_J_L]])
-    return AffineModel(matrices, inputs, constants, normal, p[P_ALPHA], mobility)
+    faded = impulse * p[P_ALPHA] / math.hypot(p[P_ALPHA], FADING)
+    jump = faded * np.array([0.0, mobility[0] / p[P_I], 0.0, -mobility[1], 0.0])
+    return AffineModel(matrices, inputs, constants, normal, p[P_ALPHA], mobility, jump)
 
 
 def _unit(n: int) -> tuple[float, float, float, float, float, float, float, float]:
@@ -130,7 +141,7 @@ def innovations(
     states = np.empty((n if keep else 0, STATES))
     contacts = np.empty(n if keep else 0, dtype=np.int64)
     run_filter(
-        model.matrices, model.inputs, model.constants, model.normal, model.alpha, phi, gain_u, gain_1, step,
+        model.matrices, model.inputs, model.constants, model.normal, model.alpha, model.jump, phi, gain_u, gain_1, step,
         u, y, variance, intensity, x0, errors, variances, states, contacts, soft,
     )  # fmt: skip
     return Innovations(errors, variances, states, contacts)
@@ -141,8 +152,8 @@ def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:
     phi, gain_u, gain_1 = _discrete(model, step)
     states = np.empty((u.size, STATES))
     run_free(
-        model.matrices, model.inputs, model.constants, model.normal, model.alpha, phi, gain_u, gain_1, step, u, x0,
-        states,
+        model.matrices, model.inputs, model.constants, model.normal, model.alpha, model.jump, phi, gain_u, gain_1,
+        step, u, x0, states,
     )  # fmt: skip
     return states
 

@@ -2,6 +2,8 @@
 
 ``mats`` (3, 5, 5), ``b_u`` (5,) and ``b_1`` (3, 5) are the affine modes, index 0: flank -1, 1: free, 2: flank +1;
 ``phi``, ``gain_u`` and ``gain_1`` the same over a sample ``h`` [s]; ``normal`` (5,) takes the twist from the state.
+``jump`` (5,) is how the state changes at once when the teeth touch at flank +1; at flank -1, and when they part, it
+is the opposite.
 """
 
 import math
@@ -131,7 +133,7 @@ def cut_at(mats, b_u, b_1, normal, edge, hit, left, u, x, part, y):  # type: ign
 
 
 @njit(cache=True, nogil=True)
-def propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x, total, end):  # type: ignore[no-untyped-def]
+def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x, total, end):  # type: ignore[no-untyped-def]
     """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch."""
     d = normal[0] * x[0] + normal[2] * x[2]
     flank = 2
@@ -171,8 +173,11 @@ def propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x, total
         speed0 = np.empty(5)
         speed1 = np.empty(5)
         derivative(mats[flank], b_u, b_1[flank], y, u, speed0)
-        derivative(mats[after], b_u, b_1[after], y, u, speed1)
         rate = normal[0] * y[1] + normal[2] * y[3]
+        way = side if flank == 1 else -side
+        for r in range(5):
+            y[r] += way * jump[r]
+        derivative(mats[after], b_u, b_1[after], y, u, speed1)
         if abs(rate) > 1e-6:
             for c in range(5):
                 along = (normal[0] * total[0, c] + normal[2] * total[2, c]) / rate
@@ -237,7 +242,7 @@ def blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore
 
 
 @njit(cache=True, nogil=True)
-def run_free(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x0, states):  # type: ignore[no-untyped-def]
+def run_free(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x0, states):  # type: ignore[no-untyped-def]
     """Fill ``states`` (n, 5) with the run from ``x0`` under ``u`` (n,), nothing measured."""
     x = x0.copy()
     total = np.empty((5, 5))
@@ -245,12 +250,12 @@ def run_free(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, x0, state
     for k in range(u.size):
         for r in range(5):
             states[k, r] = x[r]
-        propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u[k], x, total, end)
+        propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u[k], x, total, end)
 
 
 @njit(cache=True, nogil=True)
 def run_filter(  # type: ignore[no-untyped-def]
-    mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u, y, variance, intensity, x0, errors, variances,
+    mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, y, variance, intensity, x0, errors, variances,
     states, contacts, soft,
 ):  # fmt: skip
     """Fill one-step ``errors`` and ``variances`` (n, outputs); and states and contacts where they have n rows."""
@@ -285,7 +290,7 @@ def run_filter(  # type: ignore[no-untyped-def]
         if soft:
             blurred(mats, b_u, b_1, normal, alpha, cov, h, u[k], x, total)
         else:
-            propagate(mats, b_u, b_1, normal, alpha, phi, gain_u, gain_1, h, u[k], x, total, gain)
+            propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u[k], x, total, gain)
         for r in range(5):
             for c in range(5):
                 acc = 0.0

@@ -20,6 +20,8 @@ from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
 OFFSET = "effects.sensor_offset.load.offset"
+IMPULSE = "contact_impulse"
+IMPULSE_DEPTH = 2e-3  # rad, within which a contact's damping sets in; prior standard deviation
 OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
 START_DAMPING = 1e-6
@@ -28,6 +30,7 @@ DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
 # motor and load keeps it honest.
 LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-9, 30.0
 LEAST_WITH_ONE_ENCODER = (1e-4, 1e-3)
+LARGEST_LOG_NOISE = 20.0  # beyond the bounds of any unknown, where a difference quotient may look
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,8 @@ def make_problem(record: Record, model: Model) -> Problem:
     unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
     if both:
         unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
+    damping = model.parameters["c"].value
+    unknowns.append(Unknown(IMPULSE, 0.0, 0.5 * IMPULSE_DEPTH * damping, 0.5 * IMPULSE_DEPTH * damping))
     unknowns += _initial_state(record, ratio)
     levels, noises = [], []
     for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
@@ -195,6 +200,7 @@ class Likelihood:
         names = problem.names
         self._offset = names.index(OFFSET) if OFFSET in names else None
         self._alpha = names.index("alpha")
+        self._impulse = names.index(IMPULSE)
         self.information = np.diag([(10.0 / u.scale) ** 2 for u in problem.unknowns])  # the last one known
         self._floor = np.array([(0.1 / u.scale) ** 2 for u in problem.unknowns])
         self._places = [(n, NAMES.index(name)) for n, name in enumerate(names) if name in NAMES and name != OFFSET]
@@ -224,15 +230,14 @@ class Likelihood:
 
     def noise(self, theta: Array) -> NoiseLevels:
         """Return the noise levels of a vector."""
-        measured = [math.exp(theta[n]) for n in self._noise]
-        return NoiseLevels(
-            (measured[0], measured[-1]), (math.exp(theta[self._torque[0]]), math.exp(theta[self._torque[1]]))
-        )
+        measured = [math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._noise]
+        motor, load = (math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._torque)
+        return NoiseLevels((measured[0], measured[-1]), (motor, load))
 
     def run(self, theta: Array, keep: bool = False) -> Innovations:
         """Return the innovations at ``theta``."""
         record = self.problem.record
-        model = affine_model(self.parameters(theta))
+        model = affine_model(self.parameters(theta), float(theta[self._impulse]))
         outputs, x0 = self.problem.outputs, theta[self._state]
         if self._offset is not None:
             shift = theta[self._offset]

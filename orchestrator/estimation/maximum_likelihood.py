@@ -38,13 +38,17 @@ GRID = (0.0, *(3e-4 * 1.28**n for n in range(31)))  # to half a radian
 BOTH_ENCODERS = tuple((w, w) for w in (1.0, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-9))
 BLURRED = ((0.1, 1.0), (0.08, 0.7), (0.06, 0.5), (0.045, 0.3), (0.03, 0.2), (0.02, 0.1), (0.01, 0.05))
 MOTOR_ENCODER = (
+    (0.1, 1.0),
     (0.03, 0.2),
+    (0.01, 0.05),
     (0.01, 0.03),
     (3e-3, 1e-2),
     (1e-3, 3e-3),
     (3e-4, 2e-3),
     LEAST_WITH_ONE_ENCODER,
 )
+SHARP_STARTS = (2, 1, 0)  # places in MOTOR_ENCODER, tried in turn until the noise at the load gets down to this much:
+CALM_TORQUE_NOISE = 0.011
 # A lower torque noise is preferred unless the objective rises by this much above the least: the 5 % limit of the
 # likelihood ratio for a noise level at its bound, zero.
 ALLOWED_RISE = 2.7
@@ -72,8 +76,7 @@ def estimate(record: Record, model: Model, threads: int = 2) -> Estimate:
 def fit_record(likelihood: Likelihood) -> Fit:
     """Return the fit of all unknowns, by grid and continuation in the torque noise."""
     problem = likelihood.problem
-    torque = [n for n, name in enumerate(problem.names) if name.startswith("log_torque_")]
-    others = [n for n in range(len(problem.names)) if n not in torque]
+    torque, others = _split(likelihood)
     if problem.outputs.shape[1] == 2:
         first = _first_fit(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
         best = _continue(likelihood, first, BOTH_ENCODERS[1:])
@@ -82,17 +85,13 @@ def fit_record(likelihood: Likelihood) -> Fit:
         first = _first_fit(likelihood, torque, others, np.log(BLURRED[0]))
         best = _continue(likelihood, first, BLURRED[1:])
         likelihood.soft = False
-        start = best.point.theta.copy()
-        first = maximise(likelihood, start, others, STEPS_PER_LEVEL, tolerance=0.5)
-        best = _continue(likelihood, first, MOTOR_ENCODER)
+        best = _sharpen(likelihood, best)
     return _free_fit(likelihood, best, torque, others)
 
 
 def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, float]]) -> Fit:
     """Return the last fit that paid while the torque noise goes through ``levels``."""
-    names = likelihood.problem.names
-    torque = [n for n, name in enumerate(names) if name.startswith("log_torque_")]
-    others = [n for n in range(len(names)) if n not in torque]
+    torque, others = _split(likelihood)
     failures, least = 0, best.point.objective
     for level in levels:
         start = best.point.theta.copy()
@@ -108,6 +107,37 @@ def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, f
         if failures == 2:
             break
     return best
+
+
+def _sharpen(likelihood: Likelihood, blurred: Fit) -> Fit:
+    """Return the fit with sharp flanks that starts from one with ``blurred`` flanks.
+
+    Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it. Where no
+    start with sharp flanks comes up to the blurred fit, that one stays, with the wide interval that it deserves.
+    """
+    torque, others = _split(likelihood)
+    known = likelihood.information.copy()
+    fits: list[Fit] = []
+    for place in SHARP_STARTS:
+        likelihood.information = known.copy()
+        start = blurred.point.theta.copy()
+        start[torque] = np.log(MOTOR_ENCODER[place])
+        first = maximise(likelihood, start, others, STEPS_PER_LEVEL, tolerance=0.5)
+        fits.append(_continue(likelihood, first, MOTOR_ENCODER[place + 1 :]))
+        if likelihood.noise(fits[-1].point.theta).torque[1] <= CALM_TORQUE_NOISE:
+            break
+    best = min(fits, key=lambda fit: fit.point.objective)
+    if best.point.objective < blurred.point.objective:
+        return best
+    likelihood.soft, likelihood.information = True, known
+    return blurred
+
+
+def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
+    """Return the places of the torque noise in the vector of unknowns, and all others."""
+    names = likelihood.problem.names
+    torque = [n for n, name in enumerate(names) if name.startswith("log_torque_")]
+    return torque, [n for n in range(len(names)) if n not in torque]
 
 
 def _first_fit(likelihood: Likelihood, torque: list[int], others: list[int], level: Array) -> Fit:
