@@ -78,9 +78,11 @@ def test_a_dead_scheduler_keeps_what_is_done(tmp_path, local_bytes):
 
 def test_a_scheduler_that_is_not_there_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("orchestrator.engine.cluster.CONNECT_LIMIT", 1.0)
-    with pytest.raises(ScenarioError, match=r"`--scheduler` must be a Dask scheduler, but tcp://127\.0\.0\.1:9 is not"):
+    with pytest.raises(
+        ScenarioError, match=r"`--scheduler` must be a Dask scheduler, but 'tcp://127\.0\.0\.1:9' is not"
+    ):
         table(tmp_path, choose_pool(None, "tcp://127.0.0.1:9"))
-    with pytest.raises(ScenarioError, match="but nonsense is not"):
+    with pytest.raises(ScenarioError, match="but 'nonsense' is not"):
         table(tmp_path, choose_pool(None, "nonsense"))
     assert list(tmp_path.iterdir()) == []
 

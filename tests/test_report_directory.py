@@ -177,9 +177,23 @@ def test_a_damaged_table_is_named(sweep, capsys):
     assert "sweep.csv must be a CSV table" in capsys.readouterr().err
 
 
-def test_an_empty_directory_is_named(tmp_path, capsys):
+def test_a_missing_table_is_named(sweep, capsys):
+    (sweep / "sweep.csv").unlink()
+    assert main(["report", str(sweep)]) == 2
+    assert "sweep.csv must be the table of a sweep" in capsys.readouterr().err
+
+
+def test_an_empty_directory_a_missing_one_and_an_unknown_command_are_named(tmp_path, capsys):
     assert main(["report", str(tmp_path)]) == 2
     assert "has none" in capsys.readouterr().err
+    assert main(["report", str(tmp_path / "missing")]) == 2
+    assert "`DIR` must be an existing folder" in capsys.readouterr().err
+    for command in ("", "../sweep"):
+        assert main(["report", str(tmp_path), "--command", command]) == 2
+        assert (
+            f"`--command` must be one of build, check, simulate, sweep, estimate, diagnose, thesis, ssp, bench, "
+            f"but is {command!r}" in capsys.readouterr().err
+        )
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -91,16 +91,8 @@ def _print_rows(sweep: Sweep, cases: DesignCases) -> None:
     if len(cases) > len(shown):
         title += f", the first {len(shown)}; all of them are in sweep.csv"
     extra = [name for name in cases.names if name not in OWN_PARAMETERS]
-    head = [
-        "actual [rad]",
-        "noise [rad]",
-        *extra,
-        "S [rad]",
-        "estimate [rad]",
-        "interval [rad]",
-        "error [rad]",
-        "error [%]",
-    ]
+    found = ("S [rad]", "estimate [rad]", "interval [rad]", "error [rad]", "error [%]")
+    head = ["actual [rad]", "noise [rad]", *extra, *found]
     print_table(title, head, shown)
 
 

@@ -33,6 +33,10 @@ def report_from_directory(directory: Path, command: str | None = None) -> Report
     Raises:
         ScenarioError: there are no results, or several and ``command`` is not given, or they are damaged.
     """
+    if not directory.is_dir():
+        raise ScenarioError(f"`DIR` must be an existing folder, but {directory} is not")
+    if command is not None and command not in COMMANDS:
+        raise ScenarioError(f"`--command` must be one of {', '.join(COMMANDS)}, but is {command!r}")
     found = [name for name in COMMANDS if (directory / f"{name}.json").is_file()]
     if command is None and len(found) != 1:
         what = f"has those of {', '.join(found)}: choose with --command" if found else "has none"

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from orchestrator.errors import ScenarioError
 from orchestrator.reporting.model import POINT_LIMIT, ROW_LIMIT, Cell, Column, Plot, Report, Section, Series, Table
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import Source, by_column, numbers, plain, table_of, words
@@ -160,6 +161,10 @@ def _excerpts(source: Source, total: int) -> tuple[Columns, Columns, Columns]:
     """Return the first rows, the first failed rows, and rows spread over all for the plots; memory stays bounded."""
     rows = source.rows("sweep.csv")
     header = next(rows, [])
+    if "status" not in header:
+        raise ScenarioError(
+            f"{source.directory / 'sweep.csv'} must be the table of a sweep, but has no column `status`"
+        )
     status = header.index("status")
     stride = max(1, -(-total // POINT_LIMIT))
     first: list[list[Cell]] = []
