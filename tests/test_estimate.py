@@ -281,3 +281,24 @@ def test_nonlinear_models_are_sent_to_diagnose(tmp_path: Path, capsys: pytest.Ca
     model.write_text('[parameters."effects.coulomb_friction.motor.torque"]\nvalue = 1.0\n')
     assert main(["estimate", "--design", "--model", str(model), "--out", str(tmp_path / "out")]) == 2
     assert "diagnose" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_a_large_gap_that_is_traversed_rarely_is_found() -> None:
+    seed = 1_000_085
+    columns, _ = make_record(
+        {"alpha": 0.0941}, 100_000 + seed, 10.0, contact="dead_zone", noise=(1e-4, 1e-4), counts=None,
+        excitation="closed_loop",
+    )  # fmt: skip
+    result = estimator("maximum_likelihood")(record_from_columns(columns, "rare"), MODEL)
+    assert result.alpha == pytest.approx(0.0941, rel=1e-3)
+    assert result.visible
+
+
+def test_the_impulse_of_a_soft_contact_is_estimated() -> None:
+    record, truth = _record(0.02, 42, 6.0, excitation="levels")
+    result = estimator("maximum_likelihood")(record, MODEL)
+    entry = result.diagnostics["parameters"]["contact_impulse"]
+    # The simulator's damping sets in over 2 mrad: what is missing is half of that times c.
+    assert entry["value"] == pytest.approx(1e-3 * truth["linear"]["c"], rel=0.3)
+    assert max(result.diagnostics["torque_noise"]) < 3e-3

@@ -345,7 +345,7 @@ def _step(
 ) -> tuple[Point, float]:
     """Return the next point and damping; the same point when no step lowers the objective."""
     open_ = np.flatnonzero(~held)
-    diagonal = np.sqrt(np.diag(information)[open_])
+    diagonal = np.sqrt(np.maximum(np.diag(information)[open_], 1e-300))
     scaled = information[np.ix_(open_, open_)] / np.outer(diagonal, diagonal)
     for _ in range(16):
         move = np.linalg.solve(scaled + damping * np.eye(open_.size), -gradient[open_] / diagonal) / diagonal

@@ -53,6 +53,8 @@ CALM_TORQUE_NOISE = 0.011
 # likelihood ratio for a noise level at its bound, zero.
 ALLOWED_RISE = 2.7
 STEPS_PER_LEVEL = 10
+ABOUT_AS_GOOD = 15.0  # in the objective
+DIFFERENT = 1.5  # ratio of two sizes
 MISFIT_WIDENING = 1.3
 # What a model that is right but for its parameters' values and its contact law never reaches: torque noise as a share
 # of the drive's torque, and autocorrelation of the one-step errors.
@@ -78,11 +80,12 @@ def fit_record(likelihood: Likelihood) -> Fit:
     problem = likelihood.problem
     torque, others = _split(likelihood)
     if problem.outputs.shape[1] == 2:
-        first = _first_fit(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
-        best = _continue(likelihood, first, BOTH_ENCODERS[1:])
+        firsts = _first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
+        fits = [_continue(likelihood, first, BOTH_ENCODERS[1:]) for first in firsts]
+        best = min(fits, key=lambda fit: fit.point.objective)
     else:
         likelihood.soft = True
-        first = _first_fit(likelihood, torque, others, np.log(BLURRED[0]))
+        first, *_ = _first_fits(likelihood, torque, others, np.log(BLURRED[0]))
         best = _continue(likelihood, first, BLURRED[1:])
         likelihood.soft = False
         best = _sharpen(likelihood, best)
@@ -140,8 +143,12 @@ def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
     return torque, [n for n in range(len(names)) if n not in torque]
 
 
-def _first_fit(likelihood: Likelihood, torque: list[int], others: list[int], level: Array) -> Fit:
-    """Return the best fit at high torque noise (its logarithm ``level``) from the two best places of the grid."""
+def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], level: Array) -> list[Fit]:
+    """Return fits at high torque noise (its logarithm ``level``), the best first, as far as their sizes differ.
+
+    They start from the two best places of a grid of alpha and from the smallest size that is about as good: where the
+    gap is traversed rarely, much noise hides that sizes beyond it are too large.
+    """
     problem = likelihood.problem
     place = problem.index("alpha")
     points = []
@@ -150,11 +157,21 @@ def _first_fit(likelihood: Likelihood, torque: list[int], others: list[int], lev
         theta[torque] = level
         theta[place] = alpha
         points.append(likelihood.at(theta))
-    points.sort(key=lambda point: point.objective)
-    if not math.isfinite(points[0].objective):
+    best = min(point.objective for point in points)
+    if not math.isfinite(best):
         raise ConvergenceError("the likelihood must be finite somewhere, but no start led to one; check the units")
-    fits = [maximise(likelihood, point.theta, others, 3, tolerance=1.0) for point in points[:2]]
-    return min(fits, key=lambda fit: fit.point.objective)
+    starts = sorted(points, key=lambda point: point.objective)[:2]
+    smallest = next(point for point in points if point.objective < best + ABOUT_AS_GOOD)
+    if all(smallest is not start for start in starts):
+        starts.append(smallest)
+    fits = [maximise(likelihood, point.theta, others, 3, tolerance=1.0) for point in starts]
+    chosen: list[Fit] = []
+    for fit in sorted(fits, key=lambda fit: fit.point.objective):
+        size = float(fit.point.theta[place])
+        taken = [float(other.point.theta[place]) for other in chosen]
+        if all(max(size, known) > DIFFERENT * min(size, known) + GRID[1] for known in taken):
+            chosen.append(fit)
+    return chosen
 
 
 def _free_fit(likelihood: Likelihood, best: Fit, torque: list[int], others: list[int]) -> Fit:
