@@ -1,5 +1,7 @@
 """The online estimator as an FMU: one source, compiled or interpreted, and a loop that measures its own gap."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from orchestrator.estimation import ekf
 from orchestrator.fmi.build import ensure_built
 from orchestrator.model_file import default_model
 from orchestrator.record import Record, record_from_columns
+from orchestrator.scenario import run_scenario
 from pyfmu_sources.backlash_estimator import FILTERS, SIZE, Settings, covariance
 from pyfmu_sources.backlash_estimator_slave import (
     ALPHA_DEVIATION,
@@ -21,6 +24,7 @@ from pyfmu_sources.backlash_estimator_slave import (
 )
 from tests.support.independent_plant import make_record
 
+OWN_GAP = Path(__file__).resolve().parents[1] / "docs" / "examples" / "own_gap.toml"
 OUTPUTS = [ALPHA_HAT, ALPHA_DEVIATION, CONTACT_HAT]
 
 
@@ -112,3 +116,16 @@ def test_a_filter_that_diverges_is_dropped() -> None:
     assert best not in (0, 3)
     assert np.isfinite(alpha)
     assert np.isfinite(deviation)
+
+
+@pytest.mark.parametrize(("alpha", "seed"), [(0.01, 3), (0.02, 1), (0.06, 5)])
+def test_a_running_loop_estimates_its_own_gap(alpha: float, seed: int, tmp_path: Path) -> None:
+    text = OWN_GAP.read_text(encoding="utf-8")
+    changed = text.replace("alpha = 0.02", f"alpha = {alpha}").replace("seed = 1", f"seed = {seed}")
+    path = tmp_path / "loop.toml"
+    path.write_text(changed, encoding="utf-8")
+    result = run_scenario(path)
+    estimate, deviation = result["estimator.alpha_hat"][-1], result["estimator.alpha_deviation"][-1]
+    assert result.time[-1] == 2.0
+    assert estimate == pytest.approx(alpha, rel=0.05)
+    assert abs(estimate - alpha) < 3.0 * deviation < 0.2 * alpha
