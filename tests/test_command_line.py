@@ -1,5 +1,9 @@
 """The command line as such: wrong words are one line that names the argument, and exit code 2."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from orchestrator.cli import COMMANDS, main
@@ -51,3 +55,16 @@ def test_limits_have_the_same_names_everywhere(capsys):
         told = capsys.readouterr().out
         assert "--time-limit S" in told
         assert "--memory-limit MIB" in told
+
+
+def test_names_of_any_script_are_printed_whatever_the_encoding(tmp_path):
+    name = tmp_path / "ünï cödé.toml"
+    name.write_text(
+        'stop = 0.01\nrecord = ["plant.theta_l"]\n[master]\nstep = 1e-3\n[instances.plant]\nfmu = "Drivetrain"\n',
+        encoding="utf-8",
+    )
+    words = [sys.executable, "-m", "orchestrator", "simulate", "--scenario", str(name), "--out", str(tmp_path / "öut")]
+    environment = os.environ | {"PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert r"\xf6ut: report.html" in done.stdout

@@ -74,17 +74,11 @@ def run(args: argparse.Namespace) -> int:
     with staged(args.out) as directory:
         for path in _shown(paths):
             reports.append(check_fmu(path, options))
-            _print("\n".join(as_lines(reports[-1])))
+            print("\n".join(as_lines(reports[-1])), flush=True)
         write_result(directory, "check", arguments, None, as_results(reports))
         write_report(directory, "check")
         _write_extra(args, reports)
     return 0 if all(r.ok for r in reports) else 1
-
-
-def _print(text: str) -> None:
-    """Print names of any script, whatever the encoding of the terminal or file."""
-    encoding = sys.stdout.encoding or "utf-8"
-    print(text.encode(encoding, "backslashreplace").decode(encoding), flush=True)
 
 
 def _shown(paths: Sequence[Path]) -> Iterator[Path]:

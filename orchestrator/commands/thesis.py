@@ -48,6 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
         }
         write_result(directory, "thesis", {}, None, results)
         write_report(directory, "thesis")
+    print(f"Written to {arguments.out}: report.html, thesis.json")
     return 0
 
 
