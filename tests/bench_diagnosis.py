@@ -58,11 +58,12 @@ def judge(case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     row["warned"] = bool(diagnosis.warnings)
     row["gaps"] = [[gap.before, gap.after, gap.noise] for gap in diagnosis.gap]
     row["errors"] = errors(case, diagnosis)
+    row["linear"] = linear_errors(case, diagnosis)
     return row
 
 
-def errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, float]]:
-    """Return (parameter, relative error, error in standard errors) of each hidden size that was named."""
+def errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, float, bool]]:
+    """Return (parameter, relative error, error in standard errors, inside the interval) of each size that was named."""
     rows = []
     for short, value in case.truth["effects"].items():
         name, parameter = RECOVERED.get(short, ("", ""))
@@ -70,7 +71,19 @@ def errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, float]]:
             if effect.name == name and parameter in effect.parameters:
                 estimate = effect.parameters[parameter]
                 off = abs(estimate.value) - abs(value)
-                rows.append((short, off / abs(value), off / max(estimate.standard_error, 1e-300)))
+                low, high = estimate.interval
+                inside = low <= value <= high or low <= -value <= high  # a sign can be in the phase
+                rows.append((short, off / abs(value), off / max(estimate.standard_error, 1e-300), inside))
+    return rows
+
+
+def linear_errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, bool]]:
+    """Return (parameter, relative error, inside the interval) of each linear parameter."""
+    rows = []
+    for name, entry in diagnosis.parameters.items():
+        true = case.truth["linear"][name]
+        low, high = entry["interval"]
+        rows.append((name, (entry["value"] - true) / true, low <= true <= high))
     return rows
 
 
@@ -125,9 +138,16 @@ def report(rows: list[dict[str, Any]]) -> dict[str, Any]:
         figures["parameters"] = {
             "relative_error_median": float(np.median([abs(e[1]) for e in errors_])),
             "relative_error_90": float(np.quantile([abs(e[1]) for e in errors_], 0.9)),
-            "within_two_standard_errors": float(np.mean([abs(e[2]) < 2.0 for e in errors_])),
+            "inside_95_percent_interval": float(np.mean([e[3] for e in errors_])),
+            "count": len(errors_),
         }
-        print(figures["gap"], figures["parameters"])
+        linear = [e for row in rows if row["group"] == "none" or row["right"] for e in row["linear"]]
+        figures["linear"] = {
+            "relative_error_median": float(np.median([abs(e[1]) for e in linear])),
+            "inside_95_percent_interval": float(np.mean([e[2] for e in linear])),
+            "count": len(linear),
+        }
+        print(figures["gap"], figures["parameters"], figures["linear"])
     figures["seconds_median"] = float(np.median([row["seconds"] for row in rows]))
     figures["seconds_largest"] = float(np.max([row["seconds"] for row in rows]))
     print({name: round(value, 1) for name, value in figures.items() if isinstance(value, float)})

@@ -33,9 +33,12 @@ def test_json_keeps_the_contract(result) -> None:
     (effect,) = results["effects"]
     assert {"name", "site", "parameters", "score", "runner_up", "margin"} <= set(effect)
     assert (effect["name"], effect["site"]) == ("backlash", "shaft")
-    assert set(effect["parameters"]["alpha"]) == {"value", "standard_error", "unit"}
+    assert set(effect["parameters"]["alpha"]) == {"value", "standard_error", "interval", "unit"}
+    low, high = effect["parameters"]["alpha"]["interval"]
+    assert low < 0.005 < high < 1.02 * low
     assert effect["parameters"]["alpha"]["value"] == pytest.approx(0.005, rel=0.02)
-    assert set(results["parameters"]["k"]) == {"nominal", "value", "standard_error", "unit"}
+    assert set(results["parameters"]["k"]) == {"nominal", "value", "standard_error", "interval", "unit"}
+    assert results["parameters"]["k"]["interval"][0] < 3400.0 < results["parameters"]["k"]["interval"][1]
     assert results["parameters"]["k"]["value"] == pytest.approx(3400.0, rel=0.02)
     shares = [place["share_of_gap"] for place in results["where"]]
     assert shares == sorted(shares, reverse=True)

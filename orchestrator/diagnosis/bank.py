@@ -71,6 +71,10 @@ class Effect:
         priors: scene -> short name -> (mean, standard deviation).
         angular: True if it makes sense for an angle only, not for a position in metres.
         both_encoders: True if it can be seen only with an encoder on either side.
+        least_noise: level of process noise, as a share of the drive's torque, below which no model with this effect is
+            trusted: impacts amplify what their law leaves out, so that a predictor that is hardly corrected goes astray.
+        tolerance: name in the plant's table -> share of its value to which laws of this kind, of which none is exact,
+            leave the parameter undefined (standard deviation; measured on records made with other laws).
     """
 
     name: str
@@ -91,6 +95,8 @@ class Effect:
     angular: bool = False
     nuisances: dict[str, str] = field(default_factory=dict)
     priors: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
+    least_noise: float = 0.0
+    tolerance: dict[str, float] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -152,6 +158,10 @@ def _fractions(scene: Scene) -> tuple[float, ...]:
     return tuple(float(scene.twist * f) for f in (0.001, 0.003, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 0.9))
 
 
+def _onset(scene: Scene) -> tuple[float, float]:
+    return float(np.log(0.03 * scene.twist)), 2.0
+
+
 def _limits(scene: Scene) -> tuple[float, ...]:
     asked = np.abs(scene.u)
     shares = (0.3, 0.5, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995, 0.998)
@@ -168,12 +178,13 @@ def _frequencies(scene: Scene) -> tuple[float, ...]:
     return tuple(float(f) for f in np.geomspace(min(8.0, top / 8), min(250.0, top), 32))
 
 
-def _periodic(name: str, site: str, unit: Callable[[Scene], float]) -> Effect:
+def _periodic(name: str, site: str, unit: Callable[[Scene], float], tolerance: float = 0.0) -> Effect:
     return Effect(
         name, site, _group(name, "amplitude", "cycles_per_rev", "phase"), "amplitude", unit,
         lambda scene: {"cycles_per_rev": scene.cycles.get(name, ())}, amplitudes=("amplitude",), phase="phase",
         scales=lambda scene: {"cycles_per_rev": 0.01 / max(scene.turns, 1e-9), "phase": 0.05},
         bounds=lambda scene: {"cycles_per_rev": (0.7 / max(scene.turns, 1e-9), 1e9)}, family=f"periodic, {site}",
+        tolerance={f"effects.{name}.amplitude": tolerance},
     )  # fmt: skip
 
 
@@ -188,7 +199,10 @@ def _load_torque(scene: Scene) -> float:
 DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "backlash", "shaft", {"alpha": "alpha"}, "alpha", lambda s: 0.003 * s.twist,
-        lambda s: {"alpha": _fractions(s)}, family="weak shaft at small torque", both_encoders=False,
+        lambda s: {"alpha": _fractions(s), "onset": (_onset(s)[0],)}, family="weak shaft at small torque",
+        scales=lambda s: {"onset": 0.2}, nuisances={"onset": "contact.onset"}, priors=lambda s: {"onset": _onset(s)},
+        tolerance={"alpha": 2e-3, "k": 5e-4, "J_m": 4e-4, "J_l": 4e-4, "tau": 3e-4, "c": 0.01, "b_m": 3e-3,
+                   "b_l": 6e-3}, least_noise=1.5e-4,
     ),
     *_friction("motor"),
     *_friction("load"),
@@ -205,7 +219,8 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: 0.02 * s.stiffness / s.twist**2, amplitudes=("cubic",), family="weak shaft at small torque",
     ),
     _periodic("torque_ripple", "motor", _torque),
-    _periodic("gear_eccentricity", "shaft", lambda s: 0.003 * s.twist),
+    # Where the tooth force acts on an eccentric gear, and so its lever arm, differs between models.
+    _periodic("gear_eccentricity", "shaft", lambda s: 0.003 * s.twist, tolerance=8e-3),
     Effect(
         "load_torque", "load", _group("load_torque", "torque"), "torque", _load_torque, amplitudes=("torque",),
     ),

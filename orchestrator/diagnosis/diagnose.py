@@ -2,19 +2,21 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.admission import check_comparable, check_resolved
 from orchestrator.diagnosis.bank import Effect
-from orchestrator.diagnosis.fitting import Fit, Parts, anneal, split
+from orchestrator.diagnosis.fitting import Fit, Parts, split
 from orchestrator.diagnosis.free_run import free_run
 from orchestrator.diagnosis.likelihood import HEAD, Likelihood, Signals, signals_of
 from orchestrator.diagnosis.outcome import Diagnosis, Estimate, Gap, Named, Workings
 from orchestrator.diagnosis.plants import Plant, plant_of
 from orchestrator.diagnosis.remainder import Predictable, Remainder, remainder
-from orchestrator.diagnosis.search import LEVELS, Candidate, Search, Step, in_metres
+from orchestrator.diagnosis.search import LEVELS, Candidate, Search, Step, annealed, in_metres
+from orchestrator.diagnosis.spread import widened
 from orchestrator.diagnosis.where import missing_torque, places
 from orchestrator.model_file import Model
 from orchestrator.record import Record
@@ -67,7 +69,9 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
     unknown, floor_off = found.unknown, found.floor_off
     units = METRIC if in_metres(model) else {}
     named = tuple(_name(plant, effect, final, search.steps, units) for effect in best.effects)
-    chosen = base_fit if unknown else final
+    chosen = final
+    if unknown:
+        chosen = widened(likelihood, plant, base_fit, slice(parts.fitted.start, parts.validated.stop), ())
     verdict = "unknown" if unknown else "effects" if named else _plain_verdict(likelihood, nominal, base_fit, parts)
     untouched = replace(base_fit, p=nominal)
     before = missing_torque(likelihood, plant, untouched if verdict in ("none", "parameters") else base_fit)
@@ -110,8 +114,11 @@ def _search(
     search = Search(likelihood, plant, model, used, progress)
     base, best = search.run()
     whole = Parts(slice(parts.fitted.start, parts.validated.stop), parts.validated, parts.held_out)
-    base_fit = anneal(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, LEVELS)
-    final = base_fit if not best.effects else anneal(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, LEVELS)
+    base_fit = annealed(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, ())
+    final = base_fit
+    if best.effects:
+        final = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
+    final = widened(likelihood, plant, final, whole.fitted, best.effects)
     left = _left(likelihood, plant, base_fit, final, best.fit, parts)
     growth = _growth(plant, signals, nominal, final, whole)
     left = replace(left, growth=growth if best.effects else max(growth, left.growth))
@@ -194,6 +201,7 @@ def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step], units
         short: Estimate(
             float(final.p[place]),
             final.standard_error(place),
+            final.interval(place),
             units.get(plant.table[place].unit, plant.table[place].unit),
         )
         for short, place in effect.places(plant).items()
@@ -203,12 +211,13 @@ def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step], units
     return Named(effect.name, effect.site, parameters, gain, runner.effects[-1].label if runner else "", margin, family)
 
 
-def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, dict[str, float | str]]:
+def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, dict[str, Any]]:
     return {
         u.name: {
             "nominal": u.value,
             "value": float(final.p[plant.index(u.name)]),
             "standard_error": final.standard_error(plant.index(u.name)),
+            "interval": [*final.interval(plant.index(u.name))],
             "unit": METRIC.get(u.unit, u.unit) if in_metres(model) else u.unit,
         }
         for u in model.uncertain

@@ -11,6 +11,7 @@ from orchestrator.diagnosis.likelihood import Likelihood
 Array = NDArray[np.float64]
 
 DIFFERENCE = 1e-3  # step of the Jacobian in units of a parameter's scale
+NORMAL_95 = 1.959964  # half-width of a normal distribution's 95 % interval, in standard deviations
 PATIENCE = 6  # dampings tried before a fit is called converged
 
 
@@ -41,6 +42,13 @@ class Fit:
         """Return the standard error of one free parameter."""
         row = next(n for n, entry in enumerate(self.free) if entry.place == place)
         return float(np.sqrt(max(self.covariance[row, row], 0.0)))
+
+    def interval(self, place: int) -> tuple[float, float]:
+        """Return the 95 % interval of one free parameter, cut off at its bounds."""
+        entry = next(entry for entry in self.free if entry.place == place)
+        reach = NORMAL_95 * self.standard_error(place)
+        low, high = float(self.p[place]) - reach, float(self.p[place]) + reach
+        return (max(low, entry.minimum), min(high, entry.maximum))
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its standard error and unit."""
+    """A value with its standard error, 95 % interval and unit."""
 
     value: float
     standard_error: float
+    interval: tuple[float, float]
     unit: str
 
 
@@ -145,7 +146,7 @@ def _named(effect: Named) -> dict[str, Any]:
         "name": effect.name,
         "site": effect.site,
         "parameters": {
-            short: {"value": e.value, "standard_error": e.standard_error, "unit": e.unit}
+            short: {"value": e.value, "standard_error": e.standard_error, "interval": [*e.interval], "unit": e.unit}
             for short, e in effect.parameters.items()
         },
         "score": effect.score,

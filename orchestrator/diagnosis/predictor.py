@@ -4,7 +4,8 @@ The predictor is in innovation form: ``e = y - C x``, ``x+ = f(x + K e)``. It is
 same source that runs inside the FMU (:mod:`orchestrator.compiled`) and integrated by classical Runge-Kutta steps.
 The direction of dry friction, which that source takes as an argument, builds up over a short distance here (Dahl's
 bristle, Canudas de Wit et al., IEEE Trans. Automatic Control 40(3), 1995): real friction does, innovations become
-differentiable in the parameters, and as the distance goes to zero it is the signum that the FMU uses.
+differentiable in the parameters, and as the distance goes to zero it is the signum that the FMU uses. In the same way
+the damping of teeth that meet grows with their penetration (Hunt and Crossley, J. Applied Mechanics 42(2), 1975).
 """
 
 import math
@@ -25,14 +26,17 @@ Array = NDArray[np.float64]
 FINER = 8  # times more Runge-Kutta steps in a sample in which dry friction may turn round
 NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
 
-# Nuisance parameters, appended to the plant's own: logarithm of the distance over which dry friction builds up.
-NUISANCES = ("presliding.motor", "presliding.load")
+# Nuisance parameters, appended to the plant's own: logarithms [rad] of the distance over which dry friction builds up,
+# and of the penetration over which the damping of teeth in contact does.
+NUISANCES = ("presliding.motor", "presliding.load", "contact.onset")
 
 
 def _drivetrain_stage() -> tuple[Any, Any, Any]:
     source = compiled("equations")
     rates, twist, contact_of, level = source.rates, source.twist, source.contact_of, source.sliding_friction
+    twist_rate, twist_slope = source.twist_rate, source.twist_slope
     alpha_at, end = dt.P_ALPHA, dt.COUNT
+    damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
     m = (dt.P_COULOMB_M, dt.P_STRIBECK_M, dt.P_BREAKAWAY_M, dt.P_STRIBECK_SPEED_M)
     n = (dt.P_COULOMB_L, dt.P_STRIBECK_L, dt.P_BREAKAWAY_L, dt.P_STRIBECK_SPEED_L)
 
@@ -42,8 +46,17 @@ def _drivetrain_stage() -> tuple[Any, Any, Any]:
 
     @njit(error_model="numpy")
     def stage(x: Any, signs: Any, p: Any, u: float) -> Any:
-        contact = contact_of(twist(x, p), p[alpha_at]) if p[alpha_at] > 0.0 else 1
-        return rates(x, contact, signs[0], signs[1], p, u, 0.0)
+        if p[alpha_at] <= 0.0:
+            return rates(x, 1, signs[0], signs[1], p, u, 0.0)
+        angle = twist(x, p)
+        contact = contact_of(angle, p[alpha_at])
+        r = rates(x, contact, signs[0], signs[1], p, u, 0.0)
+        if contact == 0:
+            return r
+        depth = abs(angle) - p[alpha_at]
+        lacking = p[damping_at] * twist_rate(x, p) * math.exp(-depth / math.exp(p[onset_at]))
+        motor, load = lacking * twist_slope(x, p) / p[motor_at], lacking / p[load_at]
+        return (r[0], r[1] + motor, r[2], r[3] - load, r[4], r[5], r[6], r[7])
 
     return friction, stage, (end, end + 1)
 

@@ -91,7 +91,7 @@ def predictable(likelihood: Likelihood, plant: Plant, model: Fit, parts: Parts) 
     found = []
     for site, column in _sites(response):
         for kind, basis in _bases(likelihood, plant, states[:stop], site, model).items():
-            columns = _filtered(np.ascontiguousarray(basis), response.F, column, response.W)[looked]
+            columns = filtered(np.ascontiguousarray(basis), response.F, column, response.W)[looked]
             gain, share = _out_of_sample(white, np.concatenate([nuisance, columns], axis=2), nuisance, cut)
             found.append(Predictable(site, kind, gain, share))
     return tuple(sorted(found, key=lambda entry: entry.gain, reverse=True))
@@ -123,7 +123,7 @@ def _sites(response: ErrorResponse) -> list[tuple[str, Array]]:
 
 
 @njit(cache=True)
-def _filtered(basis: Array, F: Array, column: Array, W: Array) -> Array:
+def filtered(basis: Array, F: Array, column: Array, W: Array) -> Array:
     """Return (n, channels, k): the whitened innovations that a torque along each basis function would cause."""
     n, k = basis.shape
     out = np.zeros((n, W.shape[0], k))

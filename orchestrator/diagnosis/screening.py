@@ -136,13 +136,7 @@ def with_cycles(scene: Scene, likelihood: Likelihood, plant: Plant, model: Fit, 
         return scene
     response = error_response(likelihood, plant, model)
     effort = back_propagated(response, raw[part, : likelihood.signals.channels])
-    # Lines closer than the reciprocal of the travel cannot be told apart: three points per such width.
-    spacing = 1.0 / (3.0 * turns)
-    highest = min(
-        max(HIGHEST, HIGHEST_PER_TRAVEL / turns), 2.4 * np.pi / likelihood.signals.h / max(scene.speed_m, 1e-9)
-    )
-    cycles = np.arange(min(0.7 / turns, 0.5 * highest), highest, spacing)
-    cycles = cycles[:: max(1, cycles.size // 3000)]
+    cycles = cycle_grid(turns, likelihood.signals.h, scene.speed_m)
     found = {}
     for name, shaft in PERIODIC.items():
         column = 1 if shaft else 0
@@ -151,6 +145,15 @@ def with_cycles(scene: Scene, likelihood: Likelihood, plant: Plant, model: Fit, 
         power = _scan(np.ascontiguousarray(effort[:, column]), theta, omega, cycles, *_gain_table(response, column))
         found[name] = tuple(float(c) for c in _peaks(cycles, power))
     return replace(scene, cycles=found)
+
+
+def cycle_grid(turns: float, h: float, speed: float) -> Array:
+    """Return the cycles per revolution to look at, for a travel in revolutions, a sample time [s] and an rms speed."""
+    # Lines closer than the reciprocal of the travel cannot be told apart: three points per such width.
+    spacing = 1.0 / (3.0 * turns)
+    highest = min(max(HIGHEST, HIGHEST_PER_TRAVEL / turns), 2.4 * np.pi / h / max(speed, 1e-9))
+    cycles = np.arange(min(0.7 / turns, 0.5 * highest), highest, spacing)
+    return np.asarray(cycles[:: max(1, cycles.size // 3000)])
 
 
 @dataclass(frozen=True)

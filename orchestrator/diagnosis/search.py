@@ -32,6 +32,15 @@ SHORTLIST = 6
 WORTH = 0.03  # a candidate is fitted only when it promises at least this share of the best promise
 
 
+def annealed(
+    likelihood: Likelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, effects: Sequence[Effect]
+) -> Fit:  # fmt: skip
+    """Fit a model with ``effects`` down the ladder of process noise, no lower than their laws are exact."""
+    least = max((effect.least_noise for effect in effects), default=0.0)
+    levels = [level for level in LEVELS if level >= least]
+    return anneal(likelihood, start, max(q, levels[-1]), free, parts, levels)
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A fitted model: the effects it has and its fit."""
@@ -106,7 +115,7 @@ class Search:
     def base(self) -> Candidate:
         """Return the model without effects, its uncertain parameters re-fitted."""
         start = self.plant.extended(self.model.values)
-        fitted = anneal(self.likelihood, start, FIRST_LEVEL, self.linear(), self.parts, LEVELS)
+        fitted = annealed(self.likelihood, start, FIRST_LEVEL, self.linear(), self.parts, ())
         self._tick("parameters")
         return Candidate((), fitted)
 
@@ -172,7 +181,7 @@ class Search:
             return candidate
         start, stop = (f(self.parts.fitted, self.parts.validated) for f in (_first, _last))
         both = Parts(slice(start, stop), self.parts.validated, self.parts.held_out)
-        fitted = anneal(self.likelihood, candidate.fit.p, current.fit.q, candidate.fit.free, both, LEVELS)
+        fitted = annealed(self.likelihood, candidate.fit.p, current.fit.q, candidate.fit.free, both, candidate.effects)
         self._tick(f"{candidate.effects[-1].label}, both parts")
         whole = fitted.fitted
         share = self.likelihood.log_likelihood(fitted.z, fitted.q, self.parts.validated)
@@ -187,7 +196,7 @@ class Search:
         best: Fit | None = None
         for start in effect.refine(values, scene):
             p = self.placed(bare, effect, start)
-            fitted = anneal(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, LEVELS)
+            fitted = annealed(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, effects)
             if best is None or fitted.fitted > best.fitted:
                 best = fitted
         self._tick(effect.label)
@@ -200,7 +209,7 @@ class Search:
         """Return ``current`` with one more effect, fitted from the guess."""
         effects = (*current.effects, effect)
         p = self.placed(current.fit.p, effect, guess.values)
-        fitted = anneal(self.likelihood, p, current.fit.q, self.free(effects, scene), self.parts, LEVELS)
+        fitted = annealed(self.likelihood, p, current.fit.q, self.free(effects, scene), self.parts, effects)
         self._tick(effect.label)
         return Candidate(effects, fitted)
 
@@ -212,7 +221,7 @@ class Search:
             for effect in current.effects[:-1]:
                 kept = tuple(e for e in current.effects if e is not effect)
                 p = self.without(current.fit.p, effect.label)
-                fitted = anneal(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, LEVELS)
+                fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
                 self._tick(f"without {effect.label}")
                 reduced.append(Candidate(kept, fitted))
             best = max(reduced, key=lambda candidate: candidate.score)
