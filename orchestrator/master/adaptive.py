@@ -14,7 +14,7 @@ windows grow again. They end where a source jumps.
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,10 +23,11 @@ from numpy.typing import NDArray
 from orchestrator.errors import ConvergenceError, ScenarioError
 from orchestrator.master.algorithms import Adaptive
 from orchestrator.master.layout import Layout
-from orchestrator.master.pieces import CELLS, NODES, dense_matrix, piece_times, piece_weights
-from orchestrator.master.protocol import Signals, StepDiscardedError
+from orchestrator.master.pieces import CELLS, NODES, piece_times, piece_weights
+from orchestrator.master.protocol import StepDiscardedError
 from orchestrator.master.result import Statistics
 from orchestrator.master.signals import GRID_SLACK, Signal
+from orchestrator.master.waveform import Waveform
 from orchestrator.master.wiring import Stage, Wiring
 
 Array = NDArray[np.float64]
@@ -42,27 +43,13 @@ SHORT = 0.02
 SUSPICIOUS = 100.0
 """Error beyond which a window is taken to hold an event rather than to be too long."""
 
+TELLING = 0.05
+"""A window that is shorter than this part of the next one tells nothing of the error between that one's nodes."""
+
 HOPELESS = 30.0
 """Error at the middle of a window beyond which its second half is not worth stepping."""
 ORDER = 5
 """Order, in a smooth window's length, of the error after it."""
-
-
-@dataclass
-class _Waveform:
-    """Outputs at equidistant nodes of a window, and the polynomials through them."""
-
-    start: float
-    end: float
-    nodes: Array
-    coefficients: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.coefficients = dense_matrix(len(self.nodes)) @ self.nodes
-
-    def at(self, times: Signals) -> Array:
-        s = (times - self.start) / (self.end - self.start)
-        return np.vander(s, len(self.nodes), increasing=True) @ self.coefficients
 
 
 @dataclass(frozen=True)
@@ -77,8 +64,8 @@ class _Attempt:
         trouble: time [s] by which the trouble has come, for a window that was undone.
     """
 
-    outputs: _Waveform | None
-    guess: _Waveform | None
+    outputs: Waveform | None
+    guess: Waveform | None
     error: float
     length: float
     trouble: float
@@ -176,6 +163,7 @@ class _Run:
         )
         self.outputs = self.outputs[~self.held[self.outputs]]
         self.closing = {b.name: self._feeds_through(b.name) for b in wiring.layout.blocks}
+        self.before: Waveform | None = None  # the window before the present one, unless a jump lies between them
         self.counts = _Counts()
         self.calls = dict.fromkeys((b.name for b in wiring.layout.blocks), 0)
 
@@ -194,7 +182,7 @@ class _Run:
         time, length = self.start, min(self.settings.first, self.settings.largest)
         row, longest = 1, 0.0
         for target in self.breaks:
-            guess: _Waveform | None = None
+            guess = self.before = None
             event: _Event | None = None
             while time < target:
                 end = _window_end(time, length, target) if event is None else event.window_end(time)
@@ -210,6 +198,7 @@ class _Run:
                     self._give_up(time, (event.window_end(time) - time) if event else length)
                     continue
                 row = self._write(attempt.outputs, row)
+                self.before = attempt.guess
                 self.counts.accepted += 1
                 longest = max(longest, attempt.length)
                 length = self._next_length(attempt, share)
@@ -249,7 +238,7 @@ class _Run:
             for stage, state in states:
                 stage.slave.free_state(state)
 
-    def _attempt(self, start: float, end: float, guess: _Waveform | None, share: float) -> _Attempt:
+    def _attempt(self, start: float, end: float, guess: Waveform | None, share: float) -> _Attempt:
         """Try one window; leave the slaves at its end when its error is within ``share``, else at its start."""
         middle, length = 0.5 * (start + end), end - start
         with self._saved() as restore:
@@ -267,10 +256,27 @@ class _Run:
                 return _Attempt(None, None, math.inf, length, end)
             error = self._difference(whole.nodes[-1], second.nodes[-1])
             if error <= share:
-                both = _Waveform(start, end, np.concatenate((first.nodes, second.nodes[1:])))
-                return _Attempt(both, second, error, length, end)
+                both = Waveform(start, end, np.concatenate((first.nodes, second.nodes[1:])))
+                # Beside an event the window before may have held it, and tells nothing of this one.
+                between = self._between(both) if share == 1.0 else 0.0
+                if between <= 1.0:
+                    return _Attempt(both, second, max(error, between), length, end)
+                error = min(between, SUSPICIOUS)
             restore()
             return _Attempt(None, whole if math.isfinite(error) else None, error, length, end)
+
+    def _between(self, window: Waveform) -> float:
+        """Return the error of recorded points between the nodes as a multiple of the tolerance."""
+        step = self.settings.step
+        first = math.ceil((window.start - self.start) / step * (1.0 + 1e-12) + 1e-9)
+        times = self.start + step * np.arange(first, math.ceil((window.end - self.start) / step - 1e-9))
+        before = self.before
+        if before is None or not len(times) or before.end - before.start < TELLING * (window.end - window.start):
+            return 0.0
+        signals = self.record[~self.held[self.record]]
+        scale = self.settings.tolerance * np.maximum(1.0, np.abs(window.nodes[-1, signals]))
+        error = float(np.max(np.abs(window.error_between(before, times)[:, signals]) / scale, initial=0.0))
+        return error if math.isfinite(error) else SUSPICIOUS
 
     def _difference(self, one: Array, other: Array) -> float:
         """Return the largest difference of two sets of values as a multiple of the tolerance."""
@@ -279,7 +285,7 @@ class _Run:
         error = float(np.max(np.abs(a - b) / scale, initial=0.0))
         return error if math.isfinite(error) else math.inf
 
-    def _sweep(self, start: float, end: float, guess: _Waveform | None) -> _Waveform:
+    def _sweep(self, start: float, end: float, guess: Waveform | None) -> Waveform:
         """Step all slaves from ``start`` to ``end`` [s], ``SWEEPS`` times over, and return the outputs in between."""
         times = start + (end - start) * np.arange(NODES) / CELLS
         initial = self.wiring.values.copy()
@@ -295,7 +301,7 @@ class _Run:
                 self.counts.sweeps += 1
                 for stage in self.wiring.stages:
                     self._advance(stage, start, end, nodes, feeds)
-        return _Waveform(start, end, nodes)
+        return Waveform(start, end, nodes)
 
     def _signal_nodes(self, times: Array) -> Array:
         """Return what the sources add at the nodes, shape (rows, nodes): left limits at a window's end."""
@@ -342,7 +348,7 @@ class _Run:
             columns[:, k] = column
         return columns
 
-    def _write(self, waveform: _Waveform, row: int) -> int:
+    def _write(self, waveform: Waveform, row: int) -> int:
         """Fill in the recorded points up to the end of the window; return the next one's number."""
         step, last = self.settings.step, len(self.rows) - 1
         slack = 1e-9 * step

@@ -104,15 +104,17 @@ class Layout:
         return table
 
 
-def lay_out(system: System, record: Sequence[str], simultaneous: bool) -> Layout:
+def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: bool = False) -> Layout:
     """Plan the signals of a sound system.
 
     Args:
         system: without problems.
         record: signals to be recorded, ``instance.variable``.
         simultaneous: all instances take their inputs at the start of a step (Jacobi).
+        states: outputs that show an instance's state are needed too, whether or not anybody reads them.
     """
-    needed = _needed(system, record)
+    shown = _state_outputs(system) if states else []
+    needed = _needed(system, [*record, *shown])
     fed = _fed(system)
     slots: dict[str, int] = {}
     order = system.execution_order()
@@ -140,6 +142,19 @@ def _needed(system: System, record: Sequence[str]) -> dict[str, tuple[str, ...]]
         if variable not in fed[name]:
             wanted[name][variable] = found
     return {name: _by_type(variables) for name, variables in wanted.items()}
+
+
+def _state_outputs(system: System) -> list[str]:
+    """Return the continuous outputs that depend on no input at once: they change as the state does."""
+    return [
+        f"{instance.name}.{name}"
+        for instance in system.instances
+        for name, v in instance.model.variables.items()
+        if v.causality == "output"
+        and v.type == "Real"
+        and v.variability == "continuous"
+        and not instance.model.depends_on(name)
+    ]
 
 
 def _fed(system: System) -> dict[str, tuple[str, ...]]:

@@ -57,7 +57,9 @@ class Session:
         self.system, self.record, self.algorithm = system, names, algorithm
         self.start, self.stop = start, stop
         self.steps = step_count(start, stop, algorithm.step)
-        self.layout: Layout = lay_out(system, names, simultaneous=isinstance(algorithm, Jacobi))
+        self.layout: Layout = lay_out(
+            system, names, simultaneous=isinstance(algorithm, Jacobi), states=isinstance(algorithm, Adaptive)
+        )
         self._slaves: dict[str, Slave] = {}
         self._wiring: Wiring | None = None
         self._compiled: CompiledLoop | None = None

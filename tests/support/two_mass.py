@@ -4,8 +4,6 @@ Each slave solves its own equations exactly for inputs that are held: what is le
 """
 
 import itertools
-import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,11 +12,11 @@ from scipy.integrate import solve_ivp
 
 from orchestrator.master.signals import Signal, Sine, Square
 from orchestrator.master.system import Connection, Instance, Source, System
+from tests.support.load_side import B_L, J_L, C, K, load_after, shaft_torque
 from tests.support.mock_slave import instance, model, variable
+from tests.support.motor_side import B_M, J_M, RATIO, TAU, motor_after
 
-J_M, J_L, K, C, B_M, B_L, RATIO, TAU = 0.4, 5.6, 3300.0, 1.0, 0.1, 1.0, 3.984, 0.05
 TORQUE = Square(amplitude=40.0, period=0.8)
-TERMS = 14
 
 MOTOR = model(
     "Motor",
@@ -39,67 +37,18 @@ LOAD = model(
 )
 
 
-def taylor(rates: Callable[[NDArray[np.float64]], NDArray[np.float64]], x: NDArray[np.float64], h: float) -> Any:
-    """Advance ``x' = A x + b`` by its Taylor series; ``rates(x)`` is linear in ``x`` with the last entry 1."""
-    total, term = x.copy(), x.copy()
-    for order in range(1, TERMS):
-        term = rates(term) * (h / order)
-        total = total + term
-    return total
-
-
 def motor_step(v: dict[str, Any], time: float, step: float) -> None:
-    load, u = v["T_shaft"] / RATIO, v["u"]
-    matrix = np.array(
-        [
-            [0.0, 1.0, 0.0, 0.0],
-            [0.0, -B_M / J_M, 1.0 / J_M, -load / J_M],
-            [0.0, 0.0, -1.0 / TAU, u / TAU],
-            [0.0, 0.0, 0.0, 0.0],
-        ]
+    v["theta_m"], v["omega_m"], v["T_m"] = motor_after(
+        v["theta_m"], v["omega_m"], v.get("T_m", 0.0), v["u"], v["T_shaft"], step
     )
-    x = taylor(lambda y: matrix @ y, np.array([v["theta_m"], v["omega_m"], v.get("T_m", 0.0), 1.0]), step)
-    v["theta_m"], v["omega_m"], v["T_m"] = float(x[0]), float(x[1]), float(x[2])
-
-
-def torque(twist: float, rate: float, alpha: float) -> float:
-    if abs(twist) <= alpha:
-        return 0.0
-    return K * (twist - math.copysign(alpha, twist)) + C * rate
 
 
 def load_step(v: dict[str, Any], time: float, step: float) -> None:
-    theta_m, omega_m, alpha = v["theta_m"] / RATIO, v["omega_m"] / RATIO, v["alpha"]
-    x, left = np.array([v["theta_l"], v["omega_l"], 1.0]), step
-    while left > 0.0:
-        twist = theta_m - x[0]
-        contact = 0 if abs(twist) < alpha else int(math.copysign(1, twist))
-        if abs(abs(twist) - alpha) < 1e-15:
-            contact = int(math.copysign(1, twist)) if -x[1] * twist > 0 else 0
-        on = 1.0 if contact or alpha == 0.0 else 0.0
-        rest = K * (theta_m - contact * alpha) + C * omega_m
-        matrix = np.array([[0.0, 1.0, 0.0], [-on * K / J_L, -(on * C + B_L) / J_L, on * rest / J_L], [0.0, 0.0, 0.0]])
-        h = left
-        end = taylor(lambda y, m=matrix: m @ y, x, h)
-        if alpha > 0.0 and _crosses(theta_m - end[0], alpha, contact):
-            low, high = 0.0, left
-            for _ in range(60):
-                h = 0.5 * (low + high)
-                end = taylor(lambda y, m=matrix: m @ y, x, h)
-                low, high = (low, h) if _crosses(theta_m - end[0], alpha, contact) else (h, high)
-            h = high
-            end = taylor(lambda y, m=matrix: m @ y, x, h)
-        x, left = end, left - h
-    v["theta_l"], v["omega_l"] = float(x[0]), float(x[1])
-
-
-def _crosses(twist: float, alpha: float, contact: int) -> bool:
-    return abs(twist) > alpha if contact == 0 else contact * twist < alpha
+    v["theta_l"], v["omega_l"] = load_after(v["theta_l"], v["omega_l"], v["theta_m"], v["omega_m"], v["alpha"], step)
 
 
 def load_outputs(v: dict[str, Any]) -> None:
-    rate = v["omega_m"] / RATIO - v["omega_l"]
-    v["T_shaft"] = torque(v["theta_m"] / RATIO - v["theta_l"], rate, v["alpha"])
+    v["T_shaft"] = shaft_torque(v["theta_m"], v["omega_m"], v["theta_l"], v["omega_l"], v["alpha"])
 
 
 def loop(alpha: float = 0.0, signal: Signal = TORQUE) -> System:

@@ -1,0 +1,51 @@
+"""What is known of the outputs over a window: their values at equidistant nodes, and the polynomials through them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.master.pieces import dense_matrix
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Waveform:
+    """Outputs over a window.
+
+    Attributes:
+        start: of the window [s].
+        end: of the window [s].
+        nodes: values at equidistant nodes, shape (nodes, slots).
+        coefficients: of the polynomials in the fraction of the window that has passed, shape of ``nodes``.
+    """
+
+    start: float
+    end: float
+    nodes: Array
+    coefficients: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.coefficients = dense_matrix(len(self.nodes)) @ self.nodes
+
+    def at(self, times: NDArray[np.floating]) -> Array:
+        """Return the values of the polynomials at ``times`` [s], shape (times, slots)."""
+        s = (times - self.start) / (self.end - self.start)
+        return np.vander(s, len(self.nodes), increasing=True) @ self.coefficients
+
+    def times(self) -> Array:
+        """Return the instants of the nodes [s]."""
+        return np.linspace(self.start, self.end, len(self.nodes))
+
+    def error_between(self, before: "Waveform", times: NDArray[np.floating]) -> Array:
+        """Return an estimate of the polynomials' errors at ``times`` [s], shape (times, slots).
+
+        It is Newton's term for one more node, the last one but one of ``before``, the window that ended at ``start``.
+        """
+        nodes = self.times()
+        extra = before.times()[-2]
+        known = before.nodes[-2] - self.at(np.array([extra]))[0]
+        unit = self.end - self.start  # products of lengths in seconds would underflow
+        weights = np.prod((times[:, None] - nodes) / unit, axis=1) / np.prod((extra - nodes) / unit)
+        return np.outer(weights, known)
