@@ -18,7 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from orchestrator.commands._console import print_table
 from orchestrator.errors import ConvergenceError, ScenarioError
 from orchestrator.estimation import cramer_rao
-from orchestrator.estimation.design import LONGEST, Limits, design
+from orchestrator.estimation.design import LONGEST, SHORTEST, Limits, design
 from orchestrator.estimation.protocol import LEVEL, METHODS, Estimate, NotApplicableError, estimator
 from orchestrator.estimation.tables import write_tables
 from orchestrator.model_file import Model, read_model
@@ -46,7 +46,7 @@ SIZES = (1e-5, 0.5)  # rad, half-gaps that a record can be designed for
 DESIGN_OPTIONS = (
     DesignOption("--torque-limit", "N.m", 250.0, 1e-3, 1e6, "largest torque to ask for"),
     DesignOption("--speed-limit", "RAD/S", 50.0, 1e-3, 1e5, "largest speed of the motor"),
-    DesignOption("--duration", "S", 10.0, 1e-2, 1e4, "length of the proposed record"),
+    DesignOption("--duration", "S", 10.0, SHORTEST, 1e4, "length of the proposed record"),
     DesignOption("--rate", "HZ", 200.0, 1.0, 1e5, "its samples per second"),
 )
 UNSEEN = 1.0  # rad, bound from which on a record says nothing
@@ -255,9 +255,17 @@ def _design(
     duration, rate = options["--duration"], options["--rate"]
     with _progress(None) as advance:
         grid, candidates = design(model, size, limits, duration, rate, motor_only, lambda done, total: advance())
-    rows = [[c.name, f"{c.bound:.2g}", f"{c.torque:.4g}", f"{c.speed:.4g}"] for c in candidates]
+    rows = [
+        [c.name, f"{c.bound:.2g}" if c.bound < UNSEEN else "not seen", f"{c.torque:.4g}", f"{c.speed:.4g}"]
+        for c in candidates
+    ]
     head = ("excitation", "bound on the half-gap [rad]", "peak torque [N.m]", "peak motor speed [rad/s]")
     print_table(f"To see a half-gap of {size:g} rad in {duration:g} s", head, rows)
+    if candidates[0].bound > 0.5 * size:
+        sys.stdout.write(
+            f"No excitation within these limits shows a half-gap of {size:g} rad: raise `--torque-limit`, "
+            "`--speed-limit` or `--duration`\n"
+        )
     with (directory / "design.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(("time", "u"))
@@ -266,7 +274,7 @@ def _design(
     return [
         {"name": c.name, "bound": c.bound, "peak_torque": c.torque, "peak_motor_speed": c.speed}
         for c in candidates
-        if math.isfinite(c.bound)
+        if c.bound < UNSEEN
     ]
 
 

@@ -1,8 +1,11 @@
 """Which torque record would show the gap best, within limits of torque and speed.
 
-Each candidate (square pulses and multisines of several paces) is scaled until torque or motor speed meets its limit on
-the nominal plant; the one with the least Cramer-Rao bound on alpha wins. The bound allows for some torque noise, since
-a bound for a perfect model would reward excitations that only a perfect model can use.
+Each excitation is scaled until torque or motor speed meets its limit on the nominal plant; the one with the least
+Cramer-Rao bound on alpha wins. The bound allows for some torque noise, since a bound for a perfect model would reward
+excitations that only a perfect model can use. Square pulses and multisines of several paces come first; then the
+spectrum of a multisine and how hard its peaks are clipped are searched for, by an evolution strategy of one parent and
+one child whose step follows its success (Rechenberg 1973): the bound jumps wherever a contact comes or goes, so that
+its slope is of no use.
 """
 
 import math
@@ -23,7 +26,12 @@ TORQUE_NOISE = 1e-2  # N.m.s^0.5
 DEFAULT_NOISE = (3.5e-4, 1.75e-4)  # rad
 PULSE_PERIODS = (0.3, 0.5, 0.8, 1.2, 2.0, 3.0)  # s
 BANDS = (1.0, 2.0, 4.0, 8.0)  # Hz
+EDGES = np.geomspace(0.2, 16.0, 8)  # Hz
+SEARCHED = "clipped multisine, searched"
+SEARCH = 60  # evaluations
+FIRST_STEP, STEP_UP, STEP_DOWN = 0.5, 1.3, 0.93
 SEED = 20
+SHORTEST = 1.0  # s
 LONGEST = 200_000  # samples
 
 
@@ -37,7 +45,10 @@ class Limits:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One excitation: its name, torque request (n,) [N.m], bound on alpha [rad], peak torque and motor speed."""
+    """One excitation: its name, torque request (n,) [N.m], bound on alpha [rad], peak torque and motor speed.
+
+    The bound is infinite where no scale keeps the limits.
+    """
 
     name: str
     u: Array
@@ -76,15 +87,79 @@ def design(
     if not MINIMUM_ROWS <= n <= LONGEST:
         must = f"{MINIMUM_ROWS} to {LONGEST} samples"
         raise DesignError(f"`duration` times `rate` must be {must}, but is {duration * rate:g}")
+    if duration < SHORTEST:
+        raise DesignError(f"`duration` must be at least {SHORTEST:g} s, but is {duration:g}")
     time = np.arange(n) / rate
+    task = _Task(time, model, alpha, limits, motor_only)
     shapes = [(f"square pulses, period {period:g} s", _pulses(time, period)) for period in PULSE_PERIODS]
     shapes += [(f"multisine to {top:g} Hz", _multisine(time, top)) for top in BANDS]
     candidates = []
-    for k, (name, shape) in enumerate(shapes):
-        candidates.append(_judge(name, shape, time, model, alpha, limits, motor_only))
+    for name, shape in shapes:
+        candidates.append(_judge(name, shape, task))
         if tell is not None:
-            tell(k + 1, len(shapes))
+            tell(len(candidates), len(shapes) + SEARCH)
+
+    def look(done: int) -> None:
+        if tell is not None:
+            tell(len(shapes) + done, len(shapes) + SEARCH)
+
+    candidates.append(_search(task, look))
     return time, sorted(candidates, key=lambda candidate: candidate.bound)
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What is to be designed: see ``design``."""
+
+    time: Array
+    model: Model
+    alpha: float
+    limits: Limits
+    motor_only: bool
+
+
+@dataclass(frozen=True)
+class _Spectrum:
+    """A clipped multisine: log amplitudes at ``EDGES``, log of the clipping gain, phases of all lines [rad]."""
+
+    levels: Array
+    phases: Array
+
+    def shape(self, time: Array) -> Array:
+        """Return the wave (n,) within (-1, 1)."""
+        frequency = np.fft.rfftfreq(time.size, float(time[1] - time[0]))
+        inside = (frequency >= EDGES[0]) & (frequency <= EDGES[-1])
+        level = np.interp(np.log(np.where(inside, frequency, 1.0)), np.log(EDGES), self.levels[:-1])
+        lines = np.where(inside, np.exp(level), 0.0) * np.exp(1j * self.phases)
+        wave = np.fft.irfft(lines, time.size)
+        return np.asarray(np.tanh(np.exp(self.levels[-1]) * wave / np.sqrt(np.mean(wave**2))))
+
+    def child(self, rng: np.random.Generator, step: float) -> "_Spectrum":
+        """Return a spectrum nearby; ``step`` is a standard deviation."""
+        return _Spectrum(self.levels + step * rng.standard_normal(self.levels.size), self.phases)
+
+
+def _search(task: _Task, tell: Callable[[int], None]) -> Candidate:
+    """Return the best clipped multisine that ``SEARCH`` evaluations find."""
+    rng = np.random.default_rng(SEED)
+    lines = task.time.size // 2 + 1
+    starts = [
+        _Spectrum(np.append(np.where(top > EDGES, 0.5 * np.log(1.0 + EDGES**2), -3.0), gain), 2.0 * np.pi * phases)
+        for top in (3.0, 6.0, 10.0)
+        for gain, phases in ((-0.5, rng.random(lines)), (0.5, rng.random(lines)))
+    ]
+    judged = [_judge(SEARCHED, start.shape(task.time), task) for start in starts]
+    first = min(range(len(starts)), key=lambda n: judged[n].bound)
+    best, parent, step = judged[first], starts[first], FIRST_STEP
+    for n in range(len(starts), SEARCH):
+        child = parent.child(rng, step)
+        candidate = _judge(SEARCHED, child.shape(task.time), task)
+        if candidate.bound < best.bound:
+            best, parent, step = candidate, child, step * STEP_UP
+        else:
+            step *= STEP_DOWN
+        tell(n + 1)
+    return best
 
 
 def _pulses(time: Array, period: float) -> Array:
@@ -102,27 +177,27 @@ def _multisine(time: Array, top: float) -> Array:
     return np.asarray(wave / np.max(np.abs(wave)))
 
 
-def _judge(
-    name: str, shape: Array, time: Array, model: Model, alpha: float, limits: Limits, motor_only: bool
-) -> Candidate:
-    values = list(model.values)
-    values[P_ALPHA] = alpha
+def _judge(name: str, shape: Array, task: _Task) -> Candidate:
+    values = list(task.model.values)
+    values[P_ALPHA] = task.alpha
     plant = affine_model(tuple(values))
-    step = float(time[1] - time[0])
-    scale = limits.torque / float(np.max(np.abs(shape)))
+    step = float(task.time[1] - task.time[0])
+    scale = task.limits.torque / float(np.max(np.abs(shape)))
     states = simulate(plant, scale * shape, step, np.zeros(5))
     for _ in range(6):
         fastest = float(np.max(np.abs(states[:, 1])))
-        if fastest <= limits.speed:
+        if fastest <= task.limits.speed:
             break
-        scale *= 0.98 * limits.speed / fastest
+        scale *= 0.98 * task.limits.speed / fastest
         states = simulate(plant, scale * shape, step, np.zeros(5))
-    u = np.round(scale * shape, 4)
-    record = Record(time, u, states[:, 0].copy(), None if motor_only else states[:, 2].copy(), name)
-    noise = tuple(_noise(model, column, k) for k, column in enumerate(("theta_m", "theta_l")))
-    truth = cramer_rao.truth_values({}, alpha, np.zeros(5))
-    bound = cramer_rao.bound(make_problem(record, model), truth, (noise[0], noise[1]), TORQUE_NOISE)
-    return Candidate(name, u, bound, float(np.max(np.abs(u))), float(np.max(np.abs(states[:, 1]))))
+    u, fastest = scale * shape, float(np.max(np.abs(states[:, 1])))
+    if fastest > task.limits.speed:
+        return Candidate(name, u, math.inf, float(np.max(np.abs(u))), fastest)
+    record = Record(task.time, u, states[:, 0].copy(), None if task.motor_only else states[:, 2].copy(), name)
+    noise = tuple(_noise(task.model, column, k) for k, column in enumerate(("theta_m", "theta_l")))
+    truth = cramer_rao.truth_values({}, task.alpha, np.zeros(5))
+    bound = cramer_rao.bound(make_problem(record, task.model), truth, (noise[0], noise[1]), TORQUE_NOISE)
+    return Candidate(name, u, bound, float(np.max(np.abs(u))), fastest)
 
 
 def _noise(model: Model, column: str, place: int) -> float:
