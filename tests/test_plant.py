@@ -119,19 +119,25 @@ def test_conservative_effects_keep_the_energy():
         parameters(c=0.0, b_m=0.0, b_l=0.0, tau=1e9),
         {
             "effects.gravity_load.amplitude": 30.0,
+            "effects.gravity_load.phase": 0.4,
             "effects.hardening_stiffness.cubic": 1e6,
             "effects.extra_resonance.inertia": 0.8,
             "effects.extra_resonance.damping_ratio": 0.0,
             "effects.torque_ripple.amplitude": 5.0,
+            "effects.torque_ripple.cycles_per_rev": 7.0,
+            "effects.torque_ripple.phase": -0.6,
             "effects.gear_eccentricity.amplitude": 1e-3,
+            "effects.gear_eccentricity.cycles_per_rev": 2.0,
+            "effects.gear_eccentricity.phase": 0.9,
         },
     )
     start = (0.3, 3.0, 0.0, -2.0, 0.0, 0.0, 0.0, 0.0)
     states, _ = simulate(p, np.zeros(1000), start=start, source=compiled("drivetrain"))
     theta_m, omega_m, theta_l, omega_l, _, theta_r, omega_r, _ = states.T
-    twist = theta_m / 3.984 - theta_l + 1e-3 * np.sin(theta_m)
+    twist = theta_m / 3.984 - theta_l + 1e-3 * np.sin(2.0 * theta_m + 0.9)
     energy = 0.2 * omega_m**2 + 2.8 * omega_l**2 + 0.4 * omega_r**2 + 1650.0 * twist**2 + 0.25e6 * twist**4
-    energy += -30.0 * np.cos(theta_l) + 0.4 * 60.0**2 * (theta_l - theta_r) ** 2 + 5.0 / 6.0 * np.cos(6.0 * theta_m)
+    energy += -30.0 * np.cos(theta_l + 0.4) + 5.0 / 7.0 * np.cos(7.0 * theta_m - 0.6)
+    energy += 0.4 * 60.0**2 * (theta_l - theta_r) ** 2
     assert np.abs(energy - energy[0]).max() < 1e-8
 
 

@@ -8,6 +8,7 @@ from orchestrator.fmi.build import ROOT, default_directory, ensure_built
 from orchestrator.fmi.launcher import find_toolchain
 from orchestrator.fmi.sources import catalogue
 from orchestrator.output import staged, write_result
+from orchestrator.reporting import write_report
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +42,7 @@ def run(args: argparse.Namespace) -> int:
         results = {"fmus": {name: str(path) for name, path in paths.items()}, "remark": remark}
         arguments = {"names": list(paths), "directory": str(directory), "force": args.force}
         write_result(folder, "build", arguments, None, results)
+        write_report(folder, "build")
     return 0
 
 
