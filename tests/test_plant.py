@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from orchestrator.compiled import compiled
 from orchestrator.reference import ReferencePlant, linear_solution, reference_solution
-from pyfmu_sources import drivetrain
+from pyfmu_sources import drivetrain, linear_mode
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, NAMES, parameters, with_values
 
 H = 1e-3
@@ -247,3 +247,19 @@ def test_unknown_parameter_names_are_refused():
     with pytest.raises(KeyError, match="stiffness"):
         parameters(stiffness=1.0)
     assert len(set(NAMES)) == len(NAMES)
+
+
+def test_the_search_for_events_steps_over_no_root():
+    rng = np.random.default_rng(5)
+    times = np.linspace(0.0, 1.0, 5001)
+    found = 0
+    for _ in range(500):
+        series = rng.normal(size=linear_mode.TERMS + 1)
+        series[0] = 0.03 * abs(series[0]) + 1e-6
+        negative = np.nonzero(np.polynomial.polynomial.polyval(times, series) < 0.0)[0]
+        root = linear_mode.first_root(series.tolist(), 1.0, 1e-13)
+        if len(negative):
+            assert root <= times[negative[0]]
+            assert abs(np.polynomial.polynomial.polyval(root, series)) < 1e-12
+            found += 1
+    assert found > 300
