@@ -48,6 +48,16 @@ def test_dry_friction_stops_the_axis_where_energy_says_and_holds_it() -> None:
     assert slid[1] == pytest.approx(0.01 / 2.0, rel=1e-6)
 
 
+def test_an_axis_at_rest_is_held_up_to_its_breakaway_torque() -> None:
+    p = parameters(P_J=2.0, P_B=0.0, P_COULOMB=1.0, P_STRIBECK=3.0, P_BREAKAWAY=5.0, P_STRIBECK_SPEED=0.01)
+    for way in (1, -1):
+        held, mode = axis.advance((0.5, 0.0, 0.0), 0, p, 5.99 * way, 0.0, 1.0)
+        assert (held[0], held[1], mode) == (0.5, 0.0, 0)
+        slid, mode = axis.advance((0.5, 0.0, 0.0), 0, p, 6.01 * way, 0.0, 2.0)
+        assert mode == way
+        assert slid[1] * way > 1.0  # driven by 6.01 against 4 of sliding friction, once the curve has fallen
+
+
 def test_viscous_friction_that_differs_by_direction_follows_its_closed_form() -> None:
     p = parameters(P_J=2.0, P_B=3.0, P_DIRECTION=-1.0)
     for way, damping in ((1, 2.0), (-1, 4.0)):
