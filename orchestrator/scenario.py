@@ -39,6 +39,7 @@ class Scenario:
         stop: end [s].
         start: beginning [s].
         name: for titles.
+        origin: the file that describes it, for messages.
     """
 
     system: System
@@ -47,6 +48,7 @@ class Scenario:
     stop: float
     start: float = 0.0
     name: str = "scenario"
+    origin: str = ""
 
     def session(self) -> Session:
         """Return a session that runs this scenario as often as needed; to be closed.
@@ -65,8 +67,11 @@ def simulate(scenario: Scenario) -> Result:
         InputError: the scenario or an FMU is wrong.
         SimulationError: the run went wrong.
     """
-    with scenario.session() as session:
-        return session.run()
+    try:
+        with scenario.session() as session:
+            return session.run()
+    except FmuError as error:  # of what only comes out when an FMU is unpacked or loaded
+        raise FmuError(f"{scenario.origin}: {error}" if scenario.origin else str(error)) from None
 
 
 def run_scenario(scenario: Scenario | Path | str) -> Result:
@@ -205,7 +210,7 @@ def load_scenario(path: Path) -> Scenario:
     assert algorithm is not None
     system = System(instances, connections, sources, order)
     raise_problems(system.problems() + system.record_problems(tuple(top.record)), str(path))
-    return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name)
+    return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))
 
 
 def _content(path: Path) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Scenario files: what runs, and what is refused with which message."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -170,3 +171,19 @@ def test_bad_tables(tmp_path: Path, content: str, expected: str) -> None:
     table = 'kind = "table"\nto = "plant.u"\nfile = "torque.csv"\ncolumn = "u"\n'
     with pytest.raises(ScenarioError, match=expected):
         load_scenario(write(tmp_path, GOOD.split("[[sources]]", maxsplit=1)[0] + "[[sources]]\n" + table))
+
+
+def test_an_fmu_that_is_corrupt_inside_is_named_with_its_scenario(tmp_path: Path, fmus) -> None:
+    """The model description can be read, so that it only comes out when the rest is unpacked."""
+    content = bytearray(fmus["Drivetrain"].read_bytes())
+    with zipfile.ZipFile(fmus["Drivetrain"]) as archive:
+        member = next(m for m in archive.infolist() if m.filename.startswith("binaries/linux64"))
+    content[member.header_offset + 200 : member.header_offset + 250] = bytes(50)
+    (tmp_path / "bad.fmu").write_bytes(content)
+    file = tmp_path / "bad.toml"
+    file.write_text(
+        'stop = 0.1\nrecord = ["p.theta_l"]\n[master]\nalgorithm = "jacobi"\nstep = 1e-2\n'
+        '[instances.p]\nfmu = "bad.fmu"\n'
+    )
+    with pytest.raises(FmuError, match=r"bad.toml: \$.instances.p: `fmu` must be an intact zip archive"):
+        run_scenario(file)

@@ -221,6 +221,33 @@ def test_commands(fmus, tmp_path: Path, capsys) -> None:
     assert (tmp_path / "r" / "ssp.csv").read_text().count("\n") == 102
     assert main(["ssp", "run", str(tmp_path / "none.ssp"), "--out", str(tmp_path / "x")]) == 2
     assert main(["ssp", "run", "--out", str(tmp_path / "x")]) == 2
-    assert main(["ssp", "export", "--alpha", "nan", "--out", str(tmp_path / "x")]) == 2
+    assert main(["ssp", "export", "--alpha", "-1", "--out", str(tmp_path / "x")]) == 2
     assert capsys.readouterr().err.count("\n") == 3
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["run", "."], "must be an archive, but . is a directory"),
+        (["run", "a.ssp", "--alpha", "0.1"], "`--alpha` must be left out of `ssp run`"),
+        (["run", "--scenario", "a.toml"], "`--scenario` must be left out of `ssp run`"),
+        (["export", "a.toml"], "must be given a scenario by --scenario"),
+        (["export", "--jacobi"], "`--jacobi` must be left out of `ssp export`"),
+        (["export", "--scenario", "a.toml", "--alpha", "0.1"], "`--alpha` must be left out of `ssp export --scenario`"),
+    ],
+)
+def test_words_that_do_not_fit_the_action(tmp_path: Path, capsys, words: list[str], expected: str) -> None:
+    assert main(["ssp", *words, "--out", str(tmp_path / "x")]) == 2
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_single_fmu_without_connections(tmp_path: Path) -> None:
+    scenario = tmp_path / "alone.toml"
+    scenario.write_text(
+        'stop = 0.01\nrecord = ["plant.theta_m"]\n[master]\nalgorithm = "jacobi"\nstep = 1e-3\n'
+        '[instances.plant]\nfmu = "Drivetrain"\n[[sources]]\nto = "plant.u"\nkind = "constant"\nvalue = 3.0\n'
+    )
+    assert main(["ssp", "export", "--scenario", str(scenario), "--out", str(tmp_path / "out")]) == 0
+    assert main(["ssp", "run", str(tmp_path / "out" / "alone.ssp"), "--out", str(tmp_path / "run")]) == 0

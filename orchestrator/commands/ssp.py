@@ -3,6 +3,7 @@
 import argparse
 import csv
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,13 +22,15 @@ from orchestrator.ssp.read import opened_ssp
 from orchestrator.ssp.write import write_ssp
 
 ACTIONS = ("export", "run")
+PAIR = {"alpha": 0.02, "reference": 0.5}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what both actions take."""
     parser.add_argument("action", choices=ACTIONS, help="export: write an SSP file; run: simulate one")
+    parser.add_argument("file", type=Path, nargs="?", metavar="FILE.ssp", help="run: the SSP file")
     parser.add_argument(
-        "file", type=Path, nargs="?", help="run: the SSP file; export: a TOML scenario (default: the paired loops)"
+        "--scenario", type=Path, metavar="FILE", help="export: this TOML scenario (default: the paired loops)"
     )
     parser.add_argument(
         "--alpha", type=float, default=0.02, metavar="RAD", help="export: half-gap (default: %(default)s)"
@@ -49,11 +52,15 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _export(arguments: argparse.Namespace) -> int:
-    if arguments.file is None:
+    if arguments.file is not None:
+        raise ScenarioError(f"`ssp export` must be given a scenario by --scenario, but is given {arguments.file}")
+    _refuse(arguments, "`ssp export`", {"step": None, "stop": None, "jacobi": False, "input": []})
+    if arguments.scenario is None:
         scenario = paired_scenario(Experiment(), ensure_built(FMUS), arguments.alpha, arguments.reference)
     else:
-        scenario = load_scenario(arguments.file)
-    name = "paired.ssp" if arguments.file is None else f"{arguments.file.stem}.ssp"
+        _refuse(arguments, "`ssp export --scenario`", PAIR)
+        scenario = load_scenario(arguments.scenario)
+    name = "paired.ssp" if arguments.scenario is None else f"{arguments.scenario.stem}.ssp"
     with staged(arguments.out) as directory:
         write_ssp(directory / name, scenario)
         results = {
@@ -71,6 +78,9 @@ def _export(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    if arguments.scenario is not None:
+        raise ScenarioError("`--scenario` must be left out of `ssp run`; `simulate --scenario` runs scenarios")
+    _refuse(arguments, "`ssp run`", PAIR)
     if arguments.file is None:
         raise ScenarioError("`ssp run` must be given an SSP file, but is given none")
     if arguments.step is not None and not 0.0 < arguments.step < float("inf"):
@@ -91,6 +101,12 @@ def _run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _refuse(arguments: argparse.Namespace, action: str, defaults: Mapping[str, object]) -> None:
+    for name, default in defaults.items():
+        if getattr(arguments, name) != default:
+            raise ScenarioError(f"`--{name}` must be left out of {action}, which it does not change")
+
+
 def _inputs(words: list[str]) -> dict[str, Signal]:
     inputs: dict[str, Signal] = {}
     for word in words:
@@ -103,7 +119,7 @@ def _inputs(words: list[str]) -> dict[str, Signal]:
 
 
 def _words(arguments: argparse.Namespace) -> dict[str, object]:
-    names = ("action", "file", "alpha", "reference", "step", "stop", "jacobi")
+    names = ("action", "file", "scenario", "alpha", "reference", "step", "stop", "jacobi")
     return {
         name: str(value) if isinstance(value, Path) else value
         for name, value in vars(arguments).items()

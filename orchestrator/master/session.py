@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.errors import FmuError, ScenarioError, SimulationError
 from orchestrator.master.adaptive import run_adaptive
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
 from orchestrator.master.fixed_step import run_sequential, run_simultaneous
@@ -16,7 +16,7 @@ from orchestrator.master.layout import Layout, lay_out
 from orchestrator.master.protocol import Slave, Value
 from orchestrator.master.result import Result, Statistics
 from orchestrator.master.signals import Signal
-from orchestrator.master.system import Problem, Quantity, System, raise_problems, split
+from orchestrator.master.system import Instance, Problem, Quantity, System, raise_problems, split
 from orchestrator.master.wiring import Wiring, wire
 
 if TYPE_CHECKING:
@@ -81,6 +81,13 @@ class Session:
         self._slaves.clear()
         self._wiring = self._compiled = None
 
+    @staticmethod
+    def _created(instance: Instance) -> Slave:
+        try:
+            return instance.create(instance.name)
+        except FmuError as error:
+            raise FmuError(f"$.instances.{instance.name}: {error}") from None
+
     def run(
         self, start: Mapping[str, Value | Quantity] | None = None, signals: Mapping[int, Signal] | None = None
     ) -> Result:
@@ -117,7 +124,7 @@ class Session:
             self._used.clear()
             try:
                 for instance in self.system.instances:
-                    self._slaves[instance.name] = instance.create(instance.name)
+                    self._slaves[instance.name] = self._created(instance)
                 self._wiring = wire(self.layout, self._slaves)
             except BaseException:
                 self.close()

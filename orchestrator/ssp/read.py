@@ -59,6 +59,8 @@ def opened_ssp(
         ConnectionMismatchError: its connections are.
         FmuError: one of its FMUs is.
     """
+    if path.is_dir():
+        raise ScenarioError(f"`ssp` must be an archive, but {path} is a directory; zip what is in it")
     folder = Path(tempfile.mkdtemp(prefix="ssp-"))
     try:
         try:

@@ -85,11 +85,12 @@ def _structure(scenario: Scenario) -> bytes:
     elements = etree.SubElement(system, tag("ssd", "Elements"))
     for instance in scenario.system.instances:
         _component(elements, scenario.system, instance)
-    connections = etree.SubElement(system, tag("ssd", "Connections"))
+    if scenario.system.connections:  # the schema knows no empty list
+        connections = etree.SubElement(system, tag("ssd", "Connections"))
     for k, connection in enumerate(scenario.system.connections):
         _connection(connections, connection, k)
     _master(system, scenario)
-    _units(etree.SubElement(root, tag("ssd", "Units")), scenario.system.instances)
+    _units(root, scenario.system.instances)
     _experiment(root, scenario)
     return _bytes(root, "ssd", STRUCTURE)
 
@@ -151,10 +152,11 @@ def _connection(parent: etree._Element, connection: Connection, k: int) -> None:
         etree.SubElement(element, tag("ssc", "LinearTransformation"), linear)
 
 
-def _units(parent: etree._Element, instances: Iterable[Instance]) -> None:
+def _units(root: etree._Element, instances: Iterable[Instance]) -> None:
     units: dict[str, Unit] = {}
     for instance in instances:
         units.update(instance.model.units)
+    parent = etree.SubElement(root, tag("ssd", "Units")) if units else root
     for name in sorted(units):
         _unit(parent, units[name])
 
