@@ -270,6 +270,35 @@ def test_algebraic_loop_is_solved_also_where_plain_iteration_diverges(k: float) 
     np.testing.assert_allclose(result.values, np.tile([[a], [b]], 4), rtol=1e-10)
 
 
+def test_an_instance_that_feeds_itself_is_a_loop_too() -> None:
+    system = System((instance("a", GAIN, gain, gain, k=0.5, c=1.0),), (Connection("a.y", "a.u"),))
+    with Session(system, ("a.y",), Iterated(0.1, tolerance=1e-12), 0.3) as session:
+        np.testing.assert_allclose(session.run()["a.y"], 2.0, rtol=1e-10)
+
+
+def test_a_loop_through_a_state_takes_each_step_once() -> None:
+    store = model(
+        "Store", variable("u", "input"), variable("x", "parameter"), variable("y", "output"), feedthrough={"y": ["u"]}
+    )
+
+    def fill(v) -> None:
+        v["y"] = v["x"] + 0.2 * v["u"]
+
+    def advance(v, time: float, step: float) -> None:
+        v["x"] += step * v["u"]
+
+    instances = (instance("a", store, advance, fill), instance("b", GAIN, gain, gain, k=0.5, c=1.0))
+    system = System(instances, (Connection("a.y", "b.u"), Connection("b.y", "a.u")))
+    with Session(system, ("a.y",), Iterated(0.1, tolerance=1e-13), 1.0) as session:
+        found = session.run()["a.y"]
+    x, expected = 0.0, [0.2 / 0.9]
+    for _ in range(10):
+        y = (x + 0.3) / (1.0 - 0.5 * 0.3)  # y = x + 0.1 u + 0.2 u with u = 0.5 y + 1
+        x += 0.1 * (0.5 * y + 1.0)
+        expected.append(y)
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
 def test_loop_without_solution_is_an_error_with_advice() -> None:
     with (
         Session(ring(1.0), ("a.y",), Iterated(0.1), 0.3) as session,
@@ -326,3 +355,10 @@ def test_noise_is_added_to_what_is_connected_at_the_same_instant() -> None:
     with Session(system, ("plant.y", "estimator.y"), GaussSeidel(0.1), 0.5) as session:
         result = session.run()
     np.testing.assert_allclose(result["estimator.y"] - result["plant.y"], np.arange(6.0) * 100.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("stop", [0.2000003, 0.205, 0.25])
+def test_the_stop_time_is_on_the_grid(stop: float) -> None:
+    assert step_count(0.0, 0.2 * (1.0 + 1e-9), 0.1) == 2
+    with pytest.raises(ScenarioError, match="`stop` must be a whole number of steps"):
+        step_count(0.0, stop, 0.1)
