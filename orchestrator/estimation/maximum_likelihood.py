@@ -80,15 +80,11 @@ def fit_record(likelihood: Likelihood) -> Fit:
     problem = likelihood.problem
     torque, others = _split(likelihood)
     if problem.outputs.shape[1] == 2:
-        firsts = _first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
+        firsts = _different(_first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0])), problem.index("alpha"))
         fits = [_continue(likelihood, first, BOTH_ENCODERS[1:]) for first in firsts]
         best = min(fits, key=lambda fit: fit.point.objective)
     else:
-        likelihood.soft = True
-        first, *_ = _first_fits(likelihood, torque, others, np.log(BLURRED[0]))
-        best = _continue(likelihood, first, BLURRED[1:])
-        likelihood.soft = False
-        best = _sharpen(likelihood, best)
+        best = _fit_one_encoder(likelihood, torque, others)
     return _free_fit(likelihood, best, torque, others)
 
 
@@ -112,13 +108,34 @@ def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, f
     return best
 
 
-def _sharpen(likelihood: Likelihood, blurred: Fit) -> Fit:
+def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int]) -> Fit:
+    """Return the best fit with little torque noise, and leave ``likelihood`` with its flanks as that fit took them.
+
+    The flanks are blurred at first and sharpened then. The second start of the grid is tried where the first one does
+    not get down to little noise. Where no fit with sharp flanks comes up to a blurred one, that one stays, with the
+    wide interval that it deserves.
+    """
+    found: list[tuple[Fit, bool, Array]] = []
+    likelihood.soft = True
+    for first in _first_fits(likelihood, torque, others, np.log(BLURRED[0]))[:2]:
+        likelihood.soft = True
+        likelihood.information[np.ix_(first.free, first.free)] = first.information
+        blurred = _continue(likelihood, first, BLURRED[1:])
+        found.append((blurred, True, likelihood.information.copy()))
+        likelihood.soft = False
+        sharp = _sharpen(likelihood, blurred, torque, others)
+        found.append((sharp, False, likelihood.information.copy()))
+        if likelihood.noise(sharp.point.theta).torque[1] <= CALM_TORQUE_NOISE:
+            break
+    best, likelihood.soft, likelihood.information = min(found, key=lambda entry: entry[0].point.objective)
+    return best
+
+
+def _sharpen(likelihood: Likelihood, blurred: Fit, torque: list[int], others: list[int]) -> Fit:
     """Return the fit with sharp flanks that starts from one with ``blurred`` flanks.
 
-    Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it. Where no
-    start with sharp flanks comes up to the blurred fit, that one stays, with the wide interval that it deserves.
+    Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it.
     """
-    torque, others = _split(likelihood)
     known = likelihood.information.copy()
     fits: list[Fit] = []
     for place in SHARP_STARTS:
@@ -129,11 +146,7 @@ def _sharpen(likelihood: Likelihood, blurred: Fit) -> Fit:
         fits.append(_continue(likelihood, first, MOTOR_ENCODER[place + 1 :]))
         if likelihood.noise(fits[-1].point.theta).torque[1] <= CALM_TORQUE_NOISE:
             break
-    best = min(fits, key=lambda fit: fit.point.objective)
-    if best.point.objective < blurred.point.objective:
-        return best
-    likelihood.soft, likelihood.information = True, known
-    return blurred
+    return min(fits, key=lambda fit: fit.point.objective)
 
 
 def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
@@ -144,7 +157,7 @@ def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
 
 
 def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], level: Array) -> list[Fit]:
-    """Return fits at high torque noise (its logarithm ``level``), the best first, as far as their sizes differ.
+    """Return fits at high torque noise (its logarithm ``level``), the best first.
 
     They start from the two best places of a grid of alpha and from the smallest size that is about as good: where the
     gap is traversed rarely, much noise hides that sizes beyond it are too large.
@@ -165,11 +178,16 @@ def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], le
     if all(smallest is not start for start in starts):
         starts.append(smallest)
     fits = [maximise(likelihood, point.theta, others, 3, tolerance=1.0) for point in starts]
+    return sorted(fits, key=lambda fit: fit.point.objective)
+
+
+def _different(fits: list[Fit], place: int) -> list[Fit]:
+    """Return the fits of which no better one has about the same size; ``place`` is that of alpha."""
     chosen: list[Fit] = []
-    for fit in sorted(fits, key=lambda fit: fit.point.objective):
+    for fit in fits:
         size = float(fit.point.theta[place])
-        taken = [float(other.point.theta[place]) for other in chosen]
-        if all(max(size, known) > DIFFERENT * min(size, known) + GRID[1] for known in taken):
+        known = [float(other.point.theta[place]) for other in chosen]
+        if all(max(size, other) > DIFFERENT * min(size, other) + GRID[1] for other in known):
             chosen.append(fit)
     return chosen
 
