@@ -88,6 +88,7 @@ def test_the_definition_is_plain_json_and_tells_designs_apart():
         ("plant.alpha", "NAME=SPECIFICATION"),
         ("=1", "NAME=SPECIFICATION"),
         (" = ", "NAME=SPECIFICATION"),
+        ("a=1,nordin", "a list of numbers or one of words"),
         ("a=1,,2", "before and after each comma"),
         ("a=", "NAME=SPECIFICATION"),
         ("a=rnage:0:1:3", "of a kind among range"),

@@ -117,6 +117,13 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path, capsys, words, complain
     assert not (tmp_path / "out").exists()
 
 
+def test_parquet_without_its_extra_is_refused_before_the_sweep(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("orchestrator.engine.table.find_spec", lambda name: None)
+    assert main(["sweep", "--sizes", "0.01", "--noise", "0", "--parquet", "--out", str(tmp_path / "out")]) == 2
+    assert "`--parquet` needs the extra [parquet]" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_word_that_is_no_number_is_one_line(capsys):
     with pytest.raises(SystemExit) as ending:
         main(["simulate", "--alpha", "abc"])

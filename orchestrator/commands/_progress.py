@@ -22,6 +22,7 @@ from orchestrator.engine import (
     Work,
     choose_pool,
     draws,
+    require_parquet,
     run_cases,
     write_csv,
     write_parquet,
@@ -162,6 +163,8 @@ def swept(
     The journal stays in ``args.out``; discard it when ``directory`` has been published.
     """
     open_pool, limits = engine_options(args)
+    if args.parquet:
+        require_parquet()
     with CaseProgress("sweep") as progress:
         sweep = run_cases(
             cases,

@@ -9,7 +9,7 @@ from orchestrator.engine.journal import JournalFullError
 from orchestrator.engine.pools import Limits, LocalProcesses, OpenPool, choose_pool
 from orchestrator.engine.run import Interrupted, Sweep, run_cases
 from orchestrator.engine.specification import draws, parse_design
-from orchestrator.engine.table import write_csv, write_parquet
+from orchestrator.engine.table import require_parquet, write_csv, write_parquet
 from orchestrator.engine.work import Work
 
 __all__ = [
@@ -31,6 +31,7 @@ __all__ = [
     "choose_pool",
     "draws",
     "parse_design",
+    "require_parquet",
     "run_cases",
     "write_csv",
     "write_parquet",

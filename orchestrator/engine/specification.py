@@ -82,7 +82,10 @@ def _values(text: str, body: str) -> tuple[Value, ...]:
     words = [word.strip() for word in body.split(",")]
     if not all(words):
         raise ScenarioError(f"`--vary` must have a value before and after each comma, but is {text!r}")
-    return tuple(_number_or_word(word) for word in words)
+    values = tuple(_number_or_word(word) for word in words)
+    if len({type(value) for value in values}) > 1:  # a column of the table has one type
+        raise ScenarioError(f"`--vary` must be a list of numbers or one of words, but is {text!r}")
+    return values
 
 
 def _number_or_word(word: str) -> Value:

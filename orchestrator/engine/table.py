@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Iterable, Iterator, Sequence
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -33,17 +34,26 @@ def write_csv(path: Path, names: Sequence[str], columns: Sequence[Column], rows:
         raise OutputError(f"cannot write {path.name}: {error.strerror}; --resume writes it from what is kept") from None
 
 
+def require_parquet() -> None:
+    """Refuse to begin what could not be written at the end.
+
+    Raises:
+        ScenarioError: the extra ``parquet`` is not installed.
+    """
+    if find_spec("pyarrow") is None:
+        raise ScenarioError("`--parquet` needs the extra [parquet]: pip install 'backlash-cosim[parquet]'")
+
+
 def write_parquet(path: Path, names: Sequence[str], columns: Sequence[Column], rows: Iterable[Row]) -> None:
     """Write the table as Parquet, ``PARQUET_ROWS`` rows at a time. A parameter's type is that of its first value.
 
     Raises:
         ScenarioError: the extra ``parquet`` is not installed.
     """
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise ScenarioError("Parquet needs the extra [parquet]: pip install 'backlash-cosim[parquet]'") from None
+    require_parquet()
+    import pyarrow
+    import pyarrow.parquet
+
     arrow = {float: pyarrow.float64(), int: pyarrow.int64(), str: pyarrow.string()}
     stream = iter(rows)
     first = next(stream, None)
