@@ -10,7 +10,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao, ekf
-from orchestrator.estimation.design import Limits, design
+from orchestrator.estimation.design import SEARCHED, Limits, design
 from orchestrator.estimation.innovations import NoiseLevels, affine_model, innovations, simulate
 from orchestrator.estimation.likelihood import Likelihood, make_problem
 from orchestrator.estimation.paired_sum import twin
@@ -193,9 +193,35 @@ def test_design_keeps_the_limits_and_beats_a_bad_excitation() -> None:
     for candidate in candidates:
         assert candidate.torque <= 150.0
         assert candidate.speed <= 20.0
+    assert candidates[0].name == SEARCHED
+    assert candidates[0].bound < 0.9 * candidates[1].bound
     assert candidates[0].bound < 0.5 * candidates[-1].bound
     with pytest.raises(DesignError, match="`torque` must be a positive finite number"):
         design(MODEL, 0.01, Limits(-1.0, 20.0))
+
+
+@pytest.mark.slow
+def test_a_designed_record_measures_better_on_other_machines() -> None:
+    _, candidates = design(MODEL, 0.01, Limits(250.0, 50.0), duration=3.0)
+    errors: dict[str, list[float]] = {"designed": [], "default": []}
+    for seed in (43, 44):
+        for name, u in (("designed", candidates[0].u), ("default", None)):
+            record, truth = _record(0.01, seed, 3.0, u=u)
+            result = estimator("maximum_likelihood")(record, MODEL)
+            assert abs(result.alpha - 0.01) < 4.0 * result.standard_error
+            errors[name].append(result.standard_error)
+            assert np.abs(record.u).max() < 260.0
+            assert np.abs(truth["states"][:, 1]).max() < 50.0
+    assert np.mean(errors["designed"]) < 0.7 * np.mean(errors["default"])
+
+
+def test_limits_that_show_nothing_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--torque-limit", "0.001", "--duration", "1", "--motor-only"]
+    assert main(["estimate", "--design", *words, "--out", str(tmp_path / "out")]) == 0
+    shown = capsys.readouterr().out
+    assert "not seen" in shown
+    assert "No excitation within these limits shows a half-gap of 0.005 rad: raise `--torque-limit`" in shown
+    assert json.loads((tmp_path / "out" / "estimate.json").read_text())["results"]["design"] == []
 
 
 @pytest.fixture(scope="module")
@@ -241,7 +267,8 @@ def test_the_command_writes_everything(csv_file: Path, tmp_path: Path, capsys: p
         (["--design", "--size", "0"], "`--size` must be between 1e-05 and 0.5, but is 0"),
         (["--design", "--torque-limit", "-3"], "`--torque-limit` must be between 0.001 and 1e+06, but is -3"),
         (["--design", "--speed-limit", "1e9"], "`--speed-limit` must be between 0.001 and 100000, but is 1e+09"),
-        (["--design", "--duration", "0.1"], "`--duration` times `--rate` must be 200 to 200000 samples, but is 20"),
+        (["--design", "--duration", "0.1"], "`--duration` must be between 1 and 10000, but is 0.1"),
+        (["--design", "--duration", "1", "--rate", "50"], "`--duration` times `--rate` must be 200 to 200000 samples"),
         (["--design", "--rate", "5", "--duration", "100"], "`--rate` must be at least 22.2 to show a shaft"),
         (["--design", "--model", "absent.toml"], "cannot be read"),
     ],
