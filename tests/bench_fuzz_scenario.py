@@ -40,7 +40,8 @@ VALUES = (
     '"../../etc/passwd"',
 )  # fmt: skip
 SHORT_STEPS = 200
-SLOW = 20.0
+SLOW = 5.0
+"""Processor time [s] that one short file may take: more is a failure."""
 
 
 def mutated(text: str, draw: random.Random) -> bytes:
@@ -159,13 +160,17 @@ def main(arguments: list[str]) -> int:
                 failures += 1
                 print(f"FAILED {type(error).__name__}: {error}\n{content!r}\n", flush=True)
             signal.setitimer(signal.ITIMER_PROF, 0.0)
-            slowest = max(slowest, time.process_time() - begin)
+            took = time.process_time() - begin
+            slowest = max(slowest, took)
+            if took > SLOW:  # the signal's exception may have ended in a slave, which turns it into an error
+                failures += 1
+                print(f"SLOW {took:.1f} s\n{content!r}\n", flush=True)
             left = sorted(p.name for p in folder.iterdir())
             assert left == ["scenario.toml", "torque.csv"], left
     files = sum(counts.values()) + failures
     print(f"seed {seed}: {files} files, {failures} failures, slowest {slowest:.2f} s of processor time")
     print(", ".join(f"{kind} {count}" for kind, count in counts.most_common()))
-    return 1 if failures or slowest > SLOW else 0
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":

@@ -183,6 +183,8 @@ class _Run:
         row, longest = 1, 0.0
         for target in self.breaks:
             guess = self.before = None
+            # Nothing is known yet of what comes after the jump, and nothing shows what a window does between its nodes.
+            length = min(length, self.settings.largest / GROW)
             event: _Event | None = None
             while time < target:
                 end = _window_end(time, length, target) if event is None else event.window_end(time)
