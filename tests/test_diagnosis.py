@@ -27,12 +27,14 @@ def labels(found: Diagnosis) -> list[str]:
     return [f"{effect.name}@{effect.site}" for effect in found.effects]
 
 
-def test_predictor_without_correction_is_the_exact_plant() -> None:
+@pytest.mark.parametrize("delay", [0.0, 0.0123])
+def test_predictor_without_correction_is_the_exact_plant(delay: float) -> None:
     record = record_of({}, 1, 3.0, mismatch=0.0, noise=(0.0, 0.0), counts=None)
     signals = signals_of(record, 1.0)
     p = DRIVETRAIN.extended(MODEL.values)
-    for name, value in (("effects.gravity_load.amplitude", 5.0), ("effects.torque_ripple.amplitude", 0.4)):
-        p[DRIVETRAIN.index(name)] = value
+    given = {"gravity_load.amplitude": 5.0, "torque_ripple.amplitude": 0.4, "input_delay.delay": delay}
+    for name, value in given.items():
+        p[DRIVETRAIN.index(f"effects.{name}")] = value
     exact = simulate(DRIVETRAIN, p, np.zeros(8), signals, slice(0, signals.size))
     likelihood = Likelihood(DRIVETRAIN, signals, p, signals.size)
     likelihood.gains(1.0).gains[:] = 0.0
@@ -69,7 +71,7 @@ def test_exact_parameters_are_none() -> None:
 @pytest.mark.parametrize(
     ("effects", "label", "parameter", "value", "tolerance"),
     [
-        ({"alpha": 0.004}, "backlash@shaft", "alpha", 0.004, 0.02),
+        ({"alpha": 0.004}, "backlash@shaft", "alpha", 0.004, 0.005),
         ({"Fc_l": 2.0}, "coulomb_friction@load", "torque", 2.0, 0.02),
         ({"delay": 0.008}, "input_delay@actuator", "delay", 0.008, 0.01),
         ({"rip": 0.5, "rip_n": 4.0}, "torque_ripple@motor", "amplitude", 0.5, 0.02),
@@ -81,6 +83,8 @@ def test_one_effect_is_named_with_its_value(effects, label, parameter, value, to
     assert labels(found) == [label]
     estimate = found.effects[0].parameters[parameter]
     assert abs(estimate.value - value) < tolerance * value
+    low, high = estimate.interval
+    assert low < value < high < (1.0 + 4.0 * tolerance) * low
     assert found.effects[0].margin > 20.0
     for gap in found.gap:
         assert gap.after < min(0.2 * gap.before, 3.0 * gap.noise)

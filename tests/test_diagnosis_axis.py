@@ -1,12 +1,15 @@
 """``ServoAxis``: its equations against closed forms, its FMU against its equations, its diagnosis."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from orchestrator.checking.check import check_fmu
+from orchestrator.cli import main
 from orchestrator.diagnosis.diagnose import diagnose
+from orchestrator.diagnosis.evidence import evidence, evidence_of
 from orchestrator.fmi.build import ensure_built
 from orchestrator.fmi.slave import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
@@ -14,11 +17,20 @@ from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import Source, System
 from orchestrator.model_file import read_model
-from orchestrator.record import read_record
+from orchestrator.record import record_from_columns
 from pyfmu_sources import servo_axis as axis
 from tests.support import emps
 
 MODEL = Path(__file__).resolve().parents[1] / "docs" / "examples" / "emps.toml"
+AXIS = """
+fmu = "ServoAxis"
+[parameters.J]
+value = 1.0
+relative_uncertainty = 0.1
+[parameters.b]
+value = 2.0
+relative_uncertainty = 0.1
+"""
 
 
 def parameters(**values: float) -> tuple[float, ...]:
@@ -83,20 +95,54 @@ def test_fmu_passes_check_and_repeats_the_equations() -> None:
     assert np.ptp(expected) > 1e-3
 
 
+def test_ripple_that_no_effect_explains_is_seen_with_its_period(tmp_path) -> None:
+    rng = np.random.default_rng(4)
+    p = parameters(P_J=1.04, P_B=1.95, P_RIPPLE=0.15, P_RIPPLE_N=9.0, P_RIPPLE_PHASE=0.4)
+    u = np.repeat(rng.uniform(-8.0, 8.0, 100), 16)
+    x, mode, y = (0.0, 0.0, 0.0), 0, []
+    for value in u:
+        y.append(x[0])
+        x, mode = axis.advance(x, mode, p, float(value), 0.0, 0.005)
+    angle = np.array(y) + 1e-4 * rng.standard_normal(len(y))
+    table = {"time": 0.005 * np.arange(len(u)), "u": u, "theta_m": angle}
+    (tmp_path / "axis.toml").write_text(AXIS)
+    found = diagnose(record_from_columns(table, "ripple"), read_model(tmp_path / "axis.toml"))
+    assert [effect.name for effect in found.effects] == ["torque_ripple"]
+    w = found.workings
+    without = evidence(w.likelihood, w.plant, w.base, w.parts).terms[0]
+    assert without.sure
+    assert without.period == pytest.approx(2.0 * np.pi / 9.0, rel=0.05)
+    assert without.size == pytest.approx(0.15, rel=0.2)
+    assert not any(term.sure for term in evidence_of(found).terms)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not emps.available(), reason="the EMPS records are not here")
 def test_emps_lacks_dry_friction_first(tmp_path) -> None:
-    model = read_model(MODEL)
-    emps.write_csv(tmp_path / "estimation.csv", "estimation")
-    found = diagnose(read_record(tmp_path / "estimation.csv", model.columns), model)
-    assert found.verdict == "effects"
-    assert [effect.name for effect in found.effects] == ["coulomb_friction", "directional_friction"]
-    assert found.effects[1].runner_up == "load_torque@load"
-    friction = found.effects[0].parameters["torque"]
-    assert friction.unit == "N"
-    assert friction.value == pytest.approx(20.39, rel=0.03)
-    p = found.workings.final.p
-    assert emps.force_error(p, "estimation") <= 0.041
-    assert emps.force_error(p, "test") <= 0.060
-    assert emps.open_loop(p, "test") >= 0.995
-    assert emps.open_loop(found.workings.base.p, "test") < 0.6
+    for which in emps.RECORDS:
+        emps.write_csv(tmp_path / f"{which}.csv", which)
+    records = [str(tmp_path / "estimation.csv"), "--validate", str(tmp_path / "test.csv")]
+    assert main(["diagnose", *records, "--model", str(MODEL), "--out", str(tmp_path / "out")]) == 0
+    results = json.loads((tmp_path / "out" / "diagnose.json").read_text())["results"]
+    assert results["verdict"] == "effects"
+    friction, direction = results["effects"]
+    assert (friction["name"], direction["name"]) == ("coulomb_friction", "directional_friction")
+    assert friction["parameters"]["torque"]["unit"] == "N"
+    assert friction["parameters"]["torque"]["value"] == pytest.approx(20.39, rel=0.03)
+    assert direction["runner_up"] == "load_torque@load"
+    fit = results["validation"]["theta_m"]["r_squared"]
+    assert fit["parameters"] < 0.6
+    assert fit["after"] >= 0.995
+    assert results["torque_error"]["record"]["after"] <= 0.041
+    assert results["torque_error"]["validation"]["after"] <= 0.060
+    ripple, harmonic = results["also_seen"][:2]
+    assert (ripple["period_unit"], ripple["sure"], harmonic["sure"]) == ("mm", True, True)
+    assert ripple["period"] == pytest.approx(2.5, rel=0.01)
+    assert harmonic["period"] == pytest.approx(1.25, rel=0.01)
+    values = {name: entry["value"] for name, entry in results["parameters"].items()}
+    p = np.array(parameters(P_J=values["J"], P_B=values["b"]))
+    p[axis.P_COULOMB] = friction["parameters"]["torque"]["value"]
+    p[axis.P_DIRECTION] = direction["parameters"]["difference"]["value"]
+    for name, which in (("record", "estimation"), ("validation", "test")):
+        assert results["torque_error"][name]["after"] == pytest.approx(emps.force_error(p, which), rel=1e-4)
+    assert fit["after"] == pytest.approx(emps.open_loop(p, "test"), abs=1e-4)

@@ -17,9 +17,10 @@ from orchestrator.commands._console import print_table
 from orchestrator.diagnosis.admission import check_comparable
 from orchestrator.diagnosis.corrected import BeforeAfter, before_and_after, build_corrected
 from orchestrator.diagnosis.diagnose import diagnose
-from orchestrator.diagnosis.figures import draw_candidates, draw_innovations, draw_missing, draw_signals
+from orchestrator.diagnosis.evidence import Term, evidence_of
+from orchestrator.diagnosis.figures import draw_candidates, draw_innovations, draw_lines, draw_missing, draw_signals
 from orchestrator.diagnosis.outcome import Diagnosis, Gap
-from orchestrator.diagnosis.validate import gap_on
+from orchestrator.diagnosis.validate import STAGES, Validation, torque_errors, validate
 from orchestrator.errors import ConvergenceError
 from orchestrator.model_file import Model, read_model
 from orchestrator.output import staged, write_result
@@ -52,7 +53,11 @@ def run(args: argparse.Namespace) -> int:
             results = diagnosis.as_json() | {"model": str(args.out / fmu.name)}
             results["cosimulation"] = {"largest_difference_from_compiled": runs.difference, "unit": "rad"}
             if other is not None:
-                results["validation"] = {gap.signal: _gap(gap) for gap in gap_on(other, diagnosis)}
+                results |= _validated(validate(other, diagnosis))
+            if errors := torque_errors(record, diagnosis):
+                results["torque_error"] = {"record": errors} | results.get("torque_error", {})
+            found = evidence_of(diagnosis)
+            results["also_seen"] = [_term(term, diagnosis) for term in found.terms]
         except np.linalg.LinAlgError as error:
             raise ConvergenceError(f"{record.source}: no model can be fitted to this record: {error}") from None
         results["seconds"] = time.monotonic() - begun
@@ -61,6 +66,7 @@ def run(args: argparse.Namespace) -> int:
         draw_innovations(directory / "diagnose_innovations.png", diagnosis)
         draw_candidates(directory / "diagnose_candidates.png", diagnosis)
         draw_missing(directory / "diagnose_missing_torque.png", diagnosis)
+        draw_lines(directory / "diagnose_ripple.png", found, diagnosis.gap[0].unit)
         given = {"record": str(args.record), "model": args.model and str(args.model)}
         given["validate"] = args.validate and str(args.validate)
         write_result(directory, "diagnose", given, None, results)
@@ -76,6 +82,32 @@ def _read(path: Path, model: Model) -> Record:
     check_comparable(record)
     check_plausible(record, model)
     return record
+
+
+def _validated(found: Validation) -> dict[str, Any]:
+    """Return what the other record says, in its form for ``diagnose.json``."""
+    signals = {
+        gap.signal: _gap(gap) | {"r_squared": {name: values[n] for name, values in found.r_squared.items()}}
+        for n, gap in enumerate(found.gap)
+    }
+    return {"validation": signals} | (
+        {"torque_error": {"validation": found.torque_error}} if found.torque_error else {}
+    )
+
+
+def _term(term: Term, diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return what is left and what it follows, in its form for ``diagnose.json``."""
+    metric = diagnosis.gap[0].unit == "m"
+    return {
+        "name": term.name,
+        "period": None if term.period is None else 1e3 * term.period if metric else term.period,
+        "period_unit": "mm" if metric else "rad",
+        "size": term.size,
+        "unit": "N" if metric else "N.m",
+        "gain": term.gain,
+        "level": term.level,
+        "sure": term.sure,
+    }
 
 
 def _gap(gap: Gap) -> dict[str, Any]:
@@ -102,6 +134,7 @@ def _print(diagnosis: Diagnosis, results: dict[str, Any]) -> None:
         [gap.signal, name, f"{rms:.4g}", f"{rms / gap.noise:.2f}"] for gap in diagnosis.gap for name, rms in gap.stages
     ]
     print_table("Gap on held-out data", ("signal", "model", f"rms [{diagnosis.gap[0].unit}]", "times noise"), gaps)
+    _print_also_seen(results["also_seen"])
     if "validation" in results:
         rows = [
             [signal, f"{g['before']:.4g}", f"{g['after']:.4g}", f"{g['noise']:.4g}"]
@@ -112,6 +145,34 @@ def _print(diagnosis: Diagnosis, results: dict[str, Any]) -> None:
             ("signal", *(f"{name} [{diagnosis.gap[0].unit}]" for name in ("before", "after", "noise"))),
             rows,
         )
+        rows = [
+            [signal, *(f"{g['r_squared'][name]:.4f}" for name in STAGES)] for signal, g in results["validation"].items()
+        ]
+        print_table("R2 of one free run over all of the other record", ("signal", *STAGES), rows)
+    if "torque_error" in results:
+        rows = [
+            [record, *(f"{100.0 * errors[name]:.2f} %" for name in STAGES)]
+            for record, errors in results["torque_error"].items()
+        ]
+        print_table("Relative torque error of the inverse model", ("on", *STAGES), rows)
+
+
+def _print_also_seen(terms: Sequence[dict[str, Any]]) -> None:
+    """Print what the final model leaves that chance does not explain."""
+    rows = [
+        [
+            term["name"],
+            "" if term["period"] is None else f"{term['period']:.4g} {term['period_unit']}",
+            f"{term['size']:.3g} {term['unit']}",
+            f"{term['gain']:.0f}",
+            f"{term['gain'] / term['level']:.0f}",
+        ]
+        for term in terms
+        if term["sure"]
+    ]
+    if rows:
+        columns = ("what", "period", "size", "gain", "times that of any period")
+        print_table("Also seen at the motor, and not added to the model", columns, rows)
 
 
 def summary(diagnosis: Diagnosis) -> Iterator[str]:

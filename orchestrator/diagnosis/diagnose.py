@@ -82,7 +82,7 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
         effects=() if unknown else named,
         suspects=named if unknown else (),
         parameters=_parameters(plant, model, chosen),
-        where=places(before, signals.h),
+        where=tuple(replace(place, unit=units.get(place.unit, place.unit)) for place in places(before, signals.h)),
         gap=held_out_gap(plant, signals, nominal, chosen.q, stages, parts.held_out, units.get("rad", "rad")),
         remainder=left,
         warnings=_warnings(unknown, left, named, search.steps, floor_off, signals.channels, len(plant.measured)),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fitting import Fit, Parts, jacobian
 from orchestrator.diagnosis.likelihood import Likelihood
+from orchestrator.diagnosis.outcome import Diagnosis
 from orchestrator.diagnosis.plants import Plant
 from orchestrator.diagnosis.remainder import filtered
 from orchestrator.diagnosis.screening import cycle_grid, error_response, line_spectrum
@@ -68,7 +69,7 @@ def evidence(likelihood: Likelihood, plant: Plant, model: Fit, parts: Parts) -> 
     cycles = cycle_grid(stroke / (2.0 * np.pi), likelihood.signals.h, speed)
     power = line_spectrum(likelihood, plant, model, whole, cycles)
     level = float(max(np.median(power) / np.log(2.0), 1.0))
-    terms = _lines(regress, theta, cycles, power, level)
+    terms = _lines(regress, theta, cycles, power, level, stroke)
     centred = (theta - theta[looked].mean()) / max(stroke, 1e-300)
     typical = max(float(np.sqrt(np.mean(omega[looked] ** 2))), 1e-300)
     for name, basis in (
@@ -84,6 +85,12 @@ def evidence(likelihood: Likelihood, plant: Plant, model: Fit, parts: Parts) -> 
         terms.append(Term(name, float(abs(size[0])), gain, level, gain > TERM_SURE * level))
     terms.sort(key=lambda term: term.gain, reverse=True)
     return Evidence(tuple(terms), 2.0 * np.pi / cycles, power)
+
+
+def evidence_of(diagnosis: Diagnosis) -> Evidence:
+    """Return what the final model of a diagnosis leaves."""
+    w = diagnosis.workings
+    return evidence(w.likelihood, w.plant, w.final, w.parts)
 
 
 class _Regression:
@@ -119,12 +126,15 @@ class _Regression:
         return np.asarray(columns - self._basis @ (self._basis.T @ columns))
 
 
-def _lines(regress: _Regression, theta: Array, cycles: Array, power: Array, level: float) -> list[Term]:
+def _lines(
+    regress: _Regression, theta: Array, cycles: Array, power: Array, level: float, stroke: float
+) -> list[Term]:  # fmt: skip
     """Return the strongest lines, each followed by its second harmonic where that shows."""
     found: list[Term] = []
     taken: list[int] = []
     for at in np.argsort(power)[::-1].tolist():
-        if all(abs(at - other) > 4 for other in taken):
+        # What does not repeat within the travel is a trend.
+        if cycles[at] * stroke > 4.0 * np.pi and all(abs(at - other) > 4 for other in taken):
             taken.append(at)
             least = float(np.log(cycles.size)) + SURE
             found.append(_line(regress, "ripple", theta, float(cycles[at]), level, least))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.bank import BANKS, Effect
 from orchestrator.diagnosis.corrected import BeforeAfter
+from orchestrator.diagnosis.evidence import Evidence
 from orchestrator.diagnosis.fitting import Fit
 from orchestrator.diagnosis.outcome import Diagnosis
 from orchestrator.diagnosis.predictor import stage_of
@@ -114,6 +115,24 @@ def draw_missing(path: Path, diagnosis: Diagnosis) -> bool:
     _finish(list(axes))
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
     return True
+
+
+def draw_lines(path: Path, found: Evidence, unit: str) -> None:
+    """Draw the gain of a ripple at each period of the motor's position, with the lines that are sure."""
+    figure = Figure(figsize=(8.0, 3.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axis = figure.subplots()
+    factor, shown = (1e3, "mm") if unit == "m" else (1.0, unit)
+    axis.loglog(factor * found.periods, np.maximum(found.gains, 1e-2), color=GREY, linewidth=0.8, label="every period")
+    lines = [term for term in found.terms if term.sure and term.period is not None]
+    if lines:
+        at, gains = [factor * (t.period or 0.0) for t in lines], [t.gain for t in lines]
+        axis.plot(at, gains, "o", color=BLUE, label="beyond chance")
+    axis.set_title("What a ripple at the motor would still explain, beyond the final model")
+    axis.set_xlabel(f"period [{shown}]")
+    axis.set_ylabel("gain in log-likelihood")
+    _finish([axis])
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
 def _draw_law(axis: Axes, diagnosis: Diagnosis, effect: Effect, fit: Fit) -> None:
