@@ -1,0 +1,41 @@
+"""The estimator's step from sample to sample: its Jacobian, also where the teeth meet or part within the sample."""
+
+import numpy as np
+import pytest
+
+from orchestrator.estimation.innovations import _discrete, affine_model
+from orchestrator.estimation.kernel import propagate
+from pyfmu_sources.drivetrain_parameters import parameters
+
+STEP, TORQUE = 0.005, 40.0
+
+
+def advanced(model, x):
+    """Return the state after a sample, and the Jacobian that ``propagate`` leaves."""
+    phi, gain_u, gain_1 = _discrete(model, STEP)
+    x, total, scratch = x.copy(), np.empty((5, 5)), np.empty(5)
+    propagate(
+        model.matrices, model.inputs, model.constants, model.normal, model.alpha, model.jump, phi, gain_u, gain_1,
+        STEP, TORQUE, x, total, scratch,
+    )  # fmt: skip
+    return x, total
+
+
+# Twist [half-gaps], motor and load speed [rad/s]: stays in the gap, meets flank 1, flank -1, parts, meets at speed.
+@pytest.mark.parametrize(
+    ("twist", "omega_m", "omega_l", "events"),
+    [(0.0, 0.5, 0.1, 0), (0.9, 4.0, -0.5, 1), (-0.9, -4.0, 0.5, 1), (1.05, -4.0, 0.5, 1), (0.5, 60.0, 0.0, 1)],
+)
+def test_the_jacobian_is_the_derivative_also_across_contact_events(twist, omega_m, omega_l, events):
+    model = affine_model(parameters(alpha=0.01, c=20.0))
+    load = 0.3
+    motor = 3.984 * (load + twist * 0.01)
+    x = np.array([motor, omega_m, load, omega_l, 25.0])
+    after, jacobian = advanced(model, x)
+    numeric = np.empty((5, 5))
+    for n, size in enumerate((1e-7, 1e-5, 1e-7, 1e-5, 1e-4)):
+        shift = size * np.eye(5)[n]
+        numeric[:, n] = (advanced(model, x + shift)[0] - advanced(model, x - shift)[0]) / (2.0 * size)
+    np.testing.assert_allclose(jacobian, numeric, rtol=1e-5, atol=1e-5)
+    flanks = [int(np.sign(t) * (abs(t) > 0.01)) for t in (model.normal @ x, model.normal @ after)]
+    assert (flanks[0] != flanks[1]) == bool(events)
