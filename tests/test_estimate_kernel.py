@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.estimation.innovations import _discrete, affine_model
-from orchestrator.estimation.kernel import propagate
+from orchestrator.estimation.kernel import BLUR, blurred, propagate
 from pyfmu_sources.drivetrain_parameters import parameters
 
 STEP, TORQUE = 0.005, 40.0
@@ -39,3 +39,26 @@ def test_the_jacobian_is_the_derivative_also_across_contact_events(twist, omega_
     np.testing.assert_allclose(jacobian, numeric, rtol=1e-5, atol=1e-5)
     flanks = [int(np.sign(t) * (abs(t) > 0.01)) for t in (model.normal @ x, model.normal @ after)]
     assert (flanks[0] != flanks[1]) == bool(events)
+
+
+@pytest.mark.parametrize("twist", [-0.016, -0.004, 0.0, 0.007, 0.012])
+def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
+    model = affine_model(parameters(alpha=0.01, c=0.0))
+    x = np.array([3.984 * (0.3 + twist), 0.0, 0.3, 0.0, 25.0])
+    covariance = np.diag([1e-4, 0.0, 3e-5, 0.0, 0.0])
+    deviation = np.sqrt(model.normal**2 @ np.diag(covariance) + BLUR**2)
+    places = np.linspace(-8.0, 8.0, 4001)
+    weights = np.exp(-0.5 * places**2)
+    weights /= weights.sum()
+    twists = twist + deviation * places
+    wound = weights @ (np.sign(twists) * np.maximum(np.abs(twists) - 0.01, 0.0))
+    touching = weights @ (np.abs(twists) > 0.01)
+    h, after, total = 1e-6, x.copy(), np.empty((5, 5))
+    blurred(
+        model.matrices, model.inputs, model.constants, model.normal, 0.01, covariance, h, TORQUE, after, total
+    )  # fmt: skip
+    free, tight = model.matrices[1], model.matrices[2]
+    by_twist = free[:, 2] - tight[:, 2]  # accelerations per twist of the shaft
+    rate = free @ x + model.inputs * TORQUE + model.constants[1] + by_twist * wound
+    np.testing.assert_allclose((after - x) / h, rate, rtol=1e-3, atol=1e-2)
+    np.testing.assert_allclose((total - np.eye(5)) / h, free + touching * (tight - free), rtol=0.02, atol=1e-2)
