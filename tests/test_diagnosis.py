@@ -6,10 +6,12 @@ import pytest
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.fitting import split
 from orchestrator.diagnosis.free_run import simulate
-from orchestrator.diagnosis.likelihood import Likelihood, signals_of
+from orchestrator.diagnosis.likelihood import HEAD, Likelihood, signals_of
 from orchestrator.diagnosis.outcome import Diagnosis
 from orchestrator.diagnosis.plants import DRIVETRAIN, plant_of
 from orchestrator.diagnosis.remainder import play
+from orchestrator.diagnosis.search import Search
+from orchestrator.diagnosis.spread import widened
 from orchestrator.errors import ScenarioError
 from orchestrator.model_file import default_model, read_model
 from orchestrator.record import Record, record_from_columns
@@ -122,6 +124,20 @@ def test_model_without_uncertainty_is_diagnosed(tmp_path) -> None:
     found = diagnose(record_of({"alpha": 0.004}, 71, 8.0, mismatch=0.0), read_model(path))
     assert labels(found) == ["backlash@shaft"]
     assert found.parameters == {}
+
+
+def test_blocks_of_a_record_disagree_about_a_model_that_is_wrong() -> None:
+    ratios = []
+    for effects in ({}, {"jvar": 0.15}):
+        signals = signals_of(record_of(effects, 81), 1.0)
+        parts = split(signals.size, HEAD)
+        likelihood = Likelihood(DRIVETRAIN, signals, DRIVETRAIN.extended(MODEL.values), parts.validated.stop)
+        base = Search(likelihood, DRIVETRAIN, MODEL, parts).base().fit
+        found = widened(likelihood, DRIVETRAIN, base, parts.fitted, ())
+        ratios.append(np.diag(found.covariance) / np.diag(base.covariance))
+    assert np.all(ratios[0] >= 1.0 - 1e-12)
+    assert np.median(ratios[0]) < 3.0
+    assert np.max(ratios[1]) > 4.0 * np.max(ratios[0])
 
 
 def test_parts_do_not_overlap() -> None:
