@@ -26,10 +26,10 @@ OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the e
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
 START_DAMPING = 1e-6
 DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
-# White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record; a least noise of
-# motor and load keeps it honest.
+# White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record, and one whose contact
+# law is not the machine's is too sure of itself; a least noise of motor and load keeps both honest.
 LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-9, 30.0
-LEAST_WITH_ONE_ENCODER = (1e-4, 1e-3)
+LEAST_WHERE_INEXACT = (1e-4, 1e-3)
 LARGEST_LOG_NOISE = 20.0  # beyond the bounds of any unknown, where a difference quotient may look
 
 
@@ -108,7 +108,7 @@ def make_problem(record: Record, model: Model) -> Problem:
         noises.append(
             Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0)
         )
-    least = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE) if both else LEAST_WITH_ONE_ENCODER
+    least = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE) if both else LEAST_WHERE_INEXACT
     for side, low in zip(("motor", "load"), least, strict=True):
         noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(LARGEST_TORQUE_NOISE)))
     if not both:
@@ -368,10 +368,10 @@ def inverse(information: Array) -> Array:
     return np.linalg.pinv(scaled, hermitian=True) / np.outer(diagonal, diagonal)
 
 
-def with_value(problem: Problem, **means: float) -> Problem:
-    """Return the problem with other prior means, by name."""
-    changed = tuple(replace(u, mean=means[u.name]) if u.name in means else u for u in problem.unknowns)
-    return replace(problem, unknowns=changed)
+def with_least_torque_noise(problem: Problem, least: tuple[float, float]) -> Problem:
+    """Return the problem with at least this much torque noise [N.m.s^0.5] at motor and load."""
+    low = {f"log_torque_{side}": math.log(value) for side, value in zip(("motor", "load"), least, strict=True)}
+    return replace(problem, unknowns=tuple(replace(u, lower=low.get(u.name, u.lower)) for u in problem.unknowns))
 
 
 ALPHA = NAMES[P_ALPHA]

@@ -20,13 +20,16 @@ from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.cramer_rao import bound_of_fit
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.likelihood import (
+    IMPULSE,
     LEAST_TORQUE_NOISE,
-    LEAST_WITH_ONE_ENCODER,
+    LEAST_WHERE_INEXACT,
     Fit,
     Likelihood,
     Point,
+    Problem,
     make_problem,
     maximise,
+    with_least_torque_noise,
 )
 from orchestrator.estimation.protocol import LEVEL, Estimate
 from orchestrator.model_file import Model
@@ -45,7 +48,7 @@ MOTOR_ENCODER = (
     (3e-3, 1e-2),
     (1e-3, 3e-3),
     (3e-4, 2e-3),
-    LEAST_WITH_ONE_ENCODER,
+    LEAST_WHERE_INEXACT,
 )
 SHARP_STARTS = (2, 1, 0)  # places in MOTOR_ENCODER, tried in turn until the noise at the load gets down to this much:
 CALM_TORQUE_NOISE = 0.011
@@ -53,6 +56,7 @@ CALM_TORQUE_NOISE = 0.011
 # likelihood ratio for a noise level at its bound, zero.
 ALLOWED_RISE = 2.7
 STEPS_PER_LEVEL = 10
+CLEAR_IMPULSE = 3.0  # standard errors
 ABOUT_AS_GOOD = 15.0  # in the objective
 DIFFERENT = 1.5  # ratio of two sizes
 MISFIT_WIDENING = 1.3
@@ -82,10 +86,24 @@ def fit_record(likelihood: Likelihood) -> Fit:
     if problem.outputs.shape[1] == 2:
         firsts = _different(_first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0])), problem.index("alpha"))
         fits = [_continue(likelihood, first, BOTH_ENCODERS[1:]) for first in firsts]
-        best = min(fits, key=lambda fit: fit.point.objective)
+        best = _free_fit(likelihood, min(fits, key=lambda fit: fit.point.objective), torque, others)
+        if not _has_other_contact(problem, best):
+            return best
+        likelihood.problem = with_least_torque_noise(problem, LEAST_WHERE_INEXACT)
+        start = best.point.theta.copy()
+        start[torque] = np.maximum(start[torque], np.log(LEAST_WHERE_INEXACT))
+        best = maximise(likelihood, start, others, 2 * STEPS_PER_LEVEL, tolerance=0.01)
     else:
         best = _fit_one_encoder(likelihood, torque, others)
     return _free_fit(likelihood, best, torque, others)
+
+
+def _has_other_contact(problem: Problem, fit: Fit) -> bool:
+    """Return whether the machine's contact law is clearly another than the model's."""
+    place = problem.index(IMPULSE)
+    column = list(fit.free).index(place)
+    deviation = math.sqrt(max(float(fit.covariance[column, column]), 0.0))
+    return abs(float(fit.point.theta[place])) > CLEAR_IMPULSE * deviation
 
 
 def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, float]]) -> Fit:
