@@ -231,7 +231,22 @@ def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
         "gap": {"theta_m": {"before": 0.1, "after": 0.001, "noise": 0.0009, "unit": "rad", "stages": stages}},
         "model": "Corrected.fmu",
         "warnings": ["the record is short"],
-        "validation": {"theta_m": {"before": 0.1, "after": 0.01, "noise": 0.0009, "unit": "rad"}},
+        "validation": {
+            "theta_m": {
+                "before": 0.1,
+                "after": 0.01,
+                "noise": 0.0009,
+                "unit": "rad",
+                "r_squared": {"before": 0.5, "parameters": 0.6, "after": 0.99},
+            }
+        },
+        "torque_error": {"record": {"before": 0.2, "parameters": 0.1, "after": 0.04}},
+        "also_seen": [
+            {"name": "ripple", "period": 0.65, "period_unit": "rad", "size": 0.007, "unit": "N.m"}
+            | {"gain": 2.5, "level": 1.0, "sure": False},
+            {"name": "trend", "period": None, "period_unit": None, "size": 0.1, "unit": "N.m"}
+            | {"gain": 1.0, "level": 1.0, "sure": True},
+        ],
         "remainder": {
             "explained": 0.95,
             "predictable": [{"site": "shaft", "kind": "speed", "gain": 12.0, "share": 0.02}],
@@ -254,7 +269,13 @@ def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
     assert tables["Why these effects"].rows[0][-1] == "stribeck friction"
     assert tables["Gap on the other record"].rows[0][-1] == pytest.approx(10.0)
     assert tables["What the rest follows"].rows == (("shaft", "speed", 12.0, 2.0),)
-    assert tables["Parameters"].rows[0][4] == pytest.approx(5.0)
+    assert tables["Parameters"].rows[0][6] == pytest.approx(5.0)
+    assert tables["R² of one free run over all of the other record"].rows == (("motor angle", 0.5, 0.6, 0.99),)
+    assert tables["Relative torque error of the inverse model"].rows == (("record", 20.0, 10.0, 4.0),)
+    assert tables["What else follows position or direction"].rows == (
+        ("ripple", "0.65 rad", "0.007 N.m", 2.5, 1.0, False),
+        ("trend", None, "0.1 N.m", 1.0, 1.0, True),
+    )
     plots = {p.title: p for p in sections(report, Plot)}
     (bars,) = sections(report, Bars)
     assert [(b.name, b.length) for b in bars.items] == [

@@ -21,8 +21,8 @@ from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import Source, words
 
 Json = Mapping[str, Any]
-PLACED = "verdict effects parameters where gap model suspects warnings candidates validation remainder cosimulation"
-SHOWN_ELSEWHERE = frozenset((*PLACED.split(), "seconds"))
+PLACED = "verdict effects parameters where gap model suspects warnings candidates validation remainder"
+SHOWN_ELSEWHERE = frozenset((*PLACED.split(), "cosimulation", "also_seen", "torque_error", "seconds"))
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "none": ("good", "nothing is missing", "The model explains the record to its noise."),
     "parameters": (
@@ -36,6 +36,8 @@ VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
 SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the actuator"}
 SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
 STAGES = {"nominal": "model as given", "parameters": "with re-fitted parameters"}
+COMPARED = {"before": "as given", "parameters": "re-fitted", "after": "with effects"}
+MISSING = "For each effect: the torque that the model misses without it, and the law that was fitted."
 HELD_OUT = "Root mean square of simulated minus measured, on the part of the record that no fit has seen."
 
 
@@ -54,13 +56,16 @@ def build(source: Source) -> Report:
     sections += [*_shrinking(gap), *_gap_table("Gap before and after", gap, HELD_OUT)]
     note = "Root mean square of simulated minus measured, over the whole of the other record."
     sections += _gap_table("Gap on the other record", results.get("validation") or {}, note)
-    sections += _missing_torque(source)
+    sections += _free_runs(results.get("validation") or {})
+    sections += _picture(source, "missing_torque", "Missing torque", MISSING)
     sections += record_plots(source, "diagnose.csv")
     sections += _where(list(results.get("where") or []))
     sections += [_evidence("Why these effects", effects)] if effects else []
     sections += [_evidence("What came nearest, too little to be named", suspects)] if suspects else []
     sections.append(_parameters(results.get("parameters") or {}))
     sections += [*_candidates(list(results.get("candidates") or [])), *_remainder(results)]
+    sections += _torque_errors(results.get("torque_error") or {})
+    sections += _also_seen(source, list(results.get("also_seen") or []))
     sections += sections_of("More", {n: v for n, v in results.items() if n not in SHOWN_ELSEWHERE})
     return Report(
         title="Diagnosis",
@@ -158,12 +163,52 @@ def _quotient(before: float | None, after: float | None) -> float | None:
     return before / after if before is not None and after else None
 
 
-def _missing_torque(source: Source) -> list[Section]:
-    path = source.directory / "diagnose_missing_torque.png"
-    if not path.is_file():
+def _free_runs(validation: Json) -> list[Section]:
+    """Return how much of the other record one free run over all of it explains."""
+    rows = tuple(
+        (SIGNALS.get(signal, signal), *(g["r_squared"].get(n) for n in COMPARED))
+        for signal, g in validation.items()
+        if g.get("r_squared")
+    )
+    columns = tuple(Column(n, "", 6) for n in ("signal", *COMPARED.values()))
+    return [Table("R² of one free run over all of the other record", columns, rows)] if rows else []
+
+
+def _torque_errors(errors: Json) -> list[Section]:
+    """Return the relative error of the torque that the inverse model computes from the motion."""
+    rows = tuple((words(record), *(_percent(e.get(n)) for n in COMPARED)) for record, e in errors.items())
+    columns = tuple(Column(n) for n in ("on", *(f"{name} [%]" for name in COMPARED.values())))
+    return [Table("Relative torque error of the inverse model", columns, rows)] if rows else []
+
+
+def _percent(share: float | None) -> float | None:
+    return None if share is None else 100.0 * share
+
+
+def _also_seen(source: Source, terms: Sequence[Json]) -> list[Section]:
+    """Return what the final model leaves that follows position or direction, and the gain at every period."""
+    if not terms:
         return []
-    note = "For each effect: the torque that the model misses without it, and the law that was fitted."
-    return [Picture("Missing torque", path, note)]
+    names = ("what", "period", "size", "gain in log-likelihood", "gain at an arbitrary period", "beyond chance")
+    rows = tuple(
+        (
+            words(t["name"]),
+            None if t.get("period") is None else f"{t['period']:.4g} {t['period_unit']}",
+            f"{t['size']:.3g} {t['unit']}",
+            *(t.get(n) for n in ("gain", "level", "sure")),
+        )
+        for t in terms
+    )
+    note = "Too little to be named as an effect."
+    made: list[Section] = [
+        Table("What else follows position or direction", tuple(Column(n) for n in names), rows, note)
+    ]
+    return made + _picture(source, "ripple", "Gain of a ripple at each period", "")
+
+
+def _picture(source: Source, name: str, title: str, note: str) -> list[Section]:
+    path = source.directory / f"diagnose_{name}.png"
+    return [Picture(title, path, note)] if path.is_file() else []
 
 
 def _where(places: Sequence[Json]) -> list[Section]:
@@ -194,12 +239,20 @@ def _evidence(title: str, effects: Sequence[Json]) -> Table:
 
 
 def _parameters(parameters: Json) -> Table:
-    columns = ("parameter", "nominal", "value", "standard error", "change [%]", "unit")
+    columns = ("parameter", "nominal", "value", "standard error", "lower", "upper", "change [%]", "unit")
     rows = tuple(
-        (name, p.get("nominal"), p.get("value"), p.get("standard_error"), _change(p), p.get("unit"))
+        (
+            name,
+            *(p.get(n) for n in ("nominal", "value", "standard_error")),
+            *(p.get("interval") or (None, None)),
+            _change(p),
+            p.get("unit"),
+        )
         for name, p in parameters.items()
     )
-    return Table("Parameters", tuple(Column(c, "", 3 if c in columns[3:5] else 6) for c in columns), rows)
+    note = "Lower and upper: ends of the 95 % interval."
+    shown = tuple(Column(c, "", 3 if c in ("standard error", "change [%]") else 6) for c in columns)
+    return Table("Parameters", shown, rows, note)
 
 
 def _change(p: Json) -> float | None:
