@@ -25,6 +25,7 @@ def main() -> int:
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--file-limit", type=int)
     args = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # shells start background jobs with SIGINT ignored
     if args.file_limit:
         resource.setrlimit(resource.RLIMIT_FSIZE, (args.file_limit, resource.RLIM_INFINITY))
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
