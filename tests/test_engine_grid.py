@@ -76,6 +76,12 @@ def test_cases_have_independent_reproducible_generators():
     assert DesignCases(cases.design, 6)[0].generator().standard_normal() != first[0]
 
 
+def test_draws_share_no_randomness_with_the_cases():
+    cases = DesignCases(parse_design(["a=random:0:1"], 3, 5), 5)
+    for i in range(3):
+        assert cases[i].parameters["a"] != cases[i].generator().random()
+
+
 def test_the_definition_is_plain_json_and_tells_designs_apart():
     texts = [["a=1,2"], ["a=1,3"], ["a=range:1:2:2"], ["a=random:1:2"], ["a=sobol:1:2"], ["a=lograndom:1:2"]]
     definitions = {json.dumps(DesignCases(parse_design(t, 2, 0), 0).definition(), sort_keys=True) for t in texts}

@@ -42,6 +42,22 @@ def test_every_appended_case_is_in_the_file_before_append_returns(tmp_path):
         assert (tmp_path / "j").read_bytes().count(b"\n") == 2
 
 
+def test_an_appended_case_survives_a_power_cut(tmp_path, monkeypatch):
+    synced = []
+    fsync = os.fsync
+
+    def watched(descriptor):
+        fsync(descriptor)
+        synced.append((tmp_path / "j").stat().st_size)
+
+    with Journal(tmp_path / "j", DEFINITION, 10, resume=False) as journal:
+        monkeypatch.setattr(os, "fsync", watched)
+        for index in range(3):
+            journal.append(outcomes([index]))
+            assert synced[-1] == (tmp_path / "j").stat().st_size
+        assert len(synced) == 3
+
+
 def test_a_case_is_recorded_once(tmp_path):
     with Journal(tmp_path / "j", DEFINITION, 10, resume=False) as journal:
         journal.append(outcomes([3]))
