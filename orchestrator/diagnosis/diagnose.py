@@ -15,7 +15,7 @@ from orchestrator.diagnosis.likelihood import HEAD, Likelihood, Signals, signals
 from orchestrator.diagnosis.outcome import Diagnosis, Estimate, Gap, Named, Workings
 from orchestrator.diagnosis.plants import Plant, plant_of
 from orchestrator.diagnosis.remainder import Predictable, Remainder, remainder
-from orchestrator.diagnosis.search import LEVELS, Candidate, Search, Step, annealed, in_metres
+from orchestrator.diagnosis.search import Candidate, Search, Step, annealed, in_metres, ladder
 from orchestrator.diagnosis.spread import widened
 from orchestrator.diagnosis.where import missing_torque, places
 from orchestrator.model_file import Model
@@ -119,7 +119,7 @@ def _search(
     if best.effects:
         final = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
     final = widened(likelihood, plant, final, whole.fitted, best.effects)
-    left = _left(likelihood, plant, base_fit, final, best.fit, parts)
+    left = _left(likelihood, plant, base_fit, final, best.fit, parts, ladder(best.effects)[-1])
     growth = _growth(plant, signals, nominal, final, whole)
     left = replace(left, growth=growth if best.effects else max(growth, left.growth))
     floor_off = left.missing > LEAST_MISSING * (parts.validated.stop - HEAD)
@@ -168,9 +168,14 @@ def held_out_gap(
     )
 
 
-def _left(likelihood: Likelihood, plant: Plant, base: Fit, final: Fit, fitted: Fit, parts: Parts) -> Remainder:
-    """Return the remainder of the final fit; growth and predictability are those of the fit to the first part."""
-    seen = remainder(likelihood, plant, base, fitted, parts, LEVELS[-1])
+def _left(
+    likelihood: Likelihood, plant: Plant, base: Fit, final: Fit, fitted: Fit, parts: Parts, lowest: float
+) -> Remainder:  # fmt: skip
+    """Return the remainder of the final fit; growth and predictability are those of the fit to the first part.
+
+    ``lowest`` is the level of process noise that the final model could have reached at best.
+    """
+    seen = remainder(likelihood, plant, base, fitted, parts, lowest)
     floor = seen.missing + fitted.fitted + fitted.validated
     had, left = floor - base.fitted, floor - final.fitted
     explained = 1.0 - left / had if had > 0.0 else 0.0

@@ -32,12 +32,17 @@ SHORTLIST = 6
 WORTH = 0.03  # a candidate is fitted only when it promises at least this share of the best promise
 
 
+def ladder(effects: Sequence[Effect]) -> list[float]:
+    """Return the levels of process noise, falling, that a model with ``effects`` may have."""
+    least = max((effect.least_noise for effect in effects), default=0.0)
+    return [level for level in LEVELS if level >= least]
+
+
 def annealed(
     likelihood: Likelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, effects: Sequence[Effect]
 ) -> Fit:  # fmt: skip
     """Fit a model with ``effects`` down the ladder of process noise, no lower than their laws are exact."""
-    least = max((effect.least_noise for effect in effects), default=0.0)
-    levels = [level for level in LEVELS if level >= least]
+    levels = ladder(effects)
     return anneal(likelihood, start, max(q, levels[-1]), free, parts, levels)
 
 
