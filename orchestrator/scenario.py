@@ -5,6 +5,7 @@ reported at once, each problem with its path in the file.
 """
 
 import math
+import os
 import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -299,7 +300,7 @@ class _Reader:
         if "\0" in text:
             raise FmuError(f"`fmu` must be a path or one of {', '.join(catalogue())}, but is {text!r}")
         path = self.path.parent / text
-        if not path.is_file():
+        if not os.path.isfile(path):  # unlike Path.is_file it takes names of any length
             raise FmuError(f"must be a file or one of {', '.join(catalogue())}, but {text!r} is neither")
         return path
 

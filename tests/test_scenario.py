@@ -173,6 +173,12 @@ def test_bad_tables(tmp_path: Path, content: str, expected: str) -> None:
         load_scenario(write(tmp_path, GOOD.split("[[sources]]", maxsplit=1)[0] + "[[sources]]\n" + table))
 
 
+def test_a_name_that_is_too_long_for_the_file_system(tmp_path: Path) -> None:
+    (tmp_path / "long.toml").write_text(GOOD.replace('"Drivetrain"', f'"{400 * "9"}"'))
+    with pytest.raises(FmuError, match="must be a file or one of"):
+        load_scenario(tmp_path / "long.toml")
+
+
 def test_an_fmu_that_is_corrupt_inside_is_named_with_its_scenario(tmp_path: Path, fmus) -> None:
     """The model description can be read, so that it only comes out when the rest is unpacked."""
     content = bytearray(fmus["Drivetrain"].read_bytes())

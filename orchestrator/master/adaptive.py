@@ -46,6 +46,9 @@ SUSPICIOUS = 100.0
 TELLING = 0.05
 """A window that is shorter than this part of the next one tells nothing of the error between that one's nodes."""
 
+CAUTION = 1.0
+"""Longest window after an event as a multiple of the time since then."""
+
 HOPELESS = 30.0
 """Error at the middle of a window beyond which its second half is not worth stepping."""
 ORDER = 5
@@ -186,6 +189,7 @@ class _Run:
             # Nothing is known yet of what comes after the jump, and nothing shows what a window does between its nodes.
             length = min(length, self.settings.largest / GROW)
             event: _Event | None = None
+            crossed = -math.inf
             while time < target:
                 end = _window_end(time, length, target) if event is None else event.window_end(time)
                 short = event is not None or end - time < SHORT * longest
@@ -205,8 +209,10 @@ class _Run:
                 longest = max(longest, attempt.length)
                 length = self._next_length(attempt, share)
                 if event is not None and (end >= event.end or event.was_none(attempt)):
-                    event = None
+                    crossed, event = end, None
                 time = end
+                # Held inputs must not take a slave back across the event that it has just passed.
+                length = min(length, max(attempt.length, CAUTION * (time - crossed)))
         return Statistics(self.counts.accepted, self.counts.rejected, self.calls, self.counts.sweeps)
 
     def _next_length(self, attempt: _Attempt, share: float) -> float:

@@ -1,6 +1,7 @@
 """Parameter bindings of SSP files: values, inline or in files, mapped or not, with units."""
 
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,7 +87,7 @@ def _content(
     if source is None:
         return element.find(tag(space, name))
     file = (folder / source).resolve()
-    if not (file.is_relative_to(folder.resolve()) and file.is_file()):
+    if not (file.is_relative_to(folder.resolve()) and os.path.isfile(file)):
         problems.append(Problem(f"{path}.source", f"must be a file of the archive, but is {source!r}"))
         return None
     try:

@@ -1,5 +1,6 @@
 """Scenarios from SSP files: any SSP 1.0 of FMI 2.0 co-simulation FMUs, with nested systems and parameter bindings."""
 
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -59,7 +60,7 @@ def opened_ssp(
         ConnectionMismatchError: its connections are.
         FmuError: one of its FMUs is.
     """
-    if path.is_dir():
+    if os.path.isdir(path):
         raise ScenarioError(f"`ssp` must be an archive, but {path} is a directory; zip what is in it")
     folder = Path(tempfile.mkdtemp(prefix="ssp-"))
     try:
@@ -132,7 +133,7 @@ def _component(element: etree._Element, name: str, structure: _Structure) -> Non
         structure.problems.append(Problem(f"$.{name}.type", f"must be {FMU_TYPE}, but is {kind!r}"))
     elif element.get("implementation") == "ModelExchange":
         structure.problems.append(Problem(f"$.{name}.implementation", "must be CoSimulation, but is ModelExchange"))
-    elif not (file.is_relative_to(structure.folder.resolve()) and file.is_file()):
+    elif not (file.is_relative_to(structure.folder.resolve()) and os.path.isfile(file)):
         structure.problems.append(Problem(f"$.{name}.source", f"must be a file of the archive, but is {source!r}"))
     else:
         structure.components[name] = file
