@@ -86,8 +86,13 @@ def test_error_controlled_master_needs_few_steps_in_a_smooth_loop(folder: Path) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("alpha", [0.01, 0.02, 0.05])
-def test_error_controlled_master_reaches_a_microradian_with_backlash(folder: Path, alpha: float) -> None:
-    result = run(folder, 'algorithm = "adaptive"\nstep = 1e-3\ntolerance = 1e-8', 2.0, alpha)
-    assert error(result, alpha) < 2e-7
-    assert max(result.statistics.do_steps.values()) <= 100_000
+@pytest.mark.parametrize(
+    ("alpha", "tolerance", "bound"),
+    [(0.01, 1e-7, 5e-7), (0.02, 1e-7, 5e-7), (0.05, 1e-7, 5e-7), (0.05, 1e-8, 1e-7)],
+)
+def test_error_controlled_master_reaches_a_microradian_with_backlash(
+    folder: Path, alpha: float, tolerance: float, bound: float
+) -> None:
+    result = run(folder, f'algorithm = "adaptive"\nstep = 1e-3\ntolerance = {tolerance}', 2.0, alpha)
+    assert error(result, alpha) < bound
+    assert max(result.statistics.do_steps.values()) <= 70_000
