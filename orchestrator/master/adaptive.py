@@ -8,7 +8,7 @@ outputs; two sweeps leave an error of order five in the window's length, so that
 The error is estimated by step doubling: the window once as a whole, then in two halves, for which the whole is so good
 a guess that two sweeps do. The halves are kept. A jump or a kink inside a window, such as a tooth that makes contact,
 shows as a large difference: the window is undone and shortened until the event's effect is below the tolerance, then
-windows grow again. They end where a source jumps.
+windows grow again, no faster than the time since the event. They end where a source jumps.
 """
 
 import math
