@@ -24,6 +24,7 @@ IMPULSE = "contact_impulse"
 IMPULSE_DEPTH = 2e-3  # rad, within which a contact's damping sets in; prior standard deviation
 OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
 NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
+JUMP = 100.0
 START_DAMPING = 1e-6
 DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
 # White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record, and one whose contact
@@ -263,13 +264,22 @@ class Likelihood:
         base = point.result
         basis = self._basis(free)
 
-        def run(n: int) -> tuple[Array, Array]:
+        def look(n: int, step: float) -> tuple[Array, Array]:
             moved = point.theta.copy()
-            moved[free] += self.difference * basis[:, n]
+            moved[free] += step * basis[:, n]
             result = self.run(moved)
-            error = (result.errors - base.errors) / (self.difference * np.sqrt(base.variances))
-            spread = (result.variances - base.variances) / (self.difference * base.variances)
+            error = (result.errors - base.errors) / (step * np.sqrt(base.variances))
+            spread = (result.variances - base.variances) / (step * base.variances)
             return error.ravel(), spread.ravel()
+
+        def run(n: int) -> tuple[Array, Array]:
+            error, spread = look(n, self.difference)
+            # A direction is scaled to an information of one. Much more is a contact that comes or goes within the step.
+            if float(error @ error) > JUMP:
+                other = look(n, -self.difference)
+                if float(other[0] @ other[0]) < float(error @ error):
+                    return other
+            return error, spread
 
         columns = list(self._pool.map(run, range(free.size)) if self._pool else map(run, range(free.size)))
         error = np.array([column[0] for column in columns])
