@@ -71,6 +71,7 @@ class Effect:
         priors: scene -> short name -> (mean, standard deviation).
         angular: True if it makes sense for an angle only, not for a position in metres.
         both_encoders: True if it can be seen only with an encoder on either side.
+        leaves: share of what the effect gains that its law, not being exact, may leave for other effects to gain.
         least_noise: level of process noise, as a share of the drive's torque, below which no model with this effect is
             trusted: impacts amplify what their law leaves out, and a predictor that is hardly corrected goes astray.
         tolerance: name in the plant's table -> share of its value to which laws of this kind, of which none is exact,
@@ -95,6 +96,7 @@ class Effect:
     angular: bool = False
     nuisances: dict[str, str] = field(default_factory=dict)
     priors: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
+    leaves: float = 0.06
     least_noise: float = 0.0
     tolerance: dict[str, float] = field(default_factory=dict)
 
@@ -202,7 +204,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: {"alpha": _fractions(s), "onset": (_onset(s)[0],)}, family="weak shaft at small torque",
         scales=lambda s: {"onset": 0.2}, nuisances={"onset": "contact.onset"}, priors=lambda s: {"onset": _onset(s)},
         tolerance={"alpha": 2e-3, "k": 5e-4, "J_m": 4e-4, "J_l": 4e-4, "tau": 3e-4, "c": 0.01, "b_m": 3e-3,
-                   "b_l": 6e-3}, least_noise=9e-4,
+                   "b_l": 6e-3}, least_noise=9e-4, leaves=0.025,
     ),
     *_friction("motor"),
     *_friction("load"),

@@ -25,7 +25,6 @@ FIRST_LEVEL = LEVELS[10]
 PENALTY = 5.0  # log-likelihood that each further parameter must earn
 PAYS = 22.0  # least gain that an effect must bring in all
 LEAST_DECIDED = 6.0  # and on the deciding part alone
-SHARE = 0.06  # and as a share of what earlier effects have gained
 MOST_EFFECTS = 4
 RESCUED = 60.0  # gain on the fitted part from which a candidate that fails on the other is fitted to both
 SHORTLIST = 6
@@ -65,12 +64,14 @@ class Candidate:
     def pays_over(self, other: "Candidate", base: "Candidate") -> bool:
         """Tell whether this model, which has more effects than ``other``, earns them on both parts.
 
-        The gain must also be a fair share of what the effects before have gained over ``base``: no law of friction or
-        contact is exact, and what is left of a large effect must not pass for a small one.
+        The gain must also be more than what the laws of the effects before may leave of what those have gained over
+        ``base``: no law of friction or contact is exact, and what is left of a large effect must not pass for a small
+        one.
         """
         more = PENALTY * max(parameter_count(self) - parameter_count(other), 1)
         fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
-        least = max(PAYS, SHARE * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
+        left = max((effect.leaves for effect in other.effects), default=0.0)
+        least = max(PAYS, left * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
         return self.gain_over(other) > least and fitted > more and decided > LEAST_DECIDED
 
 
