@@ -4,7 +4,7 @@ A new effect needs its term in ``pyfmu_sources/effects.py`` (and the equations t
 plant's table, and one row here; ``docs/diagnosis.md`` walks through an example.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -74,6 +74,8 @@ class Effect:
         leaves: share of what the effect gains that its law, not being exact, may leave for other effects to gain.
         least_noise: level of process noise, as a share of the drive's torque, below which no model with this effect is
             trusted: impacts amplify what their law leaves out, and a predictor that is hardly corrected goes astray.
+        taken_from: short name -> parameter of the plant that is lowered by as much when the effect is put into a model.
+        tries: how many starts, of different values of the first parameter in ``starts``, are fitted in full.
         tolerance: name in the plant's table -> share of its value to which laws of this kind, of which none is exact,
             leave the parameter undefined (standard deviation; measured on records made with other laws).
     """
@@ -96,14 +98,36 @@ class Effect:
     angular: bool = False
     nuisances: dict[str, str] = field(default_factory=dict)
     priors: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
-    leaves: float = 0.06
+    leaves: float = 0.01
     least_noise: float = 0.0
+    taken_from: dict[str, str] = field(default_factory=dict)
+    tries: int = 1
     tolerance: dict[str, float] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
         """Return name and site, unique in the bank."""
         return f"{self.name}@{self.site}"
+
+    def put(self, plant: Plant, p: Array, values: Mapping[str, float]) -> Array:
+        """Return parameters ``p`` of a model without the effect with ``values`` of it put in, within their bounds."""
+        moved = p.copy()
+        for short, place in self.places(plant).items():
+            if short in values:
+                entry = plant.entry(place)
+                moved[place] = min(max(values[short], entry.minimum), entry.maximum)
+                if short in self.taken_from:
+                    moved[plant.index(self.taken_from[short])] -= moved[place]
+        return moved
+
+    def taken_out(self, plant: Plant, p: Array, default: Array) -> Array:
+        """Return parameters ``p`` with the effect switched off, its parameters at their ``default``."""
+        moved = p.copy()
+        for short, place in self.places(plant).items():
+            if short in self.taken_from:
+                moved[plant.index(self.taken_from[short])] += moved[place]
+            moved[place] = default[place]
+        return moved
 
     def places(self, plant: Plant) -> dict[str, int]:
         """Return the place of each parameter in the predictor's tuple, by short name, nuisances last."""
@@ -146,7 +170,7 @@ def _friction(site: str) -> tuple[Effect, Effect]:
     coulomb = Effect(
         "coulomb_friction", site, _group("coulomb_friction", f"{site}.torque"), "torque", unit, start,
         amplitudes=("torque",), scales=lambda s: {"presliding": 0.2},
-        family=f"dry friction of the {site}", nuisances=nuisances, priors=priors,
+        family=f"dry friction of the {site}", nuisances=nuisances, priors=priors, leaves=0.04,
     )  # fmt: skip
     stribeck = Effect(
         "stribeck_friction", site, _group("stribeck_friction", *names), "coulomb", unit,
@@ -177,16 +201,22 @@ def _delays(scene: Scene) -> tuple[float, ...]:
 
 def _frequencies(scene: Scene) -> tuple[float, ...]:
     top = 0.8 * np.pi / scene.h
-    return tuple(float(f) for f in np.geomspace(min(8.0, top / 8), min(250.0, top), 32))
+    return tuple(float(f) for f in np.geomspace(min(8.0, top / 8), min(250.0, top), 48))
 
 
-def _periodic(name: str, site: str, unit: Callable[[Scene], float], tolerance: float = 0.0) -> Effect:
+def _parts_of_the_load(scene: Scene) -> tuple[float, ...]:
+    return tuple(scene.inertia * f for f in (3e-4, 1.2e-3, 5e-3, 0.02, 0.08))
+
+
+def _periodic(
+    name: str, site: str, unit: Callable[[Scene], float], tolerance: float = 0.0, leaves: float = 0.01
+) -> Effect:
     return Effect(
         name, site, _group(name, "amplitude", "cycles_per_rev", "phase"), "amplitude", unit,
         lambda scene: {"cycles_per_rev": scene.cycles.get(name, ())}, amplitudes=("amplitude",), phase="phase",
         scales=lambda scene: {"cycles_per_rev": 0.01 / max(scene.turns, 1e-9), "phase": 0.05},
         bounds=lambda scene: {"cycles_per_rev": (0.7 / max(scene.turns, 1e-9), 1e9)}, family=f"periodic, {site}",
-        tolerance={f"effects.{name}.amplitude": tolerance},
+        tolerance={f"effects.{name}.amplitude": tolerance}, leaves=leaves,
     )  # fmt: skip
 
 
@@ -219,10 +249,11 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "hardening_stiffness", "shaft", _group("hardening_stiffness", "cubic"), "cubic",
         lambda s: 0.02 * s.stiffness / s.twist**2, amplitudes=("cubic",), family="weak shaft at small torque",
+        leaves=0.03,
     ),
     _periodic("torque_ripple", "motor", _torque),
     # Where the tooth force acts on an eccentric gear, and so its lever arm, differs between models.
-    _periodic("gear_eccentricity", "shaft", lambda s: 0.003 * s.twist, tolerance=8e-3),
+    _periodic("gear_eccentricity", "shaft", lambda s: 0.003 * s.twist, tolerance=8e-3, leaves=0.04),
     Effect(
         "load_torque", "load", _group("load_torque", "torque"), "torque", _load_torque, amplitudes=("torque",),
     ),
@@ -233,8 +264,10 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "extra_resonance", "load", _group("extra_resonance", "inertia", "frequency", "damping_ratio"), "inertia",
         lambda s: 0.01 * s.inertia,
-        lambda s: {"frequency": _frequencies(s), "damping_ratio": (0.03,)}, amplitudes=("inertia",),
+        lambda s: {"frequency": _frequencies(s), "damping_ratio": (0.03,), "inertia": _parts_of_the_load(s)},
         scales=lambda s: {"frequency": 0.5, "damping_ratio": 0.01},
+        # Below its resonance the added inertia moves with the load, so the re-fitted J_l already holds it.
+        taken_from={"inertia": "J_l"}, tries=3,
     ),
     Effect(
         "quadratic_drag", "load", _group("quadratic_drag", "coefficient"), "coefficient",
@@ -258,6 +291,7 @@ _AXIS = ("coulomb_friction@motor", "stribeck_friction@motor", "input_delay@actua
 _DIRECTIONAL = Effect(
     "directional_friction", "motor", _group("directional_friction", "motor.difference"), "difference",
     lambda s: 0.01 * s.torque / max(s.speed_m, 1e-12), amplitudes=("difference",),
+    leaves=0.04,
 )  # fmt: skip
 
 SERVO_AXIS_BANK = (*(effect for effect in DRIVETRAIN_BANK if effect.label in _AXIS), _DIRECTIONAL)

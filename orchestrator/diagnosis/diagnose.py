@@ -32,6 +32,8 @@ EXPLAINED_BY_NOMINAL = 3.0  # per parameter: log-likelihood that re-fitting gain
 
 # Units of a plant's table when its position is a length.
 METRIC = {"rad": "m", "rad/s": "m/s", "N.m": "N", "kg.m2": "kg", "N.m.s/rad": "N.s/m", "N.m.s2/rad2": "N.s2/m2"}
+# Of a ripple: its phase stays an angle, and what is a revolution of an angle is 2 pi metres of a position.
+PERIODIC_METRIC = {"phase": "rad", "cycles_per_rev": "1/(2 pi m)"}
 
 Progress = Callable[[int, int, str], None]
 
@@ -119,7 +121,7 @@ def _search(
     if best.effects:
         final = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
     final = widened(likelihood, plant, final, whole.fitted, best.effects)
-    left = _left(likelihood, plant, base_fit, final, best.fit, parts, ladder(best.effects)[-1])
+    left = _left(likelihood, plant, base_fit, final, best.fit, parts, ladder(best.effects, final.q)[-1])
     growth = _growth(plant, signals, nominal, final, whole)
     left = replace(left, growth=growth if best.effects else max(growth, left.growth))
     floor_off = left.missing > LEAST_MISSING * (parts.validated.stop - HEAD)
@@ -207,13 +209,18 @@ def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step], units
             float(final.p[place]),
             final.standard_error(place),
             final.interval(place),
-            units.get(plant.table[place].unit, plant.table[place].unit),
+            PERIODIC_METRIC[short] if units and short in PERIODIC_METRIC else _unit(plant, place, units),
         )
         for short, place in effect.places(plant).items()
         if place < len(plant.table)
     }
     margin = own.score - runner.score if runner else gain
     return Named(effect.name, effect.site, parameters, gain, runner.effects[-1].label if runner else "", margin, family)
+
+
+def _unit(plant: Plant, place: int, units: Mapping[str, str]) -> str:
+    own = plant.table[place].unit
+    return units.get(own, own)
 
 
 def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, dict[str, Any]]:

@@ -48,16 +48,17 @@ class Screen:
         self._basis = self._basis[: columns.shape[0]]
         self._residual = self._clean(self._white(model.z))
 
-    def guess(self, effect: Effect, scene: Scene) -> Guess | None:
-        """Return the most promising starting values of an effect, or None when nothing promises a gain."""
+    def guesses(self, effect: Effect, scene: Scene) -> tuple[Guess, ...]:
+        """Return the most promising starting values of an effect, best first; none when nothing promises a gain."""
         starts = effect.starts(scene)
-        best: Guess | None = None
+        best: dict[float, Guess] = {}  # by the first parameter: neighbouring starts would end in the same fit
         for combination in itertools.product(*starts.values()):
             values = dict(zip(starts, combination, strict=True))
             found = self._amplitudes(effect, values, scene) if effect.amplitudes else self._as_is(effect, values)
-            if found is not None and (best is None or found.gain > best.gain):
-                best = found
-        return best
+            first = combination[0] if combination else 0.0
+            if found is not None and (first not in best or found.gain > best[first].gain):
+                best[first] = found
+        return tuple(sorted(best.values(), key=lambda guess: guess.gain, reverse=True)[: effect.tries])
 
     def _as_is(self, effect: Effect, values: dict[str, float]) -> Guess | None:
         response = self._run(effect, values)
@@ -96,10 +97,7 @@ class Screen:
         return [values | zeros | {name: unit} for name in effect.amplitudes]
 
     def _run(self, effect: Effect, values: dict[str, float]) -> Array:
-        p = self._model.p.copy()
-        for short, place in effect.places(self._plant).items():
-            if short in values:
-                p[place] = values[short]
+        p = effect.put(self._plant, self._model.p, values)
         return self._likelihood.whitened(p, self._model.q)
 
     def _white(self, z: Array) -> Array:

@@ -19,30 +19,34 @@ from orchestrator.diagnosis.screening import Guess, Screen, scene_of, with_cycle
 from orchestrator.model_file import Model
 
 Array = NDArray[np.float64]
+Guesses = tuple[Guess, ...]  # best first, at least one
 
 LEVELS = tuple(float(f) for f in np.geomspace(3.0, 1e-5, 23))  # process noise, as a share of the drive's torque
 FIRST_LEVEL = LEVELS[10]
 PENALTY = 5.0  # log-likelihood that each further parameter must earn
-PAYS = 22.0  # least gain that an effect must bring in all
+PAYS = 10.0  # least gain that an effect must bring in all
 LEAST_DECIDED = 6.0  # and on the deciding part alone
+LEAST_DECIDED_SHARE = 0.08  # of the gain on the fitted part, which is twice as long
 MOST_EFFECTS = 4
 RESCUED = 60.0  # gain on the fitted part from which a candidate that fails on the other is fitted to both
 SHORTLIST = 6
 WORTH = 0.03  # a candidate is fitted only when it promises at least this share of the best promise
 
 
-def ladder(effects: Sequence[Effect]) -> list[float]:
-    """Return the levels of process noise, falling, that a model with ``effects`` may have."""
+def ladder(effects: Sequence[Effect], before: float) -> list[float]:
+    """Return the levels of process noise, falling, that a model with ``effects`` may have.
+
+    ``before`` is the level of the model that it comes from, which is always among them.
+    """
     least = max((effect.least_noise for effect in effects), default=0.0)
-    return [level for level in LEVELS if level >= least]
+    return [level for level in LEVELS if level >= min(least, before)]
 
 
 def annealed(
     likelihood: Likelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, effects: Sequence[Effect]
 ) -> Fit:  # fmt: skip
     """Fit a model with ``effects`` down the ladder of process noise, no lower than their laws are exact."""
-    levels = ladder(effects)
-    return anneal(likelihood, start, max(q, levels[-1]), free, parts, levels)
+    return anneal(likelihood, start, q, free, parts, ladder(effects, q))
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,11 @@ class Candidate:
         left = max((effect.leaves for effect in other.effects), default=0.0)
         least = max(PAYS, left * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
         return self.gain_over(other) > least and fitted > more and decided > LEAST_DECIDED
+
+    def holds_over(self, other: "Candidate") -> bool:
+        """Tell whether what the last effect gains where it was fitted, it also gains where it was not."""
+        fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
+        return decided > LEAST_DECIDED_SHARE * fitted
 
 
 def parameter_count(candidate: Candidate) -> int:
@@ -128,24 +137,20 @@ class Search:
     def step(self, current: Candidate, base: Candidate) -> Step:
         """Fit the shortlist of effects on top of ``current``."""
         scene, guesses = self.screen(current)
-        found = [self.extend(current, effect, guess, scene) for effect, guess in self.shortlist(guesses)]
+        found = [self.extend(current, effect, starts, scene) for effect, starts in self.shortlist(guesses)]
         found += self.refined(found, current, base, scene)
         found = [self.rescued(candidate, current, base) for candidate in found]
         found.sort(key=lambda candidate: candidate.score, reverse=True)
-        accepted = bool(found) and found[0].pays_over(current, base)
+        accepted = bool(found) and found[0].pays_over(current, base) and found[0].holds_over(current)
         return Step(current, tuple(found), accepted)
 
-    def screen(self, current: Candidate) -> tuple[Scene, dict[str, tuple[Effect, Guess]]]:
-        """Return the scene and the guess of every effect that is not in ``current``."""
+    def screen(self, current: Candidate) -> tuple[Scene, dict[str, tuple[Effect, Guesses]]]:
+        """Return the scene and the guesses of every effect that is not in ``current``."""
         scene = scene_of(self.likelihood, self.plant, current.fit)
         scene = with_cycles(scene, self.likelihood, self.plant, current.fit, self.parts)
         screen = Screen(self.likelihood, self.plant, current.fit, self.parts)
-        guesses = {}
-        for effect in self.eligible(current):
-            guess = screen.guess(effect, scene)
-            if guess is not None:
-                guesses[effect.label] = (effect, guess)
-        return scene, guesses
+        guesses = {effect.label: (effect, screen.guesses(effect, scene)) for effect in self.eligible(current)}
+        return scene, {label: pair for label, pair in guesses.items() if pair[1]}
 
     def eligible(self, current: Candidate) -> Iterable[Effect]:
         """Return the effects that could be added to ``current``."""
@@ -158,13 +163,13 @@ class Search:
             if effect.label not in present | replaced and not blind:
                 yield effect
 
-    def shortlist(self, guesses: dict[str, tuple[Effect, Guess]]) -> list[tuple[Effect, Guess]]:
+    def shortlist(self, guesses: dict[str, tuple[Effect, Guesses]]) -> list[tuple[Effect, Guesses]]:
         """Return the effects worth a fit, most promising first."""
-        own = sorted(guesses.values(), key=lambda pair: pair[1].gain, reverse=True)
+        own = sorted(guesses.values(), key=lambda pair: pair[1][0].gain, reverse=True)
         if not own:
             return []
-        least = max(3.0, WORTH * own[0][1].gain)
-        return [pair for n, pair in enumerate(own) if n < SHORTLIST and pair[1].gain > least] or own[:1]
+        least = max(3.0, WORTH * own[0][1][0].gain)
+        return [pair for n, pair in enumerate(own) if n < SHORTLIST and pair[1][0].gain > least] or own[:1]
 
     def refined(self, found: Sequence[Candidate], current: Candidate, base: Candidate, scene: Scene) -> list[Candidate]:
         """Return candidates whose effect contains one that pays (Stribeck's friction contains Coulomb's)."""
@@ -198,10 +203,10 @@ class Search:
         """Return the best fit of ``effect`` in the place of ``simpler``, from several starts; None: not plausible."""
         effects = tuple(effect if e is simpler else e for e in source.effects)
         values = {short: float(source.fit.p[place]) for short, place in simpler.places(self.plant).items()}
-        bare = self.without(source.fit.p, simpler.label)
+        bare = self.without(source.fit.p, simpler)
         best: Fit | None = None
         for start in effect.refine(values, scene):
-            p = self.placed(bare, effect, start)
+            p = effect.put(self.plant, bare, start)
             fitted = annealed(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, effects)
             if best is None or fitted.fitted > best.fitted:
                 best = fitted
@@ -211,13 +216,14 @@ class Search:
         final = {short: float(best.p[place]) for short, place in effect.places(self.plant).items()}
         return Candidate(effects, best) if effect.plausible(final) else None
 
-    def extend(self, current: Candidate, effect: Effect, guess: Guess, scene: Scene) -> Candidate:
-        """Return ``current`` with one more effect, fitted from the guess."""
+    def extend(self, current: Candidate, effect: Effect, guesses: Guesses, scene: Scene) -> Candidate:
+        """Return ``current`` with one more effect: the best of the fits from the guesses."""
         effects = (*current.effects, effect)
-        p = self.placed(current.fit.p, effect, guess.values)
-        fitted = annealed(self.likelihood, p, current.fit.q, self.free(effects, scene), self.parts, effects)
+        free = self.free(effects, scene)
+        starts = [effect.put(self.plant, current.fit.p, guess.values) for guess in guesses]
+        fits = [annealed(self.likelihood, p, current.fit.q, free, self.parts, effects) for p in starts]
         self._tick(effect.label)
-        return Candidate(effects, fitted)
+        return Candidate(effects, max(fits, key=lambda fitted: fitted.fitted))
 
     def prune(self, current: Candidate, base: Candidate) -> Candidate:
         """Take out earlier effects that the last one has made superfluous."""
@@ -226,7 +232,7 @@ class Search:
             reduced = []
             for effect in current.effects[:-1]:
                 kept = tuple(e for e in current.effects if e is not effect)
-                p = self.without(current.fit.p, effect.label)
+                p = self.without(current.fit.p, effect)
                 fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
                 self._tick(f"without {effect.label}")
                 reduced.append(Candidate(kept, fitted))
@@ -257,24 +263,9 @@ class Search:
                     free.append(Free(place, scales.get(short, unit), low, high, prior))
         return tuple(free)
 
-    def placed(self, p: Array, effect: Effect, values: dict[str, float]) -> Array:
-        """Return ``p`` with starting values put in, kept off the bounds where the response has no slope."""
-        moved = p.copy()
-        for short, place in effect.places(self.plant).items():
-            if short in values:
-                entry = self.plant.entry(place)
-                moved[place] = min(max(values[short], entry.minimum), entry.maximum)
-        return moved
-
-    def without(self, p: Array, label: str) -> Array:
+    def without(self, p: Array, effect: Effect) -> Array:
         """Return ``p`` with one effect switched off."""
-        moved = p.copy()
-        for effect in BANKS[self.plant.name]:
-            if effect.label == label:
-                default = self.plant.extended(self.model.values)
-                for place in effect.places(self.plant).values():
-                    moved[place] = default[place]
-        return moved
+        return effect.taken_out(self.plant, p, self.plant.extended(self.model.values))
 
     def _tick(self, what: str) -> None:
         self.done += 1
