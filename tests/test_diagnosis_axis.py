@@ -125,8 +125,10 @@ def test_emps_lacks_dry_friction_first(tmp_path) -> None:
     assert main(["diagnose", *records, "--model", str(MODEL), "--out", str(tmp_path / "out")]) == 0
     results = json.loads((tmp_path / "out" / "diagnose.json").read_text())["results"]
     assert results["verdict"] == "effects"
-    friction, direction = results["effects"]
-    assert (friction["name"], direction["name"]) == ("coulomb_friction", "directional_friction")
+    friction, direction, ripple = results["effects"]
+    assert [effect["name"] for effect in results["effects"]] == [
+        "coulomb_friction", "directional_friction", "torque_ripple"
+    ]  # fmt: skip
     assert friction["parameters"]["torque"]["unit"] == "N"
     assert friction["parameters"]["torque"]["value"] == pytest.approx(20.39, rel=0.03)
     assert direction["runner_up"] == "load_torque@load"
@@ -135,14 +137,22 @@ def test_emps_lacks_dry_friction_first(tmp_path) -> None:
     assert fit["after"] >= 0.995
     assert results["torque_error"]["record"]["after"] <= 0.041
     assert results["torque_error"]["validation"]["after"] <= 0.060
-    ripple, harmonic = results["also_seen"][:2]
-    assert (ripple["period_unit"], ripple["sure"], harmonic["sure"]) == ("mm", True, True)
-    assert ripple["period"] == pytest.approx(2.5, rel=0.01)
+    cycles = ripple["parameters"]["cycles_per_rev"]
+    assert (cycles["unit"], ripple["parameters"]["phase"]["unit"]) == ("rad/m", "rad")
+    assert 2.0 * np.pi / cycles["value"] == pytest.approx(2.5e-3, rel=0.01)
+    harmonic = results["also_seen"][0]
+    assert (harmonic["period_unit"], harmonic["sure"]) == ("mm", True)
     assert harmonic["period"] == pytest.approx(1.25, rel=0.01)
     values = {name: entry["value"] for name, entry in results["parameters"].items()}
     p = np.array(parameters(P_J=values["J"], P_B=values["b"]))
     p[axis.P_COULOMB] = friction["parameters"]["torque"]["value"]
     p[axis.P_DIRECTION] = direction["parameters"]["difference"]["value"]
+    for place, short in (
+        (axis.P_RIPPLE, "amplitude"),
+        (axis.P_RIPPLE_N, "cycles_per_rev"),
+        (axis.P_RIPPLE_PHASE, "phase"),
+    ):
+        p[place] = ripple["parameters"][short]["value"]
     for name, which in (("record", "estimation"), ("validation", "test")):
         assert results["torque_error"][name]["after"] == pytest.approx(emps.force_error(p, which), rel=1e-4)
     assert fit["after"] == pytest.approx(emps.open_loop(p, "test"), abs=1e-4)

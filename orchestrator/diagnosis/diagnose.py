@@ -32,8 +32,8 @@ EXPLAINED_BY_NOMINAL = 3.0  # per parameter: log-likelihood that re-fitting gain
 
 # Units of a plant's table when its position is a length.
 METRIC = {"rad": "m", "rad/s": "m/s", "N.m": "N", "kg.m2": "kg", "N.m.s/rad": "N.s/m", "N.m.s2/rad2": "N.s2/m2"}
-# Of a ripple: its phase stays an angle, and what is a revolution of an angle is 2 pi metres of a position.
-PERIODIC_METRIC = {"phase": "rad", "cycles_per_rev": "1/(2 pi m)"}
+# Of a ripple along a position: its phase stays an angle, and advances by so many radians a metre.
+PERIODIC_METRIC = {"phase": "rad", "cycles_per_rev": "rad/m"}
 
 Progress = Callable[[int, int, str], None]
 

@@ -161,7 +161,8 @@ class Likelihood:
         raw, _ = self.innovations(p, q)
         roots = self.gains(q).roots[: self.stop]
         m = self.signals.channels
-        return np.asarray((roots @ raw[:, :m, None])[:, :, 0])
+        with np.errstate(over="ignore", invalid="ignore"):  # of an unstable predictor; the caller sees that
+            return np.asarray((roots @ raw[:, :m, None])[:, :, 0])
 
     def delivered(self, p: Array, stop: int) -> tuple[Array, Array, float]:
         """Return the torque that reaches the drive in each of the first ``stop`` samples: limited, then delayed.

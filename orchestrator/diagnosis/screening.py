@@ -64,9 +64,10 @@ class Screen:
         response = self._run(effect, values)
         if not np.all(np.isfinite(response)):
             return None
-        left = self._clean(self._white(response))
-        gain = 0.5 * (self._residual @ self._residual - left @ left)
-        return Guess(values, float(gain))
+        with np.errstate(over="ignore", invalid="ignore"):
+            left = self._clean(self._white(response))
+            gain = 0.5 * float(self._residual @ self._residual - left @ left)
+        return Guess(values, gain) if np.isfinite(gain) else None
 
     def _amplitudes(self, effect: Effect, values: dict[str, float], scene: Scene) -> Guess | None:
         unit = effect.unit_of_size(scene)

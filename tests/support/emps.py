@@ -52,6 +52,7 @@ def force_error(p: Array, which: str) -> float:
     acceleration = np.gradient(speed, STEP)
     force = p[sa.P_J] * acceleration + p[sa.P_B] * speed + p[sa.P_COULOMB] * np.sign(speed) + p[sa.P_LOAD_TORQUE]
     force = force + p[sa.P_DIRECTION] * np.abs(speed)
+    force = force - p[sa.P_RIPPLE] * np.sin(p[sa.P_RIPPLE_N] * data["position"] + p[sa.P_RIPPLE_PHASE])
     inside = slice(BORDER, -BORDER)
     model, measured = (decimate(f[inside], DECIMATION, zero_phase=True) for f in (force, data["force"]))
     return float(np.linalg.norm(measured - model) / np.linalg.norm(measured))
