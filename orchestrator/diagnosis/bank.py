@@ -176,6 +176,7 @@ def _friction(site: str) -> tuple[Effect, Effect]:
         "stribeck_friction", site, _group("stribeck_friction", *names), "coulomb", unit,
         refine=refine, plausible=falls, scales=lambda s: {"stribeck_speed": 0.02 * rms(s), "presliding": 0.2},
         family=f"dry friction of the {site}", needs=f"coulomb_friction@{site}", nuisances=nuisances, priors=priors,
+        leaves=0.04,
     )  # fmt: skip
     return coulomb, stribeck
 
@@ -202,6 +203,10 @@ def _delays(scene: Scene) -> tuple[float, ...]:
 def _frequencies(scene: Scene) -> tuple[float, ...]:
     top = 0.8 * np.pi / scene.h
     return tuple(float(f) for f in np.geomspace(min(8.0, top / 8), min(250.0, top), 48))
+
+
+def _band(scene: Scene) -> tuple[float, float]:
+    return 0.5 * _frequencies(scene)[0], 1.2 * _frequencies(scene)[-1]
 
 
 def _parts_of_the_load(scene: Scene) -> tuple[float, ...]:
@@ -266,6 +271,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: 0.01 * s.inertia,
         lambda s: {"frequency": _frequencies(s), "damping_ratio": (0.03,), "inertia": _parts_of_the_load(s)},
         scales=lambda s: {"frequency": 0.5, "damping_ratio": 0.01},
+        bounds=lambda s: {"frequency": _band(s), "damping_ratio": (0.0, 1.0)},
         # Below its resonance the added inertia moves with the load, so the re-fitted J_l already holds it.
         taken_from={"inertia": "J_l"}, tries=3,
     ),

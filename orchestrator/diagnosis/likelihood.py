@@ -21,6 +21,7 @@ from orchestrator.record import Record, quantisation_step
 Array = NDArray[np.float64]
 
 HEAD = 10  # samples at the start that only settle the state
+FINER = 8  # times more Runge-Kutta steps in a sample in which dry friction may turn round
 
 
 @dataclass(frozen=True)
@@ -109,16 +110,12 @@ class Gains:
 
 @dataclass
 class Likelihood:
-    """Runs the predictor over one record; keeps the gains of each process-noise level.
-
-    ``runs`` counts predictor runs, for progress and tests.
-    """
+    """Runs the predictor over one record; keeps the gains of each process-noise level."""
 
     plant: Plant
     signals: Signals
     nominal: Array
     stop: int
-    runs: int = 0
     _gains: dict[float, Gains] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -146,7 +143,6 @@ class Likelihood:
 
     def innovations(self, p: Array, q: float) -> tuple[Array, Array]:
         """Return raw innovations (stop, 2) and corrected states (stop, 8)."""
-        self.runs += 1
         n = self.stop
         raw, states = np.empty((n, 2)), np.empty((n, 8))
         offsets = [p[place] for place in self._offsets] + [0.0]
@@ -181,12 +177,15 @@ class Likelihood:
         early = u[np.maximum(np.arange(stop) - whole - 1, 0)]
         return early, late, delay - whole * h
 
-    def substeps(self, p: Array) -> int:
-        """Return Runge-Kutta steps per sample; an extra resonance may need more than the plant alone."""
+    def substeps(self, p: Array) -> tuple[int, int]:
+        """Return Runge-Kutta steps of a sample, and of one in which dry friction may turn round.
+
+        An extra resonance may need more than the plant alone.
+        """
+        needed = 1
         if "resonance" in self._places and p[self._places["resonance"]] > 0.0:
             needed = math.ceil(p[self._places["frequency"]] * self.signals.h * 1.3 / 0.5)
-            return max(self._substeps, min(needed, 20))
-        return self._substeps
+        return max(self._substeps, needed), max(FINER * self._substeps, needed)
 
     def log_likelihood(self, z: Array, q: float, part: slice) -> float:
         """Return the log-likelihood of a part, the innovations' covariance taken from that part."""

@@ -23,8 +23,8 @@ from pyfmu_sources import servo_axis as sa
 
 Array = NDArray[np.float64]
 
-FINER = 8  # times more Runge-Kutta steps in a sample in which dry friction may turn round
 NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
+CALM = 0.02  # distances of presliding per sample below which it hardly changes
 
 # Nuisance parameters, appended to the plant's own: logarithms [rad] of the distance over which dry friction builds up,
 # and of the penetration over which the damping of teeth in contact does.
@@ -106,8 +106,9 @@ def _turned(bristle: float, speed: float, level: float, rest: float, distance: f
 
 @njit(error_model="numpy")
 def _near_rest(speed: float, acceleration: float, distance: float, h: float) -> Any:
-    """Whether dry friction may turn round within ``h``."""
-    return abs(speed) * h < 1.5 * h * h * abs(acceleration) + NEAR * distance
+    """Whether dry friction may turn round within ``h``, so far that steps must be short."""
+    way, change = abs(speed) * h, 1.5 * h * h * abs(acceleration)
+    return way < change + NEAR * distance and way + change > CALM * distance
 
 
 @njit(error_model="numpy")
@@ -145,6 +146,7 @@ def predictor_of(plant: str) -> Any:
     """Return ``predict(y, early, late, first, p, h, substeps, gains, offsets, start, innovations, states)``, compiled.
 
     In each sample the torque ``early`` acts for ``first`` [s], then ``late`` (a dead time is no multiple of ``h``).
+    ``substeps`` are the Runge-Kutta steps of a sample, and of one in which dry friction may turn round.
     Shapes: y (n, 2), early and late (n,), gains (n, 8, 2), offsets (2,), start (8,), innovations (n, 2) out,
     states (n, 8) out: the corrected states. ``p`` is the plant's tuple followed by ``NUISANCES``.
     """
@@ -159,9 +161,9 @@ def predictor_of(plant: str) -> Any:
         k4 = stage(_along(x, k3, step), signs, p, torque)
         return _along(_along(_along(_along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", nogil=True)
     def predict(
-        y: Array, early: Array, late: Array, first: float, p: Any, h: float, substeps: int, gains: Array, offsets: Any,
+        y: Array, early: Array, late: Array, first: float, p: Any, h: float, substeps: Any, gains: Array, offsets: Any,
         start: Any, innovations: Array, states: Array,
     ) -> None:  # fmt: skip
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
@@ -179,13 +181,13 @@ def predictor_of(plant: str) -> Any:
             x = _corrected(x, gains[n], a, b)
             for j in range(8):
                 states[n, j] = x[j]
-            steps = substeps
+            steps = substeps[0]
             if rest[0] > 0.0 or rest[1] > 0.0:
                 rate = stage(x, signs, p, late[n])
                 turning_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach_m, h)
                 turning_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach_l, h)
                 if turning_m or turning_l:
-                    steps = substeps * FINER
+                    steps = substeps[1]
             for piece in range(2):
                 span, torque = (first, early[n]) if piece == 0 else (h - first, late[n])
                 if span <= 1e-9 * h:

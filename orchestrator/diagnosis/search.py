@@ -2,15 +2,20 @@
 
 Every candidate is fitted together with the uncertain linear parameters, with its own level of process noise. What a
 step gains is counted on the part of the record that decides (and on the part that was fitted); naming an effect
-must pay on both.
+must pay on both. Candidates are fitted in threads, one per core; the predictor runs outside the interpreter's lock.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
+from threading import Lock
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.cores import usable_cores
 from orchestrator.diagnosis.bank import BANKS, Effect, Scene
 from orchestrator.diagnosis.fitting import Fit, Free, Parts, anneal
 from orchestrator.diagnosis.likelihood import Likelihood
@@ -20,6 +25,8 @@ from orchestrator.model_file import Model
 
 Array = NDArray[np.float64]
 Guesses = tuple[Guess, ...]  # best first, at least one
+T = TypeVar("T")
+R = TypeVar("R")
 
 LEVELS = tuple(float(f) for f in np.geomspace(3.0, 1e-5, 23))  # process noise, as a share of the drive's torque
 FIRST_LEVEL = LEVELS[10]
@@ -114,6 +121,7 @@ class Search:
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None
     steps: list[Step] = field(default_factory=list)
     done: int = 0
+    _counting: Lock = field(default_factory=Lock)
 
     def run(self) -> tuple[Candidate, Candidate]:
         """Return the model with re-fitted parameters only, and the best model found."""
@@ -137,9 +145,9 @@ class Search:
     def step(self, current: Candidate, base: Candidate) -> Step:
         """Fit the shortlist of effects on top of ``current``."""
         scene, guesses = self.screen(current)
-        found = [self.extend(current, effect, starts, scene) for effect, starts in self.shortlist(guesses)]
+        found = _each(lambda pair: self.extend(current, *pair, scene), self.shortlist(guesses))
         found += self.refined(found, current, base, scene)
-        found = [self.rescued(candidate, current, base) for candidate in found]
+        found = _each(lambda candidate: self.rescued(candidate, current, base), found)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
         accepted = bool(found) and found[0].pays_over(current, base) and found[0].holds_over(current)
         return Step(current, tuple(found), accepted)
@@ -149,8 +157,8 @@ class Search:
         scene = scene_of(self.likelihood, self.plant, current.fit)
         scene = with_cycles(scene, self.likelihood, self.plant, current.fit, self.parts)
         screen = Screen(self.likelihood, self.plant, current.fit, self.parts)
-        guesses = {effect.label: (effect, screen.guesses(effect, scene)) for effect in self.eligible(current)}
-        return scene, {label: pair for label, pair in guesses.items() if pair[1]}
+        pairs = _each(lambda effect: (effect, screen.guesses(effect, scene)), list(self.eligible(current)))
+        return scene, {effect.label: (effect, found) for effect, found in pairs if found}
 
     def eligible(self, current: Candidate) -> Iterable[Effect]:
         """Return the effects that could be added to ``current``."""
@@ -173,12 +181,13 @@ class Search:
 
     def refined(self, found: Sequence[Candidate], current: Candidate, base: Candidate, scene: Scene) -> list[Candidate]:
         """Return candidates whose effect contains one that pays (Stribeck's friction contains Coulomb's)."""
-        refined = []
+        trials = []
         for source in [c for c in (*found, current) if c is current or c.pays_over(current, base)]:
             for effect in BANKS[self.plant.name]:
                 simpler = next((e for e in source.effects if e.label == effect.needs), None)
                 if simpler is not None and (source is current or simpler is source.effects[-1]):
-                    refined.append(self.refine(source, simpler, effect, scene))
+                    trials.append((source, simpler, effect))
+        refined = _each(lambda trial: self.refine(*trial, scene), trials)
         return [candidate for candidate in refined if candidate is not None]
 
     def rescued(self, candidate: Candidate, current: Candidate, base: Candidate) -> Candidate:
@@ -229,18 +238,20 @@ class Search:
         """Take out earlier effects that the last one has made superfluous."""
         scene = scene_of(self.likelihood, self.plant, current.fit)
         while len(current.effects) > 1:
-            reduced = []
-            for effect in current.effects[:-1]:
-                kept = tuple(e for e in current.effects if e is not effect)
-                p = self.without(current.fit.p, effect)
-                fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
-                self._tick(f"without {effect.label}")
-                reduced.append(Candidate(kept, fitted))
+            reduced = _each(partial(self.reduced, current, scene), current.effects[:-1])
             best = max(reduced, key=lambda candidate: candidate.score)
             if current.pays_over(best, base):
                 break
             current = best
         return current
+
+    def reduced(self, current: Candidate, scene: Scene, effect: Effect) -> Candidate:
+        """Return ``current`` without one of its effects, fitted again."""
+        kept = tuple(e for e in current.effects if e is not effect)
+        p = self.without(current.fit.p, effect)
+        fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
+        self._tick(f"without {effect.label}")
+        return Candidate(kept, fitted)
 
     def linear(self) -> tuple[Free, ...]:
         """Return the uncertain parameters of the model file."""
@@ -268,9 +279,16 @@ class Search:
         return effect.taken_out(self.plant, p, self.plant.extended(self.model.values))
 
     def _tick(self, what: str) -> None:
-        self.done += 1
-        expected = max(self.done + 2, (len(self.steps) + 1) * (SHORTLIST + 2))
-        self.progress(self.done, expected, what)
+        with self._counting:
+            self.done += 1
+            expected = max(self.done + 2, (len(self.steps) + 1) * (SHORTLIST + 2))
+            self.progress(self.done, expected, what)
+
+
+def _each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """Return ``function`` of each item, in order, computed in threads."""
+    with ThreadPoolExecutor(usable_cores()) as pool:
+        return list(pool.map(function, items))
 
 
 def _first(a: slice, b: slice) -> int:

@@ -3,7 +3,6 @@
 Both are used through the ``concurrent.futures`` executor interface and run the same ``Lane``.
 """
 
-import os
 import pickle
 import threading
 from collections.abc import Callable
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Protocol
 
 from orchestrator.cache import cache_directory
+from orchestrator.cores import usable_cores
 from orchestrator.engine.blobs import BlobStore
 from orchestrator.engine.cases import Case, Outcome
 from orchestrator.engine.lane import Lane
@@ -69,7 +69,7 @@ class LocalProcesses:
 
     def __call__(self, work: Work, limits: Limits) -> "LocalPool":
         """Open the pool; processes start with their first case."""
-        count = self.workers or len(os.sched_getaffinity(0))
+        count = self.workers or usable_cores()
         store = BlobStore(cache_directory("blobs"))
         paths = {name: store.path(store.put(Path(path).read_bytes())) for name, path in work.files.items()}
         return LocalPool(count, Assignment(pickled(work), paths, limits.time, limits.memory))
