@@ -1,5 +1,8 @@
 """The diagnosis on records of the independent simulator: right names, no false ones, honest rest."""
 
+import os
+import signal
+
 import numpy as np
 import pytest
 
@@ -90,6 +93,53 @@ def test_one_effect_is_named_with_its_value(effects, label, parameter, value, to
     assert found.effects[0].margin > 20.0
     for gap in found.gap:
         assert gap.after < min(0.2 * gap.before, 3.0 * gap.noise)
+
+
+@pytest.mark.parametrize(
+    ("effects", "label", "parameter"),
+    [
+        ({"J3": 0.11, "w3": 54.0}, "extra_resonance@load", "inertia"),  # 2 % of the load's inertia, which hides it
+        ({"alpha": 1.2e-4}, "backlash@shaft", "alpha"),  # below the encoders' noise
+    ],
+)
+def test_effects_that_refitted_parameters_nearly_imitate(effects, label, parameter) -> None:
+    found = diagnose(record_of(effects, 72, 20.0), MODEL)
+    assert labels(found) == [label]
+    low, high = found.effects[0].parameters[parameter].interval
+    value = next(iter(effects.values()))
+    assert 0.8 * value < low < value < high < 1.2 * value
+
+
+def test_an_added_inertia_beside_a_load_that_is_known_exactly(tmp_path) -> None:
+    columns, truth = make_record({"J3": 0.3, "w3": 40.0}, 81, 20.0, substeps=50)
+    exact = {name: value for name, value in truth["linear"].items() if name == "J_l"}
+    rows = [f"[parameters.{name}]\nvalue = {value!r}\n" for name, value in exact.items()]
+    rows += [
+        f"[parameters.{name}]\nvalue = {value!r}\nrelative_uncertainty = 0.05\n"
+        for name, value in NOMINAL.items()
+        if name not in exact
+    ]
+    path = tmp_path / "model.toml"
+    path.write_text('fmu = "Drivetrain"\n' + "".join(rows))
+    found = diagnose(record_from_columns(columns, "record"), read_model(path))
+    assert labels(found) == ["extra_resonance@load"]
+    low, high = found.effects[0].parameters["inertia"].interval
+    assert low < 0.3 < high
+    assert "J_l" not in found.parameters
+    assert found.corrected.get("J_l", exact["J_l"]) == exact["J_l"]
+
+
+def test_an_interrupt_stops_the_fits_that_run() -> None:
+    seen = []
+
+    def interrupted(done: int, expected: int, what: str) -> None:
+        seen.append(what)
+        if len(seen) == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(record_of({"Fc_m": 0.8}, 91, 12.0), MODEL, interrupted)
+    assert len(seen) < 5  # of at least eight: a fit that runs beside may just have ended
 
 
 def test_two_effects_in_a_closed_loop() -> None:

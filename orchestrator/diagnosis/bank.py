@@ -4,7 +4,7 @@ A new effect needs its term in ``pyfmu_sources/effects.py`` (and the equations t
 plant's table, and one row here; ``docs/diagnosis.md`` walks through an example.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -74,7 +74,8 @@ class Effect:
         leaves: share of what the effect gains that its law, not being exact, may leave for other effects to gain.
         least_noise: level of process noise, as a share of the drive's torque, below which no model with this effect is
             trusted: impacts amplify what their law leaves out, and a predictor that is hardly corrected goes astray.
-        taken_from: short name -> parameter of the plant that is lowered by as much when the effect is put into a model.
+        taken_from: short name -> parameter of the plant that holds as much already, if it has been re-fitted: it is
+            lowered by as much when the effect is put into a model.
         tries: how many starts, of different values of the first parameter in ``starts``, are fitted in full.
         tolerance: name in the plant's table -> share of its value to which laws of this kind, of which none is exact,
             leave the parameter undefined (standard deviation; measured on records made with other laws).
@@ -109,25 +110,31 @@ class Effect:
         """Return name and site, unique in the bank."""
         return f"{self.name}@{self.site}"
 
-    def put(self, plant: Plant, p: Array, values: Mapping[str, float]) -> Array:
-        """Return parameters ``p`` of a model without the effect with ``values`` of it put in, within their bounds."""
+    def put(self, plant: Plant, p: Array, values: Mapping[str, float], refitted: Collection[int]) -> Array:
+        """Return parameters ``p`` of a model without the effect with ``values`` of it put in, within their bounds.
+
+        ``refitted`` are the places of the plant's own parameters that have been fitted without the effect.
+        """
         moved = p.copy()
         for short, place in self.places(plant).items():
             if short in values:
                 entry = plant.entry(place)
                 moved[place] = min(max(values[short], entry.minimum), entry.maximum)
-                if short in self.taken_from:
-                    moved[plant.index(self.taken_from[short])] -= moved[place]
+                if self._holder(plant, short) in refitted:
+                    moved[self._holder(plant, short)] -= moved[place]
         return moved
 
-    def taken_out(self, plant: Plant, p: Array, default: Array) -> Array:
+    def taken_out(self, plant: Plant, p: Array, default: Array, refitted: Collection[int]) -> Array:
         """Return parameters ``p`` with the effect switched off, its parameters at their ``default``."""
         moved = p.copy()
         for short, place in self.places(plant).items():
-            if short in self.taken_from:
-                moved[plant.index(self.taken_from[short])] += moved[place]
+            if self._holder(plant, short) in refitted:
+                moved[self._holder(plant, short)] += moved[place]
             moved[place] = default[place]
         return moved
+
+    def _holder(self, plant: Plant, short: str) -> int:
+        return plant.index(self.taken_from[short]) if short in self.taken_from else -1
 
     def places(self, plant: Plant) -> dict[str, int]:
         """Return the place of each parameter in the predictor's tuple, by short name, nuisances last."""
@@ -210,7 +217,7 @@ def _band(scene: Scene) -> tuple[float, float]:
 
 
 def _parts_of_the_load(scene: Scene) -> tuple[float, ...]:
-    return tuple(scene.inertia * f for f in (3e-4, 1.2e-3, 5e-3, 0.02, 0.08))
+    return tuple(f * scene.inertia for f in (3e-4, 1.2e-3, 5e-3, 0.02, 0.08))
 
 
 def _periodic(

@@ -84,6 +84,7 @@ def jacobian(likelihood: Likelihood, p: Array, q: float, free: Sequence[Free], z
     return columns
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a step into instability is seen by its cost
 def fit(
     likelihood: Likelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, iterations: int = 8,
     enough: float = 0.05,
@@ -125,9 +126,8 @@ def fit(
             step = -np.linalg.solve(hessian + np.diag(damping * np.diag(hessian) + 1e-9), gradient)
             moved = _moved(p, step * scales, free)
             z_moved = likelihood.whitened(moved, q)
-            with np.errstate(over="ignore", invalid="ignore"):  # a step into instability is a step too far
-                new = (z_moved[part] @ root.T).ravel()
-                cost_moved = 0.5 * new @ new - log_prior(moved, free)
+            new = (z_moved[part] @ root.T).ravel()
+            cost_moved = 0.5 * new @ new - log_prior(moved, free)
             if np.isfinite(cost_moved) and cost_moved < cost:
                 gain = float(cost - cost_moved)
                 p, z, damping = moved, z_moved, damping / 10.0

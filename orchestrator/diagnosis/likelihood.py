@@ -7,7 +7,9 @@ state is not known) and not on the candidate, so one set of gains serves all can
 
 import math
 from collections.abc import Mapping
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -117,6 +119,7 @@ class Likelihood:
     nominal: Array
     stop: int
     _gains: dict[float, Gains] = field(default_factory=dict)
+    _halted: Event = field(default_factory=Event)
 
     def __post_init__(self) -> None:
         self._predict = predictor_of(self.plant.name)
@@ -141,8 +144,14 @@ class Likelihood:
             self._gains[q] = self._solve(q)
         return self._gains[q]
 
+    def halt(self) -> None:
+        """Let every run of the predictor from now on, in whatever thread, raise ``CancelledError``."""
+        self._halted.set()
+
     def innovations(self, p: Array, q: float) -> tuple[Array, Array]:
         """Return raw innovations (stop, 2) and corrected states (stop, 8)."""
+        if self._halted.is_set():
+            raise CancelledError
         n = self.stop
         raw, states = np.empty((n, 2)), np.empty((n, 8))
         offsets = [p[place] for place in self._offsets] + [0.0]

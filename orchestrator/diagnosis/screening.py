@@ -48,6 +48,7 @@ class Screen:
         self._basis = self._basis[: columns.shape[0]]
         self._residual = self._clean(self._white(model.z))
 
+    @np.errstate(over="ignore", invalid="ignore")  # a start may be unstable; it promises nothing then
     def guesses(self, effect: Effect, scene: Scene) -> tuple[Guess, ...]:
         """Return the most promising starting values of an effect, best first; none when nothing promises a gain."""
         starts = effect.starts(scene)
@@ -56,7 +57,9 @@ class Screen:
             values = dict(zip(starts, combination, strict=True))
             found = self._amplitudes(effect, values, scene) if effect.amplitudes else self._as_is(effect, values)
             first = combination[0] if combination else 0.0
-            if found is not None and (first not in best or found.gain > best[first].gain):
+            if found is None or not np.isfinite(found.gain):
+                continue
+            if first not in best or found.gain > best[first].gain:
                 best[first] = found
         return tuple(sorted(best.values(), key=lambda guess: guess.gain, reverse=True)[: effect.tries])
 
@@ -64,10 +67,9 @@ class Screen:
         response = self._run(effect, values)
         if not np.all(np.isfinite(response)):
             return None
-        with np.errstate(over="ignore", invalid="ignore"):
-            left = self._clean(self._white(response))
-            gain = 0.5 * float(self._residual @ self._residual - left @ left)
-        return Guess(values, gain) if np.isfinite(gain) else None
+        left = self._clean(self._white(response))
+        gain = 0.5 * float(self._residual @ self._residual - left @ left)
+        return Guess(values, gain)
 
     def _amplitudes(self, effect: Effect, values: dict[str, float], scene: Scene) -> Guess | None:
         unit = effect.unit_of_size(scene)
@@ -98,7 +100,7 @@ class Screen:
         return [values | zeros | {name: unit} for name in effect.amplitudes]
 
     def _run(self, effect: Effect, values: dict[str, float]) -> Array:
-        p = effect.put(self._plant, self._model.p, values)
+        p = effect.put(self._plant, self._model.p, values, [free.place for free in self._model.free])
         return self._likelihood.whitened(p, self._model.q)
 
     def _white(self, z: Array) -> Array:

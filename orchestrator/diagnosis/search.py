@@ -145,9 +145,9 @@ class Search:
     def step(self, current: Candidate, base: Candidate) -> Step:
         """Fit the shortlist of effects on top of ``current``."""
         scene, guesses = self.screen(current)
-        found = _each(lambda pair: self.extend(current, *pair, scene), self.shortlist(guesses))
+        found = self._each(lambda pair: self.extend(current, *pair, scene), self.shortlist(guesses))
         found += self.refined(found, current, base, scene)
-        found = _each(lambda candidate: self.rescued(candidate, current, base), found)
+        found = self._each(lambda candidate: self.rescued(candidate, current, base), found)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
         accepted = bool(found) and found[0].pays_over(current, base) and found[0].holds_over(current)
         return Step(current, tuple(found), accepted)
@@ -157,7 +157,7 @@ class Search:
         scene = scene_of(self.likelihood, self.plant, current.fit)
         scene = with_cycles(scene, self.likelihood, self.plant, current.fit, self.parts)
         screen = Screen(self.likelihood, self.plant, current.fit, self.parts)
-        pairs = _each(lambda effect: (effect, screen.guesses(effect, scene)), list(self.eligible(current)))
+        pairs = self._each(lambda effect: (effect, screen.guesses(effect, scene)), list(self.eligible(current)))
         return scene, {effect.label: (effect, found) for effect, found in pairs if found}
 
     def eligible(self, current: Candidate) -> Iterable[Effect]:
@@ -187,7 +187,7 @@ class Search:
                 simpler = next((e for e in source.effects if e.label == effect.needs), None)
                 if simpler is not None and (source is current or simpler is source.effects[-1]):
                     trials.append((source, simpler, effect))
-        refined = _each(lambda trial: self.refine(*trial, scene), trials)
+        refined = self._each(lambda trial: self.refine(*trial, scene), trials)
         return [candidate for candidate in refined if candidate is not None]
 
     def rescued(self, candidate: Candidate, current: Candidate, base: Candidate) -> Candidate:
@@ -215,7 +215,7 @@ class Search:
         bare = self.without(source.fit.p, simpler)
         best: Fit | None = None
         for start in effect.refine(values, scene):
-            p = effect.put(self.plant, bare, start)
+            p = effect.put(self.plant, bare, start, self.refitted)
             fitted = annealed(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, effects)
             if best is None or fitted.fitted > best.fitted:
                 best = fitted
@@ -229,7 +229,7 @@ class Search:
         """Return ``current`` with one more effect: the best of the fits from the guesses."""
         effects = (*current.effects, effect)
         free = self.free(effects, scene)
-        starts = [effect.put(self.plant, current.fit.p, guess.values) for guess in guesses]
+        starts = [effect.put(self.plant, current.fit.p, guess.values, self.refitted) for guess in guesses]
         fits = [annealed(self.likelihood, p, current.fit.q, free, self.parts, effects) for p in starts]
         self._tick(effect.label)
         return Candidate(effects, max(fits, key=lambda fitted: fitted.fitted))
@@ -238,7 +238,7 @@ class Search:
         """Take out earlier effects that the last one has made superfluous."""
         scene = scene_of(self.likelihood, self.plant, current.fit)
         while len(current.effects) > 1:
-            reduced = _each(partial(self.reduced, current, scene), current.effects[:-1])
+            reduced = self._each(partial(self.reduced, current, scene), current.effects[:-1])
             best = max(reduced, key=lambda candidate: candidate.score)
             if current.pays_over(best, base):
                 break
@@ -252,6 +252,11 @@ class Search:
         fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
         self._tick(f"without {effect.label}")
         return Candidate(kept, fitted)
+
+    @property
+    def refitted(self) -> list[int]:
+        """Return the places of the plant's own parameters that every model re-fits."""
+        return [entry.place for entry in self.linear()]
 
     def linear(self) -> tuple[Free, ...]:
         """Return the uncertain parameters of the model file."""
@@ -276,19 +281,23 @@ class Search:
 
     def without(self, p: Array, effect: Effect) -> Array:
         """Return ``p`` with one effect switched off."""
-        return effect.taken_out(self.plant, p, self.plant.extended(self.model.values))
+        return effect.taken_out(self.plant, p, self.plant.extended(self.model.values), self.refitted)
+
+    def _each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """Return ``function`` of each item, in order, computed in threads."""
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            try:
+                return list(pool.map(function, items))
+            except BaseException:
+                self.likelihood.halt()  # an interrupt need not wait for the fits that run
+                pool.shutdown(cancel_futures=True)
+                raise
 
     def _tick(self, what: str) -> None:
         with self._counting:
             self.done += 1
             expected = max(self.done + 2, (len(self.steps) + 1) * (SHORTLIST + 2))
             self.progress(self.done, expected, what)
-
-
-def _each(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """Return ``function`` of each item, in order, computed in threads."""
-    with ThreadPoolExecutor(usable_cores()) as pool:
-        return list(pool.map(function, items))
 
 
 def _first(a: slice, b: slice) -> int:
