@@ -110,6 +110,20 @@ def test_effects_that_refitted_parameters_nearly_imitate(effects, label, paramet
     assert 0.8 * value < low < value < high < 1.2 * value
 
 
+@pytest.mark.parametrize("quarter", [1, 2, 3])
+def test_a_limit_that_is_reached_in_one_quarter_alone(quarter) -> None:
+    rng = np.random.default_rng(7)
+    torque = 40.0 * np.sin(np.cumsum(rng.uniform(0.02, 0.12, 3200)))
+    torque[800 * quarter + 300 : 800 * quarter + 420] *= 3.0
+    columns, _ = make_record({"sat": 100.0}, 61, 16.0, substeps=50, u=torque)
+    found = diagnose(record_from_columns(columns, "record"), MODEL)
+    assert labels(found) == ["torque_saturation@actuator"]
+    low, high = found.effects[0].parameters["limit"].interval
+    assert low < 100.0 < high < 1.01 * low
+    late = [warning for warning in found.warnings if "the first was held out in its place" in warning]
+    assert len(late) == (1 if quarter == 3 else 0)
+
+
 def test_an_added_inertia_beside_a_load_that_is_known_exactly(tmp_path) -> None:
     columns, truth = make_record({"J3": 0.3, "w3": 40.0}, 81, 20.0, substeps=50)
     exact = {name: value for name, value in truth["linear"].items() if name == "J_l"}

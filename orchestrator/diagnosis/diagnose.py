@@ -57,23 +57,15 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
     check_resolved(plant, nominal, record.step, model.source)
     tau = float(nominal[plant.index("tau")])
     signals = signals_of(record, tau)
-    parts = split(signals.size, HEAD)
-    likelihood = Likelihood(plant, signals, nominal, parts.validated.stop)
-    found = _search(plant, model, likelihood, parts, parts, progress)
-    if found.unknown:
-        # What shows on the deciding part alone (a limit that is reached once) is found with the parts exchanged.
-        exchanged = Parts(
-            slice(signals.size // 4, parts.validated.stop), slice(HEAD, signals.size // 4), parts.held_out
-        )
-        again = _search(plant, model, likelihood, parts, exchanged, progress)
-        found = found if again.unknown else again
+    found = _passes(plant, model, signals, nominal, progress)
+    likelihood, parts = found.likelihood, found.parts
     search, best, base_fit, final, left = found.search, found.best, found.base, found.final, found.left
-    unknown, floor_off = found.unknown, found.floor_off
+    unknown = found.unknown
     units = METRIC if in_metres(model) else {}
     named = tuple(_name(plant, effect, final, search.steps, units) for effect in best.effects)
     chosen = final
     if unknown:
-        chosen = widened(likelihood, plant, base_fit, slice(parts.fitted.start, parts.validated.stop), ())
+        chosen = widened(likelihood, plant, base_fit, parts.seen, ())
     verdict = "unknown" if unknown else "effects" if named else _plain_verdict(likelihood, nominal, base_fit, parts)
     untouched = replace(base_fit, p=nominal)
     before = missing_torque(likelihood, plant, untouched if verdict in ("none", "parameters") else base_fit)
@@ -87,7 +79,7 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
         where=tuple(replace(place, unit=units.get(place.unit, place.unit)) for place in places(before, signals.h)),
         gap=held_out_gap(plant, signals, nominal, chosen.q, stages, parts.held_out, units.get("rad", "rad")),
         remainder=left,
-        warnings=_warnings(unknown, left, named, search.steps, floor_off, signals.channels, len(plant.measured)),
+        warnings=_warnings(found, named, signals.channels, len(plant.measured)),
         corrected={name: float(chosen.p[plant.index(name)]) for name in _changed(plant, nominal, chosen.p)},
         workings=Workings(
             plant, likelihood, parts, nominal, base_fit, chosen, best, tuple(search.steps), before, after
@@ -99,6 +91,8 @@ def diagnose(record: Record, model: Model, progress: Progress = lambda done, exp
 class _Found:
     """One pass of the search, with its fits to all that may be looked at."""
 
+    likelihood: Likelihood
+    parts: Parts
     search: Search
     best: Candidate
     base: Fit
@@ -108,6 +102,25 @@ class _Found:
     unknown: bool
 
 
+def _passes(plant: Plant, model: Model, signals: Signals, nominal: Array, progress: Progress) -> _Found:
+    """Search; where nothing is found but a gap, search again with the parts of the record in other roles."""
+    parts, size = split(signals.size, HEAD), signals.size
+    likelihood = Likelihood(plant, signals, nominal, parts.validated.stop)
+    found = _search(plant, model, likelihood, parts, parts, progress)
+    if found.unknown:
+        # What shows on the deciding part alone (a limit that is reached once) must be fitted to be found.
+        exchanged = Parts(slice(size // 4, parts.validated.stop), slice(HEAD, size // 4), parts.held_out)
+        again = _search(plant, model, likelihood, parts, exchanged, progress)
+        found = found if again.unknown else again
+    if found.unknown and found.left.growth > GROWN:
+        # What shows on the held-out part alone must be looked at: the first quarter is held out in its place.
+        turned = Parts(slice(size // 4, 3 * size // 4), slice(3 * size // 4, size), slice(HEAD, size // 4))
+        exchanged = Parts(slice(size // 2, size), slice(size // 4, size // 2), turned.held_out)
+        again = _search(plant, model, Likelihood(plant, signals, nominal, size), turned, exchanged, progress)
+        found = found if again.unknown else again
+    return found
+
+
 def _search(
     plant: Plant, model: Model, likelihood: Likelihood, parts: Parts, used: Parts, progress: Progress
 ) -> _Found:  # fmt: skip
@@ -115,7 +128,7 @@ def _search(
     signals, nominal = likelihood.signals, likelihood.nominal
     search = Search(likelihood, plant, model, used, progress)
     base, best = search.run()
-    whole = Parts(slice(parts.fitted.start, parts.validated.stop), parts.validated, parts.held_out)
+    whole = Parts(parts.seen, parts.validated, parts.held_out)
     base_fit = annealed(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, ())
     final = base_fit
     if best.effects:
@@ -124,9 +137,9 @@ def _search(
     left = _left(likelihood, plant, base_fit, final, best.fit, parts, ladder(best.effects, final.q)[-1])
     growth = _growth(plant, signals, nominal, final, whole)
     left = replace(left, growth=growth if best.effects else max(growth, left.growth))
-    floor_off = left.missing > LEAST_MISSING * (parts.validated.stop - HEAD)
+    floor_off = left.missing > LEAST_MISSING * (parts.seen.stop - parts.seen.start)
     unknown = (floor_off and left.explained < LEAST_EXPLAINED) or left.growth > GROWN
-    return _Found(search, best, base_fit, final, left, floor_off, unknown)
+    return _Found(likelihood, parts, search, best, base_fit, final, left, floor_off, unknown)
 
 
 def _growth(plant: Plant, signals: Signals, nominal: Array, final: Fit, whole: Parts) -> float:
@@ -186,7 +199,7 @@ def _left(
 
 def _plain_verdict(likelihood: Likelihood, nominal: Array, base: Fit, parts: Parts) -> str:
     """Return "none" when the nominal values explain the record as well as re-fitted ones do, else "parameters"."""
-    part = slice(parts.fitted.start, parts.validated.stop)
+    part = parts.seen
     z = likelihood.whitened(nominal, base.q)
     gained = base.fitted - likelihood.log_likelihood(z, base.q, part)
     return "none" if gained < EXPLAINED_BY_NOMINAL * len(base.free) else "parameters"
@@ -253,29 +266,23 @@ def _stages(
     return [*stages, (f"+ {best.effects[-1].label}", chosen.p)]
 
 
-def _warnings(
-    unknown: bool,
-    left: Remainder,
-    named: Sequence[Named],
-    steps: Sequence[Step],
-    floor_off: bool,
-    channels: int,
-    encoders: int,
-) -> tuple[str, ...]:
-    found = []
-    if unknown:
-        found.append(f"a gap is left that nothing in the library explains; it {_kind(left)}")
+def _warnings(found: _Found, named: Sequence[Named], channels: int, encoders: int) -> tuple[str, ...]:
+    left, warnings = found.left, []
+    if found.unknown:
+        warnings.append(f"a gap is left that nothing in the library explains; it {_kind(left)}")
         if named:
             names = ", ".join(f"{n.name} ({n.site})" for n in named)
-            found.append(f"{names} would take {100 * max(left.explained, 0):.0f} % of it: too little to be named")
-    elif floor_off and left.explained < 0.8:
-        found.append(f"{100 * (1 - left.explained):.0f} % of the gap's evidence is left; it {_kind(left)}")
+            warnings.append(f"{names} would take {100 * max(left.explained, 0):.0f} % of it: too little to be named")
+    elif found.floor_off and left.explained < 0.8:
+        warnings.append(f"{100 * (1 - left.explained):.0f} % of the gap's evidence is left; it {_kind(left)}")
     for effect in named:
         if effect.family:
-            found.append(f"this record cannot tell {' from '.join(effect.family)}; {_experiment(effect)}")
+            warnings.append(f"this record cannot tell {' from '.join(effect.family)}; {_experiment(effect)}")
+    if found.parts.held_out.start < found.parts.fitted.start:
+        warnings.append("what is named shows in the last quarter of the record: the first was held out in its place")
     if channels < encoders:
-        found.append("one encoder: an effect of the shaft and one of the load are harder to tell apart")
-    return tuple(found)
+        warnings.append("one encoder: an effect of the shaft and one of the load are harder to tell apart")
+    return tuple(warnings)
 
 
 def _kind(left: Remainder) -> str:

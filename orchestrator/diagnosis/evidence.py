@@ -60,7 +60,7 @@ class Evidence:
 
 def evidence(likelihood: Likelihood, plant: Plant, model: Fit, parts: Parts) -> Evidence:
     """Return what the model leaves that follows the motor's position or direction."""
-    looked = slice(parts.fitted.start, parts.validated.stop)
+    looked = parts.seen
     regress = _Regression(likelihood, plant, model, looked)
     theta, omega = regress.states[:, 0], regress.states[:, 1]
     stroke = float(np.ptp(theta[looked]))

@@ -59,6 +59,12 @@ class Parts:
     validated: slice
     held_out: slice
 
+    @property
+    def seen(self) -> slice:
+        """Return the samples that may be looked at: the fitted and the deciding ones, which are neighbours."""
+        both = (self.fitted, self.validated)
+        return slice(min(part.start for part in both), max(part.stop for part in both))
+
 
 def split(size: int, head: int) -> Parts:
     """Return the parts of a record: the first half is fitted, a quarter decides, a quarter is held out."""

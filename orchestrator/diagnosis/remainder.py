@@ -59,7 +59,7 @@ class Remainder:
 
 def noise_floor(likelihood: Likelihood, parts: Parts, lowest: float) -> float:
     """Return the log-likelihood of both parts for innovations that are measurement noise and nothing else."""
-    roots = likelihood.gains(lowest).roots[parts.fitted.start : parts.validated.stop]
+    roots = likelihood.gains(lowest).roots[parts.seen]
     return float(np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2))))
 
 
@@ -81,8 +81,8 @@ def predictable(likelihood: Likelihood, plant: Plant, model: Fit, parts: Parts) 
     """Return what each kind of basis predicts on the deciding part, best first."""
     response = error_response(likelihood, plant, model)
     _, states = likelihood.innovations(model.p, model.q)
-    stop = parts.validated.stop
-    looked = slice(parts.fitted.start, stop)
+    looked = parts.seen
+    stop = looked.stop
     e = model.z[parts.fitted]
     root = np.linalg.inv(np.linalg.cholesky(e.T @ e / len(e)))
     white = model.z[looked] @ root.T
