@@ -31,7 +31,9 @@ R = TypeVar("R")
 LEVELS = tuple(float(f) for f in np.geomspace(3.0, 1e-5, 23))  # process noise, as a share of the drive's torque
 FIRST_LEVEL = LEVELS[10]
 PENALTY = 5.0  # log-likelihood that each further parameter must earn
-PAYS = 10.0  # least gain that an effect must bring in all
+PAYS = 10.0  # least gain that an effect must bring in all, where what is left is measurement noise
+PAYS_ABOVE_NOISE = 22.0  # and where it is not: what is left is then not independent from sample to sample
+NOISE_ALONE = 1e-4  # largest level of process noise at which what is left counts as measurement noise
 LEAST_DECIDED = 6.0  # and on the deciding part alone
 LEAST_DECIDED_SHARE = 0.08  # of the gain on the fitted part, which is twice as long
 MOST_EFFECTS = 4
@@ -82,7 +84,8 @@ class Candidate:
         more = PENALTY * max(parameter_count(self) - parameter_count(other), 1)
         fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
         left = max((effect.leaves for effect in other.effects), default=0.0)
-        least = max(PAYS, left * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
+        pays = PAYS if self.fit.q <= NOISE_ALONE else PAYS_ABOVE_NOISE
+        least = max(pays, left * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
         return self.gain_over(other) > least and fitted > more and decided > LEAST_DECIDED
 
     def holds_over(self, other: "Candidate") -> bool:
