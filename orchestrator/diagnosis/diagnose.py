@@ -15,7 +15,7 @@ from orchestrator.diagnosis.likelihood import HEAD, Likelihood, Signals, signals
 from orchestrator.diagnosis.outcome import Diagnosis, Estimate, Gap, Named, Workings
 from orchestrator.diagnosis.plants import Plant, plant_of
 from orchestrator.diagnosis.remainder import Predictable, Remainder, remainder
-from orchestrator.diagnosis.search import Candidate, Search, Step, annealed, in_metres, ladder
+from orchestrator.diagnosis.search import MOST_EFFECTS, Candidate, Search, Step, annealed, in_metres, ladder
 from orchestrator.diagnosis.spread import widened
 from orchestrator.diagnosis.where import missing_torque, places
 from orchestrator.model_file import Model
@@ -23,6 +23,7 @@ from orchestrator.record import Record
 
 Array = NDArray[np.float64]
 
+MOST_IN_A_REPEAT = 2  # effects: what shows in one quarter alone explains a gap at once, or not at all
 SEGMENT = 2.0  # s, length of a free run; the length of the thesis's tests
 LEAST_EXPLAINED = 0.4  # share of the missing log-likelihood that named effects must recover
 LEAST_MISSING = 0.05  # per sample: missing log-likelihood below which nothing is left to explain
@@ -124,9 +125,9 @@ def _passes(plant: Plant, model: Model, signals: Signals, nominal: Array, progre
 def _search(
     plant: Plant, model: Model, likelihood: Likelihood, parts: Parts, used: Parts, progress: Progress
 ) -> _Found:  # fmt: skip
-    """Search with the parts ``used``; judge what is left on ``parts``."""
+    """Search with the parts ``used`` (the first time, those of ``parts``); judge what is left on ``parts``."""
     signals, nominal = likelihood.signals, likelihood.nominal
-    search = Search(likelihood, plant, model, used, progress)
+    search = Search(likelihood, plant, model, used, progress, MOST_EFFECTS if used is parts else MOST_IN_A_REPEAT)
     base, best = search.run()
     whole = Parts(parts.seen, parts.validated, parts.held_out)
     base_fit = annealed(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, ())

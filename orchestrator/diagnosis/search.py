@@ -115,6 +115,7 @@ class Search:
     Attributes:
         likelihood, plant, model, parts: what is searched.
         progress: called with (done, expected, what) as candidates are fitted.
+        most: effects that are named at most.
     """
 
     likelihood: Likelihood
@@ -122,6 +123,7 @@ class Search:
     model: Model
     parts: Parts
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None
+    most: int = MOST_EFFECTS
     steps: list[Step] = field(default_factory=list)
     done: int = 0
     _counting: Lock = field(default_factory=Lock)
@@ -130,7 +132,7 @@ class Search:
         """Return the model with re-fitted parameters only, and the best model found."""
         base = self.base()
         current = base
-        while len(current.effects) < MOST_EFFECTS:
+        while len(current.effects) < self.most:
             step = self.step(current, base)
             self.steps.append(step)
             if not step.accepted:
