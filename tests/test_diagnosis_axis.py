@@ -17,20 +17,10 @@ from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import Source, System
 from orchestrator.model_file import read_model
-from orchestrator.record import record_from_columns
 from pyfmu_sources import servo_axis as axis
-from tests.support import emps
+from tests.support import axis_record, emps
 
 MODEL = Path(__file__).resolve().parents[1] / "docs" / "examples" / "emps.toml"
-AXIS = """
-fmu = "ServoAxis"
-[parameters.J]
-value = 1.0
-relative_uncertainty = 0.1
-[parameters.b]
-value = 2.0
-relative_uncertainty = 0.1
-"""
 
 
 def parameters(**values: float) -> tuple[float, ...]:
@@ -96,17 +86,9 @@ def test_fmu_passes_check_and_repeats_the_equations() -> None:
 
 
 def test_ripple_that_no_effect_explains_is_seen_with_its_period(tmp_path) -> None:
-    rng = np.random.default_rng(4)
     p = parameters(P_J=1.04, P_B=1.95, P_RIPPLE=0.15, P_RIPPLE_N=9.0, P_RIPPLE_PHASE=0.4)
-    u = np.repeat(rng.uniform(-8.0, 8.0, 100), 16)
-    x, mode, y = (0.0, 0.0, 0.0), 0, []
-    for value in u:
-        y.append(x[0])
-        x, mode = axis.advance(x, mode, p, float(value), 0.0, 0.005)
-    angle = np.array(y) + 1e-4 * rng.standard_normal(len(y))
-    table = {"time": 0.005 * np.arange(len(u)), "u": u, "theta_m": angle}
-    (tmp_path / "axis.toml").write_text(AXIS)
-    found = diagnose(record_from_columns(table, "ripple"), read_model(tmp_path / "axis.toml"))
+    (tmp_path / "axis.toml").write_text(axis_record.MODEL)
+    found = diagnose(axis_record.axis_record(p, 4, "ripple"), read_model(tmp_path / "axis.toml"))
     assert [effect.name for effect in found.effects] == ["torque_ripple"]
     w = found.workings
     without = evidence(w.likelihood, w.plant, w.base, w.parts).terms[0]

@@ -9,38 +9,21 @@ from pathlib import Path
 
 import pytest
 
+from tests.support import axis_record
+
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAM = """
-import numpy as np
+from pathlib import Path
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.model_file import read_model
-from orchestrator.record import record_from_columns
-from pathlib import Path
 from pyfmu_sources import servo_axis as axis
+from tests.support.axis_record import axis_record
 
-rng = np.random.default_rng(3)
 p = list(axis.DEFAULTS)
 p[axis.P_J], p[axis.P_B], p[axis.P_CABLE] = 1.04, 1.95, 3.0
-p = tuple(p)
-u = np.repeat(rng.uniform(-8.0, 8.0, 100), 16)
-x, mode, y = (0.0, 0.0, 0.0), 0, []
-for value in u:
-    y.append(x[0])
-    x, mode = axis.advance(x, mode, p, float(value), 0.0, 0.005)
-y = np.array(y) + 1e-4 * rng.standard_normal(len(y))
-record = record_from_columns({"time": 0.005 * np.arange(len(u)), "u": u, "theta_m": y}, "cable")
-found = diagnose(record, read_model(Path("model.toml")))
+found = diagnose(axis_record(p, 3, "cable"), read_model(Path("model.toml")))
 effect = found.effects[0]
 print(found.verdict, effect.name, abs(effect.parameters["stiffness"].value - 3.0) < 0.05, len(found.effects))
-"""
-MODEL = """
-fmu = "ServoAxis"
-[parameters.J]
-value = 1.0
-relative_uncertainty = 0.1
-[parameters.b]
-value = 2.0
-relative_uncertainty = 0.1
 """
 
 
@@ -58,14 +41,14 @@ def apply(edit: str, root: Path) -> None:
 
 @pytest.mark.slow
 def test_worked_example_adds_an_effect(tmp_path: Path) -> None:
-    for package in ("orchestrator", "pyfmu_sources"):
+    for package in ("orchestrator", "pyfmu_sources", "tests/support"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
     page = (ROOT / "docs" / "diagnosis.md").read_text()
     edits = re.findall(r"```python\n(.*?)```", page[page.index("## Adding an effect") :], re.DOTALL)
     assert len(edits) == 6
     for edit in edits:
         apply(edit, tmp_path)
-    (tmp_path / "model.toml").write_text(MODEL)
+    (tmp_path / "model.toml").write_text(axis_record.MODEL)
     environment = os.environ | {"PYTHONPATH": str(tmp_path)}
     run = subprocess.run(
         [sys.executable, "-c", PROGRAM], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False

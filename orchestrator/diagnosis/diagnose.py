@@ -107,27 +107,28 @@ def _passes(plant: Plant, model: Model, signals: Signals, nominal: Array, progre
     """Search; where nothing is found but a gap, search again with the parts of the record in other roles."""
     parts, size = split(signals.size, HEAD), signals.size
     likelihood = Likelihood(plant, signals, nominal, parts.validated.stop)
-    found = _search(plant, model, likelihood, parts, parts, progress)
+    found = _search(plant, model, likelihood, parts, parts, MOST_EFFECTS, progress)
     if found.unknown:
         # What shows on the deciding part alone (a limit that is reached once) must be fitted to be found.
         exchanged = Parts(slice(size // 4, parts.validated.stop), slice(HEAD, size // 4), parts.held_out)
-        again = _search(plant, model, likelihood, parts, exchanged, progress)
+        again = _search(plant, model, likelihood, parts, exchanged, MOST_IN_A_REPEAT, progress)
         found = found if again.unknown else again
     if found.unknown and found.left.growth > GROWN:
         # What shows on the held-out part alone must be looked at: the first quarter is held out in its place.
         turned = Parts(slice(size // 4, 3 * size // 4), slice(3 * size // 4, size), slice(HEAD, size // 4))
         exchanged = Parts(slice(size // 2, size), slice(size // 4, size // 2), turned.held_out)
-        again = _search(plant, model, Likelihood(plant, signals, nominal, size), turned, exchanged, progress)
+        whole = Likelihood(plant, signals, nominal, size)
+        again = _search(plant, model, whole, turned, exchanged, MOST_IN_A_REPEAT, progress)
         found = found if again.unknown else again
     return found
 
 
 def _search(
-    plant: Plant, model: Model, likelihood: Likelihood, parts: Parts, used: Parts, progress: Progress
+    plant: Plant, model: Model, likelihood: Likelihood, parts: Parts, used: Parts, most: int, progress: Progress
 ) -> _Found:  # fmt: skip
-    """Search with the parts ``used`` (the first time, those of ``parts``); judge what is left on ``parts``."""
+    """Search for at most ``most`` effects with the parts ``used``; judge what is left on ``parts``."""
     signals, nominal = likelihood.signals, likelihood.nominal
-    search = Search(likelihood, plant, model, used, progress, MOST_EFFECTS if used is parts else MOST_IN_A_REPEAT)
+    search = Search(likelihood, plant, model, used, progress, most)
     base, best = search.run()
     whole = Parts(parts.seen, parts.validated, parts.held_out)
     base_fit = annealed(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, ())
@@ -223,7 +224,7 @@ def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step], units
             float(final.p[place]),
             final.standard_error(place),
             final.interval(place),
-            PERIODIC_METRIC[short] if units and short in PERIODIC_METRIC else _unit(plant, place, units),
+            _unit(short, plant.table[place].unit, units),
         )
         for short, place in effect.places(plant).items()
         if place < len(plant.table)
@@ -232,9 +233,8 @@ def _name(plant: Plant, effect: Effect, final: Fit, steps: Sequence[Step], units
     return Named(effect.name, effect.site, parameters, gain, runner.effects[-1].label if runner else "", margin, family)
 
 
-def _unit(plant: Plant, place: int, units: Mapping[str, str]) -> str:
-    own = plant.table[place].unit
-    return units.get(own, own)
+def _unit(short: str, own: str, units: Mapping[str, str]) -> str:
+    return PERIODIC_METRIC[short] if units and short in PERIODIC_METRIC else units.get(own, own)
 
 
 def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, dict[str, Any]]:

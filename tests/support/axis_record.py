@@ -1,0 +1,30 @@
+"""A record of a ``ServoAxis`` under random steps of torque, made with the axis's own equations, and a model of it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from orchestrator.record import Record, record_from_columns
+from pyfmu_sources import servo_axis as axis
+
+MODEL = """
+fmu = "ServoAxis"
+[parameters.J]
+value = 1.0
+relative_uncertainty = 0.1
+[parameters.b]
+value = 2.0
+relative_uncertainty = 0.1
+"""
+
+
+def axis_record(p: Sequence[float], seed: int, name: str) -> Record:
+    """Return 8 s at 200 Hz of an axis with parameters ``p``, its encoder with a noise of 0.1 mrad."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.uniform(-8.0, 8.0, 100), 16)
+    x, mode, y = (0.0, 0.0, 0.0), 0, []
+    for value in u:
+        y.append(x[0])
+        x, mode = axis.advance(x, mode, tuple(p), float(value), 0.0, 0.005)
+    angle = np.array(y) + 1e-4 * rng.standard_normal(len(y))
+    return record_from_columns({"time": 0.005 * np.arange(len(u)), "u": u, "theta_m": angle}, name)
