@@ -1,3 +1,72 @@
 """FMI co-simulation toolchain that measures the backlash of a geared drivetrain."""
 
-__version__ = "0.1.0"
+import importlib
+from typing import Any
+
+from orchestrator.shared.version import __version__
+
+# Public name -> the module that has it. A module is imported when the first of its names is used.
+_PUBLIC = {
+    "BenchmarkResult": "orchestrator.api.benchmark",
+    "BuildResult": "orchestrator.api.build",
+    "ThesisResult": "orchestrator.api.thesis",
+    "CalibrationError": "orchestrator.errors",
+    "CalibrationResult": "orchestrator.api.any_fmu",
+    "CheckResult": "orchestrator.api.check",
+    "ConvergenceError": "orchestrator.errors",
+    "DesignResult": "orchestrator.api.design",
+    "DiagnosisResult": "orchestrator.api.diagnose",
+    "ExportedSsp": "orchestrator.api.ssp",
+    "EstimateResult": "orchestrator.api.estimate",
+    "InspectResult": "orchestrator.api.inspect",
+    "Experiment": "orchestrator.paired.experiment",
+    "FmuError": "orchestrator.errors",
+    "FmuDiagnosisResult": "orchestrator.api.any_fmu",
+    "InputError": "orchestrator.errors",
+    "Model": "orchestrator.records.model_file",
+    "NotApplicableError": "orchestrator.estimation.protocol",
+    "OrchestratorError": "orchestrator.errors",
+    "OutputError": "orchestrator.errors",
+    "PairResult": "orchestrator.api.pair",
+    "Record": "orchestrator.records.arrays",
+    "RecordError": "orchestrator.errors",
+    "RunOptions": "orchestrator.api.cases",
+    "Scenario": "orchestrator.scenarios.definition",
+    "ScenarioError": "orchestrator.errors",
+    "SimulationError": "orchestrator.errors",
+    "SimulationResult": "orchestrator.api.simulate",
+    "ScenarioSweepResult": "orchestrator.api.scenario_sweep",
+    "SweepResult": "orchestrator.api.sweep",
+    "benchmark": "orchestrator.api.benchmark",
+    "build": "orchestrator.api.build",
+    "calibrate": "orchestrator.api.any_fmu",
+    "check": "orchestrator.api.check",
+    "design": "orchestrator.api.design",
+    "diagnose": "orchestrator.api.diagnose",
+    "diagnose_fmu": "orchestrator.api.any_fmu",
+    "draft_map": "orchestrator.api.any_fmu",
+    "estimate": "orchestrator.api.estimate",
+    "inspect": "orchestrator.api.inspect",
+    "export_ssp": "orchestrator.api.ssp",
+    "read_model": "orchestrator.api.records",
+    "read_record": "orchestrator.api.records",
+    "report": "orchestrator.api.report",
+    "run_pair": "orchestrator.api.pair",
+    "simulate": "orchestrator.api.simulate",
+    "sweep": "orchestrator.api.sweep",
+    "sweep_scenario": "orchestrator.api.scenario_sweep",
+    "thesis": "orchestrator.api.thesis",
+}
+
+__all__ = ["__version__", *_PUBLIC]  # noqa: PLE0604 - names in a dictionary are text
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PUBLIC:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(importlib.import_module(_PUBLIC[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

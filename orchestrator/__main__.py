@@ -1,11 +1,44 @@
-"""``python -m orchestrator``."""
+"""``python -m orchestrator``, and the program ``backlash-cosim``."""
 
 import gc
+import os
 import sys
 
-from orchestrator.cli import main
 
-if __name__ == "__main__":
-    code = main()
+def run() -> None:
+    """Run the command line and end the process with its exit code.
+
+    Raises:
+        SystemExit: always.
+    """
+    for name, number in (("stdout", 1), ("stderr", 2)):
+        if getattr(sys, name) is None:  # closed by the caller: what is written then goes nowhere
+            null = os.open(os.devnull, os.O_WRONLY)
+            if null != number:
+                os.dup2(null, number)
+            setattr(sys, name, open(number, "w", encoding="utf-8"))  # noqa: SIM115 - until the process ends
+    try:
+        # Here, for Ctrl-C and a lack of memory or descriptors may come while modules are loaded.
+        from orchestrator.cli import main
+
+        code = main()
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        code = 130
+    except BrokenPipeError:
+        code = 1
+    except (OSError, ImportError, MemoryError) as error:
+        text = " ".join(str(error).split())[:300] or "out of memory"
+        sys.stderr.write(f"error: {text}\n")
+        code = 1
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # else the interpreter complains once more when it ends
     gc.freeze()  # else the interpreter takes a second to collect numba's objects before it ends
     sys.exit(code)
+
+
+if __name__ == "__main__":
+    run()

@@ -3,21 +3,27 @@
 import argparse
 import importlib
 import io
+import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TextIO, cast
 
-from orchestrator import __version__
-from orchestrator.commands._parser import Parser, one_line
+from orchestrator.commands._console import ForgivingStream
+from orchestrator.commands._parser import Parser, flags_of, one_line, worded
 from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.shared.version import __version__
 
+PROGRAM = "backlash-cosim"
 COMMANDS = {
     "build": "build the FMUs into fmus/",
     "check": "check FMUs for FMI compliance",
     "simulate": "one paired run: table, CSV, plots",
     "sweep": "many sizes and seeds: the table of estimates, CSV, JSON, plots",
+    "inspect": "what is in a measured record, and what it would show",
     "estimate": "the gap, with interval, from a measured record",
     "diagnose": "where a record and the model disagree, and which effect is missing",
+    "calibrate": "parameters of any FMU from a measured record, with intervals",
     "thesis": "every published number beside the recomputed one",
     "ssp": "write the paired loops as an SSP file, or run any SSP file",
     "bench": "speed and accuracy as ratios measured in one run",
@@ -26,8 +32,17 @@ COMMANDS = {
 
 
 def build_parser(command: str | None) -> argparse.ArgumentParser:
-    """Return the parser; only the module of ``command`` is imported, so that start-up stays quick."""
-    parser = Parser(prog="python -m orchestrator", description=importlib.import_module("orchestrator").__doc__)
+    """Return the parser; only the module of ``command`` is imported, so that start-up stays quick.
+
+    Args:
+        command: whose options are needed; None: no command is given.
+
+    Returns:
+        The parser.
+    """
+    called = Path(sys.argv[0]).name  # the module itself when run by `python -m`
+    program = called if called == PROGRAM else "python -m orchestrator"
+    parser = Parser(prog=program, description=importlib.import_module("orchestrator").__doc__)
     parser.add_argument("--version", action="version", version=__version__)
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, summary in COMMANDS.items():
@@ -44,27 +59,40 @@ def build_parser(command: str | None) -> argparse.ArgumentParser:
                 metavar="DIR",
                 help="where results go (default: %(default)s)",
             )
-        sub.set_defaults(run=module.run)
+        sub.set_defaults(run=module.run, flags=flags_of(sub) | getattr(module, "FLAGS", {}))
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0 done, 1 a check or a run found problems, 2 bad input."""
+    """Run one command and return its exit code: 0 done, 1 a check or a run found problems, 2 bad input.
+
+    Args:
+        argv: words of the command line (default: those of this process).
+
+    Returns:
+        The exit code; 130 after Ctrl-C.
+    """
     words = list(sys.argv[1:] if argv is None else argv)
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a home that cannot be written is no news to the user
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of any script, whatever the terminal's encoding
+        sys.stdout = cast(TextIO, ForgivingStream(sys.stdout))
     command = next((w for w in words if not w.startswith("-")), None)
     arguments = build_parser(command).parse_args(words)
+    flags = vars(arguments).pop("flags")
     try:
-        return int(arguments.run(arguments))
-    except InputError as error:
-        sys.stderr.write(f"error: {one_line(str(error))}\n")
-        return 2
+        code = int(arguments.run(arguments))
+        sys.stdout.flush()
+        return code
     except OrchestratorError as error:
-        sys.stderr.write(f"error: {one_line(str(error))}\n")
-        return 1
+        sys.stderr.write(f"error: {one_line(worded(error, flags))}\n")
+        return 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
-        sys.stderr.write(f"interrupted: {interruption}\n" if str(interruption) else "interrupted\n")
+        text = worded(interruption, flags)
+        sys.stderr.write(f"interrupted: {text}\n" if text else "interrupted\n")
         return 130
     except BrokenPipeError:
+        raise  # whoever read the output has gone: the program ends without a word
+    except (OSError, MemoryError) as error:  # no descriptors, no memory, a full disk behind standard output
+        sys.stderr.write(f"error: {one_line(str(error) or 'out of memory')}\n")
         return 1

@@ -13,12 +13,31 @@
     │   └── OutputError           a place that cannot be written
     └── SimulationError           a run that went wrong: exit code 1
         ├── SlaveError            a slave refused or failed a call
+        ├── ChildError            a child process that ran foreign code ended, or broke a limit
         └── ConvergenceError      an iteration that did not converge
 """
 
 
+def _one_line(text: str) -> str:
+    if text.isprintable():
+        return text
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(text.split()))
+
+
 class OrchestratorError(Exception):
-    """Base of every error that the project raises on purpose; its text is one line for the user."""
+    """Base of every error that the project raises on purpose; its text is one line for the user.
+
+    Texts hold names and messages from files and libraries: line breaks in them become spaces, and what a terminal
+    would act on is written as an escape.
+
+    Args:
+        text: it calls arguments by their names in Python, in backticks.
+        arguments: those names, so that a caller with other names (a command and its flags) can put its own there.
+    """
+
+    def __init__(self, text: str = "", *arguments: str) -> None:
+        super().__init__(_one_line(text))
+        self.arguments = arguments
 
 
 class InputError(OrchestratorError):
@@ -38,7 +57,10 @@ class ConnectionMismatchError(InputError):
 
 
 class RecordError(InputError):
-    """A measured record is wrong."""
+    """A measured record is wrong; the text may say how to read it differently."""
+
+    def __init__(self, text: str = "", *arguments: str) -> None:
+        super().__init__(text, *(arguments or ("model", "part", "resample", "rate")))
 
 
 class DesignError(InputError):
@@ -59,6 +81,20 @@ class SimulationError(OrchestratorError):
 
 class SlaveError(SimulationError):
     """A slave refused or failed a call."""
+
+
+class ChildError(SimulationError):
+    """A child process that ran foreign code ended, or broke a limit.
+
+    Attributes:
+        reason: ``exit``, ``signal``, ``time``, ``memory``, ``disk``, ``threads`` or ``protocol``.
+        code: exit code or number of the signal.
+        said: the last line that it printed, untrusted.
+    """
+
+    def __init__(self, text: str, reason: str = "exit", code: int = 0, said: str = "") -> None:
+        super().__init__(text)
+        self.reason, self.code, self.said = reason, code, said
 
 
 class ConvergenceError(SimulationError):

@@ -13,15 +13,19 @@ stiffness, ``offset`` the twist [rad] in mid-gap. ``m`` is the tuple ``(J_m, J_l
 """
 
 from math import erfc, exp, log, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 Model = tuple[float, float, float, float, float, float, float, float]
 
 STATES = 9
 SIZE = STATES + STATES * STATES + 1
+FILTERS = 7
+Filter = Annotated[list[float], SIZE]
+Filters = Annotated[list[Filter], FILTERS]
+Row = tuple[float, float, float, float, float, float, float, float, float]
+SettingValues = Row
 WEIGHT = SIZE - 1
 ALPHA = 6
-FILTERS = 7
 SMALLEST = 0.0025  # half-gap of the first filter [rad]; each next one is twice as large
 RELATIVE_SPREAD = 0.4  # standard deviation of each filter's half-gap over its size
 FORGOTTEN = -30.0  # log weight below which a filter is no longer run
@@ -49,11 +53,28 @@ class Settings(NamedTuple):
 
 
 def covariance(r: int, c: int) -> int:
-    """Return where the covariance of states ``r`` and ``c`` stands in a filter."""
+    """Return where the covariance of states ``r`` and ``c`` stands in a filter.
+
+    Args:
+        r: row, from 0.
+        c: column, from 0.
+
+    Returns:
+        The place.
+    """
     return STATES + STATES * r + c
 
 
-def start(f, number, theta_m, theta_l, noise_m, noise_l, stiffness_spread, offset_spread):  # type: ignore[no-untyped-def]
+def start(
+    f: Filter,
+    number: int,
+    theta_m: float,
+    theta_l: float,
+    noise_m: float,
+    noise_l: float,
+    stiffness_spread: float,
+    offset_spread: float,
+) -> None:
     """Set filter ``number`` (0 to ``FILTERS`` - 1) at the first measured angles [rad].
 
     Args:
@@ -77,8 +98,16 @@ def start(f, number, theta_m, theta_l, noise_m, noise_l, stiffness_spread, offse
         f[covariance(n, n)] = spreads[n] * spreads[n]
 
 
-def distance_variance(f, side):  # type: ignore[no-untyped-def]
-    """Return the part of the variance [rad2] of the distance to a flank that does not concern the motor's angle."""
+def distance_variance(f: Filter, side: float) -> float:
+    """Return the part of the variance [rad2] of the distance to a flank that does not concern the motor's angle.
+
+    Args:
+        f: the filter's values.
+        side: flank, -1.0 or 1.0.
+
+    Returns:
+        The variance.
+    """
     return (
         f[covariance(2, 2)]
         + f[covariance(8, 8)]
@@ -87,8 +116,16 @@ def distance_variance(f, side):  # type: ignore[no-untyped-def]
     )
 
 
-def flank(distance, variance):  # type: ignore[no-untyped-def]
-    """Return (probability that a flank is loaded, mean penetration [rad]) for a Gaussian distance beyond it."""
+def flank(distance: float, variance: float) -> tuple[float, float]:
+    """Return (probability that a flank is loaded, mean penetration [rad]) for a Gaussian distance beyond it.
+
+    Args:
+        distance: mean of the distance beyond the flank [rad].
+        variance: of it [rad2].
+
+    Returns:
+        Both.
+    """
     sigma = sqrt(variance)
     z = distance / sigma
     share = 0.5 * erfc(-z * ROOT_HALF)
@@ -96,7 +133,7 @@ def flank(distance, variance):  # type: ignore[no-untyped-def]
     return share, distance * share + sigma * bell
 
 
-def predict(f, m, u, h, s):  # type: ignore[no-untyped-def]
+def predict(f: Filter, m: Model, u: float, h: float, s: SettingValues) -> None:
     """Advance a filter by ``h`` [s] with the torque request ``u`` [N.m] held.
 
     Args:
@@ -156,14 +193,16 @@ def predict(f, m, u, h, s):  # type: ignore[no-untyped-def]
     f[3] += h * a_l
     f[4] = keep * f[4] + (1.0 - keep) * u
     _spread(f, row_m, row_l, h, keep)
-    f[covariance(1, 1)] += h * (s[2] / J_m) ** 2
-    f[covariance(3, 3)] += h * (s[3] / J_l) ** 2
+    noise_m = s[2] / J_m
+    noise_l = s[3] / J_l
+    f[covariance(1, 1)] += h * (noise_m * noise_m)
+    f[covariance(3, 3)] += h * (noise_l * noise_l)
     f[covariance(4, 4)] += h * LAG_MEMORY * lag_error * lag_error
     f[covariance(5, 5)] += h * s[4] * s[4]
     f[covariance(6, 6)] += h * s[5] * s[5]
 
 
-def _spread(f, row_m, row_l, h, keep):  # type: ignore[no-untyped-def]
+def _spread(f: Filter, row_m: Row, row_l: Row, h: float, keep: float) -> None:
     """Replace the covariance P by F P F^T for the sparse transition F of :func:`predict`.
 
     Angles move with the new speeds (semi-implicit Euler), which keeps the undamped oscillation's covariance bounded.
@@ -195,7 +234,7 @@ def _spread(f, row_m, row_l, h, keep):  # type: ignore[no-untyped-def]
         f[base + 4] *= keep
 
 
-def correct(f, state, measured, variance):  # type: ignore[no-untyped-def]
+def correct(f: Filter, state: int, measured: float, variance: float) -> tuple[float, float]:
     """Take in one measured angle.
 
     Args:
@@ -229,10 +268,17 @@ def correct(f, state, measured, variance):  # type: ignore[no-untyped-def]
     return error, spread
 
 
-def combine(filters, count):  # type: ignore[no-untyped-def]
+def combine(filters: Filters, count: int) -> tuple[float, float, int]:
     """Return (alpha [rad], its standard deviation [rad], number of the heaviest filter) of the Gaussian sum.
 
     Log weights are shifted so that the largest is zero, and kept from falling out of range.
+
+    Args:
+        filters: of the Gaussian sum.
+        count: how many of them are used.
+
+    Returns:
+        The three.
     """
     largest = filters[0][WEIGHT]
     best = 0
@@ -255,21 +301,36 @@ def combine(filters, count):  # type: ignore[no-untyped-def]
     return mean, sqrt(max(square / total - mean * mean, 0.0)), best
 
 
-def contact(f, i):  # type: ignore[no-untyped-def]
-    """Return the flank (-1, 0, 1) at which a filter puts the gear, for the gear ratio ``i``."""
+def contact(f: Filter, i: float) -> int:
+    """Return the flank (-1, 0, 1) at which a filter puts the gear, for the gear ratio ``i``.
+
+    Args:
+        f: the filter's values.
+        i: gear ratio.
+
+    Returns:
+        The flank.
+    """
     wound = f[0] / i - f[2] - f[8]
     if wound > f[ALPHA]:
         return 1
     return -1 if wound < -f[ALPHA] else 0
 
 
-def begin(filters, theta_m, theta_l, s):  # type: ignore[no-untyped-def]
-    """Set all filters at the first measured angles [rad] with the settings ``s``."""
+def begin(filters: Filters, theta_m: float, theta_l: float, s: SettingValues) -> None:
+    """Set all filters at the first measured angles [rad] with the settings ``s``.
+
+    Args:
+        filters: that are set.
+        theta_m: motor angle [rad].
+        theta_l: load angle [rad].
+        s: settings.
+    """
     for n in range(FILTERS):
         start(filters[n], n, theta_m, theta_l, s[0], s[1], s[6], s[7])
 
 
-def advance(filters, m, s, u, h):  # type: ignore[no-untyped-def]
+def advance(filters: Filters, m: Model, s: SettingValues, u: float, h: float) -> None:
     """Predict with all filters over a sample of ``h`` [s].
 
     Args:
@@ -287,8 +348,15 @@ def advance(filters, m, s, u, h):  # type: ignore[no-untyped-def]
                 predict(filters[n], m, u, h / parts, s)
 
 
-def measure(filters, s, theta_m, theta_l):  # type: ignore[no-untyped-def]
-    """Take both measured angles [rad] into all filters."""
+def measure(filters: Filters, s: SettingValues, theta_m: float, theta_l: float) -> None:
+    """Take both measured angles [rad] into all filters.
+
+    Args:
+        filters: that are corrected.
+        s: settings.
+        theta_m: motor angle [rad].
+        theta_l: load angle [rad].
+    """
     for n in range(FILTERS):
         if filters[n][WEIGHT] > FORGOTTEN:
             correct(filters[n], 0, theta_m, s[0] * s[0])

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from . import backlash_estimator as source
+from .backlash_estimator import Filters, Model, SettingValues
 from .fmu_variables import Variable
 from .sampled_slave import SampledSlave
 
@@ -76,17 +77,43 @@ class BacklashEstimator(SampledSlave):
         Variable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1.0),
     )
 
+    _model: Model
+    _settings: SettingValues
+    _filters: Filters
+    _predicted: Filters
+
     def take_parameters(self) -> None:
-        """Collect model, settings and sample time."""
+        """Collect model and settings."""
         real = self.real
-        self._model: Any = tuple(real[FIRST_MODEL + n] for n in range(8))
-        self._settings: Any = tuple(real[FIRST_SETTING + n] for n in range(9))
+        n = FIRST_MODEL
+        self._model = (
+            real[n],
+            real[n + 1],
+            real[n + 2],
+            real[n + 3],
+            real[n + 4],
+            real[n + 5],
+            real[n + 6],
+            real[n + 7],
+        )
+        n = FIRST_SETTING
+        self._settings = (
+            real[n],
+            real[n + 1],
+            real[n + 2],
+            real[n + 3],
+            real[n + 4],
+            real[n + 5],
+            real[n + 6],
+            real[n + 7],
+            real[n + 8],
+        )
 
     def begin(self) -> None:
         """Start all filters at the first measurement."""
-        self._predicted: Any = [[0.0] * source.SIZE for _ in range(source.FILTERS)]
+        self._predicted = [[0.0] * source.SIZE for _ in range(source.FILTERS)]
         source.begin(self._predicted, self.real[THETA_M], self.real[THETA_L], self._settings)
-        self._filters: Any = [list(f) for f in self._predicted]
+        self._filters = [list(f) for f in self._predicted]
         self._report()
 
     def predict(self) -> None:
@@ -109,14 +136,3 @@ class BacklashEstimator(SampledSlave):
         real[CONTACT_HAT] = float(source.contact(state, self._model[6]))
         for n in range(6):
             real[FIRST_ESTIMATE + n] = state[n]
-
-    def saved(self) -> Any:
-        """Return the clock, the filters and the prediction that the present sample corrects."""
-        return [super().saved(), self._filters, self._predicted]
-
-    def restore(self, saved: Any) -> None:
-        """Take over a saved state."""
-        clock, filters, predicted = saved
-        super().restore(clock)
-        self._filters = [list(f) for f in filters]
-        self._predicted = [list(f) for f in predicted]

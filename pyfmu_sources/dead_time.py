@@ -1,38 +1,43 @@
-"""Dead time of a requested torque: which older request acts when, within a communication step."""
+"""Dead time of a requested torque: the requests that are still under way.
 
-Requests = tuple[tuple[float, float], ...]
+A request is ``(time [s], torque [N.m])``; the list of them is ordered, the oldest first, and its first may act already.
+"""
+
+from typing import Annotated
+
+MOST_REQUESTS = 16384
+Request = tuple[float, float]
+Requests = Annotated[list[Request], MOST_REQUESTS]
 ROUNDING = 1e-9  # of a step: how far time stamps may be off
 
 
-def split_step(
-    requests: Requests, u: float, delay: float, time: float, step: float
-) -> tuple[Requests, list[tuple[float, float]]]:
-    """Return the requests that still matter after a step, and the step's pieces ``(delayed torque, length)``.
+def is_new(requests: Requests, u: float) -> int:
+    """Return 1 if the torque ``u`` [N.m] is another one than was requested last, else 0.
 
     Args:
-        requests: ``(time [s], torque [N.m])`` of earlier steps, oldest first; the first may act already.
-        u: torque that is requested from ``time`` on [N.m].
-        delay: dead time [s]; with zero, requests act at once and none is kept. Before the first one acts, the
-            torque is zero.
-        time: start of the step [s].
-        step: its length [s].
+        requests: time and torque of each request that is under way.
+        u: requested torque [N.m].
+
+    Returns:
+        1 or 0.
     """
-    if delay == 0.0:
-        return (), [(u, step)]
-    if not requests or requests[-1][1] != u:
-        requests = (*requests, (time, u))
-    least = ROUNDING * step
-    pieces: list[tuple[float, float]] = []
-    begin, acting, first = time, 0.0, 0
-    for n, (asked, value) in enumerate(requests):
-        switch = asked + delay
-        if switch >= time + step - least:
-            break
-        if switch <= time + least:
-            first = n
-        else:
-            pieces.append((acting, switch - begin))
-            begin = switch
-        acting = value
-    pieces.append((acting, time + step - begin))
-    return requests[first:], pieces
+    if len(requests) == 0:
+        return 1
+    return 1 if requests[-1][1] != u else 0
+
+
+def request_at(requests: Requests, n: int, u: float, time: float) -> Request:
+    """Return the request number ``n``; the one behind the last is what is requested now, ``u`` at ``time``.
+
+    Args:
+        requests: time and torque of each request that is under way.
+        n: number, from 0.
+        u: requested torque [N.m].
+        time: [s].
+
+    Returns:
+        Time and torque.
+    """
+    if n < len(requests):
+        return requests[n]
+    return (time, u)

@@ -5,7 +5,9 @@ The index constants ``P_*`` are plain module integers, so that numba compiles ``
 
 from typing import NamedTuple
 
-BACKLASH_MODELS = ("none", "dead_zone", "nordin", "hysteresis", "rigid_impact", "elastic_impact")
+from .backlash_models import MODELS
+
+BACKLASH_MODELS = tuple(model.name for model in MODELS)
 NONE, DEAD_ZONE, NORDIN, HYSTERESIS, RIGID_IMPACT, ELASTIC_IMPACT = range(6)
 
 
@@ -23,7 +25,7 @@ class Parameter(NamedTuple):
 BIG = 1e12
 TINY = 1e-9
 
-PARAMETERS = (
+_FIRST = (
     Parameter("J_m", "kg.m2", 0.4, TINY, BIG, "Motor inertia"),
     Parameter("J_l", "kg.m2", 5.6, TINY, BIG, "Load inertia"),
     Parameter("k", "N.m/rad", 3300.0, 0.0, BIG, "Shaft stiffness, load side"),
@@ -33,7 +35,7 @@ PARAMETERS = (
     Parameter("i", "1", 3.984, TINY, BIG, "Gear ratio: motor angle over load angle"),
     Parameter("tau", "s", 1.0, 1e-6, BIG, "Time constant of the motor's torque"),
     Parameter("alpha", "rad", 0.0, 0.0, BIG, "Half of the backlash gap, load side"),
-    Parameter("backlash_model", "1", float(DEAD_ZONE), 0.0, 5.0, "Backlash model"),
+    Parameter("backlash_model", "1", float(DEAD_ZONE), 0.0, float(len(MODELS) - 1), "Backlash model"),
     Parameter("restitution", "1", 0.5, 0.0, 1.0, "Coefficient of restitution of rigid_impact"),
     Parameter("contact_stiffness", "N.m/rad", 33000.0, TINY, BIG, "Contact stiffness of elastic_impact"),
     Parameter("contact_damping", "N.m.s/rad", 10.0, 0.0, BIG, "Contact damping of elastic_impact"),
@@ -71,6 +73,81 @@ PARAMETERS = (
     Parameter("effects.sensor_offset.motor.offset", "rad", 0.0, -BIG, BIG, "Offset of the motor's encoder"),
     Parameter("effects.sensor_offset.load.offset", "rad", 0.0, -BIG, BIG, "Offset of the load's encoder"),
 )
+
+
+def wave(effect: str, unit: str, text: str, cycles: float) -> tuple[Parameter, ...]:
+    """Return amplitude, cycles and phase of what repeats with an angle.
+
+    Args:
+        effect: its name.
+        unit: of the amplitude.
+        text: what it is.
+        cycles: default of the cycles per revolution.
+
+    Returns:
+        Three parameters.
+    """
+    return (
+        Parameter(f"effects.{effect}.amplitude", unit, 0.0, -BIG, BIG, text),
+        Parameter(f"effects.{effect}.cycles_per_rev", "1", cycles, 0.0, BIG, "Its cycles per revolution"),
+        Parameter(f"effects.{effect}.phase", "rad", 0.0, -BIG, BIG, "Its phase at angle zero"),
+    )
+
+
+def _harmonic(order: str) -> tuple[Parameter, ...]:
+    """Return amplitude and phase of a harmonic of the torque ripple."""
+    return (
+        Parameter(f"effects.torque_ripple.{order}.amplitude", "N.m", 0.0, -BIG, BIG, f"Its {order} harmonic"),
+        Parameter(f"effects.torque_ripple.{order}.phase", "rad", 0.0, -BIG, BIG, "Phase of that at angle zero"),
+    )
+
+
+def friction_details(site: str) -> tuple[Parameter, ...]:
+    """Return what the friction of a ``site`` may depend on beside its speed.
+
+    Args:
+        site: "motor" or "load".
+
+    Returns:
+        The parameters.
+    """
+    of = f"of the {site}'s friction"
+    return (
+        Parameter(f"effects.presliding.{site}.distance", "rad", 0.0, 0.0, BIG, f"Distance {of} to build up (0: none)"),
+        Parameter(f"effects.presliding.{site}.damping", "N.m.s/rad", 0.0, 0.0, BIG, f"Damping {of} building up"),
+        Parameter(f"effects.directional_friction.{site}.difference", "N.m.s/rad", 0.0, -BIG, BIG,
+                  f"Viscous part {of}, forward minus mean"),
+        Parameter(f"effects.load_dependent_friction.{site}.coefficient", "1", 0.0, 0.0, 1.0,
+                  f"Part {of} per torque of the shaft"),
+        *wave(f"periodic_friction.{site}", "N.m", f"Part {of} that repeats with the angle", 1.0),
+    )  # fmt: skip
+
+
+# Laws of the drive and of the moved body, which an axis without a gear has too.
+DRIVE = (
+    Parameter("effects.drive_filter.time_constant", "s", 0.0, 0.0, BIG, "Second lag of the drive (0: none)"),
+    Parameter("effects.rate_limit.rate", "N.m/s", BIG, TINY, BIG, "Fastest change of the drive's torque request"),
+    *_harmonic("second"),
+    *_harmonic("third"),
+)
+BODY = (
+    Parameter("effects.spring_load.stiffness", "N.m/rad", 0.0, -BIG, BIG, "Spring or cable that pulls the load back"),
+    Parameter("effects.spring_load.cubic", "N.m/rad3", 0.0, -BIG, BIG, "Its cubic stiffness"),
+    Parameter("effects.spring_load.angle", "rad", 0.0, -BIG, BIG, "Load angle at which it is at rest"),
+    Parameter("effects.end_stop.lower", "rad", -BIG, -BIG, BIG, "Load angle of the lower end stop"),
+    Parameter("effects.end_stop.upper", "rad", BIG, -BIG, BIG, "Load angle of the upper end stop"),
+    Parameter("effects.end_stop.stiffness", "N.m/rad", 1e4, 0.0, BIG, "Stiffness of the end stops"),
+    Parameter("effects.end_stop.dissipation", "s/rad", 0.1, 0.0, BIG, "Their damping, per stiffness and depth"),
+    *wave("varying_inertia", "kg.m2", "Part of the load's inertia that turns with its angle", 1.0),
+)
+SHAFT = (
+    *wave("varying_stiffness", "1", "Relative part of the stiffness that turns with the motor", 1.0),
+    Parameter("effects.shaft_hysteresis.torque", "N.m", 0.0, 0.0, BIG, "Hysteresis of the shaft (Bouc-Wen): torque"),
+    Parameter("effects.shaft_hysteresis.twist", "rad", 1e-3, TINY, BIG, "Twist over which it turns round"),
+    Parameter("effects.impact_damping.depth", "rad", 0.0, 0.0, BIG, "Depth over which damping of teeth sets in"),
+)
+
+PARAMETERS = (*_FIRST, *friction_details("motor"), *friction_details("load"), *DRIVE, *BODY, *SHAFT)
 
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
 DEFAULTS = tuple(parameter.default for parameter in PARAMETERS)
@@ -116,11 +193,50 @@ COUNT = len(PARAMETERS)
     P_DRAG,
     P_OFFSET_M,
     P_OFFSET_L,
+    P_PRESLIDING_M,
+    P_BRISTLE_C_M,
+    P_DIRECTION_M,
+    P_LOADED_M,
+    P_WAVY_M,
+    P_WAVY_N_M,
+    P_WAVY_PHASE_M,
+    P_PRESLIDING_L,
+    P_BRISTLE_C_L,
+    P_DIRECTION_L,
+    P_LOADED_L,
+    P_WAVY_L,
+    P_WAVY_N_L,
+    P_WAVY_PHASE_L,
+    P_FILTER,
+    P_RATE,
+    P_RIPPLE_2,
+    P_RIPPLE_2_PHASE,
+    P_RIPPLE_3,
+    P_RIPPLE_3_PHASE,
+    P_SPRING,
+    P_SPRING_CUBIC,
+    P_SPRING_ANGLE,
+    P_STOP_LOWER,
+    P_STOP_UPPER,
+    P_STOP_K,
+    P_STOP_D,
+    P_J_WAVE,
+    P_J_WAVE_N,
+    P_J_WAVE_PHASE,
+    P_K_WAVE,
+    P_K_WAVE_N,
+    P_K_WAVE_PHASE,
+    P_HYSTERESIS,
+    P_HYSTERESIS_TWIST,
+    P_ONSET,
 ) = range(COUNT)
 
 
 def parameters(**values: float) -> tuple[float, ...]:
     """Return ``p`` with the defaults replaced by ``values``; dots in names are written as two underscores.
+
+    Returns:
+        The parameters, in the order of ``NAMES``.
 
     Raises:
         KeyError: a name is not in ``NAMES``.
@@ -130,6 +246,13 @@ def parameters(**values: float) -> tuple[float, ...]:
 
 def with_values(p: tuple[float, ...], values: dict[str, float]) -> tuple[float, ...]:
     """Return ``p`` with the parameters named in ``values`` (names as in the FMU) replaced.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+        values: by name.
+
+    Returns:
+        The parameters, in the order of ``NAMES``.
 
     Raises:
         KeyError: a name is not in ``NAMES``.

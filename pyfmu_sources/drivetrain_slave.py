@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from . import drivetrain
-from .dead_time import Requests, split_step
-from .drivetrain_parameters import P_DELAY, P_LIMIT, P_MODEL, P_OFFSET_L, P_OFFSET_M, PARAMETERS, Parameter
+from .dead_time import MOST_REQUESTS, ROUNDING, Requests, is_new, request_at
+from .drivetrain import Mode, State, Table
+from .drivetrain_modes import QUIET, Indicators, after_events, indicators, rates_and_outputs, state_rates
+from .drivetrain_parameters import (
+    BIG,
+    COUNT,
+    P_DELAY,
+    P_LIMIT,
+    P_MODEL,
+    P_OFFSET_L,
+    P_OFFSET_M,
+    P_RATE,
+    PARAMETERS,
+    Parameter,
+)
 from .effects import saturated
 from .fmu_variables import LARGEST, Variable
-from .slave_base import SlaveBase, StepRefusedError
+from .slave_base import TOO_STIFF, SlaveBase, StepRefusedError
 
 U, T_L, THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(9)
 FIRST_PARAMETER = CONTACT + 1
@@ -19,6 +33,10 @@ MODEL = FIRST_PARAMETER + P_MODEL
 KNOWN_STEPS = 16
 # The work of a step grows with its length; a host that asks for more than this has mistaken the unit.
 LONGEST_STEP = 100.0
+
+Values = Annotated[tuple[float, ...], COUNT]
+KnownStep = tuple[float, Table]
+KnownSteps = Annotated[list[KnownStep], KNOWN_STEPS]
 
 _NAMES = tuple(parameter.name for parameter in PARAMETERS)
 _STARTS = (
@@ -47,7 +65,7 @@ def _variable(parameter: Parameter) -> Variable:
             int(default) + 1,
             description,
             1,
-            6,
+            int(maximum) + 1,
             type="Enumeration",
             declared_type="BacklashModel",
         )
@@ -92,70 +110,177 @@ class Drivetrain(SlaveBase):
         *(Variable(name, "parameter", unit, 0.0, text, -1e12, 1e12) for name, unit, text in _STARTS),
     )
 
+    _x: State
+    _mode: Mode
+    _p: Values
+    _requests: Requests
+    _events: int
+    _event_time: float
+    _known: KnownSteps
+
+    # The hidden attribute that model exchange integrates, and its items: name, unit, nominal value, meaning.
+    state_attribute: ClassVar[str] = "_x"
+    continuous_states: ClassVar[tuple[tuple[str, str, float, str], ...]] = (
+        ("state.theta_m", "rad", 1.0, "Motor angle"),
+        ("state.omega_m", "rad/s", 10.0, "Motor speed"),
+        ("state.theta_l", "rad", 1.0, "Load angle"),
+        ("state.omega_l", "rad/s", 10.0, "Load speed"),
+        ("state.T_m", "N.m", 100.0, "Motor torque"),
+        ("state.theta_r", "rad", 1.0, "Angle of the extra inertia"),
+        ("state.omega_r", "rad/s", 10.0, "Speed of the extra inertia"),
+        ("state.s", "rad", 1e-2, "Twist left in a parted shaft"),
+        ("state.z_m", "rad", 1e-3, "Bristles of the motor's friction"),
+        ("state.z_l", "rad", 1e-3, "Bristles of the load's friction"),
+        ("state.w", "1", 1.0, "Memory of the shaft's hysteresis"),
+        ("state.y", "N.m", 100.0, "Filtered torque request"),
+    )
+
+    # What directional derivatives are of: a function of hidden attributes and inputs by their names, which returns the
+    # derivatives of the states and these outputs.
+    response: ClassVar[Callable[..., Any]] = rates_and_outputs
+    response_outputs: ClassVar[tuple[str, ...]] = ("theta_m", "theta_l", "omega_m", "omega_l", "T_m", "T_shaft")
+
     def initialise(self) -> None:
         """Read the parameters and start at the initial state."""
-        self._take_parameters()
-        theta_m, omega_m, theta_l, omega_l, T_m = (self.real[FIRST_START + n] for n in range(len(_STARTS)))
-        x = (theta_m, omega_m, theta_l, omega_l, T_m, theta_l, omega_l, 0.0)
+        real = self.real
+        self._p = tuple(
+            float(self.integer[MODEL] - 1) if n == P_MODEL else real[FIRST_PARAMETER + n] for n in range(COUNT)
+        )
+        theta_l, omega_l = real[FIRST_START + 2], real[FIRST_START + 3]
+        x = (real[FIRST_START], real[FIRST_START + 1], theta_l, omega_l, real[FIRST_START + 4], theta_l, omega_l, 0.0)
         self._x = drivetrain.consistent_start(x, self._p)
         self._mode = drivetrain.initial_mode(self._x, self._p)
-        self._tables: dict[float, drivetrain.Table] = {}
-        self._requests: Requests = ()
+        self._known = []
+        self._requests = []
+        self._events = 0
+        self._event_time = 0.0
         self._write()
-
-    def _take_parameters(self) -> None:
-        values = [self.real.get(FIRST_PARAMETER + n, 0.0) for n in range(len(PARAMETERS))]
-        values[P_MODEL] = float(self.integer[MODEL] - 1)
-        self._p = tuple(values)
-        self._delay = values[P_DELAY]
-        self._limit = values[P_LIMIT]
-        self._offset_m = values[P_OFFSET_M]
-        self._offset_l = values[P_OFFSET_L]
 
     def advance(self, time: float, step: float) -> None:
-        """Integrate with the inputs held; a dead time splits the step where an older request takes over."""
-        real = self.real
-        p = self._p
-        T_l = real[T_L]
-        u = saturated(real[U], self._limit)
-        x, mode, requests = self._x, self._mode, self._requests
-        if self._delay == 0.0:
-            table = self._tables.get(step)
-            if table is None:
-                step, table = self._table(time, step)
-            x, mode = drivetrain.advance(x, mode, p, u, T_l, step, table)
+        """Integrate with the inputs held; a dead time splits the step where an older request takes over.
+
+        Args:
+            time: [s].
+            step: [s].
+        """
+        u = saturated(self.real[U], self._p[P_LIMIT])
+        if self._p[P_DELAY] == 0.0:
+            x, mode = self._moved(self._x, self._mode, u, time, step)
+            self._take(x, mode, step)
         else:
-            requests, pieces = split_step(requests, u, self._delay, time, step)
-            for u, piece in pieces:
-                length, table = self._table(time, piece)
-                x, mode = drivetrain.advance(x, mode, p, u, T_l, length, table)
+            self._advance_delayed(u, time, step)
+
+    def _advance_delayed(self, u: float, time: float, step: float) -> None:
+        """Advance piece by piece; before the first request acts, the torque is zero."""
+        x, mode = self._x, self._mode
+        new = is_new(self._requests, u)
+        count = len(self._requests) + new
+        if count > MOST_REQUESTS:
+            raise StepRefusedError(f"at most {MOST_REQUESTS} requests may be under way, but this one is one more")
+        end = time + step
+        least = ROUNDING * step
+        begin, acting, first = time, 0.0, 0
+        for n in range(count):
+            asked, value = request_at(self._requests, n, u, time)
+            change = asked + self._p[P_DELAY]
+            if change >= end - least:
+                break
+            if change <= time + least:
+                first = n
+            else:
+                x, mode = self._moved(x, mode, acting, time, change - begin)
+                begin = change
+            acting = value
+        x, mode = self._moved(x, mode, acting, time, end - begin)
+        self._take(x, mode, step)
+        if new:
+            self._requests.append((time, u))
+        del self._requests[:first]
+
+    def _moved(self, x: State, mode: Mode, u: float, time: float, step: float) -> tuple[State, Mode]:
+        """Return state and mode after a piece of a step."""
+        number = self._step_number(time, step)
+        known = self._known
+        return drivetrain.advance(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
+
+    def _take(self, x: State, mode: Mode, step: float) -> None:
+        """Take over a state that is finite, or refuse the step."""
+        if x[0] != x[0]:
+            raise StepRefusedError(f"the step of {step!r} s {TOO_STIFF}")
         if not -LARGEST <= x[0] + x[1] + x[2] + x[3] + x[4] <= LARGEST:
             raise StepRefusedError(f"the state must stay finite, but is {x!r} after a step of {step!r} s")
-        self._x, self._mode, self._requests = x, mode, requests
+        self._x = x
+        self._mode = mode
         self._write()
 
-    def _table(self, time: float, step: float) -> tuple[float, drivetrain.Table]:
-        """Return the table of a step size, and the size it was made for.
+    def _step_number(self, time: float, step: float) -> int:
+        """Return which of the known steps this one is, after preparing for it if it is new.
 
         Hosts compute step sizes as differences of time stamps, so that equal sizes differ by rounding; they
         count as equal. Which sizes are known is part of the saved state, so that a restored run repeats bit for bit.
         """
+        for n in range(len(self._known)):
+            if self._known[n][0] == step:
+                return n
         noise = 1e-15 * (1.0 + abs(time))
-        for known, table in self._tables.items():
-            if abs(known - step) <= noise:
-                return known, table
+        for n in range(len(self._known)):
+            if abs(self._known[n][0] - step) <= noise:
+                return n
         if step > LONGEST_STEP:
             raise StepRefusedError(f"a step must be at most {LONGEST_STEP!r} s long, but is {step!r} s")
         table = _prepare(self._p, step)
-        if len(self._tables) < KNOWN_STEPS:
-            self._tables[step] = table
-        return step, table
+        if len(self._known) == KNOWN_STEPS:
+            self._known[KNOWN_STEPS - 1] = (step, table)
+        else:
+            self._known.append((step, table))
+        return len(self._known) - 1
+
+    def derivatives(self) -> State:
+        """Return the derivatives of the state, for model exchange.
+
+        Returns:
+            The derivatives, in the order of the state.
+        """
+        u = saturated(self.real[U], self._p[P_LIMIT])
+        return state_rates(self._x, self._mode, self._p, u, self.real[T_L])
+
+    def indicators(self) -> Indicators:
+        """Return the event indicators, for model exchange.
+
+        Returns:
+            The indicators.
+        """
+        u = saturated(self.real[U], self._p[P_LIMIT])
+        return indicators(self._x, self._mode, self._p, u, self.real[T_L])
+
+    def update(self, time: float) -> None:
+        """Settle state and mode at an event, for model exchange.
+
+        Args:
+            time: [s].
+
+        Raises:
+            ValueError: an effect is on that model exchange does not have.
+        """
+        if self._p[P_DELAY] > 0.0:
+            raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
+        if self._p[P_RATE] < BIG:
+            raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
+        u = saturated(self.real[U], self._p[P_LIMIT])
+        quiet = time - self._event_time > QUIET
+        x, mode, events = after_events(self._x, self._mode, self._events, quiet, self._p, u, self.real[T_L])
+        if events > 0:
+            self._event_time = time
+        self._x = x
+        self._mode = mode
+        self._events = events
+        self._write()
 
     def _write(self) -> None:
         real = self.real
         x = self._x
-        real[THETA_M] = x[0] + self._offset_m
-        real[THETA_L] = x[2] + self._offset_l
+        real[THETA_M] = x[0] + self._p[P_OFFSET_M]
+        real[THETA_L] = x[2] + self._p[P_OFFSET_L]
         real[OMEGA_M] = x[1]
         real[OMEGA_L] = x[3]
         real[T_M] = x[4]
@@ -165,16 +290,3 @@ class Drivetrain(SlaveBase):
     def refresh(self) -> None:
         """Recompute the shaft torque, which a rigid gear passes on from the load torque at once."""
         self.real[T_SHAFT] = drivetrain.shaft_torque(self._x, self._mode, self._p, self.real[T_L])
-
-    def saved(self) -> Any:
-        """Return state, mode, torque requests that are still under way and known step sizes."""
-        return [self._x, self._mode, self._requests, list(self._tables)]
-
-    def restore(self, saved: Any) -> None:
-        """Take over a saved state."""
-        x, mode, requests, steps = saved
-        self._take_parameters()
-        self._x = tuple(x)
-        self._mode = tuple(mode)
-        self._requests = tuple((time, u) for time, u in requests)
-        self._tables = {step: _prepare(self._p, step) for step in steps}

@@ -6,11 +6,48 @@ every effect off is the thesis's plant to the last bit.
 
 from math import cos, exp, sin
 
+UNASKED = 1e300  # N.m, of a filtered request before the first step: the drive has settled at what is asked first
+LARGEST = 1.7976931348623157e308
+RAMP_END = 1e-4  # s, of a request that is reached: any time constant, as nothing moves any more
+
+
+def sine(angle: float) -> float:
+    """Return the sine, and 0 for an angle that is not finite: a trial step that overflows is refused, not raised.
+
+    Args:
+        angle: [rad].
+
+    Returns:
+        The sine.
+    """
+    return sin(angle) if abs(angle) <= LARGEST else 0.0
+
+
+def cosine(angle: float) -> float:
+    """Return the cosine, and 0 for an angle that is not finite.
+
+    Args:
+        angle: [rad].
+
+    Returns:
+        The cosine.
+    """
+    return cos(angle) if abs(angle) <= LARGEST else 0.0
+
+
 # --- input -------------------------------------------------------------------------------------------------
 
 
 def saturated(u: float, limit: float) -> float:
-    """Return the torque that a drive with a symmetric ``limit`` delivers for the request ``u`` [N.m]."""
+    """Return the torque that a drive with a symmetric ``limit`` delivers for the request ``u`` [N.m].
+
+    Args:
+        u: what it follows [N.m].
+        limit: in the unit of what it limits.
+
+    Returns:
+        The torque.
+    """
     if u > limit:
         return limit
     if u < -limit:
@@ -26,6 +63,16 @@ def sliding_friction(speed: float, coulomb: float, sliding: float, breakaway: fl
 
     Coulomb friction plus Stribeck's curve, ``sliding + (breakaway - sliding) exp(-(speed/stribeck_speed)^2)``
     (Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, with exponent 2).
+
+    Args:
+        speed: [rad/s].
+        coulomb: Coulomb friction [N.m].
+        sliding: Stribeck's part at high speed [N.m].
+        breakaway: Stribeck's part at rest [N.m].
+        stribeck_speed: [rad/s].
+
+    Returns:
+        The magnitude.
     """
     if breakaway == 0.0 and sliding == 0.0:
         return coulomb
@@ -34,21 +81,286 @@ def sliding_friction(speed: float, coulomb: float, sliding: float, breakaway: fl
 
 
 def torque_ripple(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the torque [N.m] that a position-dependent ripple adds at the motor angle ``theta_m`` [rad]."""
+    """Return the torque [N.m] that a position-dependent ripple adds at the motor angle ``theta_m`` [rad].
+
+    Args:
+        theta_m: motor angle [rad].
+        amplitude: in the unit of the result.
+        cycles_per_rev: how often it repeats per revolution.
+        phase: at angle zero [rad].
+
+    Returns:
+        The torque.
+    """
     if amplitude == 0.0:
         return 0.0
-    return amplitude * sin(cycles_per_rev * theta_m + phase)
+    return amplitude * sine(cycles_per_rev * theta_m + phase)
+
+
+def periodic(angle: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
+    """Return ``amplitude sin(cycles_per_rev angle + phase)``, in the unit of the amplitude.
+
+    Args:
+        angle: [rad].
+        amplitude: in the unit of the result.
+        cycles_per_rev: how often it repeats per revolution.
+        phase: at angle zero [rad].
+
+    Returns:
+        The value.
+    """
+    if amplitude == 0.0:
+        return 0.0
+    return amplitude * sine(cycles_per_rev * angle + phase)
+
+
+def periodic_slope(angle: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
+    """Return the derivative of :func:`periodic` by the angle.
+
+    Args:
+        angle: [rad].
+        amplitude: in the unit of the result.
+        cycles_per_rev: how often it repeats per revolution.
+        phase: at angle zero [rad].
+
+    Returns:
+        The derivative, in the unit of the amplitude a radian.
+    """
+    if amplitude == 0.0:
+        return 0.0
+    return amplitude * cycles_per_rev * cosine(cycles_per_rev * angle + phase)
+
+
+def dependent_friction(
+    level: float, transmitted: float, coefficient: float, angle: float, amplitude: float, cycles: float, phase: float
+) -> float:
+    """Return the magnitude of dry friction [N.m] that depends on load torque and on position, never below zero.
+
+    Args:
+        level: its magnitude [N.m] without both.
+        transmitted: torque [N.m] that the bearing or the teeth carry.
+        coefficient: friction per transmitted torque.
+        angle: of the part [rad].
+        amplitude: of what repeats with the angle [N.m].
+        cycles: how often it repeats per revolution.
+        phase: its phase at angle zero [rad].
+
+    Returns:
+        The magnitude.
+    """
+    return max(0.0, level + coefficient * abs(transmitted) + periodic(angle, amplitude, cycles, phase))
+
+
+def spring_torque(angle: float, stiffness: float, cubic: float, rest: float) -> float:
+    """Return the torque [N.m] against a part of a spring or a cable that is at rest at the angle ``rest`` [rad].
+
+    Args:
+        angle: [rad].
+        stiffness: [N.m/rad].
+        cubic: [N.m/rad3].
+        rest: [rad].
+
+    Returns:
+        The torque.
+    """
+    if stiffness == 0.0 and cubic == 0.0:
+        return 0.0
+    way = angle - rest
+    return stiffness * way + cubic * way * way * way
+
+
+def end_stop_torque(
+    angle: float, speed: float, lower: float, upper: float, stiffness: float, dissipation: float
+) -> float:
+    """Return the torque [N.m] against a part of two end stops (Hunt and Crossley, J. Applied Mechanics 42(2), 1975).
+
+    Inside the stop by ``d`` and moving further in with ``v`` the stop pushes back by
+    ``stiffness d (1 + dissipation v)``; it never pulls.
+
+    Args:
+        angle: [rad].
+        speed: [rad/s].
+        lower: angle of the lower stop [rad].
+        upper: angle of the upper stop [rad].
+        stiffness: [N.m/rad].
+        dissipation: [s/rad].
+
+    Returns:
+        The torque.
+    """
+    if angle > upper:
+        return max(0.0, stiffness * (angle - upper) * (1.0 + dissipation * speed))
+    if angle < lower:
+        return min(0.0, stiffness * (angle - lower) * (1.0 - dissipation * speed))
+    return 0.0
+
+
+def set_in(depth: float, onset: float) -> float:
+    """Return which part (0 to 1) of the damping of teeth acts at a ``depth`` [rad], for damping that sets in slowly.
+
+    Args:
+        depth: of contact [rad].
+        onset: depth over which it sets in [rad].
+
+    Returns:
+        The part.
+    """
+    return 1.0 - exp(-abs(depth) / onset)
+
+
+def hysteresis_rate(memory: float, rate: float, width: float) -> float:
+    """Return the rate [1/s] of Bouc and Wen's hysteresis (-1 to 1), twisted at ``rate`` [rad/s] (exponent 1).
+
+    It turns round over the twist ``width`` [rad] (Wen, J. Engineering Mechanics 102(2), 1976).
+
+    Args:
+        memory: of the hysteresis, -1 to 1.
+        rate: of the twist [rad/s].
+        width: [rad].
+
+    Returns:
+        The rate.
+    """
+    return (rate - 0.5 * abs(rate) * memory - 0.5 * rate * abs(memory)) / width
+
+
+# --- friction that builds up -------------------------------------------------------------------------------
+
+
+def bristle_rate(bristle: float, speed: float, reach: float) -> float:
+    """Return the rate [rad/s] of a friction bristle (Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995).
+
+    Args:
+        bristle: its bending [rad].
+        speed: of the part [rad/s].
+        reach: bending [rad] at which it slides, in proportion to the friction at this speed.
+
+    Returns:
+        The rate.
+    """
+    return speed - abs(speed) * bristle / reach if reach > 0.0 else 0.0
+
+
+# --- drive -------------------------------------------------------------------------------------------------
+
+
+def request_rate(request: float, u: float, time_constant: float, limit: float) -> float:
+    """Return the rate [N.m/s] of a request that follows ``u`` [N.m] with a lag, never faster than ``limit``.
+
+    Without a lag the request must not be reached inside a step: :func:`ramp_time` tells when it is.
+
+    Args:
+        request: behind the lag, at the beginning [N.m].
+        u: what it follows [N.m].
+        time_constant: of the lag [s]; 0: none.
+        limit: in the unit of what it limits.
+
+    Returns:
+        The rate.
+    """
+    rate = (u - request) / max(time_constant, RAMP_END)
+    return saturated(rate, limit)
+
+
+def ramp_time(request: float, u: float, time_constant: float, limit: float) -> float:
+    """Return how long [s] a request that follows ``u`` [N.m] still changes at its ``limit`` [N.m/s].
+
+    Args:
+        request: behind the lag, at the beginning [N.m].
+        u: what it follows [N.m].
+        time_constant: of the lag [s]; 0: none.
+        limit: in the unit of what it limits.
+
+    Returns:
+        The time; 0.0: it does not.
+    """
+    return max(0.0, abs(u - request) / limit - time_constant)
+
+
+def ramp_target(request: float, u: float, time_constant: float, limit: float, duration: float) -> float:
+    """Return a request [N.m] so far away that what follows it changes at its ``limit`` for ``duration`` [s].
+
+    Args:
+        request: behind the lag, at the beginning [N.m].
+        u: what it follows [N.m].
+        time_constant: of the lag [s]; 0: none.
+        limit: in the unit of what it limits.
+        duration: [s].
+
+    Returns:
+        The request.
+    """
+    reach = 2.0 * limit * (duration + max(time_constant, RAMP_END))
+    return request + reach if u > request else request - reach
+
+
+def ramp_end(request: float, u: float, time_constant: float, limit: float) -> float:
+    """Return the request [N.m] at which a ramp towards ``u`` [N.m] ends.
+
+    Args:
+        request: behind the lag, at the beginning [N.m].
+        u: what it follows [N.m].
+        time_constant: of the lag [s]; 0: none.
+        limit: in the unit of what it limits.
+
+    Returns:
+        The request.
+    """
+    return u - limit * time_constant if u > request else u + limit * time_constant
+
+
+def followed_request(request: float, u: float, time_constant: float, limit: float, h: float) -> tuple[float, float]:
+    """Return a request that follows a held ``u`` [N.m] with a lag and a limited rate, after ``h`` [s], and its mean.
+
+    Args:
+        request: at the beginning [N.m].
+        u: what it follows [N.m].
+        time_constant: of the lag [s]; 0: none.
+        limit: largest rate [N.m/s].
+        h: duration [s].
+
+    Returns:
+        Both [N.m].
+    """
+    ramp = min(h, ramp_time(request, u, time_constant, limit))
+    slope = limit if u > request else -limit
+    total = (request + 0.5 * slope * ramp) * ramp
+    reached = request + slope * ramp
+    rest = h - ramp
+    if rest <= 0.0:
+        return (reached, total / h)
+    if time_constant == 0.0:
+        return (u, (total + u * rest) / h)
+    left = (u - reached) * exp(-rest / time_constant)
+    return (u - left, (total + u * rest - time_constant * (u - reached - left)) / h)
 
 
 def gravity_torque(theta_l: float, amplitude: float, phase: float) -> float:
-    """Return the torque against the load [N.m] of an unbalanced mass at the load angle ``theta_l`` [rad]."""
+    """Return the torque against the load [N.m] of an unbalanced mass at the load angle ``theta_l`` [rad].
+
+    Args:
+        theta_l: load angle [rad].
+        amplitude: in the unit of the result.
+        phase: at angle zero [rad].
+
+    Returns:
+        The torque.
+    """
     if amplitude == 0.0:
         return 0.0
-    return amplitude * sin(theta_l + phase)
+    return amplitude * sine(theta_l + phase)
 
 
 def quadratic_drag(omega_l: float, coefficient: float) -> float:
-    """Return the torque against the load [N.m] of a drag that grows with the square of its speed [rad/s]."""
+    """Return the torque against the load [N.m] of a drag that grows with the square of its speed [rad/s].
+
+    Args:
+        omega_l: speed of the load [rad/s].
+        coefficient: [N.m.s2/rad2].
+
+    Returns:
+        The torque.
+    """
     return coefficient * omega_l * abs(omega_l)
 
 
@@ -57,12 +369,30 @@ def directional_friction(speed: float, difference: float) -> float:
 
     Half of what the coefficients of the two directions differ by is ``difference`` [N.m.s/rad]: a torque
     ``b speed + difference |speed|`` is ``(b + difference) speed`` forward and ``(b - difference) speed`` backward.
+
+    Args:
+        speed: [rad/s].
+        difference: [N.m.s/rad].
+
+    Returns:
+        The torque.
     """
     return difference * abs(speed)
 
 
 def resonance_torque(angle: float, speed: float, inertia: float, frequency: float, damping_ratio: float) -> float:
-    """Return the torque [N.m] that drives a sprung inertia which lags the load by ``angle`` and ``speed``."""
+    """Return the torque [N.m] that drives a sprung inertia which lags the load by ``angle`` and ``speed``.
+
+    Args:
+        angle: [rad].
+        speed: [rad/s].
+        inertia: that is sprung [kg.m2].
+        frequency: its own, undamped [rad/s].
+        damping_ratio: without unit.
+
+    Returns:
+        The torque.
+    """
     return inertia * frequency * (frequency * angle + 2.0 * damping_ratio * speed)
 
 
@@ -70,19 +400,64 @@ def resonance_torque(angle: float, speed: float, inertia: float, frequency: floa
 
 
 def twist_error(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the twist [rad] that an eccentric gear adds at the motor angle ``theta_m`` [rad]."""
+    """Return the twist [rad] that an eccentric gear adds at the motor angle ``theta_m`` [rad].
+
+    Args:
+        theta_m: motor angle [rad].
+        amplitude: in the unit of the result.
+        cycles_per_rev: how often it repeats per revolution.
+        phase: at angle zero [rad].
+
+    Returns:
+        The twist.
+    """
     if amplitude == 0.0:
         return 0.0
-    return amplitude * sin(cycles_per_rev * theta_m + phase)
+    return amplitude * sine(cycles_per_rev * theta_m + phase)
 
 
 def twist_error_slope(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
-    """Return the derivative of :func:`twist_error` by ``theta_m`` [rad/rad]."""
+    """Return the derivative of :func:`twist_error` by ``theta_m`` [rad/rad].
+
+    Args:
+        theta_m: motor angle [rad].
+        amplitude: in the unit of the result.
+        cycles_per_rev: how often it repeats per revolution.
+        phase: at angle zero [rad].
+
+    Returns:
+        The derivative.
+    """
     if amplitude == 0.0:
         return 0.0
-    return amplitude * cycles_per_rev * cos(cycles_per_rev * theta_m + phase)
+    return amplitude * cycles_per_rev * cosine(cycles_per_rev * theta_m + phase)
+
+
+def twist_error_curvature(theta_m: float, amplitude: float, cycles_per_rev: float, phase: float) -> float:
+    """Return the second derivative of :func:`twist_error` by ``theta_m`` [rad/rad2].
+
+    Args:
+        theta_m: motor angle [rad].
+        amplitude: in the unit of the result.
+        cycles_per_rev: how often it repeats per revolution.
+        phase: at angle zero [rad].
+
+    Returns:
+        The second derivative.
+    """
+    if amplitude == 0.0:
+        return 0.0
+    return -amplitude * cycles_per_rev * cycles_per_rev * sine(cycles_per_rev * theta_m + phase)
 
 
 def hardening_torque(twist: float, cubic: float) -> float:
-    """Return what a cubic stiffness [N.m/rad3] adds to the torque of a shaft twisted by ``twist`` [rad]."""
+    """Return what a cubic stiffness [N.m/rad3] adds to the torque of a shaft twisted by ``twist`` [rad].
+
+    Args:
+        twist: [rad].
+        cubic: [N.m/rad3].
+
+    Returns:
+        The torque.
+    """
     return cubic * twist * twist * twist

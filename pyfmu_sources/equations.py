@@ -5,8 +5,9 @@ backlash of Nordin, Galic and Gutman (Int. J. Adaptive Control and Signal Proces
 
 Conventions, the same in every function:
 
-- ``x = (theta_m, omega_m, theta_l, omega_l, T_m, theta_r, omega_r, s)`` in rad, rad/s and N.m; ``r`` is the
-  inertia of ``extra_resonance``, ``s`` the twist that a shaft still has just after its teeth parted;
+- ``x = (theta_m, omega_m, theta_l, omega_l, T_m, theta_r, omega_r, s, z_m, z_l, w, y)`` in rad, rad/s and N.m; ``r``
+  is the inertia of ``extra_resonance``, ``s`` the twist that a shaft still has just after its teeth parted, ``z`` the
+  bristles of friction that builds up, ``w`` the memory of the shaft's hysteresis, ``y`` the filtered request;
 - ``mode = (contact, slip_m, slip_l)``: ``contact`` is the flank that touches (-1, 0, 1; -2 and 2: touching and
   standing still, ``hysteresis`` only), ``slip`` the direction in which dry friction slides (0: it sticks);
 - ``p`` is the flat parameter tuple of :mod:`drivetrain_parameters`;
@@ -15,12 +16,10 @@ Conventions, the same in every function:
 Torques are positive when they drive motor or load forward; ``T_l`` and the loads' effects act against the load.
 """
 
+from .backlash_models import GRADUAL, HELD, NEVER_PULLING, OWN_CONTACT, PLAIN_WHEN_CLOSED, RIGID
 from .drivetrain_parameters import (
-    DEAD_ZONE,
-    ELASTIC_IMPACT,
-    HYSTERESIS,
+    BIG,
     NONE,
-    NORDIN,
     P_ALPHA,
     P_B_L,
     P_B_M,
@@ -32,92 +31,204 @@ from .drivetrain_parameters import (
     P_COULOMB_L,
     P_COULOMB_M,
     P_CUBIC,
+    P_DIRECTION_L,
+    P_DIRECTION_M,
     P_DRAG,
     P_ECC,
     P_ECC_N,
     P_ECC_PHASE,
+    P_FILTER,
     P_GRAVITY,
     P_GRAVITY_PHASE,
+    P_HYSTERESIS,
+    P_HYSTERESIS_TWIST,
     P_I,
     P_J_L,
     P_J_M,
+    P_J_WAVE,
+    P_J_WAVE_N,
+    P_J_WAVE_PHASE,
     P_K,
+    P_K_WAVE,
+    P_K_WAVE_N,
+    P_K_WAVE_PHASE,
     P_LOAD_TORQUE,
+    P_LOADED_L,
+    P_LOADED_M,
     P_MODEL,
+    P_ONSET,
+    P_RATE,
     P_RES_J,
     P_RES_W,
     P_RES_ZETA,
     P_RIPPLE,
+    P_RIPPLE_2,
+    P_RIPPLE_2_PHASE,
+    P_RIPPLE_3,
+    P_RIPPLE_3_PHASE,
     P_RIPPLE_N,
     P_RIPPLE_PHASE,
+    P_SPRING,
+    P_SPRING_ANGLE,
+    P_SPRING_CUBIC,
+    P_STOP_D,
+    P_STOP_K,
+    P_STOP_LOWER,
+    P_STOP_UPPER,
     P_STRIBECK_L,
     P_STRIBECK_M,
     P_STRIBECK_SPEED_L,
     P_STRIBECK_SPEED_M,
     P_TAU,
-    RIGID_IMPACT,
+    P_WAVY_L,
+    P_WAVY_M,
+    P_WAVY_N_L,
+    P_WAVY_N_M,
+    P_WAVY_PHASE_L,
+    P_WAVY_PHASE_M,
 )
 from .effects import (
+    dependent_friction,
+    directional_friction,
+    end_stop_torque,
     gravity_torque,
     hardening_torque,
+    hysteresis_rate,
+    periodic,
+    periodic_slope,
     quadratic_drag,
+    request_rate,
     resonance_torque,
+    set_in,
     sliding_friction,
+    spring_torque,
     torque_ripple,
     twist_error,
+    twist_error_curvature,
     twist_error_slope,
 )
 
-State = tuple[float, float, float, float, float, float, float, float]
+State = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
 Mode = tuple[int, int, int]
 Parameters = tuple[float, ...]
 
+# An eccentric gear whose ratio passes through infinity has no meaning; below this slope the ratio is cut off.
+SMALLEST_SLOPE = 1e-12
+
 
 def backlash_model(p: Parameters) -> int:
-    """Return the backlash model that acts: without a gap, the elastic models are all ``NONE``."""
+    """Return the backlash model that acts: without a gap, the elastic models are all ``NONE``.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        Its number.
+    """
     model = int(p[P_MODEL])
-    if p[P_ALPHA] == 0.0 and model in (DEAD_ZONE, NORDIN):
+    if p[P_ALPHA] == 0.0 and model in PLAIN_WHEN_CLOSED:
         return NONE
     return model
 
 
 def is_rigid(p: Parameters) -> bool:
-    """Tell whether teeth in contact couple motor and load rigidly (``hysteresis``, ``rigid_impact``)."""
-    return int(p[P_MODEL]) in (HYSTERESIS, RIGID_IMPACT)
+    """Tell whether teeth in contact couple motor and load rigidly (``hysteresis``, ``rigid_impact``).
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        True when they do.
+    """
+    return int(p[P_MODEL]) in RIGID
 
 
 def teeth_never_pull(p: Parameters) -> bool:
-    """Tell whether the teeth part when their torque reaches zero (``nordin``, ``elastic_impact``)."""
-    return backlash_model(p) in (NORDIN, ELASTIC_IMPACT)
+    """Tell whether the teeth part when their torque reaches zero (``nordin``, ``elastic_impact``).
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        True when they do.
+    """
+    return backlash_model(p) in NEVER_PULLING
 
 
 def shaft_stiffness(p: Parameters) -> float:
-    """Return the stiffness [N.m/rad] of teeth in contact and shaft."""
-    return p[P_CONTACT_K] if int(p[P_MODEL]) == ELASTIC_IMPACT else p[P_K]
+    """Return the stiffness [N.m/rad] of teeth in contact and shaft.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The stiffness.
+    """
+    model = int(p[P_MODEL])  # whose teeth may have a stiffness of their own
+    return p[P_CONTACT_K] if model in OWN_CONTACT else p[P_K]
 
 
 def shaft_damping(p: Parameters) -> float:
-    """Return the damping [N.m.s/rad] of teeth in contact and shaft."""
-    return p[P_CONTACT_C] if int(p[P_MODEL]) == ELASTIC_IMPACT else p[P_C]
+    """Return the damping [N.m.s/rad] of teeth in contact and shaft.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The damping.
+    """
+    return p[P_CONTACT_C] if int(p[P_MODEL]) in OWN_CONTACT else p[P_C]
 
 
 def twist(x: State, p: Parameters) -> float:
-    """Return the twist [rad], ``theta_m / i - theta_l`` plus the error of an eccentric gear."""
+    """Return the twist [rad], ``theta_m / i - theta_l`` plus the error of an eccentric gear.
+
+    Args:
+        x: state, see the head of the module.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The twist.
+    """
     return x[0] / p[P_I] - x[2] + twist_error(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
 def twist_slope(x: State, p: Parameters) -> float:
-    """Return the derivative of the twist by the motor angle [rad/rad], which is 1/i for an ideal gear."""
+    """Return the derivative of the twist by the motor angle [rad/rad], which is 1/i for an ideal gear.
+
+    Args:
+        x: state, see the head of the module.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The derivative.
+    """
     return 1.0 / p[P_I] + twist_error_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
 def twist_rate(x: State, p: Parameters) -> float:
-    """Return the time derivative of the twist [rad/s]."""
+    """Return the time derivative of the twist [rad/s].
+
+    Args:
+        x: state, see the head of the module.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The rate.
+    """
     return x[1] * twist_slope(x, p) - x[3]
 
 
 def contact_of(angle: float, alpha: float) -> int:
-    """Return the flank (-1, 0, 1) at which a ``twist`` angle [rad] lies for a half-gap ``alpha`` [rad]."""
+    """Return the flank (-1, 0, 1) at which a ``twist`` angle [rad] lies for a half-gap ``alpha`` [rad].
+
+    Args:
+        angle: the twist [rad].
+        alpha: half-gap [rad].
+
+    Returns:
+        The flank.
+    """
     if angle > alpha:
         return 1
     if angle < -alpha:
@@ -126,49 +237,192 @@ def contact_of(angle: float, alpha: float) -> int:
 
 
 def elastic_torque(x: State, contact: int, p: Parameters) -> float:
-    """Return the load-side shaft torque [N.m] of an elastic model at the flank ``contact`` (eq. 2.6, mended)."""
+    """Return the load-side shaft torque [N.m] of an elastic model at the flank ``contact`` (eq. 2.6, mended).
+
+    Args:
+        x: state, see the head of the module.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
     if contact == 0:
         return 0.0
     offset = 0.0 if backlash_model(p) == NONE else contact * p[P_ALPHA]
     wound = twist(x, p) - offset
-    return shaft_stiffness(p) * wound + shaft_damping(p) * twist_rate(x, p) + hardening_torque(wound, p[P_CUBIC])
+    stiffness = shaft_stiffness(p)
+    damping = shaft_damping(p)
+    if p[P_K_WAVE] != 0.0:
+        stiffness *= 1.0 + periodic(x[0], p[P_K_WAVE], p[P_K_WAVE_N], p[P_K_WAVE_PHASE])
+    if p[P_ONSET] != 0.0 and int(p[P_MODEL]) in GRADUAL:
+        damping *= set_in(wound, p[P_ONSET])
+    torque = stiffness * wound + damping * twist_rate(x, p) + hardening_torque(wound, p[P_CUBIC])
+    if p[P_HYSTERESIS] != 0.0:
+        torque += p[P_HYSTERESIS] * x[10]
+    return torque
 
 
-def motor_torque(x: State, sign_m: float, p: Parameters) -> float:
-    """Return the torque on the motor [N.m] without the shaft's: drive, ripple, viscous and dry friction."""
-    friction = sliding_friction(x[1], p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M], p[P_STRIBECK_SPEED_M])
-    ripple = torque_ripple(x[0], p[P_RIPPLE], p[P_RIPPLE_N], p[P_RIPPLE_PHASE])
-    return x[4] + ripple - p[P_B_M] * x[1] - sign_m * friction
+def friction_m(x: State, transmitted: float, p: Parameters) -> float:
+    """Return the magnitude of the motor's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it.
+
+    Args:
+        x: state, see the head of the module.
+        transmitted: torque of the shaft that friction depends on [N.m].
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The magnitude.
+    """
+    level = sliding_friction(x[1], p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M], p[P_STRIBECK_SPEED_M])
+    if p[P_LOADED_M] == 0.0 and p[P_WAVY_M] == 0.0:
+        return level
+    return dependent_friction(level, transmitted, p[P_LOADED_M], x[0], p[P_WAVY_M], p[P_WAVY_N_M], p[P_WAVY_PHASE_M])
 
 
-def load_torque(x: State, sign_l: float, p: Parameters, T_l: float) -> float:
-    """Return the torque on the load [N.m] without the shaft's: external, friction, gravity, drag, resonance."""
-    friction = sliding_friction(x[3], p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L], p[P_STRIBECK_SPEED_L])
-    against = T_l + p[P_LOAD_TORQUE] + p[P_B_L] * x[3] + sign_l * friction
+def friction_l(x: State, transmitted: float, p: Parameters) -> float:
+    """Return the magnitude of the load's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it.
+
+    Args:
+        x: state, see the head of the module.
+        transmitted: torque of the shaft that friction depends on [N.m].
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The magnitude.
+    """
+    level = sliding_friction(x[3], p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L], p[P_STRIBECK_SPEED_L])
+    if p[P_LOADED_L] == 0.0 and p[P_WAVY_L] == 0.0:
+        return level
+    return dependent_friction(level, transmitted, p[P_LOADED_L], x[2], p[P_WAVY_L], p[P_WAVY_N_L], p[P_WAVY_PHASE_L])
+
+
+def ripple(theta_m: float, p: Parameters) -> float:
+    """Return the ripple of the motor's torque [N.m] with its harmonics.
+
+    Args:
+        theta_m: motor angle [rad].
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    cycles = p[P_RIPPLE_N]
+    torque = torque_ripple(theta_m, p[P_RIPPLE], cycles, p[P_RIPPLE_PHASE])
+    if p[P_RIPPLE_2] != 0.0 or p[P_RIPPLE_3] != 0.0:
+        torque += torque_ripple(theta_m, p[P_RIPPLE_2], 2.0 * cycles, p[P_RIPPLE_2_PHASE])
+        torque += torque_ripple(theta_m, p[P_RIPPLE_3], 3.0 * cycles, p[P_RIPPLE_3_PHASE])
+    return torque
+
+
+def motor_torque(x: State, transmitted: float, sign_m: float, p: Parameters) -> float:
+    """Return the torque on the motor [N.m] without the shaft's: drive, ripple, viscous and dry friction.
+
+    Args:
+        x: state, see the head of the module.
+        transmitted: torque of the shaft that friction depends on [N.m].
+        sign_m: direction of the motor's dry friction, -1 to 1.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    torque = x[4] + ripple(x[0], p) - p[P_B_M] * x[1] - sign_m * friction_m(x, transmitted, p)
+    if p[P_DIRECTION_M] != 0.0:
+        torque -= directional_friction(x[1], p[P_DIRECTION_M])
+    return torque
+
+
+def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l: float) -> float:
+    """Return the torque on the load [N.m] without the shaft's: external, friction, gravity, drag, springs, stops.
+
+    Args:
+        x: state, see the head of the module.
+        transmitted: torque of the shaft that friction depends on [N.m].
+        sign_l: the same of the load.
+        p: parameters, in the order of the FMU's table.
+        T_l: load torque [N.m].
+
+    Returns:
+        The torque.
+    """
+    against = T_l + p[P_LOAD_TORQUE] + p[P_B_L] * x[3] + sign_l * friction_l(x, transmitted, p)
     against += gravity_torque(x[2], p[P_GRAVITY], p[P_GRAVITY_PHASE]) + quadratic_drag(x[3], p[P_DRAG])
     if p[P_RES_J] > 0.0:
         against += resonance_torque(x[2] - x[5], x[3] - x[6], p[P_RES_J], p[P_RES_W], p[P_RES_ZETA])
+    if p[P_DIRECTION_L] != 0.0:
+        against += directional_friction(x[3], p[P_DIRECTION_L])
+    if p[P_SPRING] != 0.0 or p[P_SPRING_CUBIC] != 0.0:
+        against += spring_torque(x[2], p[P_SPRING], p[P_SPRING_CUBIC], p[P_SPRING_ANGLE])
+    if x[2] > p[P_STOP_UPPER] or x[2] < p[P_STOP_LOWER]:
+        against += end_stop_torque(x[2], x[3], p[P_STOP_LOWER], p[P_STOP_UPPER], p[P_STOP_K], p[P_STOP_D])
+    if p[P_J_WAVE] != 0.0:
+        against += 0.5 * periodic_slope(x[2], p[P_J_WAVE], p[P_J_WAVE_N], p[P_J_WAVE_PHASE]) * x[3] * x[3]
     return -against
 
 
+def load_inertia(x: State, p: Parameters) -> float:
+    """Return the load's inertia [kg.m2] at its angle; a wave larger than the inertia leaves a thousandth of it.
+
+    Args:
+        x: state, see the head of the module.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The inertia.
+    """
+    if p[P_J_WAVE] == 0.0:
+        return p[P_J_L]
+    return max(1e-3 * p[P_J_L], p[P_J_L] + periodic(x[2], p[P_J_WAVE], p[P_J_WAVE_N], p[P_J_WAVE_PHASE]))
+
+
+def gear(x: State, p: Parameters) -> float:
+    """Return motor angle over load angle [rad/rad] for small motions of rigid teeth: ``i``, unless eccentric.
+
+    Args:
+        x: state, see the head of the module.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The ratio.
+    """
+    if p[P_ECC] == 0.0:
+        return p[P_I]
+    slope = twist_slope(x, p)
+    return 1.0 / slope if abs(slope) > SMALLEST_SLOPE else 1.0 / SMALLEST_SLOPE
+
+
 def rigid_acceleration(x: State, sign_m: float, sign_l: float, p: Parameters, T_l: float) -> float:
-    """Return the load's acceleration [rad/s2] while gear and load turn as one body."""
-    i = p[P_I]
-    drive = i * motor_torque(x, sign_m, p) + load_torque(x, sign_l, p, T_l)
-    return drive / (p[P_J_M] * i * i + p[P_J_L])
+    """Return the load's acceleration [rad/s2] while gear and load turn as one body.
+
+    Args:
+        x: state, see the head of the module.
+        sign_m: direction of the motor's dry friction, -1 to 1.
+        sign_l: the same of the load.
+        p: parameters, in the order of the FMU's table.
+        T_l: load torque [N.m].
+
+    Returns:
+        The acceleration.
+    """
+    i = gear(x, p)
+    drive = i * motor_torque(x, 0.0, sign_m, p) + load_torque(x, 0.0, sign_l, p, T_l)
+    if p[P_ECC] != 0.0:
+        drive += p[P_J_M] * i * i * gear_acceleration(x, p)
+    return drive / (p[P_J_M] * i * i + load_inertia(x, p))
 
 
-def shaft_torque(x: State, mode: Mode, p: Parameters, T_l: float) -> float:
-    """Return the torque [N.m] that the shaft exerts on the load, whatever the model."""
-    contact = mode[0]
-    if contact == 0:
-        return 0.0
-    if not is_rigid(p):
-        return elastic_torque(x, contact, p)
-    if contact in (-2, 2):
-        return -load_torque(x, 0.0, p, T_l)
-    accelerated = rigid_acceleration(x, float(mode[1]), float(mode[2]), p, T_l)
-    return p[P_J_L] * accelerated - load_torque(x, float(mode[2]), p, T_l)
+def gear_acceleration(x: State, p: Parameters) -> float:
+    """Return the load's acceleration [rad/s2] that an eccentric gear makes of a constant motor speed.
+
+    Args:
+        x: state, see the head of the module.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The acceleration.
+    """
+    return twist_error_curvature(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE]) * x[1] * x[1]
 
 
 def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u: float, T_l: float) -> State:
@@ -182,6 +436,9 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
         p: parameters.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
+
+    Returns:
+        The derivative.
     """
     wound_rate = 0.0
     if contact == 0 and x[7] != 0.0:
@@ -192,23 +449,45 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
         pull = resonance_torque(x[2] - x[5], x[3] - x[6], p[P_RES_J], p[P_RES_W], p[P_RES_ZETA])
         follower = pull / p[P_RES_J]
     lag = (u - x[4]) / p[P_TAU]
+    follows = 0.0
+    if p[P_FILTER] > 0.0 or p[P_RATE] < BIG:
+        lag = (x[11] - x[4]) / p[P_TAU]
+        follows = request_rate(x[11], u, p[P_FILTER], p[P_RATE])
+    memory = 0.0
     if is_rigid(p):
         accelerated_m, accelerated_l = rigid_rates(x, contact, sign_m, sign_l, p, T_l)
     else:
         shaft = elastic_torque(x, contact, p)
-        accelerated_m = (motor_torque(x, sign_m, p) - shaft * twist_slope(x, p)) / p[P_J_M]
-        accelerated_l = (load_torque(x, sign_l, p, T_l) + shaft) / p[P_J_L]
-    return (x[1], accelerated_m, x[3], accelerated_l, lag, x[6], follower, wound_rate)
+        transmitted = shaft * twist_slope(x, p)
+        accelerated_m = (motor_torque(x, transmitted, sign_m, p) - transmitted) / p[P_J_M]
+        accelerated_l = (load_torque(x, shaft, sign_l, p, T_l) + shaft) / load_inertia(x, p)
+        if p[P_HYSTERESIS] != 0.0 and contact != 0:
+            memory = hysteresis_rate(x[10], twist_rate(x, p), p[P_HYSTERESIS_TWIST])
+    return (x[1], accelerated_m, x[3], accelerated_l, lag, x[6], follower, wound_rate, 0.0, 0.0, memory, follows)
 
 
 def rigid_rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, T_l: float) -> tuple[float, float]:
-    """Return both accelerations [rad/s2] of the rigid models (eqs. 2.3 to 2.5)."""
+    """Return both accelerations [rad/s2] of the rigid models (eqs. 2.3 to 2.5).
+
+    Args:
+        x: state, see the head of the module.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        sign_m: direction of the motor's dry friction, -1 to 1.
+        sign_l: the same of the load.
+        p: parameters, in the order of the FMU's table.
+        T_l: load torque [N.m].
+
+    Returns:
+        Motor's and load's.
+    """
     if contact in (-2, 2):
         return (0.0, 0.0)
     if contact != 0:
         together = rigid_acceleration(x, sign_m, sign_l, p, T_l)
-        return (together * p[P_I], together)
-    alone = motor_torque(x, sign_m, p) / p[P_J_M]
-    if int(p[P_MODEL]) == HYSTERESIS:
+        if p[P_ECC] == 0.0:
+            return (together * p[P_I], together)
+        return ((together - gear_acceleration(x, p)) * gear(x, p), together)
+    alone = motor_torque(x, 0.0, sign_m, p) / p[P_J_M]
+    if int(p[P_MODEL]) in HELD:
         return (alone, 0.0)
-    return (alone, load_torque(x, sign_l, p, T_l) / p[P_J_L])
+    return (alone, load_torque(x, 0.0, sign_l, p, T_l) / load_inertia(x, p))

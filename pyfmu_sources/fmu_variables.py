@@ -24,7 +24,7 @@ class Variable(NamedTuple):
 
     ``minimum`` and ``maximum`` are closed bounds, and finiteness is demanded where there are none. ``depends_on``
     names the inputs from which an output is computed at the same communication point; ``starts_from``
-    names what determines its initial value.
+    names what determines its initial value; ``derivative_of`` the state whose derivative it is.
     """
 
     name: str
@@ -40,6 +40,7 @@ class Variable(NamedTuple):
     declared_type: str = ""
     depends_on: tuple[str, ...] = ()
     starts_from: tuple[str, ...] = ()
+    derivative_of: str = ""
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -51,6 +52,13 @@ class Variable(NamedTuple):
 
 def with_starts(variables: tuple[Variable, ...], starts: dict[str, float]) -> tuple[Variable, ...]:
     """Return the table with other start values.
+
+    Args:
+        variables: the table.
+        starts: value by name.
+
+    Returns:
+        The table.
 
     Raises:
         ValueError: a name is unknown or not a parameter, or a value is outside its bounds.
@@ -69,6 +77,12 @@ def with_starts(variables: tuple[Variable, ...], starts: dict[str, float]) -> tu
 
 def unit_exponents(unit: str) -> Exponents:
     """Return the exponents of the SI base units (and rad) in a unit such as ``N.m.s2/rad2`` or ``rad/(N.m)``.
+
+    Args:
+        unit: its name.
+
+    Returns:
+        Exponent by base unit; none is zero.
 
     Raises:
         ValueError: the unit has a symbol that is not in ``SYMBOLS``.

@@ -16,16 +16,35 @@ Gain = tuple[
     tuple[float, float],
     tuple[float, float],
 ]
+Weight = tuple[float, float, float]
 Update = tuple[Vector6, float, float, float]
 
 
 def product(row: Vector6, x: Vector6) -> float:
-    """Return the scalar product of two vectors of six."""
+    """Return the scalar product of two vectors of six.
+
+    Args:
+        row: the one.
+        x: the other.
+
+    Returns:
+        Their product.
+    """
     return row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3] * x[3] + row[4] * x[4] + row[5] * x[5]
 
 
 def predict(x: Vector6, u: float, A: Matrix6, B: Vector6) -> Vector6:
-    """Return the state one sample later with the torque request ``u`` [N.m] held."""
+    """Return the state one sample later with the torque request ``u`` [N.m] held.
+
+    Args:
+        x: corrected state.
+        u: [N.m].
+        A: discrete state matrix.
+        B: discrete input vector.
+
+    Returns:
+        The predicted state.
+    """
     return (
         product(A[0], x) + B[0] * u,
         product(A[1], x) + B[1] * u,
@@ -36,7 +55,7 @@ def predict(x: Vector6, u: float, A: Matrix6, B: Vector6) -> Vector6:
     )
 
 
-def correct(x: Vector6, theta_m: float, theta_l: float, L: Gain, weight: tuple[float, float, float]) -> Update:
+def correct(x: Vector6, theta_m: float, theta_l: float, L: Gain, weight: Weight) -> Update:
     """Return the corrected state, both innovations [rad] and the normalised innovation squared.
 
     Args:
@@ -45,6 +64,9 @@ def correct(x: Vector6, theta_m: float, theta_l: float, L: Gain, weight: tuple[f
         theta_l: measured load angle [rad].
         L: gain, 6 x 2.
         weight: ``(S11, S12, S22)`` of the inverse innovation covariance [1/rad2].
+
+    Returns:
+        The four.
     """
     e_m = theta_m - x[0]
     e_l = theta_l - x[2]
@@ -68,7 +90,7 @@ def update(
     A: Matrix6,
     B: Vector6,
     L: Gain,
-    weight: tuple[float, float, float],
+    weight: Weight,
 ) -> Update:
     """Return :func:`correct` after :func:`predict`: one sample of the filter.
 
@@ -81,5 +103,8 @@ def update(
         B: discrete input vector.
         L: gain.
         weight: inverse innovation covariance.
+
+    Returns:
+        The four.
     """
     return correct(predict(x, u, A, B), theta_m, theta_l, L, weight)

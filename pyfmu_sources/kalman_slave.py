@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from . import kalman
 from .fmu_variables import Variable
+from .kalman import Gain, Matrix6, Vector6, Weight
 from .sampled_slave import SampledSlave
 
 U, THETA_M, THETA_L, FIRST_ESTIMATE = range(4)
@@ -89,17 +90,39 @@ class KalmanEstimator(SampledSlave):
         *_matrices(),
     )
 
+    _A: Matrix6
+    _B: Vector6
+    _K: Gain
+    _weight: Weight
+    _estimate: Vector6
+    _predicted: Vector6
+
     def take_parameters(self) -> None:
         """Collect the model and the gain."""
         values = self.real
-        self._A: Any = tuple(tuple(values[FIRST_A + 6 * r + c] for c in range(6)) for r in range(6))
-        self._B: Any = tuple(values[FIRST_B + r] for r in range(6))
-        self._K: Any = tuple((values[FIRST_K + 2 * r], values[FIRST_K + 2 * r + 1]) for r in range(6))
+        n = FIRST_A
+        self._A = (
+            self._six(n),
+            self._six(n + 6),
+            self._six(n + 12),
+            self._six(n + 18),
+            self._six(n + 24),
+            self._six(n + 30),
+        )
+        self._B = self._six(FIRST_B)
+        k = self._six(FIRST_K)
+        m = self._six(FIRST_K + 6)
+        self._K = ((k[0], k[1]), (k[2], k[3]), (k[4], k[5]), (m[0], m[1]), (m[2], m[3]), (m[4], m[5]))
         self._weight = (values[FIRST_S], values[FIRST_S + 1], values[FIRST_S + 2])
+
+    def _six(self, first: int) -> Vector6:
+        """Return six values in a row."""
+        real = self.real
+        return (real[first], real[first + 1], real[first + 2], real[first + 3], real[first + 4], real[first + 5])
 
     def begin(self) -> None:
         """Report the initial estimate; the first measurement counts at the end of the first sample period."""
-        start: Any = tuple(self.real[FIRST_START + n] for n in range(6))
+        start = self._six(FIRST_START)
         self._predicted = start
         self._report(start, 0.0, 0.0, 0.0)
 
@@ -110,23 +133,15 @@ class KalmanEstimator(SampledSlave):
     def correct(self) -> None:
         """Correct the prediction with the measurement."""
         real = self.real
-        self._report(*kalman.correct(self._predicted, real[THETA_M], real[THETA_L], self._K, self._weight))
+        estimate, innovation_m, innovation_l, squared = kalman.correct(
+            self._predicted, real[THETA_M], real[THETA_L], self._K, self._weight
+        )
+        self._report(estimate, innovation_m, innovation_l, squared)
 
-    def _report(self, estimate: Any, innovation_m: float, innovation_l: float, squared: float) -> None:
+    def _report(self, estimate: Vector6, innovation_m: float, innovation_l: float, squared: float) -> None:
         real = self.real
         self._estimate = estimate
         real[3], real[4], real[5], real[6], real[7], real[8] = estimate  # from FIRST_ESTIMATE on
         real[INNOVATION_M] = innovation_m
         real[INNOVATION_L] = innovation_l
         real[INNOVATION_SQUARED] = squared
-
-    def saved(self) -> Any:
-        """Return the clock, the estimate and the prediction that the present sample corrects."""
-        return [super().saved(), self._estimate, self._predicted]
-
-    def restore(self, saved: Any) -> None:
-        """Take over a saved state."""
-        clock, estimate, predicted = saved
-        super().restore(clock)
-        self._estimate = tuple(estimate)
-        self._predicted = tuple(predicted)

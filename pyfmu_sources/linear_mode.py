@@ -9,9 +9,10 @@ needs no series: one product with the transition matrix, made once for each step
 """
 
 from math import ceil, sqrt
+from typing import Annotated
 
+from .backlash_models import BOUNCING, HELD
 from .drivetrain_parameters import (
-    HYSTERESIS,
     NONE,
     P_ALPHA,
     P_B_L,
@@ -21,7 +22,6 @@ from .drivetrain_parameters import (
     P_J_M,
     P_MODEL,
     P_TAU,
-    RIGID_IMPACT,
 )
 from .equations import Parameters, backlash_model, is_rigid, shaft_damping, shaft_stiffness, teeth_never_pull
 
@@ -32,22 +32,36 @@ Transition = tuple[Row, Row, Row, Row, Row]
 
 ELASTIC, COUPLED, LOAD_HELD, AT_REST = range(4)
 TERMS = 20
+# Lists have a capacity, so that they can be translated to C.
+Coefficients = Annotated[list[State6], TERMS + 1]
+Series = Annotated[list[float], TERMS + 1]
 # An event counts when its guard is below minus this many roundings of the angles that make it.
 GUARD_ROUNDINGS = 16.0
 EPSILON = 2.220446049250313e-16
 MAX_MARCH = 400
+# A law so stiff that a step would need more Taylor steps than this is brought over it by doubling a shorter one.
+MOST_PIECES = 512.0
+MOST_DOUBLINGS = 200
 # The march ends at this part of the tolerance, which it can only approach from above.
 REACHED = 0.01
 
 
 def law_of(contact: int, p: Parameters) -> Law:
-    """Return (kind, stiffness, damping, offset) of the linear law that holds at ``contact``."""
+    """Return (kind, stiffness, damping, offset) of the linear law that holds at ``contact``.
+
+    Args:
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The four.
+    """
     if is_rigid(p):
         if contact in (-2, 2):
             return (AT_REST, 0.0, 0.0, 0.0)
         if contact != 0:
             return (COUPLED, 0.0, 0.0, contact * p[P_ALPHA])
-        kind = LOAD_HELD if int(p[P_MODEL]) == HYSTERESIS else ELASTIC
+        kind = LOAD_HELD if int(p[P_MODEL]) in HELD else ELASTIC
         return (kind, 0.0, 0.0, 0.0)
     if contact == 0:
         return (ELASTIC, 0.0, 0.0, 0.0)
@@ -56,7 +70,19 @@ def law_of(contact: int, p: Parameters) -> Law:
 
 
 def linear_rates(x: State6, constant: float, law: Law, p: Parameters, u: float, T_l: float) -> State6:
-    """Return ``x'`` for ``constant`` = 1 and its linear part for ``constant`` = 0 (``s`` left to its decay)."""
+    """Return ``x'`` for ``constant`` = 1 and its linear part for ``constant`` = 0 (``s`` left to its decay).
+
+    Args:
+        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
+        constant: 1: with inputs and offsets; 0: the linear part alone.
+        law: kind, stiffness, damping and offset of the linear law.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        The derivative.
+    """
     kind, stiffness, damping, offset = law
     i = p[P_I]
     lag = (constant * u - x[4]) / p[P_TAU]
@@ -74,14 +100,29 @@ def linear_rates(x: State6, constant: float, law: Law, p: Parameters, u: float, 
 
 
 def fastest_rate(law: Law, p: Parameters) -> float:
-    """Return a bound [1/s] on the rates of the linear law, by which Taylor steps are scaled."""
+    """Return a bound [1/s] on the rates of the linear law, by which Taylor steps are scaled.
+
+    Args:
+        law: kind, stiffness, damping and offset of the linear law.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The bound.
+    """
     mobility = 1.0 / p[P_J_L] + 1.0 / (p[P_J_M] * p[P_I] * p[P_I])
     friction = p[P_B_M] / p[P_J_M] + p[P_B_L] / p[P_J_L] + 1.0 / p[P_TAU]
     return sqrt(law[1] * mobility) + law[2] * mobility + friction
 
 
 def relaxation_rate(p: Parameters) -> float:
-    """Return the rate [1/s] at which a parted shaft unwinds; zero where it does so at once or has none."""
+    """Return the rate [1/s] at which a parted shaft unwinds; zero where it does so at once or has none.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The rate.
+    """
     damping = shaft_damping(p)
     stiffness = shaft_stiffness(p)
     if not teeth_never_pull(p) or damping == 0.0 or stiffness > 1e7 * damping:
@@ -89,9 +130,22 @@ def relaxation_rate(p: Parameters) -> float:
     return stiffness / damping
 
 
-def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float, kappa: float) -> list[State6]:
-    """Return the Taylor coefficients of the state, scaled so that time runs from 0 to 1 over ``step`` [s]."""
-    coefficients = [x]
+def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float, kappa: float) -> Coefficients:
+    """Return the Taylor coefficients of the state, scaled so that time runs from 0 to 1 over ``step`` [s].
+
+    Args:
+        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
+        law: kind, stiffness, damping and offset of the linear law.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        step: over which it is expanded [s].
+        kappa: rate at which a parted shaft unwinds [1/s].
+
+    Returns:
+        ``TERMS + 1`` states.
+    """
+    coefficients: Coefficients = [x]
     term = x
     for n in range(1, TERMS + 1):
         rate = linear_rates(term, 1.0 if n == 1 else 0.0, law, p, u, T_l)
@@ -101,8 +155,16 @@ def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float
     return coefficients
 
 
-def evaluate(coefficients: list[State6], time: float) -> State6:
-    """Return the state of a scaled Taylor series at ``time`` in [0, 1]."""
+def evaluate(coefficients: Coefficients, time: float) -> State6:
+    """Return the state of a scaled Taylor series at ``time`` in [0, 1].
+
+    Args:
+        coefficients: of the scaled Taylor series, one state each.
+        time: 0 to 1.
+
+    Returns:
+        The state.
+    """
     a, b, c, d, e, f = coefficients[TERMS]
     for n in range(TERMS - 1, -1, -1):
         term = coefficients[n]
@@ -116,7 +178,15 @@ def evaluate(coefficients: list[State6], time: float) -> State6:
 
 
 def guard_count(contact: int, p: Parameters) -> int:
-    """Return how many ways the mode ``contact`` can end."""
+    """Return how many ways the mode ``contact`` can end.
+
+    Args:
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        0, 1 or 2.
+    """
     if backlash_model(p) == NONE or (is_rigid(p) and p[P_ALPHA] == 0.0):
         return 0
     return 2 if contact in (0, -2, 2) else 1
@@ -126,6 +196,18 @@ def guard(x: State6, constant: float, contact: int, which: int, p: Parameters, u
     """Return the guard ``which`` of the mode ``contact``; the mode ends when it turns negative.
 
     Guards are affine in the state; ``constant`` = 0 asks for their linear part.
+
+    Args:
+        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
+        constant: 1: with inputs and offsets; 0: the linear part alone.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        which: number of the guard.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        The guard, in rad, N.m or rad/s.
     """
     model = int(p[P_MODEL])
     i = p[P_I]
@@ -138,9 +220,9 @@ def guard(x: State6, constant: float, contact: int, which: int, p: Parameters, u
         if which == 0:
             return side * x[4]
         return -side * (i * x[4] - constant * T_l)
-    if model == HYSTERESIS:
+    if model in HELD:
         return side * x[1]
-    if model == RIGID_IMPACT:
+    if model in BOUNCING:
         rate = linear_rates(x, constant, (COUPLED, 0.0, 0.0, 0.0), p, u, T_l)
         return side * (p[P_J_L] * rate[3] + p[P_B_L] * x[3] + constant * T_l)
     if teeth_never_pull(p):
@@ -150,7 +232,16 @@ def guard(x: State6, constant: float, contact: int, which: int, p: Parameters, u
 
 
 def guard_tolerance(x: State6, contact: int, p: Parameters) -> float:
-    """Return how far below zero rounding alone can take a guard."""
+    """Return how far below zero rounding alone can take a guard.
+
+    Args:
+        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The distance, in the guard's unit.
+    """
     angles = GUARD_ROUNDINGS * EPSILON * (1.0 + abs(x[0] / p[P_I]) + abs(x[2]) + p[P_ALPHA])
     if contact != 0 and teeth_never_pull(p):
         return angles * max(1.0, shaft_stiffness(p))
@@ -159,13 +250,24 @@ def guard_tolerance(x: State6, contact: int, p: Parameters) -> float:
     return angles
 
 
-def first_event(coefficients: list[State6], contact: int, p: Parameters, u: float, T_l: float) -> tuple[float, int]:
-    """Return (time in [0, 1], guard) of the first event of a scaled Taylor series, or (1, -1)."""
+def first_event(coefficients: Coefficients, contact: int, p: Parameters, u: float, T_l: float) -> tuple[float, int]:
+    """Return (time in [0, 1], guard) of the first event of a scaled Taylor series, or (1, -1).
+
+    Args:
+        coefficients: of the scaled Taylor series, one state each.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        Both.
+    """
     earliest = 1.0
     which = -1
     tolerance = guard_tolerance(coefficients[0], contact, p)
     for candidate in range(guard_count(contact, p)):
-        series = [guard(coefficients[0], 1.0, contact, candidate, p, u, T_l) + tolerance]
+        series: Series = [guard(coefficients[0], 1.0, contact, candidate, p, u, T_l) + tolerance]
         for n in range(1, TERMS + 1):
             series.append(guard(coefficients[n], 0.0, contact, candidate, p, u, T_l))
         time = first_root(series, earliest, tolerance)
@@ -175,12 +277,20 @@ def first_event(coefficients: list[State6], contact: int, p: Parameters, u: floa
     return (earliest, which)
 
 
-def first_root(series: list[float], end: float, tolerance: float) -> float:
+def first_root(series: Series, end: float, tolerance: float) -> float:
     """Return the first root in [0, ``end``) of a polynomial that starts positive, or ``end``.
 
     March by the earliest moment at which a root is possible: with value v, slope s and a bound L on the
     curvature that is the positive root of ``v + s t - L t^2 / 2``. No root is stepped over, and the
     march converges to a simple root quadratically.
+
+    Args:
+        series: coefficients of the polynomial.
+        end: of the interval.
+        tolerance: values below it count as zero.
+
+    Returns:
+        The root.
     """
     if series[0] <= REACHED * tolerance:
         if series[1] < -tolerance:
@@ -209,12 +319,32 @@ def first_root(series: list[float], end: float, tolerance: float) -> float:
 
 
 def column(x: State6, start: State6) -> Row:
-    """Return what a unit start value has added to each state."""
+    """Return what a unit start value has added to each state.
+
+    Args:
+        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
+        start: state at the beginning.
+
+    Returns:
+        The row.
+    """
     return (x[0] - start[0], x[1] - start[1], x[2] - start[2], x[3] - start[3], x[4] - start[4], 0.0)
 
 
 def propagate(x: State6, law: Law, p: Parameters, u: float, T_l: float, h: float) -> State6:
-    """Return the state after ``h`` [s] in one linear mode, whatever its guards say."""
+    """Return the state after ``h`` [s] in one linear mode, whatever its guards say.
+
+    Args:
+        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
+        law: kind, stiffness, damping and offset of the linear law.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+
+    Returns:
+        The state.
+    """
     count = max(1, ceil(h * fastest_rate(law, p)))
     for _ in range(count):
         x = evaluate(taylor(x, law, p, u, T_l, h / count, 0.0), 1.0)
@@ -222,8 +352,21 @@ def propagate(x: State6, law: Law, p: Parameters, u: float, T_l: float, h: float
 
 
 def transition(law: Law, p: Parameters, h: float) -> Transition:
-    """Return the five rows by which ``(twist, omega_m, omega_l, T_m, u, T_l)`` moves the state in ``h`` [s]."""
+    """Return the five rows by which ``(twist, omega_m, omega_l, T_m, u, T_l)`` moves the state in ``h`` [s].
+
+    Args:
+        law: kind, stiffness, damping and offset of the linear law.
+        p: parameters, in the order of the FMU's table.
+        h: length of the step [s].
+
+    Returns:
+        Five rows.
+    """
     free = (law[0], law[1], law[2], 0.0)
+    doublings = 0
+    while h * fastest_rate(law, p) > MOST_PIECES and doublings < MOST_DOUBLINGS:
+        h *= 0.5
+        doublings += 1
     zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     wound = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
     motor = (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
@@ -235,10 +378,79 @@ def transition(law: Law, p: Parameters, h: float) -> Transition:
     d = column(propagate(torque, free, p, 0.0, 0.0, h), torque)
     e = column(propagate(zero, free, p, 1.0, 0.0, h), zero)
     f = column(propagate(zero, free, p, 0.0, 1.0, h), zero)
-    return (
+    rows = (
         (a[0], b[0], c[0], d[0], e[0], f[0]),
         (a[1], b[1], c[1], d[1], e[1], f[1]),
         (a[2], b[2], c[2], d[2], e[2], f[2]),
         (a[3], b[3], c[3], d[3], e[3], f[3]),
         (a[4], b[4], c[4], d[4], e[4], f[4]),
     )
+    for _ in range(doublings):
+        rows = doubled(rows, p[P_I])
+    return rows
+
+
+def doubled(rows: Transition, i: float) -> Transition:
+    """Return the transition rows of two steps in a row: a stiff law needs too many Taylor steps for one.
+
+    Args:
+        rows: of the transition.
+        i: gear ratio.
+
+    Returns:
+        Five rows.
+    """
+    r0, r1, r2, r3, r4 = rows
+    wound = added(scaled(r0, 1.0 / i), scaled(r2, -1.0))
+    return (
+        added(r0, followed(r0, wound, r1, r3, r4)),
+        added(r1, followed(r1, wound, r1, r3, r4)),
+        added(r2, followed(r2, wound, r1, r3, r4)),
+        added(r3, followed(r3, wound, r1, r3, r4)),
+        added(r4, followed(r4, wound, r1, r3, r4)),
+    )
+
+
+def scaled(row: Row, f: float) -> Row:
+    """Return ``f row``.
+
+    Args:
+        row: six numbers.
+        f: factor.
+
+    Returns:
+        Six numbers.
+    """
+    return (f * row[0], f * row[1], f * row[2], f * row[3], f * row[4], f * row[5])
+
+
+def added(a: Row, b: Row) -> Row:
+    """Return ``a + b``.
+
+    Args:
+        a: six numbers.
+        b: six numbers.
+
+    Returns:
+        Six numbers.
+    """
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
+
+
+def followed(row: Row, wound: Row, motor: Row, load: Row, torque: Row) -> Row:
+    """Return what ``row`` adds in a step that starts where a step with the given rows has ended.
+
+    Args:
+        row: of the second step.
+        wound: row of the twist of the first step.
+        motor: row of the motor's speed.
+        load: row of the load's speed.
+        torque: row of the drive's torque.
+
+    Returns:
+        The row of both steps.
+    """
+    moved = added(
+        added(scaled(wound, row[0]), scaled(motor, row[1])), added(scaled(load, row[2]), scaled(torque, row[3]))
+    )
+    return added(row, moved)

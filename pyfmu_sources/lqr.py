@@ -28,6 +28,9 @@ def control(
         i: gear ratio.
         compliance: 1/k of the shaft [rad/(N.m)].
         u_max: torque limit [N.m].
+
+    Returns:
+        The torque, within the limit.
     """
     theta_m, omega_m, theta_l, omega_l, T_l, T_m = estimate
     k1, k2, k3, k4, k5 = gains

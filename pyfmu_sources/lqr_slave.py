@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from operator import itemgetter
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from .fmu_variables import Variable
-from .lqr import control
+from .lqr import Gains, control
 from .sampled_slave import SampledSlave
 
 REFERENCE, REFERENCE_SPEED, FIRST_ESTIMATE = range(3)
@@ -35,9 +34,6 @@ _INPUT_NAMES = tuple(name for name, _, _ in _INPUTS)
 _PARAMETER_NAMES = (*(name for name, _, _ in _GAINS), "i", "compliance", "u_max")
 
 
-_estimate: Any = itemgetter(*range(FIRST_ESTIMATE, FIRST_ESTIMATE + 6))
-
-
 class LqrController(SampledSlave):
     """Sampled-data state feedback with the load torque fed forward and the torque limited."""
 
@@ -63,11 +59,18 @@ class LqrController(SampledSlave):
         Variable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
     )
 
+    _gains: Gains
+
     def take_parameters(self) -> None:
-        """Collect gains, gear ratio, compliance and limit."""
+        """Collect the gains."""
         real = self.real
-        self._gains: Any = tuple(real[FIRST_GAIN + n] for n in range(5))
-        self._rest = (real[I], real[COMPLIANCE], real[U_MAX])
+        self._gains = (
+            real[FIRST_GAIN],
+            real[FIRST_GAIN + 1],
+            real[FIRST_GAIN + 2],
+            real[FIRST_GAIN + 3],
+            real[FIRST_GAIN + 4],
+        )
 
     def begin(self) -> None:
         """Compute the first torque request."""
@@ -76,4 +79,8 @@ class LqrController(SampledSlave):
     def correct(self) -> None:
         """Compute the torque request of this sample."""
         real = self.real
-        real[U] = control(real[REFERENCE], real[REFERENCE_SPEED], _estimate(real), self._gains, *self._rest)
+        # One index each: this runs at every sample.
+        estimate = (real[2], real[3], real[4], real[5], real[6], real[7])
+        real[U] = control(
+            real[REFERENCE], real[REFERENCE_SPEED], estimate, self._gains, real[I], real[COMPLIANCE], real[U_MAX]
+        )

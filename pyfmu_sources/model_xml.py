@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 from xml.etree.ElementTree import Element, SubElement
 
+from .backlash_models import MODELS
 from .fmu_variables import Variable, unit_exponents
-
-if TYPE_CHECKING:
-    from .slave_base import SlaveBase
 
 AUTHOR = "backlash-cosim project"
 LICENSE = "MIT"
-VERSION = "0.1.0"
+VERSION = "0.2.0"
 # A fixed date: the same sources give the same bytes on every day.
 DATE = "2026-01-01T00:00:00Z"
-ENUMERATIONS = {
-    "BacklashModel": (
-        ("none", "Elastic shaft without a gap"),
-        ("dead_zone", "Elastic shaft behind a dead zone"),
-        ("nordin", "Elastic shaft behind a gap, the teeth never pull"),
-        ("hysteresis", "Play: the load follows the motor at either flank, else stands still"),
-        ("rigid_impact", "Rigid bodies that collide with a coefficient of restitution"),
-        ("elastic_impact", "Bodies that collide through a contact stiffness and damping"),
-    )
-}
+ENUMERATIONS = {"BacklashModel": tuple((model.name, model.description) for model in MODELS)}
 LOG_CATEGORIES = (
     ("logStatusWarning", "Something a user should know; the call was carried out"),
     ("logStatusDiscard", "A value or a step was refused; the simulation can go on"),
@@ -34,8 +23,26 @@ LOG_CATEGORIES = (
 )
 
 
-def model_description(slave: type[SlaveBase], name: str) -> Element:
-    """Return the root element; GUID and model identifier of the build are put in by the builder."""
+class Described(Protocol):
+    """What the description says of a class of slaves."""
+
+    title: str
+    table: tuple[Variable, ...]
+    stop_time: float
+    step_size: float
+    variable_step: bool
+
+
+def model_description(slave: Described, name: str) -> Element:
+    """Return the root element; GUID and model identifier of the build are put in by the builder.
+
+    Args:
+        slave: class of the adapter.
+        name: of the model.
+
+    Returns:
+        The element.
+    """
     root = Element(
         "fmiModelDescription",
         {
@@ -67,7 +74,7 @@ def model_description(slave: type[SlaveBase], name: str) -> Element:
     return root
 
 
-def _capabilities(slave: type[SlaveBase], name: str) -> dict[str, str]:
+def _capabilities(slave: Described, name: str) -> dict[str, str]:
     flags = {
         "needsExecutionTool": False,
         "canHandleVariableCommunicationStepSize": slave.variable_step,
@@ -102,7 +109,9 @@ def _types(root: Element, table: tuple[Variable, ...]) -> None:
 
 
 def _scalar_variable(reference: int, variable: Variable) -> Element:
-    default = {"parameter": "fixed", "input": "continuous", "output": "continuous"}[variable.causality]
+    default = {"parameter": "fixed", "input": "continuous", "output": "continuous", "local": "continuous"}[
+        variable.causality
+    ]
     if variable.type != "Real" and variable.causality != "parameter":
         default = "discrete"
     element = Element(

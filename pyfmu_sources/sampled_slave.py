@@ -28,18 +28,30 @@ class SampledSlave(SlaveBase):
     _warned = False
 
     def begin(self) -> None:
-        """Compute the outputs at the first sample instant."""
+        """Compute the outputs at the first sample instant.
+
+        Raises:
+            NotImplementedError: a subclass must do it.
+        """
         raise NotImplementedError
 
     def predict(self) -> None:
         """Move the hidden state to the next sample instant, with the inputs of the step that ends there."""
 
     def correct(self) -> None:
-        """Compute the outputs of this sample instant from the hidden state and the inputs; may be repeated."""
+        """Compute the outputs of this sample instant from the hidden state and the inputs; may be repeated.
+
+        Raises:
+            NotImplementedError: a subclass must do it.
+        """
         raise NotImplementedError
 
     def take_parameters(self) -> None:
-        """Collect the parameters from the values."""
+        """Collect the parameters from the values.
+
+        Raises:
+            NotImplementedError: a subclass must do it.
+        """
         raise NotImplementedError
 
     def initialise(self) -> None:
@@ -50,7 +62,15 @@ class SampledSlave(SlaveBase):
         self.begin()
 
     def advance(self, time: float, step: float) -> None:
-        """Hold the outputs, or take every sample that is due by the end of the step."""
+        """Hold the outputs, or take every sample that is due by the end of the step.
+
+        Args:
+            time: [s].
+            step: [s].
+
+        Raises:
+            StepRefusedError: too many samples are due.
+        """
         period = self.real[self.sample_time_reference]
         slack = SLACK * period
         end = time + step
@@ -86,10 +106,18 @@ class SampledSlave(SlaveBase):
                 self.begin()
 
     def saved(self) -> Any:
-        """Return the clock; subclasses add to it."""
-        return [self._samples, self._at_sample]
+        """Return the clock and the hidden state.
+
+        Returns:
+            Plain data.
+        """
+        return [self._samples, self._at_sample, super().saved()]
 
     def restore(self, saved: Any) -> None:
-        """Take over a saved clock."""
-        self.take_parameters()
-        self._samples, self._at_sample = saved
+        """Take over a saved clock and hidden state.
+
+        Args:
+            saved: what ``saved`` returned.
+        """
+        self._samples, self._at_sample, hidden = saved
+        super().restore(hidden)

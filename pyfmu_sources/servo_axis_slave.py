@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Annotated, ClassVar
 
 from . import servo_axis
-from .dead_time import Requests, split_step
+from .dead_time import MOST_REQUESTS, ROUNDING, Requests, is_new, request_at
 from .effects import saturated
 from .fmu_variables import LARGEST, Variable
-from .servo_axis import P_DELAY, P_LIMIT, P_OFFSET, PARAMETERS
-from .slave_base import SlaveBase, StepRefusedError
+from .servo_axis import State
+from .servo_axis_parameters import COUNT, P_DELAY, P_LIMIT, P_OFFSET, PARAMETERS
+from .slave_base import TOO_STIFF, SlaveBase, StepRefusedError
 
 U, T_L, THETA_M, OMEGA_M, T_M = range(5)
 FIRST_PARAMETER = T_M + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
+
+Values = Annotated[tuple[float, ...], COUNT]
+UNDECIDED = 2  # direction of sliding before the first step, whose request decides
 
 _OFFSET = "effects.sensor_offset.motor.offset"
 
@@ -34,42 +38,81 @@ class ServoAxis(SlaveBase):
         Variable("T_m_start", "parameter", "N.m", 0.0, "Initial torque of the drive", -1e12, 1e12),
     )
 
+    _x: State
+    _mode: int
+    _p: Values
+    _acting: float
+    _requests: Requests
+
     def initialise(self) -> None:
         """Read the parameters and start at the initial state."""
-        self._p = tuple(self.real[FIRST_PARAMETER + n] for n in range(len(PARAMETERS)))
-        self._x = (self.real[FIRST_START], self.real[FIRST_START + 1], self.real[FIRST_START + 2])
-        self._mode: int | None = None
-        self._requests: Requests = ()
+        self._p = tuple(self.real[FIRST_PARAMETER + n] for n in range(COUNT))
+        real = self.real
+        self._x = servo_axis.start(real[FIRST_START], real[FIRST_START + 1], real[FIRST_START + 2], self._p)
+        self._mode = UNDECIDED
+        self._requests = []
         self._acting = 0.0
         self._write()
 
     def advance(self, time: float, step: float) -> None:
-        """Integrate with the inputs held; a dead time splits the step where an older request takes over."""
-        x, mode = self._x, self._mode
+        """Integrate with the inputs held; a dead time splits the step where an older request takes over.
+
+        Args:
+            time: [s].
+            step: [s].
+        """
         u = saturated(self.real[U], self._p[P_LIMIT])
-        requests, pieces = split_step(self._requests, u, self._p[P_DELAY], time, step)
-        for u, piece in pieces:
-            if mode is None:
-                mode = servo_axis.initial_mode(x, self._p, u)
-            x, mode = servo_axis.advance(x, mode, self._p, u, self.real[T_L], piece)
+        if self._p[P_DELAY] == 0.0:
+            x, mode = self._moved(self._x, self._mode, u, step)
+            self._take(x, mode, u, step)
+        else:
+            self._advance_delayed(u, time, step)
+
+    def _advance_delayed(self, u: float, time: float, step: float) -> None:
+        """Advance piece by piece; before the first request acts, the torque is zero."""
+        x, mode = self._x, self._mode
+        new = is_new(self._requests, u)
+        count = len(self._requests) + new
+        if count > MOST_REQUESTS:
+            raise StepRefusedError(f"at most {MOST_REQUESTS} requests may be under way, but this one is one more")
+        end = time + step
+        least = ROUNDING * step
+        begin, acting, first = time, 0.0, 0
+        for n in range(count):
+            asked, value = request_at(self._requests, n, u, time)
+            change = asked + self._p[P_DELAY]
+            if change >= end - least:
+                break
+            if change <= time + least:
+                first = n
+            else:
+                x, mode = self._moved(x, mode, acting, change - begin)
+                begin = change
+            acting = value
+        x, mode = self._moved(x, mode, acting, end - begin)
+        self._take(x, mode, acting, step)
+        if new:
+            self._requests.append((time, u))
+        del self._requests[:first]
+
+    def _moved(self, x: State, mode: int, u: float, step: float) -> tuple[State, int]:
+        """Return state and direction of sliding after a piece of a step."""
+        if mode == UNDECIDED:
+            mode = servo_axis.initial_mode(x, self._p, u)
+        return servo_axis.advance(x, mode, self._p, u, self.real[T_L], step)
+
+    def _take(self, x: State, mode: int, acting: float, step: float) -> None:
+        """Take over a state that is finite, or refuse the step."""
+        if x[0] != x[0]:
+            raise StepRefusedError(f"the step of {step!r} s {TOO_STIFF}")
         if not -LARGEST <= x[0] + x[1] + x[2] <= LARGEST:
             raise StepRefusedError(f"the state must stay finite, but is {x!r} after a step of {step!r} s")
-        self._x, self._mode, self._requests, self._acting = x, mode, requests, u
+        self._x = x
+        self._mode = mode
+        self._acting = acting
         self._write()
 
     def _write(self) -> None:
         self.real[THETA_M] = self._x[0] + self._p[P_OFFSET]
         self.real[OMEGA_M] = self._x[1]
         self.real[T_M] = servo_axis.drive_torque(self._x, self._p, self._acting)
-
-    def saved(self) -> Any:
-        """Return state, direction of sliding, torque requests that are still under way and the one that acts."""
-        return [self._x, self._mode, self._requests, self._acting]
-
-    def restore(self, saved: Any) -> None:
-        """Take over a saved state."""
-        x, mode, requests, self._acting = saved
-        self._p = tuple(self.real[FIRST_PARAMETER + n] for n in range(len(PARAMETERS)))
-        self._x = tuple(x)
-        self._mode = mode
-        self._requests = tuple((time, u) for time, u in requests)

@@ -27,6 +27,7 @@ except ImportError:
     from pythonfmu.logmsg import LogMsg
 
 from .fmu_variables import LARGEST, Variable, with_starts
+from .hidden_state import copied, hidden_names, hidden_type, shaped
 
 INSTANTIATED, INITIALIZING, STEPPING, TERMINATED = range(4)
 PHASE_NAMES = ("before initialization", "in initialization mode", "in step mode", "after termination")
@@ -38,9 +39,10 @@ Bounds = dict[int, tuple[float, float]]
 class SlaveBase(Fmi2Slave):
     """Base of our slaves.
 
-    A subclass declares ``table`` and the class attributes below, and implements ``initialise``, ``advance``,
-    ``saved`` and ``restore``; one with feedthrough also ``refresh``. Values live in ``real`` and ``integer``, keyed by
-    value reference.
+    A subclass declares ``table``, the class attributes below and, as annotations without a value, its hidden state,
+    and implements ``initialise`` and ``advance``; one with feedthrough also ``refresh``. Values live in ``real`` and
+    ``integer``, keyed by value reference. The hidden state is what a saved state holds beside them: numbers, tuples and
+    lists of those.
     """
 
     table: ClassVar[tuple[Variable, ...]] = ()
@@ -54,14 +56,22 @@ class SlaveBase(Fmi2Slave):
     _real_starts: ClassVar[dict[int, float]] = {}
     _integer_starts: ClassVar[dict[int, int]] = {}
     _writable: ClassVar[tuple[tuple[Bounds, Bounds], ...]] = ()
+    _hidden: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
+        cls._hidden = (*cls._hidden, *hidden_names(cls))
         cls._index()
 
     @classmethod
     def customise(cls, name: str, build: str, starts: dict[str, float]) -> None:
-        """Give the class the name, the build identity and the start values of one built FMU."""
+        """Give the class the name, the build identity and the start values of one built FMU.
+
+        Args:
+            name: of the model.
+            build: its fingerprint.
+            starts: value by parameter.
+        """
         cls.model_name = name
         cls.build = build
         cls.table = with_starts(cls.table, starts)
@@ -106,28 +116,54 @@ class SlaveBase(Fmi2Slave):
     # What a subclass implements -------------------------------------------------------------------------
 
     def initialise(self) -> None:
-        """Compute state and outputs from the parameters; may be called repeatedly. ValueError refuses."""
+        """Compute state and outputs from the parameters; may be called repeatedly. ValueError refuses.
+
+        Raises:
+            NotImplementedError: a subclass must do it.
+        """
         raise NotImplementedError
 
     def advance(self, time: float, step: float) -> None:
-        """Move state and outputs on by ``step`` [s], or raise and change nothing."""
+        """Move state and outputs on by ``step`` [s], or raise and change nothing.
+
+        Args:
+            time: beginning of the step [s].
+            step: its length [s].
+
+        Raises:
+            NotImplementedError: a subclass must do it.
+        """
         raise NotImplementedError
 
     def refresh(self) -> None:
         """Recompute outputs that depend on inputs directly, after inputs have been set in step mode."""
 
     def saved(self) -> Any:
-        """Return the hidden state as nested lists or tuples of numbers, copied."""
-        raise NotImplementedError
+        """Return the hidden state: the attributes that the class declares, lists copied.
+
+        Returns:
+            Plain data.
+        """
+        return [copied(getattr(self, name)) for name in self._hidden]
 
     def restore(self, saved: Any) -> None:
-        """Take over what ``saved`` returned; lists may stand for tuples."""
-        raise NotImplementedError
+        """Take over what ``saved`` returned; lists may stand for tuples, as they do after serialisation.
+
+        Args:
+            saved: plain data.
+        """
+        for name, value in zip(self._hidden, saved):  # noqa: B905 - Python 3.9 has no `strict`
+            setattr(self, name, shaped(value, hidden_type(self.__class__, name)))
 
     # Messages ---------------------------------------------------------------------------------------------
 
     def say(self, status: Fmi2Status, message: str) -> None:
-        """Queue a message; a percent sign is doubled because hosts take messages as printf formats."""
+        """Queue a message; a percent sign is doubled because hosts take messages as printf formats.
+
+        Args:
+            status: of the message.
+            message: one line.
+        """
         category = f"logStatus{status.name.capitalize()}"
         self.log_queue.append(LogMsg(status, category, message.replace("%", "%%")))
 
@@ -154,7 +190,13 @@ class SlaveBase(Fmi2Slave):
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        """Take the start time; refused unless finite and before the stop time."""
+        """Take the start time; refused unless finite and before the stop time.
+
+        Args:
+            start_time: [s].
+            stop_time: [s]; None: open.
+            tolerance: relative; it is not used.
+        """
         if not self._expects("fmi2SetupExperiment", INSTANTIATED):
             return
         stop = LARGEST if stop_time is None else stop_time
@@ -182,7 +224,15 @@ class SlaveBase(Fmi2Slave):
             self._failed("fmi2ExitInitializationMode", error)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """Move on by ``step_size`` [s]; False (``fmi2Discard``) leaves everything as it was."""
+        """Move on by ``step_size`` [s]; False (``fmi2Discard``) leaves everything as it was.
+
+        Args:
+            current_time: beginning of the step [s].
+            step_size: its length [s].
+
+        Returns:
+            True when it was done.
+        """
         try:
             end = current_time + step_size
             slack = TIME_TOLERANCE * (1.0 + abs(current_time))
@@ -231,7 +281,14 @@ class SlaveBase(Fmi2Slave):
             self.refresh()
 
     def get_real(self, vrs: list[int]) -> list[float]:
-        """Return the values of Real variables, NaN for all if that is refused."""
+        """Return the values of Real variables, NaN for all if that is refused.
+
+        Args:
+            vrs: value references.
+
+        Returns:
+            A value per reference.
+        """
         try:
             if not self._fresh:
                 self._recompute()
@@ -241,7 +298,14 @@ class SlaveBase(Fmi2Slave):
             return [self.real.get(vr, float("nan")) for vr in vrs]
 
     def get_integer(self, vrs: list[int]) -> list[int]:
-        """Return the values of Integer and Enumeration variables."""
+        """Return the values of Integer and Enumeration variables.
+
+        Args:
+            vrs: value references.
+
+        Returns:
+            A value per reference.
+        """
         try:
             if not self._fresh:
                 self._recompute()
@@ -258,11 +322,21 @@ class SlaveBase(Fmi2Slave):
             self.say(Fmi2Status.error, f"{what} must not be used for {self._name(wrong)}, which is of another type")
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set Real inputs, and parameters before the first step."""
+        """Set Real inputs, and parameters before the first step.
+
+        Args:
+            vrs: value references.
+            values: one per reference.
+        """
         self._set("fmi2SetReal", self.real, self._writable_real, vrs, values)
 
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """Set Integer and Enumeration parameters before the first step."""
+        """Set Integer and Enumeration parameters before the first step.
+
+        Args:
+            vrs: value references.
+            values: one per reference.
+        """
         self._set("fmi2SetInteger", self.integer, self._writable_integer, vrs, values)
 
     def _set(self, what: str, store: dict[int, Any], writable: Bounds, vrs: list[int], values: list[Any]) -> None:
@@ -288,24 +362,48 @@ class SlaveBase(Fmi2Slave):
         return "input" if causality == "input" else f"FMU {causality}"
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """Refuse: there are no Boolean variables."""
+        """Refuse: there are no Boolean variables.
+
+        Args:
+            vrs: value references.
+
+        Returns:
+            False, one per reference.
+        """
         for vr in vrs:
             self._other_type("fmi2GetBoolean", vr)
         return [False] * len(vrs)
 
     def get_string(self, vrs: list[int]) -> list[str]:
-        """Refuse: there are no String variables."""
+        """Refuse: there are no String variables.
+
+        Args:
+            vrs: value references.
+
+        Returns:
+            Empty texts, one per reference.
+        """
         for vr in vrs:
             self._other_type("fmi2GetString", vr)
         return [""] * len(vrs)
 
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        """Refuse: there are no Boolean variables."""
+        """Refuse: there are no Boolean variables.
+
+        Args:
+            vrs: value references.
+            values: one per reference.
+        """
         for vr in vrs:
             self._other_type("fmi2SetBoolean", vr)
 
     def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """Refuse: there are no String variables."""
+        """Refuse: there are no String variables.
+
+        Args:
+            vrs: value references.
+            values: one per reference.
+        """
         for vr in vrs:
             self._other_type("fmi2SetString", vr)
 
@@ -362,7 +460,14 @@ class SlaveBase(Fmi2Slave):
         return found if isinstance(found, dict) else {}
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Any:
-        """Return the complete model description."""
+        """Return the complete model description.
+
+        Args:
+            model_options: of PythonFMU; they are not used.
+
+        Returns:
+            The root element.
+        """
         from .model_xml import model_description
 
         return model_description(type(self), self.modelName)
@@ -372,6 +477,13 @@ def _rekeyed(keys: dict[int, Any], values: list[Any]) -> dict[int, Any]:
     if len(keys) != len(values):
         raise ValueError(f"{len(keys)} values must be given, but there are {len(values)}")
     return dict(zip(keys, values))  # noqa: B905 - Python 3.9 has no `strict`
+
+
+TOO_STIFF = (
+    "must be one that can be resolved, but stiffness, damping or a time constant is so extreme "
+    "for the inertias that it takes too many internal steps; bring the parameters nearer to each other, "
+    "or ask for shorter steps"
+)
 
 
 class StepRefusedError(ValueError):

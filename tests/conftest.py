@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.fmi.build import ensure_built
+from orchestrator.building.build import ensure_built
 
 
 @pytest.fixture(scope="session")

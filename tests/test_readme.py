@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.record import read_record
+from orchestrator.records.record import read_record
 from tests.support.example_record import FILE, FRICTION, HALF_GAP, example_record
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,7 +27,7 @@ def blocks(page, language):
 
 def run(words, folder):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=900, check=False)
 
 
 COMMANDS = [line for body in blocks("README.md", "sh") for line in body.splitlines() if line.startswith("python -m")]
@@ -45,6 +45,17 @@ def test_command_of_the_readme(line, tmp_path, fmus):
     assert done.returncode == 0, done.stderr
     command = words[3]
     assert (tmp_path / "results" / command / f"{command}.json").exists()
+
+
+@pytest.mark.slow
+def test_the_five_steps_on_the_reader_s_own_machine(tmp_path, fmus):
+    page = (ROOT / "docs" / "your-machine.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^ *(python -m orchestrator .*)$", page, re.MULTILINE)
+    assert len(lines) == 5
+    shutil.copytree(ROOT / "docs" / "examples", tmp_path / "docs" / "examples")
+    for line in lines:
+        done = run([sys.executable, *shlex.split(line)[1:]], tmp_path)
+        assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_the_example_record_is_what_its_simulator_makes():

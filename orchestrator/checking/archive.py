@@ -5,51 +5,52 @@ import shutil
 import stat
 import zipfile
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from orchestrator.checking.findings import Finding, has_errors
+from orchestrator.shared.isolation.archives import ArchiveLimits
+from orchestrator.shared.isolation.limits import MEBIBYTE
 
-MEBIBYTE = 1 << 20
 _RESERVED = re.compile(r"^(con|prn|aux|nul|com[1-9]|lpt[1-9])(\..*)?$", re.IGNORECASE)
 _CHUNK = 1 << 18
 _LONGEST_NAME = 255
 _LONGEST_PATH = 1000
 
 
-@dataclass(frozen=True)
-class ArchiveLimits:
-    """What an archive may hold.
-
-    Attributes:
-        total: bytes of all files unpacked.
-        files: number of entries.
-        ratio: unpacked over packed size of a file larger than 1 MiB.
-    """
-
-    total: int = 1024 * MEBIBYTE
-    files: int = 20_000
-    ratio: float = 200.0
-
-
 class FmuFiles(Protocol):
     """Read access to the files of an FMU, packed or not."""
 
     def names(self) -> list[str]:
-        """Paths of the files, with forward slashes, folders left out."""
+        """Paths of the files, with forward slashes, folders left out.
+
+        Returns:
+            Paths inside the FMU.
+        """
 
     def read(self, name: str, limit: int) -> bytes:
-        """At most ``limit`` + 1 bytes of a file, so that a longer one can be told."""
+        """At most ``limit`` + 1 bytes of a file, so that a longer one can be told.
+
+        Args:
+            name: path inside the FMU.
+            limit: bytes that a reader takes.
+
+        Returns:
+            The bytes; more than ``limit`` of them when the file is longer.
+        """
 
     def extract(self, target: Path) -> None:
-        """Copy all files below ``target``."""
+        """Copy all files below ``target``.
+
+        Args:
+            target: a folder; it is made where missing.
+        """
 
     def close(self) -> None:
         """Let go of the archive."""
 
 
-class ZipFiles:
+class ZipFiles(FmuFiles):
     """The files of a packed FMU."""
 
     def __init__(self, path: Path) -> None:
@@ -73,7 +74,7 @@ class ZipFiles:
         self.archive.close()
 
 
-class FolderFiles:
+class FolderFiles(FmuFiles):
     """The files of an unpacked FMU; symbolic links are not followed."""
 
     def __init__(self, path: Path) -> None:
@@ -99,6 +100,10 @@ class FolderFiles:
 
 def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[Finding]]:
     """Open an FMU (file or unpacked folder) and check its archive.
+
+    Args:
+        path: the FMU's file or folder.
+        limits: the most bytes and files that are unpacked.
 
     Returns:
         The files, or None when the archive is not fit to be read, and the findings.
@@ -158,6 +163,11 @@ def _name_findings(name: str) -> Iterator[Finding]:
         yield Finding("archive.traversal", name, "an entry must stay inside the FMU, but its path has `..`")
     elif name.startswith(("/", "\\")) or re.match(r"^[A-Za-z]:", name):
         yield Finding("archive.absolute", name, "an entry must have a relative path, but this one is absolute")
+    elif not set(parts) - {"", "."}:
+        yield Finding("archive.corrupt", name, "an entry must have a name, but this one has none")
+    elif set(parts) & {"", "."}:
+        text = "folders of a path must have names, but one here is empty or a dot"
+        yield Finding("archive.odd-name", name, text)
     elif "\\" in name:
         yield Finding("archive.backslash", name, "folders must be separated by `/`, but here by a backslash")
     elif "\0" in name or any(ord(c) < 32 for c in name):

@@ -22,6 +22,8 @@ SUFFIXES = {
     "darwin32": ".dylib",
     "darwin64": ".dylib",
 }
+# FMI 2.0 has no name for these platforms and lets vendors add some; these are the names of FMI 3.0.
+WITHOUT_NAME = ("aarch64-linux", "aarch64-windows", "aarch32-linux", "riscv64-linux")
 _LONGEST_NAME = 1 << 16
 _FORMAT = {"win": "PE", "lin": "ELF", "dar": "Mach-O"}
 
@@ -44,7 +46,7 @@ MODEL_EXCHANGE_FUNCTIONS = tuple(f"fmi2{n}" for n in f"{_COMMON} {_MODEL_EXCHANG
 
 
 @dataclass(frozen=True)
-class Library:
+class LibraryHeader:
     """What the header of a shared library says.
 
     Attributes:
@@ -65,18 +67,38 @@ class Library:
 
 
 def here() -> str:
-    """Folder of the binaries for this machine, such as "linux64"."""
+    """Folder of the binaries for this machine, such as "linux64".
+
+    Returns:
+        The folder's name.
+    """
     system = {"linux": "linux", "win32": "win", "darwin": "darwin"}.get(sys.platform, sys.platform)
     return f"{system}{64 if sys.maxsize > 2**32 else 32}"
 
 
 def library_name(identifier: str, folder: str) -> str:
-    """Path of the shared library inside the FMU."""
+    """Path of the shared library inside the FMU.
+
+    Args:
+        identifier: the model identifier of the interface.
+        folder: of the binaries, such as "linux64".
+
+    Returns:
+        The path, with forward slashes.
+    """
     return f"binaries/{folder}/{identifier}{SUFFIXES[folder]}"
 
 
 def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
-    """Findings about binaries, sources and their folders."""
+    """Findings about binaries, sources and their folders.
+
+    Args:
+        d: the model description.
+        files: of the FMU.
+
+    Yields:
+        Each finding.
+    """
     names = set(files.names())
     folders = sorted({n.split("/")[1] for n in names if n.startswith("binaries/") and n.count("/") >= 2})
     for interface in d.interfaces:
@@ -85,7 +107,7 @@ def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
                 message = f"a source file must be in sources/, but `{source}` is not"
                 yield Finding("file.source-missing", xpath(element, "name"), message)
     for folder in folders:
-        if folder not in SUFFIXES:
+        if folder not in SUFFIXES and folder not in WITHOUT_NAME:
             message = f"a folder of binaries must be one of {', '.join(SUFFIXES)}, but is `{folder}`"
             yield Finding("binary.folder", f"binaries/{folder}", message)
     known = [f for f in folders if f in SUFFIXES]
@@ -138,7 +160,7 @@ def _check_library(
         yield Finding("binary.python-symbols", path, message)
 
 
-def _exports(library: Library, data: bytes, function: str) -> bool:
+def _exports(library: LibraryHeader, data: bytes, function: str) -> bool:
     if library.exported is not None:
         return function in library.exported
     return function.encode() + b"\0" in data
@@ -155,8 +177,15 @@ def _this_machine() -> str:
     )
 
 
-def inspect(data: bytes) -> Library:
-    """Read the header of a shared library; what cannot be read is "unknown"."""
+def inspect(data: bytes) -> LibraryHeader:
+    """Read the header of a shared library; what cannot be read is "unknown".
+
+    Args:
+        data: the library's bytes.
+
+    Returns:
+        Its format, machine and exported symbols.
+    """
     try:
         if data[:4] == b"\x7fELF":
             return _elf(data)
@@ -164,10 +193,10 @@ def inspect(data: bytes) -> Library:
             return _pe(data)
         return _mach(data)
     except (struct.error, IndexError, ValueError, OverflowError):
-        return Library("unknown")
+        return LibraryHeader("unknown")
 
 
-def _elf(data: bytes) -> Library:
+def _elf(data: bytes) -> LibraryHeader:
     bits = {1: 32, 2: 64}.get(data[4], 0)
     order = "<" if data[5] == 1 else ">"
     kind, machine = struct.unpack_from(order + "HH", data, 16)
@@ -182,7 +211,7 @@ def _elf(data: bytes) -> Library:
     symbols = next((s for s in sections if s[0] == 11), None)
     dynamic = next((s for s in sections if s[0] == 6), None)
     if symbols is None or dynamic is None:
-        return Library("ELF", bits, name, kind == 3)
+        return LibraryHeader("ELF", bits, name, kind == 3)
     exported, undefined = _elf_symbols(data, order, bits, symbols, sections[symbols[3]])
     strings = sections[dynamic[3]]
     needed = []
@@ -191,7 +220,7 @@ def _elf(data: bytes) -> Library:
         tag, value = struct.unpack_from(entry, data, at)
         if tag == 1:
             needed.append(_text(data, strings[1] + value))
-    return Library("ELF", bits, name, kind == 3, frozenset(exported), frozenset(undefined), tuple(needed))
+    return LibraryHeader("ELF", bits, name, kind == 3, frozenset(exported), frozenset(undefined), tuple(needed))
 
 
 def _elf_section(data: bytes, order: str, bits: int, at: int) -> tuple[int, int, int, int]:
@@ -226,20 +255,20 @@ def _text(data: bytes, at: int) -> str:
     return data[at : data.index(b"\0", at, at + _LONGEST_NAME)].decode() if 0 <= at < len(data) else ""
 
 
-def _pe(data: bytes) -> Library:
+def _pe(data: bytes) -> LibraryHeader:
     (header,) = struct.unpack_from("<I", data, 0x3C)
     if data[header : header + 4] != b"PE\0\0":
-        return Library("unknown")
+        return LibraryHeader("unknown")
     machine, _, _, _, _, _, flags = struct.unpack_from("<HHIIIHH", data, header + 4)
     bits, name = {0x14C: (32, "x86"), 0x8664: (64, "x86"), 0xAA64: (64, "arm")}.get(machine, (0, f"machine {machine}"))
-    return Library("PE", bits, name, bool(flags & 0x2000))
+    return LibraryHeader("PE", bits, name, bool(flags & 0x2000))
 
 
-def _mach(data: bytes) -> Library:
+def _mach(data: bytes) -> LibraryHeader:
     if data[:4] in (b"\xca\xfe\xba\xbe", b"\xca\xfe\xba\xbf"):
-        return Library("Mach-O", 64, "fat")
+        return LibraryHeader("Mach-O", 64, "fat")
     if data[:4] not in (b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe"):
-        return Library("unknown")
+        return LibraryHeader("unknown")
     _, cpu, _, kind = struct.unpack_from("<IIII", data, 0)
     name = {7: "x86", 12: "arm"}.get(cpu & 0xFFFFFF, f"cpu {cpu}")
-    return Library("Mach-O", 64 if cpu & 0x01000000 else 32, name, kind in (6, 8))
+    return LibraryHeader("Mach-O", 64 if cpu & 0x01000000 else 32, name, kind in (6, 8))

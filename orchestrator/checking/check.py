@@ -5,9 +5,10 @@ from pathlib import Path
 
 from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.dynamic import can_run, check_dynamic
-from orchestrator.checking.findings import Report, has_errors, ordered
-from orchestrator.checking.sandbox import Limits
+from orchestrator.checking.findings import FmuFindings, has_errors, ordered
 from orchestrator.checking.static import check_static
+from orchestrator.shared.isolation.limits import Limits
+from orchestrator.shared.isolation.walls import support
 
 
 @dataclass(frozen=True)
@@ -17,14 +18,16 @@ class CheckOptions:
     Attributes:
         static: execute nothing.
         archive, limits: what the archive and the running FMU may use.
+        trust: run the FMU without the kernel's walls around it; limits remain.
     """
 
     static: bool = False
     archive: ArchiveLimits = field(default_factory=ArchiveLimits)
     limits: Limits = field(default_factory=Limits)
+    trust: bool = False
 
 
-def check_fmu(path: Path, options: CheckOptions | None = None) -> Report:
+def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     """Check an FMU file or an unpacked FMU.
 
     Args:
@@ -43,8 +46,16 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> Report:
         if not options.static and d is not None and files is not None and not has_errors(findings):
             executed = can_run(d, files)
             if executed:
-                findings += check_dynamic(d, files, result.references, options.limits)
+                findings += check_dynamic(d, files, result.references, options.limits, not options.trust)
     finally:
         if files is not None:
             files.close()
-    return Report(str(path), ordered(findings), executed, result.facts)
+    facts = result.facts | ({"walls": _walls(options.trust)} if executed else {})
+    return FmuFindings(str(path), ordered(findings), executed, facts)
+
+
+def _walls(trust: bool) -> str:
+    """What the FMU was kept from by the kernel, for the reader."""
+    if trust:
+        return "none (trusted)"
+    return support().in_words

@@ -39,7 +39,7 @@ class SimpleType:
 
 
 @dataclass(frozen=True)
-class Variable:
+class ScalarVariable:
     """A ScalarVariable; ``index`` counts from 1 as ModelStructure does.
 
     ``initial`` is the effective value (declared, or the default of the standard's table), ``attributes`` those
@@ -59,7 +59,14 @@ class Variable:
     own: Mapping[str, str]
 
     def number(self, attribute: str) -> float | int | None:
-        """A numeric attribute, or None when it is absent or no number."""
+        """A numeric attribute, or None when it is absent or no number.
+
+        Args:
+            attribute: its name in the XML.
+
+        Returns:
+            The value, in the variable's unit.
+        """
         return number(self.attributes.get(attribute), self.kind)
 
     @property
@@ -76,6 +83,12 @@ class Variable:
         """XPath of the variable; attributes of the type element are looked for there.
 
         Put together here, for lxml counts all siblings each time: too slow for 100,000 variables.
+
+        Args:
+            attribute: of the variable or of its type element; empty for the element.
+
+        Returns:
+            The path, after the file's name and a colon.
         """
         path = f"modelDescription.xml:/fmiModelDescription/ModelVariables/ScalarVariable[{self.index}]"
         if attribute and attribute not in self.element.attrib and self.kind:
@@ -84,7 +97,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Unknown:
+class StructureEntry:
     """An entry of ModelStructure; ``dependencies`` and ``kinds`` are None when absent or unreadable."""
 
     section: str
@@ -94,7 +107,14 @@ class Unknown:
     kinds: tuple[str, ...] | None
 
     def path(self, attribute: str) -> str:
-        """XPath of an attribute."""
+        """XPath of an attribute.
+
+        Args:
+            attribute: its name in the XML.
+
+        Returns:
+            The path, after the file's name and a colon.
+        """
         place = f"/fmiModelDescription/ModelStructure/{self.section}/Unknown[{self.position}]"
         return f"modelDescription.xml:{place}/@{attribute}"
 
@@ -108,7 +128,14 @@ class Interface:
     sources: tuple[tuple[etree._Element, str], ...]
 
     def flag(self, name: str) -> bool:
-        """A capability flag; absent means false."""
+        """A capability flag; absent means false.
+
+        Args:
+            name: of the capability, such as "canGetAndSetFMUstate".
+
+        Returns:
+            True when it is set.
+        """
         return self.element.get(name) in ("true", "1")
 
 
@@ -117,35 +144,57 @@ class Description:
     """What the rules look at."""
 
     root: etree._Element
-    variables: tuple[Variable, ...]
+    variables: tuple[ScalarVariable, ...]
     types: tuple[SimpleType, ...]
     units: Mapping[str, etree._Element]
     cosimulation: Interface | None
     model_exchange: Interface | None
-    outputs: tuple[Unknown, ...]
-    derivatives: tuple[Unknown, ...]
-    initial_unknowns: tuple[Unknown, ...]
+    outputs: tuple[StructureEntry, ...]
+    derivatives: tuple[StructureEntry, ...]
+    initial_unknowns: tuple[StructureEntry, ...]
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:
         """The interfaces that the FMU has."""
         return tuple(i for i in (self.cosimulation, self.model_exchange) if i is not None)
 
-    def variable(self, index: int | None) -> Variable | None:
-        """The variable with an index of ModelStructure, or None when there is none."""
+    def variable(self, index: int | None) -> ScalarVariable | None:
+        """The variable with an index of ModelStructure, or None when there is none.
+
+        Args:
+            index: counted from 1.
+
+        Returns:
+            The variable.
+        """
         if index is None or not 1 <= index <= len(self.variables):
             return None
         return self.variables[index - 1]
 
     def experiment(self, name: str) -> float | None:
-        """A number of DefaultExperiment."""
+        """A number of DefaultExperiment.
+
+        Args:
+            name: "startTime", "stopTime", "stepSize" or "tolerance".
+
+        Returns:
+            The number [s] (a tolerance without unit), or None when it is absent.
+        """
         element = self.root.find("DefaultExperiment")
         value = None if element is None else number(element.get(name), "Real")
         return None if value is None else float(value)
 
 
 def number(text: str | None, kind: str) -> float | int | None:
-    """Read a number as the XML schema types it; None when ``text`` is absent or not one."""
+    """Read a number as the XML schema types it; None when ``text`` is absent or not one.
+
+    Args:
+        text: as the XML has it.
+        kind: "Real", "Integer" and so on, as the XML names the type.
+
+    Returns:
+        The number.
+    """
     if text is None:
         return None
     try:
@@ -155,7 +204,14 @@ def number(text: str | None, kind: str) -> float | int | None:
 
 
 def read_description(root: etree._Element) -> Description:
-    """Read what the rules need; never fails on a document that is merely wrong."""
+    """Read what the rules need; never fails on a document that is merely wrong.
+
+    Args:
+        root: of modelDescription.xml.
+
+    Returns:
+        The description; what is missing or wrong is None or empty.
+    """
     types = tuple(_simple_type(e) for e in root.findall("TypeDefinitions/SimpleType") if len(e))
     by_name = {t.name: t for t in types}
     elements = root.findall("ModelVariables/ScalarVariable")
@@ -178,7 +234,7 @@ def _simple_type(element: etree._Element) -> SimpleType:
     return SimpleType(element, element.get("name", ""), _tag(inner), dict(inner.attrib), items)
 
 
-def _variable(element: etree._Element, index: int, types: Mapping[str, SimpleType]) -> Variable:
+def _variable(element: etree._Element, index: int, types: Mapping[str, SimpleType]) -> ScalarVariable:
     inner: Any = next((e for e in element if e.tag in (*NUMERIC, "Boolean", "String")), None)
     own = {} if inner is None else dict(inner.attrib)
     kind = "" if inner is None else _tag(inner)
@@ -188,7 +244,7 @@ def _variable(element: etree._Element, index: int, types: Mapping[str, SimpleTyp
     variability = element.get("variability", "continuous")
     declared_initial = element.get("initial")
     default = INITIAL.get((causality, variability), (None,))[0]
-    return Variable(
+    return ScalarVariable(
         element=element,
         index=index,
         name=element.get("name", ""),
@@ -203,7 +259,7 @@ def _variable(element: etree._Element, index: int, types: Mapping[str, SimpleTyp
     )
 
 
-def _unknowns(root: etree._Element, section: str) -> tuple[Unknown, ...]:
+def _unknowns(root: etree._Element, section: str) -> tuple[StructureEntry, ...]:
     found = []
     for position, element in enumerate(root.findall(f"ModelStructure/{section}/Unknown"), 1):
         text = element.get("dependencies")
@@ -211,7 +267,7 @@ def _unknowns(root: etree._Element, section: str) -> tuple[Unknown, ...]:
         dependencies = None if parts is None or None in parts else parts
         kinds = element.get("dependenciesKind")
         found.append(
-            Unknown(
+            StructureEntry(
                 section,
                 position,
                 _integer(element.get("index")),

@@ -1,24 +1,38 @@
-"""The dynamic checks: what is run, and how the ending of the child becomes a finding."""
+"""The dynamic checks: what a child process is asked to run, and how its ending becomes a finding."""
 
-import json
+import contextlib
 import math
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.binaries import here, library_name
-from orchestrator.checking.description import Description, Interface, Variable, number
+from orchestrator.checking.description import Description, Interface, ScalarVariable, number
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.layered import ReferenceResult
-from orchestrator.checking.rules import RULES
-from orchestrator.checking.sandbox import Ending, Limits, run_child
+from orchestrator.checking.probing import probes, probes_compare, probes_misuse, probes_reference, trajectory
+from orchestrator.checking.probing.binding import PENDING, Library, StatusError, TerminatedError
+from orchestrator.checking.probing.trajectory import ProbeJob
+from orchestrator.errors import ChildError, OutputError
+from orchestrator.shared.isolation.jail import Jail
+from orchestrator.shared.isolation.limits import Limits
+from orchestrator.shared.isolation.scratch import Scratch
 
-PROBES = (
-    "life cycle", "inputs", "determinism", "setting", "instances", "reset", "state", "variable steps", "reference",
-    "memory", "misuse",
-)  # fmt: skip
+_PROBES: dict[str, probes.Probe] = {
+    "life cycle": probes.life_cycle,
+    "inputs": probes.inputs,
+    "determinism": probes_compare.determinism,
+    "setting": probes.setting,
+    "instances": probes_compare.instances,
+    "reset": probes_compare.reset,
+    "state": probes_compare.state,
+    "variable steps": probes_compare.variable_steps,
+    "reference": probes_reference.reference,
+    "memory": probes.memory,
+    "misuse": probes_misuse.misuse,
+}
+PROBES = tuple(_PROBES)
 _STEPS = 200
 _MOST_FINDINGS = 10_000
 _FLAGS = (
@@ -31,182 +45,224 @@ _FLAGS = (
 
 
 def can_run(d: Description, files: FmuFiles) -> bool:
-    """Whether there is a co-simulation library for this machine."""
+    """Whether there is a co-simulation library for this machine.
+
+    Args:
+        d: the model description.
+        files: of the FMU.
+
+    Returns:
+        True when the FMU can be executed here.
+    """
     interface = d.cosimulation
     if interface is None or interface.identifier is None:
         return False
     return library_name(interface.identifier, here()) in files.names()
 
 
-def check_dynamic(d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits) -> list[Finding]:
+def check_dynamic(
+    d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits, walls: bool = True
+) -> list[Finding]:
     """Run the FMU in a child process and report what it did.
+
+    The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
 
     Args:
         d, files: of an FMU whose static checks found no error, and for which ``can_run`` is true.
         references: reference results; each is simulated.
+        limits: of the child process.
+        walls: whether the kernel shall keep the FMU from files, network and other processes.
+
+    Returns:
+        What it did wrong.
+
+    Raises:
+        OutputError: there is no room to unpack the FMU.
     """
     interface = d.cosimulation
     assert interface is not None
-    with tempfile.TemporaryDirectory(prefix="fmu-check-", ignore_cleanup_errors=True) as name:
-        base = Path(name)
+    with Scratch("check") as scratch:
+        fmu = scratch.path / "fmu"
         try:
-            files.extract(base / "fmu")
+            files.extract(fmu)
         except OSError as error:
-            return [Finding("run.failed", "", f"the FMU must be unpacked to be run, but cannot be: {error.strerror}")]
+            raise OutputError(f"the FMU must be unpacked to {scratch.path}, but cannot be: {error.strerror}") from None
         findings: list[Finding] = []
         for position, reference in enumerate(references or [None]):
             probes = PROBES if position == 0 else ("reference",)
             if position and any(f.severity == "error" for f in findings):
                 break
-            work = base / f"run{position}" / "work"
-            work.mkdir(parents=True)
-            job = _job(d, interface, base / "fmu", reference, limits)
-            findings += _Watcher(base / "fmu", work, limits).run(job, probes)
+            findings += _Watcher(fmu, limits, walls).run(_job(d, interface, fmu, reference, limits), probes)
     return findings
 
 
 class _Watcher:
-    """Runs one child and collects its findings."""
+    """Asks one child and collects the findings."""
 
-    def __init__(self, fmu: Path, work: Path, limits: Limits) -> None:
-        self.fmu, self.work, self.limits = fmu, work, limits
+    def __init__(self, fmu: Path, limits: Limits, walls: bool) -> None:
+        self.fmu, self.limits, self.walls = fmu, limits, walls
         self.findings: list[Finding] = []
         self.probe = "load"
-        self.done = False
-        self.stopped = ""
+        self.stopped = False
 
-    def run(self, job: dict[str, Any], probes: tuple[str, ...]) -> list[Finding]:
+    def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
-        side = self.work.parent
-        call, log = side / "call", side / "log"
-        call.write_bytes(bytes(128))
-        job |= {"probes": list(probes), "call": str(call), "log": str(log)}
-        file = side / "job.json"
-        file.write_text(json.dumps(job), encoding="utf-8")
         before = _snapshot(self.fmu)
-        ending = run_child("orchestrator.checking.child.main", [str(file)], self.work, self.limits, self._line)
-        # The FMU may have deleted what it was given.
-        function = call.read_bytes().rstrip(b"\0").decode("utf-8", "replace") if call.exists() else ""
-        if not self.done:
-            self._ended_early(ending, function, log)
-        self._skipped(probes)
-        self._left_behind(before, _snapshot(self.fmu), log, ending)
+        with Jail(
+            "orchestrator.checking.host:opened", write=[self.fmu], limits=self.limits, walls=self.walls, adopt=True
+        ) as jail:
+            library = Library(jail, "canRunAsynchronuously" in job.flags)
+            try:
+                self._probes(library, job, names)
+            except ChildError as error:
+                self.stopped = True
+                self._ended_early(error, library.current)
+            left = jail.finish()
+            self._skipped(names)
+            self._left_behind(before, jail, left)
         return self.findings
 
-    def _line(self, line: bytes) -> None:
-        """Take in a message. The FMU might write to the same pipe, so nothing is taken for granted."""
-        try:
-            message = json.loads(line)
-        except (ValueError, RecursionError):
+    def _probes(self, library: Library, job: ProbeJob, names: tuple[str, ...]) -> None:
+        problem = library.load(job.library)
+        if problem:
+            self._add("load.library", f"the library must load, but: {problem}")
             return
-        if not isinstance(message, dict):
-            return
-        self.probe = str(message.get("probe", self.probe))
-        self.stopped = str(message.get("stopped", self.stopped))
-        self.done = self.done or bool(message.get("done"))
-        rule = str(message.get("rule"))
-        if rule in RULES and len(self.findings) < _MOST_FINDINGS:
-            self._add(rule, str(message.get("message")), str(message.get("path", "")))
+        probes.load(library, self._add)
+        single = "canBeInstantiatedOnlyOncePerProcess" in job.flags
+        context = probes.Context(probes.Bench(job, library), self._add, single=single)
+        for self.probe in names:
+            try:
+                go_on = _PROBES[self.probe](context)
+            except TerminatedError:
+                go_on = True  # the slave ended this run earlier than the undisturbed one: nothing to compare
+            except StatusError as error:
+                self._add(_rule_of(error), str(error))
+                go_on = False
+            if not go_on:
+                self.stopped = True
+                return
 
     def _add(self, rule: str, message: str, path: str = "") -> None:
-        self.findings.append(Finding(rule, path or f"({self.probe})", message))
+        if len(self.findings) < _MOST_FINDINGS:
+            self.findings.append(Finding(rule, path or f"({self.probe})", message))
 
-    def _ended_early(self, ending: Ending, function: str, log: Path) -> None:
+    def _ended_early(self, error: ChildError, function: str) -> None:
         where = f"during {function}" if function else f"in the probe `{self.probe}`"
-        if ending.reason == "time":
+        if error.reason == "time":
             self._add("limits.time", f"a call must take at most {self.limits.time:g} s, but took longer {where}")
-        elif ending.reason == "memory":
+        elif error.reason == "memory":
             allowed = self.limits.memory >> 20
             self._add("limits.memory", f"the process must use at most {allowed} MiB, but used more {where}")
+        elif error.reason == "disk":
+            self._add("limits.output", f"text and files must stay below {self.limits.disk >> 20} MiB, but do not")
         elif self.probe == "misuse" and function:
-            self._add(
-                "misuse.crash",
-                f"a call that is to be refused must not end the process, but {ending.describe()} {where}",
-            )
+            self._add("misuse.crash", f"a call that is to be refused must not end the process, but {error} {where}")
         elif function:
-            self._add("run.crash", f"no call must end the process, but {ending.describe()} {where}")
+            self._add("run.crash", f"no call must end the process, but {error} {where}")
         else:
-            said = log.read_text("utf-8", "replace").strip().splitlines()[-1:] if log.exists() else []
-            self._add(
-                "run.failed", f"the probe `{self.probe}` must end, but {ending.describe()} ({' '.join(said)[:300]})"
-            )
+            self._add("run.failed", f"the probe `{self.probe}` must end, but {error} ({error.said})")
 
-    def _skipped(self, probes: tuple[str, ...]) -> None:
-        last = self.stopped or ("" if self.done else self.probe)
-        rest = probes[probes.index(last) + 1 :] if last in probes else probes if last == "load" else ()
-        if rest:
+    def _skipped(self, names: tuple[str, ...]) -> None:
+        rest = names[names.index(self.probe) + 1 :] if self.probe in names else names
+        if rest and (self.stopped or self.probe == "load"):
             self._add("run.skipped", f"not carried out after that: {', '.join(rest)}")
 
-    def _left_behind(self, before: dict[str, Any], after: dict[str, Any], log: Path, ending: Ending) -> None:
-        written = sorted(p.relative_to(self.work).as_posix() for p in self.work.rglob("*") if p.is_file())
+    def _left_behind(self, before: dict[str, Any], jail: Jail, left: bool) -> None:
         self.probe = "afterwards"
+        written = _files(jail.scratch, "tmp")
         if written:
             self._add("files.written", f"the FMU must write no files, but wrote {', '.join(written[:5])}", written[0])
+        after = _snapshot(self.fmu)
         changed = sorted(k for k in before.keys() | after.keys() if before.get(k) != after.get(k))
         if changed:
             self._add(
                 "files.changed", f"the FMU must leave its files alone, but changed {', '.join(changed[:5])}", changed[0]
             )
-        sizes = [p.stat().st_size for p in (log, *self.work.rglob("*")) if p.is_file()]
-        if max(sizes, default=0) >= self.limits.output:
+        if jail.printed_bytes() >= self.limits.output or any(
+            os.lstat(jail.scratch / name).st_size >= self.limits.output for name in written
+        ):
             self._add("limits.output", f"text and files must stay below {self.limits.output >> 20} MiB, but do not")
-        if ending.left:
+        if left:
             self._add("process.left", "no process must outlive the FMU, but one did (it has been killed)")
+
+
+def _rule_of(error: StatusError) -> str:
+    if error.function == "fmi2Instantiate":
+        return "run.instantiate"
+    return "run.pending" if error.status == PENDING else "run.status"
+
+
+def _files(folder: Path, left_out: str) -> list[str]:
+    """Files below ``folder``, save for those in one of its subfolders; links are not followed.
+
+    Not by ``os.walk``, which calls itself for every level: an FMU may make thousands.
+    """
+    found: list[str] = []
+    waiting = [str(folder)]
+    while waiting and len(found) <= _MOST_FINDINGS:
+        current = waiting.pop()
+        with contextlib.suppress(OSError), os.scandir(current) as entries:
+            for entry in entries:
+                if not entry.is_dir(follow_symlinks=False):
+                    found.append(os.path.relpath(entry.path, folder))
+                elif current != str(folder) or entry.name != left_out:
+                    waiting.append(entry.path)
+    return sorted(found)
 
 
 def _snapshot(folder: Path) -> dict[str, Any]:
     """Size and time of every file, byte code left out."""
     found = {}
-    for path in folder.rglob("*"):
-        if path.is_file() and "__pycache__" not in path.parts:
-            info = os.stat(path)
-            found[path.relative_to(folder).as_posix()] = (info.st_size, info.st_mtime_ns)
+    for name in _files(folder, ""):
+        if "__pycache__" not in Path(name).parts:
+            info = os.lstat(folder / name)
+            found[Path(name).as_posix()] = (info.st_size, info.st_mtime_ns)
     return found
 
 
 def _job(
     d: Description, interface: Interface, fmu: Path, reference: ReferenceResult | None, limits: Limits
-) -> dict[str, Any]:
+) -> ProbeJob:
     start = d.experiment("startTime") or 0.0
     stop = d.experiment("stopTime")
     length = (stop if stop is not None else start + 1.0) - start
     step = d.experiment("stepSize") or length / _STEPS
     # Steps beyond the stop time may be refused, so a fraction of one is left out.
     steps = max(1, math.floor(min(_STEPS, length / step + 1e-6)))
-    return {
-        "library": str(fmu / library_name(str(interface.identifier), here())),
-        "guid": d.root.get("guid", ""),
-        "resources": (fmu / "resources").as_uri(),
-        "variables": [_plain(v) for v in d.variables if v.reference is not None],
-        "start": start,
-        "stop": stop,
-        "step": step,
-        "tolerance": d.experiment("tolerance"),
-        "steps": steps,
-        "budget": min(2.0, 0.2 * limits.time),
-        "flags": [f for f in _FLAGS if interface.flag(f)],
-        "reference": None
+    return ProbeJob(
+        library=str(fmu / library_name(str(interface.identifier), here())),
+        guid=d.root.get("guid", ""),
+        resources=(fmu / "resources").as_uri(),
+        variables=tuple(_plain(v, v.reference) for v in d.variables if v.reference is not None),
+        start=start,
+        stop=stop,
+        step=step,
+        tolerance=d.experiment("tolerance"),
+        steps=steps,
+        budget=min(2.0, 0.2 * limits.time),
+        flags=frozenset(f for f in _FLAGS if interface.flag(f)),
+        reference=None
         if reference is None
         else {"path": reference.path, "names": reference.names, "rows": reference.rows},
-    }
+    )
 
 
-def _plain(v: Variable) -> dict[str, Any]:
+def _plain(v: ScalarVariable, reference: int) -> trajectory.ProbedVariable:
     start: Any = v.start
     if start is not None:
         if v.base == "Boolean":
             start = int(start in ("true", "1"))
         elif v.base != "String":
             start = number(start, v.kind)
-    return {
-        "name": v.name,
-        "reference": v.reference,
-        "base": v.base,
-        "causality": v.causality,
-        "variability": v.variability,
-        "initial": v.initial,
-        "start": start,
-        "minimum": v.number("min"),
-        "maximum": v.number("max"),
-        "nominal": v.number("nominal"),
-    }
+    return trajectory.ProbedVariable(
+        name=v.name,
+        reference=reference,
+        base=v.base,
+        causality=v.causality,
+        variability=v.variability,
+        initial=v.initial,
+        start=start,
+        minimum=v.number("min"),
+        maximum=v.number("max"),
+        nominal=v.number("nominal"),
+    )

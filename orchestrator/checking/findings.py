@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from orchestrator.checking.rules import RULES
+from orchestrator.checking.rules import RULES, Severity
 
-SEVERITIES = ("error", "warning", "info")
+SEVERITIES: tuple[Severity, ...] = ("error", "warning", "info")
 MOST_PER_RULE = 100
 
 
@@ -29,7 +29,7 @@ class Finding:
             raise KeyError(f"`rule` must be one of RULES, but is {self.rule!r}")
 
     @property
-    def severity(self) -> str:
+    def severity(self) -> Severity:
         """One of "error", "warning" and "info"."""
         return RULES[self.rule].severity
 
@@ -38,19 +38,9 @@ class Finding:
         """What to do about it."""
         return RULES[self.rule].advice
 
-    def as_dict(self) -> dict[str, str]:
-        """The finding for a JSON document."""
-        return {
-            "severity": self.severity,
-            "rule": self.rule,
-            "path": self.path,
-            "message": self.message,
-            "advice": self.advice,
-        }
-
 
 @dataclass(frozen=True)
-class Report:
+class FmuFindings:
     """All that was found about one FMU.
 
     Attributes:
@@ -66,7 +56,14 @@ class Report:
     facts: dict[str, object] = field(default_factory=dict)
 
     def count(self, severity: str) -> int:
-        """Number of findings of one severity."""
+        """Number of findings of one severity.
+
+        Args:
+            severity: one of ``SEVERITIES``.
+
+        Returns:
+            Their number.
+        """
         return sum(f.severity == severity for f in self.findings)
 
     @property
@@ -74,20 +71,16 @@ class Report:
         """No finding of severity "error"."""
         return self.count("error") == 0
 
-    def as_dict(self) -> dict[str, object]:
-        """The report for a JSON document."""
-        return {
-            "fmu": self.fmu,
-            "ok": self.ok,
-            "executed": self.executed,
-            "counts": {s: self.count(s) for s in SEVERITIES},
-            "facts": self.facts,
-            "findings": [f.as_dict() for f in self.findings],
-        }
-
 
 def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Errors first, each kept in the order found, repeats removed, at most ``MOST_PER_RULE`` of one rule."""
+    """Errors first, each kept in the order found, repeats removed, at most ``MOST_PER_RULE`` of one rule.
+
+    Args:
+        findings: in any order.
+
+    Returns:
+        The findings that a report shows.
+    """
     seen: Counter[str] = Counter()
     kept = []
     for finding in dict.fromkeys(findings):
@@ -101,5 +94,12 @@ def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def has_errors(findings: Iterable[Finding]) -> bool:
-    """Whether any finding is an error."""
+    """Whether any finding is an error.
+
+    Args:
+        findings: in any order.
+
+    Returns:
+        True when one is.
+    """
     return any(f.severity == "error" for f in findings)

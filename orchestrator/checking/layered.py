@@ -40,7 +40,14 @@ class ReferenceResult:
 
 
 def check_files(files: FmuFiles) -> Iterator[Finding]:
-    """Findings about the documentation and the icon."""
+    """Findings about the documentation and the icon.
+
+    Args:
+        files: of the FMU.
+
+    Yields:
+        Each finding.
+    """
     names = set(files.names())
     documents = any(re.fullmatch(r"documentation/(?!licenses/|diagrams?/).+", n) for n in names)
     entries = ("documentation/index.html", "documentation/_main.html")
@@ -53,7 +60,15 @@ def check_files(files: FmuFiles) -> Iterator[Finding]:
 
 
 def check_layered(d: Description, files: FmuFiles) -> tuple[list[ReferenceResult], list[Finding]]:
-    """Check every manifest of a layered standard, and read the reference results of FMI-LS-REF."""
+    """Check every manifest of a layered standard, and read the reference results of FMI-LS-REF.
+
+    Args:
+        d: the model description.
+        files: of the FMU.
+
+    Returns:
+        The reference results that can be read, and the findings.
+    """
     findings: list[Finding] = []
     results: list[ReferenceResult] = []
     names = set(files.names())

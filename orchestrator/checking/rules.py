@@ -4,13 +4,17 @@ The table of docs/check.md is this one; a test holds them together.
 """
 
 from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["error", "warning", "info"]
+_SEVERITIES: dict[str, Severity] = {"E": "error", "W": "warning", "I": "info"}
 
 
 @dataclass(frozen=True)
 class Rule:
     """A rule: severity ("error", "warning", "info"), what must hold, and advice for who broke it."""
 
-    severity: str
+    severity: Severity
     expects: str
     advice: str
 
@@ -19,7 +23,7 @@ def _rules(text: str) -> dict[str, Rule]:
     rules = {}
     for line in text.strip().splitlines():
         name, severity, expects, advice = (part.strip() for part in line.split("|"))
-        rules[name] = Rule({"E": "error", "W": "warning", "I": "info"}[severity], expects, advice)
+        rules[name] = Rule(_SEVERITIES[severity], expects, advice)
     return rules
 
 
@@ -38,7 +42,7 @@ archive.case-clash | W | paths differ by more than upper and lower case | rename
 archive.encrypted | E | no entry is encrypted | store the entry without a password
 archive.compression | E | entries are stored or deflated | pack with deflate
 archive.bomb-ratio | E | no file unpacks to absurdly more than its packed size | if you trust the file, repack it without compression
-archive.too-large | E | the files stay within the size limit | if you trust the file, raise --size-limit
+archive.too-large | E | the files stay within the size limit | if you trust the file, raise the size limit
 archive.too-many-files | E | the number of files stays within the limit | pack resources into fewer files
 archive.overlap | E | entries do not share bytes | do not unpack this archive; it is built as a bomb
 xml.too-large | E | an XML file stays within the size limit | split arrays or shorten descriptions
@@ -107,7 +111,7 @@ layered.missing | W | related files exist | add the file, or remove the entry
 layered.result | W | a reference result is a table of variables over time | write `time` and variable names as header, numbers below
 binary.none | E | there are binaries or sources | export for a platform
 binary.not-here | W | there is a binary for this machine | export for this platform, or check on another one
-binary.folder | W | folders of binaries have FMI 2.0 names | rename the folder
+binary.folder | W | folders of binaries have FMI 2.0 names, or FMI 3.0's where 2.0 has none (`aarch64-linux`) | rename the folder
 binary.missing | E | the library is named after modelIdentifier | rename the library or the modelIdentifier
 binary.format | E | the library has the platform's format | put the right file into the folder
 binary.architecture | E | the library has the platform's architecture | put the right file into the folder
@@ -116,8 +120,8 @@ binary.python-symbols | W | a library that uses Python names libpython as needed
 """  # noqa: E501
 
 _DYNAMIC = """
-limits.time | E | no call takes longer than --time-limit | look for an endless loop; raise --time-limit for a slow model
-limits.memory | E | memory stays below --memory-limit | look for a leak; raise --memory-limit for a large model
+limits.time | E | no call takes longer than the time limit | look for an endless loop; raise the limit for a slow model
+limits.memory | E | memory stays below the memory limit | look for a leak; raise the limit for a large model
 limits.output | E | printed text and files stay small | print only when logging is on
 run.crash | E | no call ends the process | run the call named under a debugger
 run.failed | E | the checks can be carried out | report this with the FMU

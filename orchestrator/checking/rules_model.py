@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from lxml import etree
 
-from orchestrator.checking.description import Description, Unknown, Variable, number
+from orchestrator.checking.description import Description, ScalarVariable, StructureEntry, number
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.units import dimension_of
 from orchestrator.checking.xml_reading import xpath
@@ -21,7 +21,14 @@ _C_KEYWORD = re.compile(
 
 
 def check_model(d: Description) -> Iterator[Finding]:
-    """Findings about everything but ModelVariables."""
+    """Findings about everything but ModelVariables.
+
+    Args:
+        d: the model description.
+
+    Yields:
+        Each finding.
+    """
     yield from _head(d)
     yield from _experiment(d)
     yield from _types(d)
@@ -170,12 +177,12 @@ def _initial_unknowns(d: Description) -> set[int]:
         state = (
             None if derivative is None else d.variable(int(number(derivative.own.get("derivative"), "Integer") or 0))
         )
-        expected |= {v.index for v in (derivative, state) if isinstance(v, Variable) and v.initial in free}
+        expected |= {v.index for v in (derivative, state) if isinstance(v, ScalarVariable) and v.initial in free}
     return expected
 
 
 def _set(
-    d: Description, section: str, found: tuple[Unknown, ...], expected: set[int], rule: str, what: str
+    d: Description, section: str, found: tuple[StructureEntry, ...], expected: set[int], rule: str, what: str
 ) -> Iterator[Finding]:
     indices = {u.index for u in found if u.index is not None}
     structure = d.root.find("ModelStructure")
@@ -187,7 +194,7 @@ def _set(
             yield Finding(rule, path, f"{section} must list exactly {what}, but {words} {names}")
 
 
-def _unknowns(d: Description, section: tuple[Unknown, ...]) -> Iterator[Finding]:
+def _unknowns(d: Description, section: tuple[StructureEntry, ...]) -> Iterator[Finding]:
     last = 0
     seen: set[int] = set()
     initial = bool(section) and section is d.initial_unknowns
@@ -207,7 +214,7 @@ def _unknowns(d: Description, section: tuple[Unknown, ...]) -> Iterator[Finding]
         yield from _dependencies(d, u, initial)
 
 
-def _dependencies(d: Description, u: Unknown, initial: bool) -> Iterator[Finding]:
+def _dependencies(d: Description, u: StructureEntry, initial: bool) -> Iterator[Finding]:
     if u.kinds is not None and (u.dependencies is None or len(u.kinds) != len(u.dependencies)):
         count = "absent" if u.dependencies is None else f"{len(u.dependencies)} long"
         message = (

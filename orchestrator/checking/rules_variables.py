@@ -11,8 +11,8 @@ from orchestrator.checking.description import (
     NUMERIC,
     VARIABILITIES,
     Description,
+    ScalarVariable,
     SimpleType,
-    Variable,
     number,
 )
 from orchestrator.checking.findings import Finding
@@ -25,7 +25,14 @@ _STRUCTURED = re.compile(rf"(?:{_IDENTIFIER}|der\({_IDENTIFIER}(?:,[0-9]+)?\))")
 
 
 def check_variables(d: Description) -> Iterator[Finding]:
-    """All findings about ModelVariables."""
+    """All findings about ModelVariables.
+
+    Args:
+        d: the model description.
+
+    Yields:
+        Each finding.
+    """
     yield from _names(d)
     types = {t.name: t for t in d.types}
     states = {_as_int(v.own.get("derivative")) for v in d.variables}
@@ -65,7 +72,7 @@ def _names(d: Description) -> Iterator[Finding]:
             yield Finding("variable.name-flat", v.path("name"), message)
 
 
-def _combination(v: Variable) -> Iterator[Finding]:
+def _combination(v: ScalarVariable) -> Iterator[Finding]:
     if v.causality not in CAUSALITIES or v.variability not in VARIABILITIES:
         return  # the schema says so
     pair = f'causality="{v.causality}", variability="{v.variability}"'
@@ -87,7 +94,7 @@ def _combination(v: Variable) -> Iterator[Finding]:
         yield Finding("variable.independent", v.path("causality"), message)
 
 
-def _start(v: Variable) -> Iterator[Finding]:
+def _start(v: ScalarVariable) -> Iterator[Finding]:
     if (v.causality, v.variability) not in INITIAL:
         return
     needed = v.initial in ("exact", "approx") or v.causality == "input"
@@ -99,7 +106,7 @@ def _start(v: Variable) -> Iterator[Finding]:
         yield Finding("variable.start-forbidden", v.path("start"), message)
 
 
-def _bounds(v: Variable) -> Iterator[Finding]:
+def _bounds(v: ScalarVariable) -> Iterator[Finding]:
     low, high, start = v.number("min"), v.number("max"), v.number("start")
     if low is not None and high is not None and low > high:
         if not {"min", "max"} & set(v.own):
@@ -122,7 +129,7 @@ def _bounds(v: Variable) -> Iterator[Finding]:
             yield Finding("variable.not-finite", v.path(attribute), message)
 
 
-def _declared_type(types: Mapping[str, SimpleType], v: Variable) -> Iterator[Finding]:
+def _declared_type(types: Mapping[str, SimpleType], v: ScalarVariable) -> Iterator[Finding]:
     name = v.own.get("declaredType")
     if name is None:
         return
@@ -147,7 +154,7 @@ def _declared_type(types: Mapping[str, SimpleType], v: Variable) -> Iterator[Fin
             yield Finding("variable.bounds-exceed-type", v.path(attribute), message)
 
 
-def _real_only(d: Description, v: Variable, states: Collection[int | None]) -> Iterator[Finding]:
+def _real_only(d: Description, v: ScalarVariable, states: Collection[int | None]) -> Iterator[Finding]:
     unit = v.attributes.get("unit")
     if unit is not None and unit not in d.units:
         message = f"unit of `{v.name}` must be defined in UnitDefinitions, but `{unit}` is not"
@@ -173,7 +180,7 @@ def _real_only(d: Description, v: Variable, states: Collection[int | None]) -> I
 
 
 def _aliases(d: Description) -> Iterator[Finding]:
-    groups: dict[tuple[str, int], list[Variable]] = defaultdict(list)
+    groups: dict[tuple[str, int], list[ScalarVariable]] = defaultdict(list)
     for v in d.variables:
         if v.reference is not None:
             groups[v.base, v.reference].append(v)
@@ -182,7 +189,7 @@ def _aliases(d: Description) -> Iterator[Finding]:
             yield from _alias_group(d, base, reference, group)
 
 
-def _alias_group(d: Description, base: str, reference: int, group: list[Variable]) -> Iterator[Finding]:
+def _alias_group(d: Description, base: str, reference: int, group: list[ScalarVariable]) -> Iterator[Finding]:
     names = ", ".join(f"`{v.name}`" for v in group)
     what = f"the {base} variables with value reference {reference} ({names})"
     settable = [v for v in group if _settable(v)]
@@ -223,7 +230,7 @@ def _base_unit(d: Description, unit: str | None) -> object:
     return frozenset((k, number(v, "Real")) for k, v in element.attrib.items() if v not in ("0", "0.0"))
 
 
-def _settable(v: Variable) -> bool:
+def _settable(v: ScalarVariable) -> bool:
     if v.variability == "constant":
         return False
     return v.causality in ("input", "parameter") or v.initial in ("exact", "approx")

@@ -20,7 +20,14 @@ def _schema() -> etree.XMLSchema:
 
 
 def check_schema(root: etree._Element) -> Iterator[Finding]:
-    """Findings of the schema that FMPy ships, one per violation."""
+    """Findings of the schema that FMPy ships, one per violation.
+
+    Args:
+        root: of modelDescription.xml.
+
+    Yields:
+        Each finding.
+    """
     schema = _schema()
     if schema.validate(root):
         return
@@ -35,6 +42,9 @@ def check_with_fmpy(path: Path, variables: int = 0) -> Iterator[Finding]:
     Args:
         variables: their number; FMPy takes a millisecond for each name, so names are left to the rules here when
             there are many.
+
+    Yields:
+        Each finding.
     """
     from fmpy import read_model_description
     from fmpy.model_description import ValidationError

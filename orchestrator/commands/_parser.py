@@ -3,7 +3,7 @@
 import argparse
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -24,17 +24,34 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        readers: tuple[tuple[type, Callable[[str], object]], ...] = ((int, whole), (float, number), (Path, path))
+        readers: tuple[tuple[type, Callable[[str], object]], ...] = ((int, _whole), (float, number), (Path, _path))
         for kind, reader in readers:
             self.register("type", kind, reader)
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where help is, and exit with 2."""
+        """Say what is wrong and where help is, and exit with 2.
+
+        Args:
+            message: argparse's words.
+
+        Returns:
+            Never.
+        """
         self.exit(2, f"error: {one_line(_worded(message))}; see {self.prog} --help\n")
 
 
-def whole(text: str) -> int:
-    """Return a whole number of a size that everything can handle."""
+def _whole(text: str) -> int:
+    """Return a whole number of a size that everything can handle.
+
+    Args:
+        text: a word of the command line.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: it is none, or has more than 18 digits.
+    """
     try:
         value = int(text)
     except ValueError:
@@ -45,7 +62,17 @@ def whole(text: str) -> int:
 
 
 def number(text: str) -> float:
-    """Return a finite number."""
+    """Return a finite number.
+
+    Args:
+        text: a word of the command line.
+
+    Returns:
+        The number.
+
+    Raises:
+        ArgumentTypeError: it is none, or not finite.
+    """
     try:
         value = float(text)
     except ValueError:
@@ -55,16 +82,62 @@ def number(text: str) -> float:
     return value
 
 
-def path(text: str) -> Path:
-    """Return a path; an empty one, which would mean the working directory, is a mistake of a script."""
+def _path(text: str) -> Path:
+    """Return a path; an empty one, which would mean the working directory, is a mistake of a script.
+
+    Args:
+        text: a word of the command line.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentTypeError: it is empty.
+    """
     if not text:
         raise argparse.ArgumentTypeError("must be a path, but is empty")
     return Path(text)
 
 
 def one_line(message: str) -> str:
-    """Return a message whose line breaks and control characters are written out."""
+    """Return a message whose line breaks and control characters are written out.
+
+    Args:
+        message: of any origin.
+
+    Returns:
+        Printable text.
+    """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
+
+
+def flags_of(parser: argparse.ArgumentParser) -> dict[str, str]:
+    """Return what the command line calls each argument, by its name in Python.
+
+    Args:
+        parser: of the command.
+
+    Returns:
+        Flag by name.
+    """
+    actions = parser._actions  # argparse has no public list of them
+    return {a.dest: a.option_strings[-1] if a.option_strings else str(a.metavar or a.dest) for a in actions}
+
+
+def worded(error: BaseException, flags: Mapping[str, str]) -> str:
+    """Return an error's text in which the arguments that it speaks of have their names of the command line.
+
+    Args:
+        error: raised by the API.
+        flags: what ``flags_of`` returned.
+
+    Returns:
+        The text.
+    """
+    text = str(error)
+    for name in getattr(error, "arguments", ()):
+        text = text.replace(f"`{name}`", f"`{flags.get(name, name)}`")
+    return text
 
 
 def _worded(message: str) -> str:

@@ -4,94 +4,103 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import Progress
 
-from orchestrator.checking.archive import MEBIBYTE, ArchiveLimits
-from orchestrator.checking.check import CheckOptions, check_fmu
-from orchestrator.checking.findings import Report
-from orchestrator.checking.sandbox import Limits
-from orchestrator.checking.writing import as_junit, as_lines, as_results
-from orchestrator.commands._parser import number
-from orchestrator.errors import FmuError, OutputError
-from orchestrator.output import staged, write_result
-from orchestrator.reporting import write_report
+from orchestrator.api.build import build
+from orchestrator.api.check import CheckResult, check, find_fmus
+from orchestrator.checking.findings import FmuFindings
+from orchestrator.checking.writing import as_lines
+from orchestrator.commands._safety import add_trust, note_missing_walls, positive
+from orchestrator.errors import OutputError
+from orchestrator.shared.isolation.archives import ArchiveLimits
+from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
+from orchestrator.shared.output import staged
+from orchestrator.shared.results import as_plain
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
+    """Add the arguments of the command.
+
+    Args:
+        parser: of the command.
+    """
     parser.add_argument(
         "fmus", nargs="*", type=Path, metavar="FMU", help="FMUs, unpacked FMUs or folders with FMUs (default: our own)"
     )
     parser.add_argument("--static", action="store_true", help="execute nothing")
+    add_trust(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the findings as JSON")
     parser.add_argument("--junit", type=Path, metavar="FILE", help="also write the findings as JUnit XML")
     limits = Limits()
     archive = ArchiveLimits()
     parser.add_argument(
-        "--time-limit", type=_positive, default=limits.time, metavar="S",
+        "--time-limit", type=positive, default=limits.time, metavar="S",
         help="wall time that one call may take (default: %(default)g)",
     )  # fmt: skip
     parser.add_argument(
-        "--memory-limit", type=_positive, default=limits.memory / MEBIBYTE, metavar="MIB",
+        "--memory-limit", type=positive, default=limits.memory / MEBIBYTE, metavar="MIB",
         help="memory that the running FMU may take (default: %(default)g)",
     )  # fmt: skip
     parser.add_argument(
-        "--size-limit", type=_positive, default=archive.total / MEBIBYTE, metavar="MIB",
+        "--size-limit", type=positive, default=archive.total / MEBIBYTE, metavar="MIB",
         help="size that the unpacked FMU may have (default: %(default)g)",
     )  # fmt: skip
 
 
-def _positive(text: str) -> float:
-    value = number(text)
-    if not 0 < value < 1e9:
-        raise argparse.ArgumentTypeError(f"must be positive and below 1e9, but is {text}")
-    return value
-
-
 def run(args: argparse.Namespace) -> int:
-    """Check every FMU; 1 when any has an error."""
-    options = CheckOptions(
-        static=args.static,
-        archive=ArchiveLimits(total=int(args.size_limit * MEBIBYTE)),
-        limits=Limits(time=args.time_limit, memory=int(args.memory_limit * MEBIBYTE)),
-    )
-    paths = find_fmus(args.fmus) if args.fmus else _own()
+    """Check every FMU; 1 when any has an error.
+
+    Args:
+        args: of the command line.
+
+    Returns:
+        The exit code.
+    """
+    paths = find_fmus(args.fmus) if args.fmus else list(build().paths.values())
     for option, target in (("--json", args.json), ("--junit", args.junit)):
         _require_place(target, option)
-    arguments = {
-        "fmus": [str(p) for p in paths],
-        "static": args.static,
-        "time_limit": args.time_limit,
-        "memory_limit": args.memory_limit,
-        "size_limit": args.size_limit,
-    }
-    reports = []
-    with staged(args.out) as directory:
-        for path in _shown(paths):
-            reports.append(check_fmu(path, options))
-            print("\n".join(as_lines(reports[-1])), flush=True)
-        write_result(directory, "check", arguments, None, as_results(reports))
-        write_report(directory, "check")
-        _write_extra(args, reports)
-    return 0 if all(r.ok for r in reports) else 1
+    if not (args.static or args.trust):
+        note_missing_walls()
+    with staged(args.out) as folder:
+        with _shown(len(paths)) as progress:
+            result = check(
+                paths,
+                static=args.static,
+                trust=args.trust,
+                time_limit=args.time_limit,
+                memory_limit=args.memory_limit,
+                size_limit=args.size_limit,
+                progress=progress,
+            )
+        result.write(folder, args.out)
+        _write_extra(args, result)
+    return 0 if result.ok else 1
 
 
-def _shown(paths: Sequence[Path]) -> Iterator[Path]:
-    """The paths one after the other, with a progress bar on a terminal."""
-    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
-        yield from progress.track(paths, description="check")
+@contextmanager
+def _shown(count: int) -> Iterator[Callable[[FmuFindings], None]]:
+    """Yield what prints a report, with a progress bar on a terminal."""
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task("check", total=count)
+
+        def shown(report: FmuFindings) -> None:
+            print("\n".join(as_lines(report)), flush=True)
+            bar.advance(task)
+
+        yield shown
 
 
-def _write_extra(args: argparse.Namespace, reports: Sequence[Report]) -> None:
+def _write_extra(args: argparse.Namespace, result: CheckResult) -> None:
     if args.json is not None:
-        _write(args.json, json.dumps(as_results(reports), indent=1) + "\n", "--json")
+        _write(args.json, json.dumps(as_plain(result.results()), indent=1) + "\n", "--json")
     if args.junit is not None:
-        _write(args.junit, as_junit(reports), "--junit")
+        _write(args.junit, result.junit(), "--junit")
 
 
 def _require_place(path: Path | None, option: str) -> None:
@@ -113,29 +122,3 @@ def _write(path: Path, text: str, option: str) -> None:
         raise OutputError(
             f"`{option}` must be a file that can be written, but {path} is not: {error.strerror}"
         ) from None
-
-
-def find_fmus(arguments: Sequence[Path]) -> list[Path]:
-    """The FMUs that the arguments mean: files, unpacked FMUs, and the ``*.fmu`` of folders.
-
-    Raises:
-        FmuError: an argument does not exist, or a folder has no FMU.
-    """
-    found: list[Path] = []
-    for path in arguments:
-        if path.is_dir() and not (path / "modelDescription.xml").exists():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() == ".fmu")
-            if not inside:
-                raise FmuError(f"a folder must have *.fmu files or a modelDescription.xml, but {path} has neither")
-            found += inside
-        elif path.is_file() or path.is_dir():
-            found.append(path)
-        else:
-            raise FmuError(f"an FMU must be an existing file or folder, but {path} is not")
-    return list(dict.fromkeys(found))
-
-
-def _own() -> list[Path]:
-    from orchestrator.fmi.build import ensure_built
-
-    return list(ensure_built().values())

@@ -1,230 +1,138 @@
 """``diagnose``: where a record and the model disagree, what is missing, and the corrected FMU."""
 
 import argparse
-import csv
 import sys
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from msgspec.structs import replace
 
-from orchestrator.commands._console import print_table
-from orchestrator.diagnosis.admission import check_comparable
-from orchestrator.diagnosis.corrected import BeforeAfter, before_and_after, build_corrected
-from orchestrator.diagnosis.diagnose import diagnose
-from orchestrator.diagnosis.evidence import Term, evidence_of
-from orchestrator.diagnosis.figures import draw_candidates, draw_innovations, draw_lines, draw_missing, draw_signals
-from orchestrator.diagnosis.outcome import Diagnosis, Gap
-from orchestrator.diagnosis.validate import STAGES, Validation, torque_errors, validate
-from orchestrator.errors import ConvergenceError
-from orchestrator.model_file import Model, read_model
-from orchestrator.output import staged, write_result
-from orchestrator.record import Record, read_record
-from orchestrator.record_plausibility import check_plausible
-from orchestrator.reporting import write_report
-
-SHOWN = 5
+from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.diagnose import comparable_record, diagnose
+from orchestrator.api.records import read_model
+from orchestrator.commands._console import print_blocks, say
+from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
+from orchestrator.commands._safety import note_missing_walls
+from orchestrator.commands._stages import Stages, diagnosis_seconds
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.errors import ScenarioError
+from orchestrator.shared.output import staged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument("record", type=Path, metavar="DATA.csv", help="measured record: time,u,theta_m[,theta_l]")
+    """Add the arguments of the command.
+
+    Args:
+        parser: of the command.
+    """
+    parser.add_argument(
+        "records", type=Path, nargs="+", metavar="DATA", help=f"measured records of one machine ({FORMATS})"
+    )
     parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the model it is compared with")
-    parser.add_argument("--validate", type=Path, metavar="OTHER.csv", help="a second record, to show the gap on")
+    parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
+    parser.add_argument(
+        "--fmu", type=Path, metavar="ANY.fmu", help="any FMI 2.0 co-simulation FMU instead of a model of ours"
+    )
+    parser.add_argument(
+        "--map", type=Path, metavar="MAP.toml", help="with an FMU: columns, uncertain parameters, ports"
+    )
+    parser.add_argument(
+        "--draft-map",
+        action="store_true",
+        help="with an FMU: write a first map.toml from its units and causality, and stop",
+    )
+    parser.add_argument("--validate", type=Path, metavar="OTHER", help="a second record, to show the misfit on")
+    parser.add_argument(
+        "--no-search", action="store_true", help="re-fit and judge the model as it stands (a corrected.toml)"
+    )
+    parser.add_argument(
+        "--time-limit", type=float, metavar="SECONDS", help="stop the search then; the verdict is unknown"
+    )
+    add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU."""
+    """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU.
+
+    Args:
+        args: of the command line.
+
+    Returns:
+        The exit code.
+
+    Raises:
+        ScenarioError: options that do not belong together.
+    """
+    if args.fmu is not None:
+        return _any_fmu(args)
+    if args.map is not None or args.draft_map:
+        raise ScenarioError("`map` and `draft_map` must come with an FMU, but none is given", "map", "draft_map")
     model = read_model(args.model)
-    record = _read(args.record, model)
-    other = _read(args.validate, model) if args.validate else None
-    begun = time.monotonic()
-    with staged(args.out) as directory, np.errstate(all="ignore"):
-        try:
-            with _shown() as progress:
-                diagnosis = diagnose(record, model, progress)
-            fmu = build_corrected(diagnosis, args.record.name, directory)
-            runs = before_and_after(diagnosis, fmu)
-            results = diagnosis.as_json() | {"model": str(args.out / fmu.name)}
-            results["cosimulation"] = {"largest_difference_from_compiled": runs.difference, "unit": "rad"}
-            if other is not None:
-                results |= _validated(validate(other, diagnosis))
-            if errors := torque_errors(record, diagnosis):
-                results["torque_error"] = {"record": errors} | results.get("torque_error", {})
-            found = evidence_of(diagnosis)
-            results["also_seen"] = [_term(term, diagnosis) for term in found.terms]
-        except np.linalg.LinAlgError as error:
-            raise ConvergenceError(f"{record.source}: no model can be fitted to this record: {error}") from None
-        results["seconds"] = time.monotonic() - begun
-        _write_csv(directory / "diagnose.csv", runs)
-        draw_signals(directory / "diagnose_signals.png", runs, diagnosis)
-        draw_innovations(directory / "diagnose_innovations.png", diagnosis)
-        draw_candidates(directory / "diagnose_candidates.png", diagnosis)
-        draw_missing(directory / "diagnose_missing_torque.png", diagnosis)
-        draw_lines(directory / "diagnose_ripple.png", found, diagnosis.gap[0].unit)
-        given = {"record": str(args.record), "model": args.model and str(args.model)}
-        given["validate"] = args.validate and str(args.validate)
-        write_result(directory, "diagnose", given, None, results)
-        write_report(directory, "diagnose")
-    _print(diagnosis, results)
-    sys.stdout.write(f"Corrected FMU: {results['model']}\nWritten to {args.out}: report.html, diagnose.json, figures\n")
+    settings = chosen_settings(args.settings, DiagnosisSettings)
+    if args.time_limit is not None:
+        if not 0.0 < args.time_limit < 1e9:
+            raise ScenarioError(
+                f"`time_limit` must be positive and below 1e9 s, but is {args.time_limit:g}", "time_limit"
+            )
+        settings = replace(settings, search=replace(settings.search, time_limit=args.time_limit))
+    reading = reading_of(args)
+    records = [comparable_record(path, model, settings, **reading) for path in args.records]
+    other = None if args.validate is None else comparable_record(args.validate, model, settings, **reading)
+    files = {"record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}
+    given = {name: path and str(path) for name, path in files.items()}
+    with staged(args.out) as folder:
+        with _shown(sum(record.size for record in records)) as progress:
+            found = diagnose(
+                records, model, validate=other, settings=settings, search=not args.no_search, progress=progress
+            )
+        found.write(folder, args.out, given)
+        fmu = args.out / found.fmu_name
+    print_blocks([*what_was_read(records if other is None else [*records, other]), *found.blocks()])
+    print_blocks(
+        [
+            f"Corrected FMU: {fmu}, for any FMI 2.0 tool: variables as before, corrected values as start values",
+            f"Its model file: {args.out / 'corrected.toml'}; `diagnose NEW.csv --no-search --model` with it judges "
+            "a new record",
+            f"Written to {args.out}: report.html, diagnose.json, figures",
+        ]
+    )
     return 0
 
 
-def _read(path: Path, model: Model) -> Record:
-    """Return a record that the model can be compared with."""
-    record = read_record(path, model.columns)
-    check_comparable(record)
-    check_plausible(record, model)
-    return record
+def _any_fmu(args: argparse.Namespace) -> int:
+    """Diagnose an FMU that is not ours, or draft its map."""
+    from orchestrator.api.any_fmu import diagnose_fmu, draft_map
 
-
-def _validated(found: Validation) -> dict[str, Any]:
-    """Return what the other record says, in its form for ``diagnose.json``."""
-    signals = {
-        gap.signal: _gap(gap) | {"r_squared": {name: values[n] for name, values in found.r_squared.items()}}
-        for n, gap in enumerate(found.gap)
-    }
-    return {"validation": signals} | (
-        {"torque_error": {"validation": found.torque_error}} if found.torque_error else {}
-    )
-
-
-def _term(term: Term, diagnosis: Diagnosis) -> dict[str, Any]:
-    """Return what is left and what it follows, in its form for ``diagnose.json``."""
-    metric = diagnosis.gap[0].unit == "m"
-    return {
-        "name": term.name,
-        "period": None if term.period is None else 1e3 * term.period if metric else term.period,
-        "period_unit": "mm" if metric else "rad",
-        "size": term.size,
-        "unit": "N" if metric else "N.m",
-        "gain": term.gain,
-        "level": term.level,
-        "sure": term.sure,
-    }
-
-
-def _gap(gap: Gap) -> dict[str, Any]:
-    return {"before": gap.before, "after": gap.after, "noise": gap.noise, "unit": gap.unit}
-
-
-def _print(diagnosis: Diagnosis, results: dict[str, Any]) -> None:
-    for line in summary(diagnosis):
-        sys.stdout.write(line + "\n")
-    rows = [
-        [
-            ", ".join(step["on_top_of"]) or "parameters",
-            tried["effect"],
-            f"{tried['gain']:.1f}",
-            f"{tried['decided']:.1f}",
-            "added" if step["accepted"] and n == 0 else "",
-        ]
-        for step in results["candidates"]
-        for n, tried in enumerate(step["tried"][:SHOWN])
-    ]
-    if rows:
-        print_table("Candidates", ("on top of", "effect", "gain", "of it on deciding part", ""), rows)
-    gaps = [
-        [gap.signal, name, f"{rms:.4g}", f"{rms / gap.noise:.2f}"] for gap in diagnosis.gap for name, rms in gap.stages
-    ]
-    print_table("Gap on held-out data", ("signal", "model", f"rms [{diagnosis.gap[0].unit}]", "times noise"), gaps)
-    _print_also_seen(results["also_seen"])
-    if "validation" in results:
-        rows = [
-            [signal, f"{g['before']:.4g}", f"{g['after']:.4g}", f"{g['noise']:.4g}"]
-            for signal, g in results["validation"].items()
-        ]
-        print_table(
-            "Gap on the other record",
-            ("signal", *(f"{name} [{diagnosis.gap[0].unit}]" for name in ("before", "after", "noise"))),
-            rows,
-        )
-        rows = [
-            [signal, *(f"{g['r_squared'][name]:.4f}" for name in STAGES)] for signal, g in results["validation"].items()
-        ]
-        print_table("R2 of one free run over all of the other record", ("signal", *STAGES), rows)
-    if "torque_error" in results:
-        rows = [
-            [record, *(f"{100.0 * errors[name]:.2f} %" for name in STAGES)]
-            for record, errors in results["torque_error"].items()
-        ]
-        print_table("Relative torque error of the inverse model", ("on", *STAGES), rows)
-
-
-def _print_also_seen(terms: Sequence[dict[str, Any]]) -> None:
-    """Print what the final model leaves that chance does not explain."""
-    rows = [
-        [
-            term["name"],
-            "" if term["period"] is None else f"{term['period']:.4g} {term['period_unit']}",
-            f"{term['size']:.3g} {term['unit']}",
-            f"{term['gain']:.0f}",
-            f"{term['gain'] / term['level']:.0f}",
-        ]
-        for term in terms
-        if term["sure"]
-    ]
-    if rows:
-        columns = ("what", "period", "size", "gain", "times that of any period")
-        print_table("Also seen at the motor, and not added to the model", columns, rows)
-
-
-def summary(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield what was found, one sentence a line."""
-    meaning = {
-        "none": "the model explains the record to its noise",
-        "parameters": "re-fitted parameters explain the record",
-        "effects": "effects are missing in the model",
-        "unknown": "a gap is left that nothing in the library explains",
-    }
-    yield f"Verdict: {diagnosis.verdict}: {meaning[diagnosis.verdict]}"
-    for effect in diagnosis.effects:
-        values = ", ".join(
-            f"{name} = {e.value:.5g} +- {e.standard_error:.2g} {e.unit}".rstrip()
-            for name, e in effect.parameters.items()
-        )
-        runner = f"; runner-up {effect.runner_up}, behind by {effect.margin:.0f}" if effect.runner_up else ""
-        yield f"  {effect.name} ({effect.site}): {values}; gain {effect.score:.0f}{runner}"
-    if diagnosis.where and diagnosis.verdict not in ("none", "parameters"):
-        yield "Where:"
-        for place in diagnosis.where[:SHOWN]:
-            yield f"  {place.words}"
-    for warning in diagnosis.warnings:
-        yield f"Note: {warning}"
-
-
-def _write_csv(path: Path, runs: BeforeAfter) -> None:
-    names: Sequence[str] = ("theta_m", "theta_l")[: runs.measured.shape[1]]
-    header = ["time", "u"] + [f"{name}{suffix}" for name in names for suffix in ("", "_before", "_after")]
-    columns = [runs.time, runs.u]
-    for n in range(len(names)):
-        columns += [runs.measured[:, n], runs.before[:, n], runs.after[:, n]]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+    if len(args.records) > 1:
+        raise ScenarioError("`records` must be one with an FMU of others", "records")
+    (path,) = args.records
+    for name in ("model", "time_limit"):
+        if getattr(args, name) is not None:
+            raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
+    note_missing_walls()
+    if args.draft_map:
+        text = draft_map(path, args.fmu)
+        with staged(args.out) as folder:
+            (folder / "map.toml").write_text(text, encoding="utf-8")
+        sys.stdout.write(f"Written to {args.out / 'map.toml'}: look it over, and give it with --map\n")
+        return 0
+    if args.map is None:
+        raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
+    with staged(args.out) as folder:
+        found = diagnose_fmu(path, args.fmu, args.map, validate=args.validate, settings=args.settings, progress=say)
+        try:
+            found.write(folder, args.out)
+        finally:
+            found.close()
+        print_blocks(found.blocks())
+    sys.stdout.write(f"Written to {args.out}: report.html, diagnose.json, diagnose.csv, figure\n")
+    return 0
 
 
 @contextmanager
-def _shown() -> Iterator[Any]:
-    """Yield a progress callback: a bar on a terminal, nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda done, expected, what: None
-        return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.completed} fits"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(file=sys.stderr), transient=True) as bar:
-        task = bar.add_task("diagnose", total=None)
-        yield lambda done, expected, what: bar.update(
-            task, completed=done, total=expected, description=f"fitted {what}"
-        )
+def _shown(rows: int) -> Iterator[Callable[[int, int, str], None]]:
+    """Show stages with the time left on a terminal; yield the progress callback of a diagnosis."""
+    with Stages() as stages:
+        stages.begin("diagnosing", diagnosis_seconds(rows))
+        yield lambda done, expected, what: stages.at(f"fitted {what}", done / max(expected, 1))

@@ -1,62 +1,82 @@
 """``estimate``: the gap, with interval, from a measured record; or the excitation that would show it."""
 
 import argparse
-import csv
 import math
 import sys
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from orchestrator.commands._console import print_table
-from orchestrator.errors import ConvergenceError, ScenarioError
-from orchestrator.estimation import cramer_rao
-from orchestrator.estimation.design import LONGEST, SHORTEST, Limits, design
-from orchestrator.estimation.protocol import LEVEL, METHODS, Estimate, NotApplicableError, estimator
-from orchestrator.estimation.tables import write_tables
-from orchestrator.model_file import Model, read_model
-from orchestrator.output import staged, write_result
-from orchestrator.record import MINIMUM_ROWS, Record, read_record
-from orchestrator.record_plausibility import LONGEST_STEP, check_plausible, own_frequency
+from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
+from orchestrator.api.estimate import (
+    DEFAULT_METHOD,
+    DIAGNOSIS,
+    EstimateResult,
+    estimate,
+    plausible_record,
+    require_linear,
+)
+from orchestrator.api.records import read_model
+from orchestrator.api.shown import Block
+from orchestrator.commands._console import print_blocks
+from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
+from orchestrator.commands._stages import Stages, diagnosis_seconds
+from orchestrator.errors import ScenarioError
+from orchestrator.estimation.cost import expected_seconds
+from orchestrator.estimation.protocol import METHODS
+from orchestrator.estimation.settings import EstimationSettings
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
 from orchestrator.reporting import write_report
+from orchestrator.shared.output import staged, write_result
 
 
 @dataclass(frozen=True)
 class DesignOption:
-    """A number that ``--design`` takes: flag, unit, default, range and what it means."""
+    """A number that ``--design`` takes: its name in Python, unit, default and what it means."""
 
-    flag: str
+    name: str
     unit: str
     default: float
-    least: float
-    most: float
     meaning: str
 
+    @property
+    def flag(self) -> str:
+        """Return the option of the command line."""
+        return "--" + self.name.replace("_", "-")
 
-DEFAULT_METHOD = "maximum_likelihood"
-DEFAULT_SIZE = 0.005  # rad
-SIZES = (1e-5, 0.5)  # rad, half-gaps that a record can be designed for
+
 DESIGN_OPTIONS = (
-    DesignOption("--torque-limit", "N.m", 250.0, 1e-3, 1e6, "largest torque to ask for"),
-    DesignOption("--speed-limit", "RAD/S", 50.0, 1e-3, 1e5, "largest speed of the motor"),
-    DesignOption("--duration", "S", 10.0, SHORTEST, 1e4, "length of the proposed record"),
-    DesignOption("--rate", "HZ", 200.0, 1.0, 1e5, "its samples per second"),
+    DesignOption("torque_limit", "N.m", 250.0, "largest torque to ask for"),
+    DesignOption("speed_limit", "RAD/S", 50.0, "largest speed of the motor"),
+    DesignOption("duration", "S", 10.0, "length of the proposed record"),
+    DesignOption("rate", "HZ", 200.0, "its samples per second"),
 )
-UNSEEN = 1.0  # rad, bound from which on a record says nothing
-HEAD = ("method", "half-gap [rad]", "standard error", "Cramer-Rao", "95 % interval", "s")
+
+
+ANNOUNCED_FROM = 20.0  # s
+SECONDS_OF_OTHERS = 3.0  # that a method without a fit takes
+LOW_RATE = 200.0  # Hz, which shows the shafts that the methods are made for
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
+    """Add the arguments of the command.
+
+    Args:
+        parser: of the command.
+    """
     parser.add_argument(
-        "record", type=Path, nargs="?", metavar="DATA.csv", help="measured record: time,u,theta_m[,theta_l]"
+        "records",
+        type=Path,
+        nargs="*",
+        metavar="DATA",
+        help=f"measured record ({FORMATS}); several of one machine are fitted together",
     )
     parser.add_argument(
         "--model",
@@ -67,222 +87,155 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     listed = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
     parser.add_argument("--method", choices=[*METHODS, "all"], help=f"{listed} (default: {DEFAULT_METHOD})")
     parser.add_argument("--motor-only", action="store_true", help="leave the load encoder out")
+    parser.add_argument("--time-limit", type=float, metavar="S", help="give up after this time (default: never)")
+    parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
+    add_reading_arguments(parser, "; with --design also those of the proposed record (default: 200)")
+    parser.add_argument(
+        "--no-diagnose", action="store_true", help="stop where the model does not explain the record; name nothing"
+    )
     group = parser.add_argument_group("design of an experiment")
     group.add_argument("--design", action="store_true", help="propose a torque record that shows the gap best")
     group.add_argument(
         "--size", type=float, metavar="RAD", help=f"half-gap to be seen (default: the estimate, or {DEFAULT_SIZE:g})"
     )
-    for option in DESIGN_OPTIONS:
+    for option in DESIGN_OPTIONS[:-1]:
         text = f"{option.meaning} (default: {option.default:g})"
         group.add_argument(option.flag, type=float, metavar=option.unit, help=text)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Estimate or design, print tables, write JSON, CSV, figures and report."""
+    """Estimate or design, print tables, write JSON, CSV, figures and report.
+
+    Args:
+        args: of the command line.
+
+    Returns:
+        The exit code.
+    """
     options = _design_options(args)
     model = read_model(args.model)
-    _require_linear(model)
-    record = None if args.record is None else _read(args, model)
+    require_linear(model)
+    settings = chosen_settings(args.settings, EstimationSettings)
+    reading = reading_of(args)
+    records = [plausible_record(path, model, args.motor_only, **reading) for path in args.records]
     if args.design:
-        _require_rate(options["--rate"], model)
-    with staged(args.out) as directory:
+        check_design(model, args.size, **options)
+    with staged(args.out) as folder:
         results: dict[str, Any] = {}
-        estimates: list[Estimate] = []
-        if record is not None:
+        blocks: list[Block] = []
+        found: EstimateResult | None = None
+        if records:
+            _announce(records, model, args)
+            blocks += what_was_read(records)
             method = args.method or DEFAULT_METHOD
-            estimates, results = _estimate(record, model, list(METHODS) if method == "all" else [method])
-            _draw(directory, record, estimates, model)
+            with _shown(records, model) as progress:
+                found = estimate(
+                    records,
+                    model,
+                    method=method,
+                    motor_only=args.motor_only,
+                    time_limit=math.inf if args.time_limit is None else args.time_limit,
+                    diagnose=not args.no_diagnose,
+                    settings=settings,
+                    progress=progress,
+                )
+            blocks += found.blocks()
+            found.write_files(folder)
+            found.write_diagnosis(folder, args.out)
+            results = found.results(args.out)
         if args.design:
-            seen = next((e.alpha for e in estimates if e.visible and e.alpha > 0.0), DEFAULT_SIZE)
-            size = args.size if args.size is not None else min(max(seen, SIZES[0]), SIZES[-1])
-            results["design"] = _design(directory, options, model, size, args.motor_only)
-        given = {k: str(v) if isinstance(v, Path) else v for k, v in vars(args).items() if k not in ("run", "command")}
-        write_result(directory, "estimate", given, None, results)
-        write_report(directory, "estimate")
-    sys.stdout.write(f"Written to {args.out}\n")
+            size = args.size if args.size is not None else _seen(found)
+            with _progress() as advance:
+                plan = design(
+                    model, size, **options, motor_only=args.motor_only, progress=lambda done, total: advance()
+                )
+            blocks += plan.blocks()
+            if not plan.shows:
+                blocks.append(
+                    f"No excitation within these limits shows a half-gap of {size:g} rad: raise `--torque-limit`, "
+                    "`--speed-limit` or `--duration`"
+                )
+            plan.write_files(folder)
+            results |= plan.results()
+        given = {"record": str(args.records[0]) if args.records else None}
+        given |= {k: _plain(v) for k, v in vars(args).items() if k not in ("run", "command")}
+        write_result(folder, "estimate", given, None, results)
+        write_report(folder, "estimate")
+    print_blocks([*blocks, f"Written to {args.out}"])
     return 0
 
 
+def _announce(records: list[Record], model: Model, args: argparse.Namespace) -> None:
+    """Say what a long fit will cost before it starts."""
+    if (args.method or DEFAULT_METHOD) not in (DEFAULT_METHOD, "all"):
+        return
+    rows = sum(record.size for record in records)
+    seconds = expected_seconds(records, model)
+    if seconds > ANNOUNCED_FROM:
+        rate = 1.0 / records[0].step
+        cheaper = "" if rate <= LOW_RATE else f"; with --rate {LOW_RATE:g} {seconds * LOW_RATE / rate:.0f} s"
+        sys.stderr.write(f"The fit of {rows} rows will take about {seconds:.0f} s{cheaper}\n")
+
+
+def _plain(value: Any) -> Any:
+    """Return an argument as JSON holds it."""
+    if isinstance(value, list):
+        return [_plain(entry) for entry in value]
+    return str(value) if isinstance(value, Path) else value
+
+
 def _design_options(args: argparse.Namespace) -> dict[str, float]:
-    """Return the value of each of ``DESIGN_OPTIONS``, by flag; refuse options that would have no effect.
+    """Return the value of each of ``DESIGN_OPTIONS``, by name; refuse options that would have no effect.
 
     Raises:
-        ScenarioError: an option is out of its range, or given where nothing reads it.
+        ScenarioError: an option is given where nothing reads it.
     """
-    if args.record is None:
+    if args.time_limit is not None and not args.time_limit > 0.0:
+        raise ScenarioError(f"`time_limit` must be positive, but is {args.time_limit:g}", "time_limit")
+    if not args.records:
         if not args.design:
-            raise ScenarioError("`DATA.csv` must be given, unless `--design` is, but neither is")
+            raise ScenarioError("`DATA` must be given, unless `--design` is, but neither is")
         if args.method is not None:
             raise ScenarioError("`--method` must come with a record, but none is given")
-    values = {"--size": (args.size, *SIZES)}
-    values |= {o.flag: (getattr(args, o.flag[2:].replace("-", "_")), o.least, o.most) for o in DESIGN_OPTIONS}
-    for flag, (value, least, most) in values.items():
-        if value is None:
-            continue
-        if not args.design:
-            raise ScenarioError(f"`{flag}` must come with `--design`, but that is not given")
-        if not least <= value <= most:
-            raise ScenarioError(f"`{flag}` must be between {least:g} and {most:g}, but is {value:g}")
-    chosen = {o.flag: o.default if values[o.flag][0] is None else values[o.flag][0] for o in DESIGN_OPTIONS}
-    rows = chosen["--duration"] * chosen["--rate"]
-    if not MINIMUM_ROWS <= round(rows) <= LONGEST:
-        raise ScenarioError(f"`--duration` times `--rate` must be {MINIMUM_ROWS} to {LONGEST} samples, but is {rows:g}")
-    return chosen
-
-
-def _require_rate(rate: float, model: Model) -> None:
-    own = own_frequency(model)
-    if rate * LONGEST_STEP < own:
-        raise ScenarioError(
-            f"`--rate` must be at least {own / LONGEST_STEP:.3g} to show a shaft that oscillates at {own:.3g} rad/s, "
-            f"but is {rate:g}"
-        )
-
-
-def _read(args: argparse.Namespace, model: Model) -> Record:
-    """Return the record, which must fit the model at all."""
-    record = read_record(args.record, model.columns)
-    record = record.without_load_encoder() if args.motor_only else record
-    check_plausible(record, model)
-    return record
-
-
-def _require_linear(model: Model) -> None:
-    """Refuse models that the estimators would not see whole."""
-    if model.fmu != "Drivetrain":
-        raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain to have a gap, but is {model.fmu}")
-    for name, entry in model.parameters.items():
-        active = name.startswith("effects.") and name.rsplit(".", 1)[1] in (
-            "delay", "amplitude", "coulomb", "breakaway", "cubic", "coefficient", "inertia"
-        )  # fmt: skip
-        active = active or (name.startswith("effects.coulomb") and name.endswith("torque"))
-        if active and (entry.value != 0.0 or entry.uncertainty > 0.0):
-            raise ScenarioError(
-                f"{model.source}: `estimate` fits the plant without nonlinear effects, but `{name}` is "
-                f"{entry.value:g}; `diagnose` fits the gap together with them"
-            )
-
-
-def _estimate(record: Record, model: Model, names: list[str]) -> tuple[list[Estimate], dict[str, Any]]:
-    """Run the methods, print their table and messages, and return estimates and results."""
-    estimates: list[Estimate] = []
-    rows: list[list[str]] = []
-    table: dict[str, Any] = {}
-    with _progress(len(names)) as advance:
-        for name in names:
-            begun = time.perf_counter()
-            try:
-                with np.errstate(all="ignore"):
-                    estimate = estimator(name)(record, model)
-                    bound = _bound(record, model, [*estimates, estimate])
-            except np.linalg.LinAlgError as error:
-                raise ConvergenceError(
-                    f"{record.source}: `{name}` finds no solution for this record: {error}"
-                ) from None
-            except NotApplicableError as error:
-                rows.append([name, "not applicable", "", "", str(error), ""])
-                table[name] = {"not_applicable": str(error)}
-            else:
-                estimates.append(estimate)
-                seconds = time.perf_counter() - begun
-                rows.append(_row(estimate, bound, seconds))
-                table[name] = _entry(estimate, bound, seconds)
-            advance()
-    length = f"{record.duration:g} s at {1.0 / record.step:g} Hz"
-    print_table(f"{record.source}: {length}, {'one encoder' if record.theta_l is None else 'two encoders'}", HEAD, rows)
-    for estimate in estimates:
-        if estimate.message:
-            sys.stdout.write(f"{estimate.method}: {estimate.message}\n")
-    results: dict[str, Any] = {"record": {"rows": record.size, "step": record.step, "source": record.source}}
-    results["estimates"] = table
-    if estimates:
-        results |= table[estimates[0].method] | {"method": estimates[0].method}
-    return estimates, results
-
-
-def _bound(record: Record, model: Model, estimates: list[Estimate]) -> float:
-    """Return the record's Cramer-Rao bound: at the fit of the likelihood, or else at the newest estimate."""
-    for estimate in estimates:
-        if "cramer_rao" in estimate.diagnostics:
-            return float(estimate.diagnostics["cramer_rao"])
-    bound = cramer_rao.bound_at(record, model, estimates[-1].alpha)
-    return bound if bound < UNSEEN else math.inf
-
-
-def _row(estimate: Estimate, bound: float, seconds: float) -> list[str]:
-    low, high = estimate.interval
-    numbers = [f"{estimate.alpha:.6g}", f"{estimate.standard_error:.2g}", f"{bound:.2g}"]
-    return [estimate.method, *numbers, f"{low:.6g} to {high:.6g}", f"{seconds:.1f}"]
-
-
-def _entry(estimate: Estimate, bound: float, seconds: float) -> dict[str, Any]:
+    if not args.design:
+        for name in ("size", *(option.name for option in DESIGN_OPTIONS[:-1])):
+            if getattr(args, name) is not None:
+                raise ScenarioError(f"`{name}` must come with `design`, but that is not given", name, "design")
+    given = {option.name: getattr(args, option.name) for option in DESIGN_OPTIONS}
     return {
-        "alpha": estimate.alpha,
-        "standard_error": estimate.standard_error,
-        "cramer_rao": bound,
-        "interval": list(estimate.interval),
-        "level": LEVEL,
-        "unit": "rad",
-        "visible": estimate.visible,
-        "message": estimate.message,
-        "seconds": seconds,
-        "diagnostics": dict(estimate.diagnostics),
+        option.name: option.default if given[option.name] is None else given[option.name] for option in DESIGN_OPTIONS
     }
 
 
-def _draw(directory: Path, record: Record, estimates: list[Estimate], model: Model) -> None:
-    from orchestrator.estimation.figures import draw_fit, draw_online, draw_profile
-
-    for estimate in estimates:
-        if estimate.method == "maximum_likelihood":
-            fitted = estimate.diagnostics["parameters"].get("i", {}).get("value", model.parameters["i"].value)
-            draw_fit(directory / "estimate_fit.png", record, estimate, fitted)
-            write_tables(directory, record, [estimate], fitted)
-            limit = estimate.diagnostics["profile_limit"]
-            draw_profile(directory / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
-        elif estimate.method == "ekf":
-            draw_online(directory / "estimate_online.png", record, estimate)
-            write_tables(directory, record, [estimate], model.parameters["i"].value)
-
-
-def _design(
-    directory: Path, options: dict[str, float], model: Model, size: float, motor_only: bool
-) -> list[dict[str, Any]]:
-    """Choose an excitation, print the candidates, write the record to run."""
-    from orchestrator.estimation.figures import draw_design
-
-    limits = Limits(options["--torque-limit"], options["--speed-limit"])
-    duration, rate = options["--duration"], options["--rate"]
-    with _progress(None) as advance:
-        grid, candidates = design(model, size, limits, duration, rate, motor_only, lambda done, total: advance())
-    rows = [
-        [c.name, f"{c.bound:.2g}" if c.bound < UNSEEN else "not seen", f"{c.torque:.4g}", f"{c.speed:.4g}"]
-        for c in candidates
-    ]
-    head = ("excitation", "bound on the half-gap [rad]", "peak torque [N.m]", "peak motor speed [rad/s]")
-    print_table(f"To see a half-gap of {size:g} rad in {duration:g} s", head, rows)
-    if candidates[0].bound > 0.5 * size:
-        sys.stdout.write(
-            f"No excitation within these limits shows a half-gap of {size:g} rad: raise `--torque-limit`, "
-            "`--speed-limit` or `--duration`\n"
-        )
-    with (directory / "design.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(("time", "u"))
-        writer.writerows((f"{t:.9g}", f"{u:.6g}") for t, u in zip(grid.tolist(), candidates[0].u.tolist(), strict=True))
-    draw_design(directory / "design.png", grid, candidates[0])
-    return [
-        {"name": c.name, "bound": c.bound, "peak_torque": c.torque, "peak_motor_speed": c.speed}
-        for c in candidates
-        if c.bound < UNSEEN
-    ]
+def _seen(found: EstimateResult | None) -> float:
+    """Return the half-gap [rad] to design for: the one that the record shows, if any."""
+    shown = [e.alpha for e in (found.estimates if found is not None else ()) if e.visible and e.alpha > 0.0]
+    least, most = RANGES["size"]
+    return min(max(shown[0], least), most) if shown else DEFAULT_SIZE
 
 
 @contextmanager
-def _progress(total: int | None) -> Iterator[Any]:
+def _shown(records: list[Record], model: Model) -> Iterator[Callable[[str, str, float], None]]:
+    """Show stages with the time left on a terminal; yield what is to be called at each."""
+    rows = sum(record.size for record in records)
+    with Stages() as stages:
+        stages.begin("preparing", expected_seconds(records, model) if sys.stderr.isatty() else 0.0)
+        known = [DEFAULT_METHOD]
+
+        def show(work: str, stage: str, share: float) -> None:
+            if work not in known:
+                known.append(work)
+                stages.begin(stage, diagnosis_seconds(rows) if work == DIAGNOSIS else SECONDS_OF_OTHERS)
+            stages.at(stage, share)
+
+        yield show
+
+
+@contextmanager
+def _progress() -> Iterator[Any]:
     """Show a bar on a terminal; yield what is to be called after each piece of work."""
     console = Console(file=sys.stderr)
-    columns = (TextColumn("estimating"), BarColumn(), MofNCompleteColumn())
+    columns = (TextColumn("designing"), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
-        task = bar.add_task("", total=total)
+        task = bar.add_task("", total=None)
         yield lambda: bar.advance(task)

@@ -1,32 +1,28 @@
 """``ssp export``: systems as SSP 1.0 files. ``ssp run``: any SSP of FMI 2.0 co-simulation FMUs under our master."""
 
 import argparse
-import csv
 import sys
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
-from orchestrator.commands._console import print_table
+from orchestrator.api.simulate import run_ssp
+from orchestrator.api.ssp import export_ssp
+from orchestrator.commands._console import print_blocks
+from orchestrator.commands._safety import add_safety_arguments, chosen_safety, note
 from orchestrator.errors import ScenarioError
-from orchestrator.fmi.build import ensure_built
-from orchestrator.master.result import Result
-from orchestrator.master.signals import Constant, Signal
-from orchestrator.output import staged, write_result
-from orchestrator.paired.cosimulation import FMUS
-from orchestrator.paired.experiment import Experiment
 from orchestrator.reporting import write_report
-from orchestrator.scenario import load_scenario, simulate
-from orchestrator.ssp.pair import paired_scenario
-from orchestrator.ssp.read import opened_ssp
-from orchestrator.ssp.write import write_ssp
+from orchestrator.shared.output import staged, write_result
 
 ACTIONS = ("export", "run")
 PAIR = {"alpha": 0.02, "reference": 0.5}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what both actions take."""
+    """Add what both actions take.
+
+    Args:
+        parser: of the command.
+    """
     parser.add_argument("action", choices=ACTIONS, help="export: write an SSP file; run: simulate one")
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE.ssp", help="run: the SSP file")
     parser.add_argument(
@@ -44,10 +40,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--input", action="append", default=[], metavar="NAME=VALUE", help="run: constant value of an outer input"
     )
+    add_safety_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write or run an SSP file."""
+    """Write or run an SSP file.
+
+    Args:
+        arguments: of the command line.
+
+    Returns:
+        The exit code.
+    """
     return _export(arguments) if arguments.action == "export" else _run(arguments)
 
 
@@ -55,24 +59,15 @@ def _export(arguments: argparse.Namespace) -> int:
     if arguments.file is not None:
         raise ScenarioError(f"`ssp export` must be given a scenario by --scenario, but is given {arguments.file}")
     _refuse(arguments, "`ssp export`", {"step": None, "stop": None, "jacobi": False, "input": []})
-    if arguments.scenario is None:
-        scenario = paired_scenario(Experiment(), ensure_built(FMUS), arguments.alpha, arguments.reference)
-    else:
+    if arguments.scenario is not None:
         _refuse(arguments, "`ssp export --scenario`", PAIR)
-        scenario = load_scenario(arguments.scenario)
     name = "paired.ssp" if arguments.scenario is None else f"{arguments.scenario.stem}.ssp"
-    with staged(arguments.out) as directory:
-        write_ssp(directory / name, scenario)
-        results = {
-            "file": name,
-            "components": [i.name for i in scenario.system.instances],
-            "connections": len(scenario.system.connections),
-            "stop": scenario.stop,
-            "step": scenario.algorithm.step,
-        }
-        write_result(directory, "ssp", _words(arguments), None, results)
-        write_report(directory, "ssp")
-    counts = f"{len(scenario.system.instances)} FMUs, {len(scenario.system.connections)} connections"
+    with staged(arguments.out) as folder:
+        written = export_ssp(folder / name, arguments.scenario, alpha=arguments.alpha, reference=arguments.reference)
+        write_result(folder, "ssp", _words(arguments), None, written.results())
+        write_report(folder, "ssp")
+    system = written.scenario.system
+    counts = f"{len(system.instances)} FMUs, {len(system.connections)} connections"
     sys.stdout.write(f"Written to {arguments.out / name}: {counts}\n")
     return 0
 
@@ -83,20 +78,18 @@ def _run(arguments: argparse.Namespace) -> int:
     _refuse(arguments, "`ssp run`", PAIR)
     if arguments.file is None:
         raise ScenarioError("`ssp run` must be given an SSP file, but is given none")
-    if arguments.step is not None and not 0.0 < arguments.step < float("inf"):
-        raise ScenarioError(f"`--step` must be finite and positive, but is {arguments.step!r}")
-    with (
-        opened_ssp(arguments.file, _inputs(arguments.input), arguments.step, arguments.jacobi) as scenario,
-        staged(arguments.out) as directory,
-    ):
-        result = simulate(scenario if arguments.stop is None else replace(scenario, stop=arguments.stop))
-        _write_csv(directory / "ssp.csv", result)
-        head = ("signal", "unit", "first", "last", "smallest", "largest")
-        rows = [_summary(result, name) for name in result.names]
-        print_table(f"{arguments.file.name}: {len(result.time) - 1} steps", head, rows)
-        signals = [dict(zip(head, row, strict=True)) for row in rows]
-        write_result(directory, "ssp", _words(arguments), None, {"signals": signals, "steps": len(result.time) - 1})
-        write_report(directory, "ssp")
+    with staged(arguments.out) as folder:
+        result = run_ssp(
+            arguments.file,
+            stop=arguments.stop,
+            step=arguments.step,
+            inputs=_inputs(arguments.input),
+            jacobi=arguments.jacobi,
+            safety=chosen_safety(arguments),
+            tell=note,
+        )
+        result.write(folder, arguments.out, _words(arguments))
+    print_blocks(result.blocks())
     sys.stdout.write(f"Written to {arguments.out}: ssp.csv, ssp.json\n")
     return 0
 
@@ -107,12 +100,12 @@ def _refuse(arguments: argparse.Namespace, action: str, defaults: Mapping[str, o
             raise ScenarioError(f"`--{name}` must be left out of {action}, which it does not change")
 
 
-def _inputs(words: list[str]) -> dict[str, Signal]:
-    inputs: dict[str, Signal] = {}
+def _inputs(words: list[str]) -> dict[str, float]:
+    inputs: dict[str, float] = {}
     for word in words:
         name, _, text = word.rpartition("=")
         try:
-            inputs[name] = Constant(float(text))
+            inputs[name] = float(text)
         except ValueError:
             raise ScenarioError(f"`--input` must be NAME=NUMBER, but is {word!r}") from None
     return inputs
@@ -125,17 +118,3 @@ def _words(arguments: argparse.Namespace) -> dict[str, object]:
         for name, value in vars(arguments).items()
         if name in names
     }
-
-
-def _summary(result: Result, name: str) -> list[str]:
-    values = result[name]
-    numbers = (values[0], values[-1], values.min(), values.max())
-    return [name, result.units.get(name) or "", *(f"{v:.6g}" for v in numbers)]
-
-
-def _write_csv(path: Path, result: Result) -> None:
-    with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(["time", *result.names])
-        for time, row in zip(result.time.tolist(), result.values.T.tolist(), strict=True):
-            writer.writerow([repr(time), *map(repr, row)])

@@ -4,14 +4,32 @@ import argparse
 import sys
 from pathlib import Path
 
+from orchestrator.api.cases import DEFAULT_SAMPLES, RunOptions
+from orchestrator.api.scenario_sweep import ScenarioSweepResult, sweep_scenario
+from orchestrator.api.sweep import SweepResult, sweep
+from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
-from orchestrator.commands._paired_sweep import run_paired_sweep
-from orchestrator.commands._progress import DEFAULT_SAMPLES, add_engine_arguments
-from orchestrator.commands._scenario_sweep import run_scenario_sweep
+from orchestrator.commands._progress import CaseProgress, add_engine_arguments
+from orchestrator.commands._safety import add_trust, note_missing_walls
+from orchestrator.engine import choose_tls
+from orchestrator.errors import ScenarioError
+from orchestrator.shared.output import staged
+
+# Where and how a sweep ran does not change what it found.
+NOT_PART_OF_THE_RESULT = frozenset(
+    {"run", "command", "out", "resume", "workers", "scheduler", "tls_ca", "tls_cert", "tls_key"}
+)
+PAIR_DEFAULTS: dict[str, object] = {"sizes": "random:20", "noise": "0,1e-4", "seeds": 1, "settings": None}
+# What `--scenario` leaves without a meaning.
+PAIR_ONLY = frozenset({"experiment", "backlash_model", *PAIR_DEFAULTS})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what a sweep takes."""
+    """Add what a sweep takes.
+
+    Args:
+        parser: of the command.
+    """
     add_experiment_arguments(parser)
     parser.add_argument(
         "--sizes",
@@ -40,16 +58,84 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help=f"draws of what --vary makes random or sobol (default: {DEFAULT_SAMPLES})",
     )
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.toml", help="settings of the calibration that differ from the default"
+    )
     parser.add_argument("--parquet", action="store_true", help="write the table as Parquet too (extra [parquet])")
     add_engine_arguments(parser)
+    add_trust(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the sweep, print the table, write the results; 1 when a case failed."""
-    chosen = run_paired_sweep if arguments.scenario is None else run_scenario_sweep
+    """Run the sweep, print the table, write the results; 1 when a case failed.
+
+    Args:
+        arguments: of the command line.
+
+    Returns:
+        The exit code.
+    """
     if arguments.scenario is not None:
-        refuse_with_scenario(arguments, {"sizes": "random:20", "noise": "0,1e-4", "seeds": 1})
-    failed = chosen(arguments)
+        refuse_with_scenario(arguments, PAIR_DEFAULTS)
+    levels = _levels(arguments.noise)
+    unused = NOT_PART_OF_THE_RESULT | (PAIR_ONLY if arguments.scenario is not None else frozenset())
+    given = {name: value for name, value in vars(arguments).items() if name not in unused}
+    if arguments.settings is not None:
+        given["settings"] = str(arguments.settings)
+    with staged(arguments.out) as folder:
+        with CaseProgress("sweep") as progress:
+            result = _sweep(arguments, levels, progress)
+        with result:
+            result.write(folder, arguments.out, given)
+            blocks, failed = result.blocks(), result.failed
+    print_blocks(blocks)
+    result.sweep.discard_journal()
     figures = ", estimates.png, errors.png, loops.png" if arguments.scenario is None else ""
     sys.stdout.write(f"Written to {arguments.out}: report.html, sweep.csv, sweep.json{figures}\n")
     return 1 if failed else 0
+
+
+def _sweep(
+    arguments: argparse.Namespace, levels: tuple[float, ...], progress: CaseProgress
+) -> SweepResult | ScenarioSweepResult:
+    options = RunOptions(
+        arguments.workers,
+        arguments.scheduler,
+        arguments.time_limit,
+        arguments.memory_limit,
+        arguments.out / "sweep.journal",
+        arguments.resume,
+        progress.update,
+        arguments.parquet,
+        choose_tls(arguments.tls_ca, arguments.tls_cert, arguments.tls_key),
+        arguments.trust,
+    )
+    if arguments.scenario is not None:
+        if not arguments.trust:
+            note_missing_walls()
+        return sweep_scenario(
+            arguments.scenario, arguments.vary, samples=arguments.samples, seed=arguments.seed, options=options
+        )
+    return sweep(
+        arguments.sizes,
+        levels,
+        seeds=arguments.seeds,
+        seed=arguments.seed,
+        vary=arguments.vary,
+        samples=arguments.samples,
+        experiment=arguments.experiment,
+        backlash_model=arguments.backlash_model,
+        settings=arguments.settings,
+        options=options,
+        tell=say,
+    )
+
+
+def _levels(text: str) -> tuple[float, ...]:
+    try:
+        levels = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise ScenarioError(f"`--noise` must be numbers separated by commas, but is {text!r}") from None
+    if len(set(levels)) != len(levels):
+        raise ScenarioError(f"`--noise` must name each level once, but is {text!r}")
+    return levels

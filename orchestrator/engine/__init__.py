@@ -3,10 +3,11 @@
 See ``docs/sweeps.md``. The entry point is ``run_cases``.
 """
 
-from orchestrator.engine.cases import Case, Cases, Column, Outcome, Progress, Row, Status
+from orchestrator.engine.cases import Case, Cases, Outcome, Progress, ResultColumn, Row, Status
 from orchestrator.engine.grid import DesignCases
 from orchestrator.engine.journal import JournalFullError
-from orchestrator.engine.pools import Limits, LocalProcesses, OpenPool, choose_pool
+from orchestrator.engine.places import choose_pool
+from orchestrator.engine.pools import CaseLimits, LocalProcesses, OpenPool, Tls, choose_tls
 from orchestrator.engine.run import Interrupted, Sweep, run_cases
 from orchestrator.engine.specification import draws, parse_design
 from orchestrator.engine.table import require_parquet, write_csv, write_parquet
@@ -14,21 +15,23 @@ from orchestrator.engine.work import Work
 
 __all__ = [
     "Case",
+    "CaseLimits",
     "Cases",
-    "Column",
     "DesignCases",
     "Interrupted",
     "JournalFullError",
-    "Limits",
     "LocalProcesses",
     "OpenPool",
     "Outcome",
     "Progress",
+    "ResultColumn",
     "Row",
     "Status",
     "Sweep",
+    "Tls",
     "Work",
     "choose_pool",
+    "choose_tls",
     "draws",
     "parse_design",
     "require_parquet",

@@ -35,7 +35,11 @@ class Case:
     seed: int
 
     def generator(self) -> np.random.Generator:
-        """Return this case's own random generator: a function of (sweep seed, index) and of nothing else."""
+        """Return this case's own random generator: a function of (sweep seed, index) and of nothing else.
+
+        Returns:
+            The generator.
+        """
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(0, self.index)))
 
 
@@ -51,11 +55,15 @@ class Cases(Protocol):
     def __getitem__(self, index: int) -> Case: ...
 
     def definition(self) -> Mapping[str, Any]:
-        """Return plain JSON data that determine every case."""
+        """Return plain JSON data that determine every case.
+
+        Returns:
+            Plain data; equal definitions mean equal cases.
+        """
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class ResultColumn:
     """One column of the results: ``kind`` is ``float``, ``int`` or ``str``; ``unit`` is SI, "1" for none."""
 
     name: str

@@ -5,71 +5,116 @@ Each thread of a Dask worker then runs its cases in a lane of its own, as on one
 hangs takes a lane's process with it, not the Dask worker.
 """
 
+import pickle
+import re
+import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 from uuid import uuid4
 
-from distributed import Client, KilledWorker, Worker, WorkerPlugin
+from distributed import Client, KilledWorker, Security, Worker, WorkerPlugin
 
-from orchestrator import __version__
-from orchestrator.cache import cache_directory
-from orchestrator.engine.blobs import BlobStore
 from orchestrator.engine.cases import Case, Outcome, Status
-from orchestrator.engine.pools import LaneOfThread, Limits, pickled
+from orchestrator.engine.loop import LoopThread
+from orchestrator.engine.pools import CaseLimits, LaneOfThread, Pool, Tls, assignment, contents, pickled
+from orchestrator.engine.supply import Supply
 from orchestrator.engine.work import Work
-from orchestrator.engine.worker import Assignment
 from orchestrator.errors import ScenarioError, SimulationError
+from orchestrator.shared.version import __version__
 
-CONNECT_LIMIT = 10.0
-FIRST_WORKER_LIMIT = 60.0
+ATTEMPTS = 3
+CONNECT_LIMIT = 30.0  # s, of one attempt: a scheduler on a busy machine takes its time
+FIRST_WORKER_LIMIT = 120.0  # s, as long as a sweep waits for a worker once it runs
 SLOTS_AGE = 5.0
 
 _tasks: dict[str, LaneOfThread] = {}
+_supplies: dict[str, Supply] = {}
 
 
 @dataclass(frozen=True)
 class DaskCluster:
-    """Opens a pool on the cluster whose scheduler is at ``address`` (``tcp://host:port``)."""
+    """Opens a pool on the cluster whose scheduler is at ``address`` (``tcp://host:port`` or ``tls://host:port``)."""
 
     address: str
+    tls: Tls | None = None
 
-    def __call__(self, work: Work, limits: Limits) -> "ClusterPool":
+    def __call__(self, work: Work, limits: CaseLimits) -> "ClusterPool":
         """Connect, and hand the work to every worker.
 
         Raises:
             ScenarioError: there is no scheduler at the address, or its workers cannot run this version.
         """
+        thread = LoopThread()
         try:
-            client = Client(self.address, timeout=CONNECT_LIMIT, set_as_default=False, name="backlash-cosim")
-        except (OSError, ValueError, TimeoutError) as error:
-            reason = " ".join(str(error).split()) or type(error).__name__
-            raise ScenarioError(
-                f"`--scheduler` must be a Dask scheduler, but {self.address!r} is not: {reason}"
-            ) from None
-        try:
-            return ClusterPool(client, work, limits)
+            client = self._client(thread)
+            try:
+                return ClusterPool(client, work, limits, thread)
+            except BaseException:
+                client.close()
+                raise
         except BaseException:
-            client.close()
+            thread.close()
             raise
 
+    def _client(self, thread: LoopThread) -> Client:
+        """Connect; somebody who listens but is slow to answer gets more tries, where nobody listens there are none."""
+        for attempt in range(ATTEMPTS):
+            client = Client.__new__(Client)  # one that fails to connect must be closed while its loop runs
+            try:
+                _require_listener(self.address)
+                client.__init__(  # type: ignore[misc]
+                    self.address,
+                    security=None if self.tls is None else _security(self.tls),
+                    timeout=CONNECT_LIMIT,
+                    set_as_default=False,
+                    name="backlash-cosim",
+                    loop=thread.loop,
+                )
+                return client
+            except (OSError, ValueError) as error:
+                with suppress(Exception):
+                    client.close(timeout=1)
+                slow = isinstance(error, TimeoutError) or "imed out" in str(error)
+                if slow and attempt + 1 < ATTEMPTS:
+                    continue
+                reason = " ".join(str(error).split()) or type(error).__name__
+                text = f"`scheduler` must be a Dask scheduler, but {self.address!r} is not: {reason}"
+                raise ScenarioError(text, "scheduler") from None
+        raise AssertionError("the last attempt returns or raises")
 
-class ClusterPool:
+
+def _require_listener(address: str) -> None:
+    """Raise an OSError at once where nobody listens at a numbered port; leave other addresses to the client."""
+    found = re.fullmatch(r"(?:tcp|tls)://(.+):(\d+)", address)
+    if found is not None:
+        socket.create_connection((found[1].strip("[]"), int(found[2])), timeout=CONNECT_LIMIT).close()
+
+
+def _security(tls: Tls) -> Security:
+    return Security(
+        require_encryption=True,
+        tls_ca_file=str(tls.authority),
+        tls_client_cert=str(tls.certificate),
+        tls_client_key=str(tls.key),
+    )
+
+
+class ClusterPool(Pool):
     """The threads of a Dask cluster's workers, each with one worker process."""
 
-    def __init__(self, client: Client, work: Work, limits: Limits) -> None:
+    def __init__(self, client: Client, work: Work, limits: CaseLimits, thread: LoopThread) -> None:
         self._client = client
+        self._thread = thread
         self._plugin = f"backlash-cosim-{uuid4().hex}"
         self._slots = 0
         self._slots_time = float("-inf")
-        blobs = {name: Path(path).read_bytes() for name, path in work.files.items()}
+        files = contents(work)
         try:
             client.wait_for_workers(1, timeout=FIRST_WORKER_LIMIT)
-            client.register_plugin(_Supply(self._plugin, pickled(work), blobs, limits), name=self._plugin)
+            client.register_plugin(_Arrival(self._plugin, pickled(work), files, limits), name=self._plugin)
         except TimeoutError:
             raise SimulationError(f"the Dask cluster has had no worker for {FIRST_WORKER_LIMIT:g} s") from None
         except ScenarioError:
@@ -80,9 +125,9 @@ class ClusterPool:
             raise ScenarioError(f"the Dask workers must have this project installed, but: {error}") from None
         self._executor = client.get_executor(pure=False)
 
-    def submit(self, case: Case) -> "Future[Outcome]":
-        """Queue a case for the next free thread of any worker; Dask moves it when that worker dies."""
-        future: Future[Outcome] = self._executor.submit(_ClusterTask(self._plugin), case)
+    def submit(self, cases: Sequence[Case]) -> "Future[list[Outcome]]":
+        """Queue cases for the next free thread of any worker; Dask moves it when that worker dies."""
+        future: Future[list[Outcome]] = self._executor.submit(_ClusterTask(self._plugin), cases)
         return future
 
     def outcome_of_loss(self, case: Case, error: BaseException) -> Outcome | None:
@@ -94,37 +139,40 @@ class ClusterPool:
     def slots(self) -> int:
         """Return the number of threads of all workers, asked for every few seconds."""
         if time.monotonic() - self._slots_time > SLOTS_AGE and self._client.status == "running":
-            self._slots = sum(self._client.nthreads().values())
+            with suppress(Exception):  # a scheduler that is lost shows in the futures, one that is slow is asked again
+                self._slots = sum(self._client.nthreads().values())
             self._slots_time = time.monotonic()
         return self._slots
 
     def close(self) -> None:
         """Cancel what is queued, end the lanes and leave the cluster."""
         try:
-            if self._client.status == "running":
-                self._executor.shutdown(wait=False)
-                self._client.unregister_worker_plugin(self._plugin)
+            with suppress(Exception):  # of a scheduler that has just gone; why the sweep ends is known already
+                if self._client.status == "running":
+                    self._executor.shutdown(wait=False)
+                    self._client.unregister_worker_plugin(self._plugin)
         finally:
             self._client.close(timeout=1)
+            self._thread.close()
 
 
 @dataclass(frozen=True)
 class _ClusterTask:
-    """Runs one case on a Dask worker, in the lane of the calling thread."""
+    """Runs cases on a Dask worker, in the lane of the calling thread."""
 
     key: str
 
-    def __call__(self, case: Case) -> Outcome:
-        return _tasks[self.key](case)
+    def __call__(self, cases: Sequence[Case]) -> list[Outcome]:
+        return _tasks[self.key](cases)
 
 
-class _Supply(WorkerPlugin):
+class _Arrival(WorkerPlugin):
     """Brings a sweep's work and files to a Dask worker."""
 
-    def __init__(self, key: str, work: bytes, blobs: Mapping[str, bytes], limits: Limits) -> None:
+    def __init__(self, key: str, work: bytes, files: Mapping[str, bytes], limits: CaseLimits) -> None:
         self._key = key
         self._work = work
-        self._blobs = blobs
+        self._files = files
         self._limits = limits
         self._version = __version__
 
@@ -134,12 +182,15 @@ class _Supply(WorkerPlugin):
             raise ScenarioError(
                 f"the Dask workers must run version {self._version}, but {worker.address} has {__version__}"
             )
-        store = BlobStore(cache_directory("blobs"))
-        paths = {name: store.path(store.put(content)) for name, content in self._blobs.items()}
-        _tasks[self._key] = LaneOfThread(Assignment(self._work, paths, self._limits.time, self._limits.memory))
+        work: Work = pickle.loads(self._work)
+        supply = Supply(self._files, work.unpacked)
+        _supplies[self._key] = supply
+        _tasks[self._key] = LaneOfThread(assignment(work, self._work, supply, self._limits))
 
     def teardown(self, worker: Worker) -> None:
         """End the sweep's processes on this worker."""
-        task: Any = _tasks.pop(self._key, None)
+        task, supply = _tasks.pop(self._key, None), _supplies.pop(self._key, None)
         if task is not None:
             task.close()
+        if supply is not None:
+            supply.close()

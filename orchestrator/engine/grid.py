@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
-from orchestrator.engine.cases import Case, Value
+from orchestrator.engine.cases import Case, Cases, Value
 from orchestrator.errors import ScenarioError
 
 SOBOL_BLOCK = 1024
@@ -29,14 +29,25 @@ class Design(Protocol):
     def __len__(self) -> int: ...
 
     def row(self, index: int) -> tuple[Value, ...]:
-        """Return the values of row ``index``, ``0 <= index < len(self)``."""
+        """Return the values of row ``index``, ``0 <= index < len(self)``.
+
+        Args:
+            index: of the row, from 0.
+
+        Returns:
+            A value per name.
+        """
 
     def definition(self) -> Mapping[str, Any]:
-        """Return plain JSON data that determine every row."""
+        """Return plain JSON data that determine every row.
+
+        Returns:
+            Plain data.
+        """
 
 
 @dataclass(frozen=True)
-class Listed:
+class Listed(Design):
     """The given values of one parameter, in the given order."""
 
     name: str
@@ -66,7 +77,7 @@ class Listed:
 
 
 @dataclass(frozen=True)
-class Ranged:
+class Ranged(Design):
     """``count`` values of one parameter from ``first`` to ``last``, both included, evenly or log-evenly spaced."""
 
     name: str
@@ -126,16 +137,27 @@ class Bounds:
             raise ScenarioError(f"`{self.name}` must be positive for a logarithmic draw, but is {self.low}:{self.high}")
 
     def at(self, fraction: float) -> float:
-        """Map ``fraction`` in [0, 1) into the interval."""
+        """Map ``fraction`` in [0, 1) into the interval.
+
+        Args:
+            fraction: of the way from ``low`` to ``high``.
+
+        Returns:
+            The value.
+        """
         return _between(self.low, self.high, fraction, self.logarithmic)
 
     def definition(self) -> Mapping[str, Any]:
-        """Return name, bounds and spacing."""
+        """Return name, bounds and spacing.
+
+        Returns:
+            Plain data.
+        """
         return {"name": self.name, "low": self.low, "high": self.high, "logarithmic": self.logarithmic}
 
 
 @dataclass(frozen=True)
-class _Drawn:
+class _Drawn(Design):
     """``count`` points over all ``bounds`` together, determined by ``seed``."""
 
     bounds: tuple[Bounds, ...]
@@ -144,7 +166,7 @@ class _Drawn:
     kind: ClassVar[str]
 
     def __post_init__(self) -> None:
-        _positive_count("--samples", self.count)
+        _positive_count("samples", self.count)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -189,7 +211,7 @@ class Sobol(_Drawn):
 
 
 @dataclass(frozen=True)
-class Product:
+class Product(Design):
     """Every combination of the rows of several designs; the last design varies fastest."""
 
     designs: tuple[Design, ...]
@@ -225,7 +247,7 @@ class Product:
 
 
 @dataclass(frozen=True)
-class DesignCases:
+class DesignCases(Cases):
     """A design seen as the engine's cases."""
 
     design: Design
@@ -274,4 +296,4 @@ def _finite(name: str, value: Value) -> None:
 
 def _positive_count(name: str, count: int) -> None:
     if not 1 <= count <= MAX_CASES:
-        raise ScenarioError(f"the count of `{name}` must be 1 to {MAX_CASES:,}, but is {count:g}")
+        raise ScenarioError(f"the count of `{name}` must be 1 to {MAX_CASES:,}, but is {count:g}", name)

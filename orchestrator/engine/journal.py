@@ -6,9 +6,11 @@ finished when its line has been written and flushed to the disk (``fsync``), nev
 a full disk has left torn are ignored, and their cases run again.
 """
 
+import errno
 import fcntl
 import json
 import os
+import stat
 import tempfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
@@ -50,10 +52,13 @@ class Journal:
         self._bits = bytearray((total + 7) // 8)
         self._made = _make_directories(path.parent)
         try:
-            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            self._descriptor = _opened(path)
         except OSError as error:
             _remove_directories(self._made)
             raise OutputError(f"cannot write {path}: {error.strerror}") from None
+        except ScenarioError:
+            _remove_directories(self._made)
+            raise
         try:
             self._lock()
             self._end = self._read(definition, resume)
@@ -74,26 +79,41 @@ class Journal:
     def append(self, outcomes: Iterable[Outcome]) -> None:
         """Record finished cases; they are on the disk when this returns.
 
+        Args:
+            outcomes: of cases of this sweep; those that are recorded already are passed over.
+
         Raises:
             JournalFullError: they could not all be written; earlier ones are untouched.
         """
         fresh = [o for o in outcomes if o.index not in self]
         if not fresh:
             return
-        self._write("".join(_line([o.index, o.status.value, o.message, list(o.values)]) for o in fresh))
+        text = "".join(_line([o.index, o.status.value, o.message, list(o.values)]) for o in fresh)
+        end, interrupted = self._end, False
+        try:
+            self._write(text)
+        except KeyboardInterrupt:  # the lines may be on the disk, or may not: writing them once more does no harm
+            interrupted = True
+            if self._end == end:
+                self._write(text)
         for outcome in fresh:
             self._count(outcome.index, outcome.status)
+        if interrupted:
+            raise KeyboardInterrupt
 
     def outcomes(self) -> Iterator[Outcome]:
         """Yield the finished cases in case order, reading them one at a time.
 
         Needs eight bytes per case for the offsets, in a temporary file beside the journal, and nothing else.
+
+        Yields:
+            Each outcome.
         """
-        with self._offset_table() as table, self.path.open("rb") as stream:
+        with self._offset_table() as table, self._stream() as stream:
             offsets = np.memmap(table, dtype=np.uint64, mode="r+", shape=(self.total,))
             for offset, line in self._lines():
                 entry = _entry(line)
-                if isinstance(entry, list) and not offsets[entry[0]]:
+                if _is_case(entry, self.total) and not offsets[entry[0]]:
                     offsets[entry[0]] = offset
             for offset in offsets:
                 if offset:
@@ -128,11 +148,13 @@ class Journal:
             table = tempfile.TemporaryFile(dir=self.path.parent)  # noqa: SIM115 - the caller closes it
             os.posix_fallocate(table.fileno(), 0, 8 * self.total)  # else a full disk is a SIGBUS later
         except OSError as error:
-            raise OutputError(f"cannot write in {self.path.parent}: {error.strerror}; {self._advice()}") from None
+            raise OutputError(
+                f"cannot write in {self.path.parent}: {error.strerror}; {self._advice()}", "resume"
+            ) from None
         return table
 
     def _advice(self) -> str:
-        return f"{self.done} of {self.total} cases are kept: make room and go on with --resume"
+        return f"{self.done} of {self.total} cases are kept: make room and go on with `resume`"
 
     def _lock(self) -> None:
         try:
@@ -151,7 +173,7 @@ class Journal:
             if offset == 0:
                 header = entry
                 ours = _is_header(header) and header["definition"] == wanted and header["cases"] == self.total
-            elif ours and isinstance(entry, list) and entry[0] not in self:
+            elif ours and _is_case(entry, self.total) and entry[0] not in self:
                 self._count(entry[0], Status(entry[1]))
             elif not ours:
                 self.done += isinstance(entry, list)
@@ -175,24 +197,32 @@ class Journal:
         if not resume:
             raise ScenarioError(
                 f"{self.path.parent} holds an unfinished sweep ({self.done} of {header['cases']} cases): "
-                f"go on with --resume, or remove {self.path} to start anew"
+                f"go on with `resume`, or remove {self.path} to start anew",
+                "resume",
             )
         if not ours:
             was = header["definition"]
             keys = sorted(k for k in {*was, *wanted} if was.get(k) != wanted.get(k)) or ["cases"]
             raise ScenarioError(
-                f"`--resume` must continue the sweep of {self.path}, but this one differs in: {', '.join(keys)}"
+                f"`resume` must continue the sweep of {self.path}, but this one differs in: {', '.join(keys)}",
+                "resume",
             )
 
     def _lines(self) -> Iterator[tuple[int, bytes]]:
         """Yield every whole line with its offset; a torn last line is left out."""
         offset = 0
-        with self.path.open("rb") as stream:
+        with self._stream() as stream:
             for line in stream:
                 if not line.endswith(b"\n"):
                     return
                 yield offset, line
                 offset += len(line)
+
+    def _stream(self) -> IO[bytes]:
+        """Return a stream of the open file, whatever its path leads to by now."""
+        stream = os.fdopen(os.dup(self._descriptor), "rb")
+        stream.seek(0)
+        return stream
 
     def _write(self, text: str) -> None:
         data = text.encode()
@@ -203,7 +233,8 @@ class Journal:
             os.fsync(self._descriptor)
         except OSError as error:
             os.ftruncate(self._descriptor, self._end)
-            raise JournalFullError(f"cannot write {self.path}: {error.strerror}; {self._advice()}") from None
+            text = f"cannot write {self.path}: {error.strerror}; {self._advice()}"
+            raise JournalFullError(text, "resume") from None
         self._end += len(data)
 
     def _count(self, index: int, status: Status) -> None:
@@ -222,11 +253,46 @@ def _entry(line: bytes) -> Any:
     checksum, _, text = line.rstrip(b"\n").partition(b" ")
     if checksum != b"%08x" % zlib.crc32(text):
         return None
-    return json.loads(text)
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
 
 
 def _is_header(entry: Any) -> bool:
-    return isinstance(entry, dict) and entry.get("format") == FORMAT
+    match entry:
+        case {"format": str() as found, "definition": dict(), "cases": int()}:
+            return found == FORMAT
+    return False
+
+
+def _is_case(entry: Any, total: int) -> bool:
+    """Whether a line holds a case; a checksum that holds does not make it one."""
+    match entry:
+        case [int() as index, str() as word, str(), list() as values] if not isinstance(index, bool):
+            plain = all(v is None or isinstance(v, (int, float, str)) for v in values)
+            return 0 <= index < total and word in set(Status) and plain
+    return False
+
+
+def _opened(path: Path) -> int:
+    """Open the file at ``path`` itself, made when missing; links are not followed, and nothing is waited for.
+
+    Raises:
+        ScenarioError: there is something else than a plain file.
+    """
+    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+    try:
+        descriptor = os.open(path, flags, 0o644)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.ENXIO, errno.EISDIR):
+            raise ScenarioError(f"{path} must be the journal of a sweep, but is no plain file: remove it") from None
+        raise
+    info = os.fstat(descriptor)
+    if not stat.S_ISREG(info.st_mode) or info.st_nlink > 1:
+        os.close(descriptor)
+        raise ScenarioError(f"{path} must be the journal of a sweep, but is no plain file of its own: remove it")
+    return descriptor
 
 
 def _sync_directory(directory: Path) -> None:
@@ -243,7 +309,9 @@ def _make_directories(directory: Path) -> list[Path]:
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise OutputError(f"`--out` must be a writable directory, but {directory} is not: {error.strerror}") from None
+        raise OutputError(
+            f"`out` must be a writable directory, but {directory} is not: {error.strerror}", "out"
+        ) from None
     return missing
 
 

@@ -2,30 +2,34 @@
 
 ``concurrent.futures.ProcessPoolExecutor`` cannot end one hung worker, and one that dies takes every case in flight
 with it. A lane therefore owns exactly one process and runs one case at a time in it: whatever happens to the
-process happened to that case. Lanes run inside the threads of an ordinary executor: a ``ThreadPoolExecutor`` here, or
-the threads of Dask's workers elsewhere.
+process happened to that case. Cases come in batches, because a message costs more than a quick case. Lanes run inside
+the threads of an ordinary executor: a ``ThreadPoolExecutor`` here, or the threads of Dask's workers elsewhere. The
+process is a jail's child; work that runs what is not ours has walls.
 """
 
-import json
-import os
-import subprocess
-import sys
-import tempfile
+import math
+import pickle
 import threading
-from multiprocessing.connection import Connection, Pipe
-from typing import IO
+from collections.abc import Sequence
 
 from orchestrator.engine.cases import Case, Outcome, Status
-from orchestrator.engine.worker import READY, Answer, Assignment
-from orchestrator.errors import SimulationError
+from orchestrator.engine.work import Work
+from orchestrator.engine.worker import BATCH_TIME, Assignment, finished_cases, read_answer
+from orchestrator.errors import ChildError, SimulationError
+from orchestrator.shared.isolation.jail import Jail
+from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
 
 ATTEMPTS = 2
 PREPARATION_LIMIT = 600.0
-_BOOTSTRAP = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[2]); "
-    "from orchestrator.engine.worker import main; main(int(sys.argv[1]))"
-)
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+LARGEST_ANSWER = 64 * MEBIBYTE
+_BOUNDLESS = 1 << 50
+_ENTRY = "orchestrator.engine.worker:opened"
+_BEYOND = {
+    "memory": "used too much memory",
+    "disk": "wrote too many files",
+    "threads": "started too many threads",
+    "protocol": "the worker process did not keep to the protocol",
+}
 
 
 class LaneClosedError(Exception):
@@ -33,7 +37,7 @@ class LaneClosedError(Exception):
 
 
 class Lane:
-    """Runs cases one at a time in a worker process of its own.
+    """Runs cases one after the other in a worker process of its own.
 
     ``run`` is called by one thread; ``close`` may be called by any, and a ``run`` under way then raises
     ``LaneClosedError``.
@@ -44,14 +48,20 @@ class Lane:
         self._lock = threading.Lock()
         self._closed = False
         self._busy = False
-        self._process: subprocess.Popen[bytes] | None = None
-        self._connection: Connection | None = None
+        self._jail: Jail | None = None
 
-    def run(self, case: Case) -> Outcome:
-        """Run one case to its outcome.
+    def run(self, cases: Sequence[Case]) -> list[Outcome]:
+        """Run a batch of cases, or as many of them as a worker process gets done in ``BATCH_TIME``.
 
-        A case whose process dies is tried once more in a fresh one, so that a process which somebody else killed
-        costs nothing; a case that hangs is not.
+        When the process dies, hangs or breaks another limit, the case that was running is the one whose outcome is
+        returned. A case whose process dies is tried once more in a fresh one, so that a process which somebody else
+        killed costs nothing; a case that hangs, or breaks another limit, is not.
+
+        Args:
+            cases: to run, at least one.
+
+        Returns:
+            How some of them ended, at least one.
 
         Raises:
             LaneClosedError: the lane was closed.
@@ -61,10 +71,11 @@ class Lane:
             self._busy = True
         try:
             for _ in range(ATTEMPTS):
-                outcome = self._exchange(self._ready_connection(), case)
-                if outcome is not None:
-                    return outcome
-            return Outcome(case.index, Status.CRASH, "the worker process died")
+                answer = self._exchange(self._ready(), cases)
+                if not isinstance(answer, int):
+                    return list(answer)
+                cases = cases[answer : answer + 1]
+            return [Outcome(cases[0].index, Status.CRASH, "the worker process died")]
         finally:
             with self._lock:
                 self._busy = False
@@ -75,73 +86,69 @@ class Lane:
         """Kill the process at once."""
         with self._lock:
             self._closed = True
-            if self._process is not None:
-                self._process.kill()
+            if self._jail is not None:
+                self._jail.interrupt()
             if not self._busy:
                 self._end()
 
-    def _exchange(self, connection: Connection, case: Case) -> Outcome | None:
-        """Return the outcome, or ``None`` when the process died."""
+    def _exchange(self, jail: Jail, cases: Sequence[Case]) -> Sequence[Outcome] | int:
+        """Return outcomes; when the process died, the place in the batch of the case that was running."""
+        limit = self._assignment.time_limit + (BATCH_TIME if len(cases) > 1 else 0.0)
+        reason = "protocol"
         try:
-            connection.send(case)
-            if not connection.poll(self._assignment.time_limit):
-                self._discard()
-                message = f"took more than {self._assignment.time_limit:g} s"
-                return Outcome(case.index, Status.TIME_LIMIT, message)
-            answer = connection.recv()
-        except (EOFError, OSError):
-            self._discard()
-            return None
-        assert isinstance(answer, Answer)
-        if answer.spent:
-            self._discard()
-        return answer.outcome
+            message = jail.call(cases, limit, LARGEST_ANSWER)
+            answer = read_answer(message, cases, self._assignment.columns)
+            if answer is not None:
+                if answer.spent:
+                    self._discard()
+                return answer.outcomes
+        except ChildError as error:
+            reason = error.reason
+        except SimulationError:  # it had no memory left to answer with
+            reason = "exit"
+        place = min(finished_cases(jail.scratch / "tmp"), len(cases) - 1)
+        index = cases[place].index
+        self._discard()
+        if reason == "time":
+            return [Outcome(index, Status.TIME_LIMIT, f"took more than {self._assignment.time_limit:g} s")]
+        return [Outcome(index, Status.CRASH, _BEYOND[reason])] if reason in _BEYOND else place
 
-    def _ready_connection(self) -> Connection:
+    def _ready(self) -> Jail:
         said = ""
         for _ in range(ATTEMPTS):
-            if self._connection is not None:
-                return self._connection
-            with tempfile.TemporaryFile() as messages:
-                self._connection = self._start(messages)
-                said = "" if self._connection else _last_line(messages)
-        if self._connection is None:
+            if self._jail is not None:
+                return self._jail
+            try:
+                self._start()
+            except ChildError as error:
+                said = f": {error.said}" if error.said else ""
+                if error.reason == "time":
+                    said = ": preparing took too long"
+                self._discard()
+            except BaseException:
+                self._discard()
+                raise
+        if self._jail is None:
             raise SimulationError(f"a worker process died while it was prepared{said}")
-        return self._connection
+        return self._jail
 
-    def _start(self, messages: IO[bytes]) -> Connection | None:
-        """Start a process and hand it its assignment; return ``None`` when the process died over it."""
-        ours, theirs = Pipe()
-        with theirs:
-            self._launch(theirs.fileno(), messages)
-        try:
-            ours.send(self._assignment)
-            answer = ours.recv() if ours.poll(PREPARATION_LIMIT) else SimulationError("preparing took too long")
-        except (EOFError, OSError):
-            answer = None
-        if answer == READY:
-            return ours
-        ours.close()
-        self._discard()
-        if answer is not None:
-            raise answer
-        return None
-
-    def _launch(self, descriptor: int, messages: IO[bytes]) -> None:
-        environment = dict.fromkeys(_ONE_THREAD, "1") | dict(os.environ)
-        command = [sys.executable, "-c", _BOOTSTRAP, str(descriptor), json.dumps(sys.path)]
+    def _start(self) -> None:
+        """Start a process and hand it its assignment."""
+        assignment = self._assignment
+        work: Work = pickle.loads(assignment.work)
+        packages = {f.__module__.partition(".")[0] for f in (work.prepare, work.run)}
         with self._lock:
             if self._closed:
                 raise LaneClosedError
-            self._process = subprocess.Popen(
-                command,
-                pass_fds=[descriptor],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=messages,
-                env=environment,
-                start_new_session=True,  # a terminal's Ctrl-C is for the process that owns the lane
+            self._jail = Jail(
+                _ENTRY,
+                assignment,
+                read=tuple(assignment.files.values()),
+                limits=_limits(assignment),
+                walls=assignment.walls,
+                packages=tuple(packages),
             )
+        self._jail.start(PREPARATION_LIMIT)
 
     def _discard(self) -> None:
         """End the process; raise ``LaneClosedError`` when closing the lane is what ended it."""
@@ -150,16 +157,16 @@ class Lane:
             raise LaneClosedError
 
     def _end(self) -> None:
-        if self._connection is not None:
-            self._connection.close()
-            self._connection = None
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-            self._process = None
+        if self._jail is not None:
+            self._jail.close()
+            self._jail = None
 
 
-def _last_line(messages: IO[bytes]) -> str:
-    messages.seek(0)
-    lines = messages.read().decode(errors="replace").strip().splitlines()
-    return f": {lines[-1][:300]}" if lines else ""
+def _limits(assignment: Assignment) -> Limits:
+    """Limits of the process; work of ours is bounded by time, and by memory from within, as cases are."""
+    if not assignment.walls:
+        return Limits(
+            assignment.time_limit, _BOUNDLESS, _BOUNDLESS, math.inf, _BOUNDLESS, _BOUNDLESS, _BOUNDLESS, 1 << 16
+        )
+    memory = 1024 * MEBIBYTE + 2 * assignment.memory if assignment.memory else _BOUNDLESS
+    return Limits(assignment.time_limit, memory, 64 * MEBIBYTE, math.inf, 256 * MEBIBYTE)

@@ -5,27 +5,26 @@ Both are used through the ``concurrent.futures`` executor interface and run the 
 
 import pickle
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-from orchestrator.cache import cache_directory
-from orchestrator.cores import usable_cores
-from orchestrator.engine.blobs import BlobStore
 from orchestrator.engine.cases import Case, Outcome
 from orchestrator.engine.lane import Lane
+from orchestrator.engine.supply import Supply
 from orchestrator.engine.work import Work
 from orchestrator.engine.worker import Assignment
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import FmuError, ScenarioError
+from orchestrator.shared.cores import usable_cores
 
 DEFAULT_TIME_LIMIT = 300.0
 DEFAULT_MEMORY = 2 * 1024**3
 
 
 @dataclass(frozen=True)
-class Limits:
+class CaseLimits:
     """Bounds on each case: wall time in seconds, and memory in bytes beyond the prepared process (0: none)."""
 
     time: float = DEFAULT_TIME_LIMIT
@@ -33,28 +32,48 @@ class Limits:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.time < 1e9:
-            raise ScenarioError(f"`--time-limit` must be positive and below 1e9 s, but is {self.time:g}")
+            raise ScenarioError(f"`time_limit` must be positive and below 1e9 s, but is {self.time:g}", "time_limit")
         if self.memory < 0:
-            raise ScenarioError(f"`--memory-limit` must not be negative, but is {self.memory / 1024**2:g} MiB")
+            text = f"`memory_limit` must not be negative, but is {self.memory / 1024**2:g} MiB"
+            raise ScenarioError(text, "memory_limit")
 
 
 class Pool(Protocol):
     """An executor with what is needed to use it for cases. ``close`` ends every worker process at once."""
 
-    def submit(self, case: Case) -> "Future[Outcome]":
-        """Hand a case to the executor; the future ends with its outcome, or with why no case can be run here."""
+    def submit(self, cases: Sequence[Case]) -> "Future[list[Outcome]]":
+        """Hand cases to the executor; the future ends with outcomes of some of them, or why no case can be run here.
+
+        Args:
+            cases: to run, at least one.
+
+        Returns:
+            Its future.
+        """
 
     def outcome_of_loss(self, case: Case, error: BaseException) -> Outcome | None:
-        """Return the outcome of a case that its executor has given up, ``None`` when ``error`` is no such thing."""
+        """Return the outcome of a case that its executor has given up, ``None`` when ``error`` is no such thing.
+
+        Args:
+            case: to run.
+            error: what the future ended with.
+
+        Returns:
+            The outcome, if the case is to blame.
+        """
 
     def slots(self) -> int:
-        """Return how many cases can run at the same time, at present."""
+        """Return how many cases can run at the same time, at present.
+
+        Returns:
+            The number, at least 0.
+        """
 
     def close(self) -> None:
         """End everything now; cases that are running are not finished."""
 
 
-OpenPool = Callable[[Work, Limits], Pool]
+OpenPool = Callable[[Work, CaseLimits], Pool]
 
 
 @dataclass(frozen=True)
@@ -65,44 +84,72 @@ class LocalProcesses:
 
     def __post_init__(self) -> None:
         if self.workers is not None and self.workers < 1:
-            raise ScenarioError(f"`--workers` must be at least 1, but is {self.workers}")
+            raise ScenarioError(f"`workers` must be at least 1, but is {self.workers}", "workers")
 
-    def __call__(self, work: Work, limits: Limits) -> "LocalPool":
+    def __call__(self, work: Work, limits: CaseLimits) -> "LocalPool":
         """Open the pool; processes start with their first case."""
         count = self.workers or usable_cores()
-        store = BlobStore(cache_directory("blobs"))
-        paths = {name: store.path(store.put(Path(path).read_bytes())) for name, path in work.files.items()}
-        return LocalPool(count, Assignment(pickled(work), paths, limits.time, limits.memory))
+        supply = Supply(contents(work), work.unpacked)
+        try:
+            return LocalPool(count, supply, assignment(work, pickled(work), supply, limits))
+        except BaseException:
+            supply.close()
+            raise
 
 
-def choose_pool(workers: int | None, scheduler: str | None) -> OpenPool:
-    """Return where to run: the Dask cluster at ``scheduler`` when given, else processes of this machine.
+@dataclass(frozen=True)
+class Tls:
+    """Files with which both ends of a connection to a cluster prove who they are (PEM).
+
+    Attributes:
+        authority: certificate of the authority that has signed those of scheduler, workers and clients.
+        certificate: of this client.
+        key: private key of this client.
+    """
+
+    authority: Path
+    certificate: Path
+    key: Path
+
+
+def choose_tls(authority: Path | None, certificate: Path | None, key: Path | None) -> Tls | None:
+    """Return what the three options say; ``None`` when none is given.
+
+    Args:
+        authority: file of the certificate authority.
+        certificate: file of this side's certificate.
+        key: file of its key.
+
+    Returns:
+        The three files.
 
     Raises:
-        ScenarioError: both are given, a bad number of workers, or the extra ``dask`` is not installed.
+        ScenarioError: some are missing, or cannot be read.
     """
-    if scheduler is None:
-        return LocalProcesses(workers)
-    if workers is not None:
-        raise ScenarioError("`--workers` must not be given with `--scheduler`: the cluster has its own workers")
-    try:
-        from orchestrator.engine.cluster import DaskCluster
-    except ImportError:
-        raise ScenarioError("`--scheduler` needs the extra [dask]: pip install 'backlash-cosim[dask]'") from None
-    return DaskCluster(scheduler)
+    options = {"tls_ca": authority, "tls_cert": certificate, "tls_key": key}
+    if authority is None or certificate is None or key is None:
+        missing = [name for name, path in options.items() if path is None]
+        if len(missing) < len(options):
+            raise ScenarioError(f"`{missing[0]}` must be given with the other two, but is not", missing[0])
+        return None
+    for name, path in options.items():
+        if path is not None and not path.is_file():
+            raise ScenarioError(f"`{name}` must be a readable file, but {path} is not", name)
+    return Tls(authority, certificate, key)
 
 
-class LocalPool:
+class LocalPool(Pool):
     """Threads of this process, each with one worker process."""
 
-    def __init__(self, workers: int, assignment: Assignment) -> None:
+    def __init__(self, workers: int, supply: Supply, assignment: Assignment) -> None:
+        self._supply = supply
         self._executor = ThreadPoolExecutor(workers, thread_name_prefix="lane")
         self._lanes = LaneOfThread(assignment)
         self._workers = workers
 
-    def submit(self, case: Case) -> "Future[Outcome]":
-        """Queue a case for the next free thread."""
-        return self._executor.submit(self._lanes, case)
+    def submit(self, cases: Sequence[Case]) -> "Future[list[Outcome]]":
+        """Queue cases for the next free thread."""
+        return self._executor.submit(self._lanes, cases)
 
     def outcome_of_loss(self, case: Case, error: BaseException) -> Outcome | None:
         """Return ``None``: lanes turn everything that a case can do into its outcome."""
@@ -113,10 +160,13 @@ class LocalPool:
         return self._workers
 
     def close(self) -> None:
-        """Kill all worker processes and end the threads."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
-        self._lanes.close()
-        self._executor.shutdown(wait=True)
+        """Kill all worker processes, end the threads and remove the workers' files."""
+        try:
+            self._executor.shutdown(wait=False, cancel_futures=True)
+            self._lanes.close()
+            self._executor.shutdown(wait=True)
+        finally:
+            self._supply.close()
 
 
 class LaneOfThread:
@@ -129,8 +179,8 @@ class LaneOfThread:
         self._lock = threading.Lock()
         self._closed = False
 
-    def __call__(self, case: Case) -> Outcome:
-        """Run one case; see ``Lane.run``."""
+    def __call__(self, cases: Sequence[Case]) -> list[Outcome]:
+        """Run cases; see ``Lane.run``."""
         lane = getattr(self._own, "lane", None)
         if lane is None:
             lane = self._own.lane = Lane(self._assignment)
@@ -138,7 +188,7 @@ class LaneOfThread:
                 self._lanes.append(lane)
                 if self._closed:
                     lane.close()
-        return lane.run(case)
+        return lane.run(cases)
 
     def close(self) -> None:
         """Close every thread's lane."""
@@ -148,8 +198,50 @@ class LaneOfThread:
                 lane.close()
 
 
+def contents(work: Work) -> dict[str, bytes]:
+    """Return the content of the work's files by name.
+
+    Args:
+        work: how to run one case.
+
+    Returns:
+        Bytes by name.
+
+    Raises:
+        FmuError: one cannot be read.
+    """
+    found = {}
+    for name, path in work.files.items():
+        try:
+            found[name] = Path(path).read_bytes()
+        except OSError as error:
+            raise FmuError(f"cannot read {path}: {error.strerror}") from None
+    return found
+
+
+def assignment(work: Work, pickled_work: bytes, supply: Supply, limits: CaseLimits) -> Assignment:
+    """Return what worker processes are told.
+
+    Args:
+        work: how to run one case.
+        pickled_work: what ``pickled`` returned.
+        supply: where the work's files are.
+        limits: time [s] and memory [bytes] per case.
+
+    Returns:
+        What a worker process is started with.
+    """
+    return Assignment(pickled_work, supply.paths, limits.time, limits.memory, len(work.columns), work.walls)
+
+
 def pickled(work: Work) -> bytes:
     """Return the work as bytes for a worker process; its files travel apart.
+
+    Args:
+        work: how to run one case.
+
+    Returns:
+        The bytes.
 
     Raises:
         ScenarioError: ``prepare``, ``run`` or ``payload`` cannot be pickled, or workers could not find the functions.

@@ -1,24 +1,30 @@
 """The main path: cases in, a journal of finished cases out."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from itertools import islice
 from pathlib import Path
 
-from orchestrator import __version__
 from orchestrator.engine.cases import Case, Cases, Outcome, Progress, Row
 from orchestrator.engine.journal import Journal
-from orchestrator.engine.pools import Limits, LocalProcesses, OpenPool, Pool
+from orchestrator.engine.pools import CaseLimits, LocalProcesses, OpenPool, Pool
 from orchestrator.engine.work import Work, file_hash
 from orchestrator.errors import SimulationError
+from orchestrator.shared.version import __version__
 
 QUEUED_PER_SLOT = 2
+MOST_IN_A_BATCH = 1024
+"""Cases: what is lost when all is killed, and what waits in memory for each worker."""
 TICK = 0.25
 NO_SLOT_LIMIT = 120.0
 
 
 class Interrupted(KeyboardInterrupt):
     """Ctrl-C; the text says how many cases are kept and how to go on."""
+
+    arguments = ("resume",)
 
 
 class Sweep:
@@ -44,7 +50,11 @@ class Sweep:
         return self._journal.failed
 
     def rows(self) -> Iterator[Row]:
-        """Yield one row per finished case, in case order."""
+        """Yield one row per finished case, in case order.
+
+        Yields:
+            Each case with its outcome.
+        """
         for outcome in self._journal.outcomes():
             yield Row(self.cases[outcome.index], outcome)
 
@@ -59,15 +69,16 @@ def run_cases(
     journal_path: Path,
     *,
     open_pool: OpenPool | None = None,
-    limits: Limits | None = None,
+    limits: CaseLimits | None = None,
     resume: bool = False,
     on_progress: Callable[[Progress], None] = lambda _: None,
 ) -> Sweep:
     """Run every case that the journal does not hold yet, and return them all.
 
     Memory does not grow with the number of cases: a case is made when a slot for it is near, and its outcome goes
-    to the journal as soon as it arrives. The same cases, work and version give the same rows, whatever
-    the pool, the order in which cases end, and however often the run was stopped and resumed.
+    to the journal as soon as it arrives, with one durable write for all that arrive together. The same cases, work and
+    version give the same rows, whatever the pool, the batches, the order in which cases end, and however often the run
+    was stopped and resumed.
 
     Args:
         cases: what to run.
@@ -78,6 +89,9 @@ def run_cases(
         resume: go on with the journal of an earlier run that was stopped.
         on_progress: called whenever cases have become durable, and at least about four times a second.
 
+    Returns:
+        The finished cases; the caller closes it.
+
     Raises:
         ScenarioError: bad arguments, or a journal that must not be continued (see ``Journal``).
         JournalFullError: no room for finished cases; what was finished before is kept.
@@ -87,13 +101,13 @@ def run_cases(
     journal = Journal(journal_path, _definition(cases, work), len(cases), resume)
     try:
         if journal.done < len(cases):
-            pool = (open_pool or LocalProcesses())(work, limits or Limits())
+            pool = (open_pool or LocalProcesses())(work, limits or CaseLimits())
             try:
                 _run(cases, pool, journal, on_progress)
             finally:
                 pool.close()
     except KeyboardInterrupt:
-        kept = f"{journal.done} of {journal.total} cases are kept: go on with --resume"
+        kept = f"{journal.done} of {journal.total} cases are kept: go on with `resume`"
         journal.close()
         raise Interrupted(kept) from None
     except BaseException:
@@ -112,10 +126,38 @@ def _definition(cases: Cases, work: Work) -> dict[str, object]:
     }
 
 
+class _Queue:
+    """Cases that wait, handed out in batches that a worker can be expected to finish in ``BATCH_TIME``."""
+
+    def __init__(self, cases: Cases, journal: Journal) -> None:
+        self._waiting = (cases[i] for i in range(len(cases)) if i not in journal)
+        self._returned: deque[tuple[Case, ...]] = deque()
+        self._size = 1
+
+    def batch(self) -> tuple[Case, ...]:
+        """Return the next cases; none when there are none left."""
+        return self._returned.popleft() if self._returned else tuple(islice(self._waiting, self._size))
+
+    def answered(self, batch: Sequence[Case], outcomes: Sequence[Outcome]) -> None:
+        """Take back what of a batch was not run, and adapt to what was."""
+        done = {outcome.index for outcome in outcomes}
+        left = tuple(case for case in batch if case.index not in done)
+        if left:
+            self._returned.append(left)
+            self._size = max(1, min(len(done), self._size))
+        elif len(batch) == self._size:
+            self._size = min(2 * self._size, MOST_IN_A_BATCH)
+
+    def alone(self, batch: Sequence[Case]) -> None:
+        """Take back a batch that was lost, one case at a time."""
+        self._returned.extend((case,) for case in batch)
+        self._size = 1
+
+
 def _run(cases: Cases, pool: Pool, journal: Journal, on_progress: Callable[[Progress], None]) -> None:
     resumed = journal.done
-    waiting = (cases[i] for i in range(len(cases)) if i not in journal)
-    running: dict[Future[Outcome], Case] = {}
+    queue = _Queue(cases, journal)
+    running: dict[Future[list[Outcome]], tuple[Case, ...]] = {}
     last_slot = time.monotonic()
     try:
         while True:
@@ -123,56 +165,65 @@ def _run(cases: Cases, pool: Pool, journal: Journal, on_progress: Callable[[Prog
             if slots:
                 last_slot = time.monotonic()
             elif time.monotonic() - last_slot > NO_SLOT_LIMIT:
-                raise SimulationError(f"no worker has been there for {NO_SLOT_LIMIT:g} s; {_kept(journal)}")
+                raise SimulationError(f"no worker has been there for {NO_SLOT_LIMIT:g} s; {_kept(journal)}", "resume")
             while len(running) < max(1, slots) * QUEUED_PER_SLOT:
-                case = next(waiting, None)
-                if case is None:
+                batch = queue.batch()
+                if not batch:
                     break
-                running[_submit(pool, case, journal)] = case
+                running[_submit(pool, batch, journal)] = batch
             if not running:
                 return
-            _record(pool, wait(running, TICK, FIRST_COMPLETED).done, running, journal)
+            _record(pool, wait(running, TICK, FIRST_COMPLETED).done, running, journal, queue)
             on_progress(Progress(journal.done, journal.total, journal.failed, resumed))
     except KeyboardInterrupt:
-        _record(pool, {f for f in running if f.done()}, running, journal)
+        _record(pool, {f for f in running if f.done()}, running, journal, queue)
         raise
 
 
-def _submit(pool: Pool, case: Case, journal: Journal) -> "Future[Outcome]":
+def _submit(pool: Pool, batch: Sequence[Case], journal: Journal) -> "Future[list[Outcome]]":
     try:
-        return pool.submit(case)
+        return pool.submit(batch)
     except (BrokenExecutor, RuntimeError, OSError) as error:
-        raise SimulationError(f"cases can no longer be run: {error}; {_kept(journal)}") from None
+        raise SimulationError(f"cases can no longer be run: {error}; {_kept(journal)}", "resume") from None
 
 
 def _record(
-    pool: Pool, finished: set["Future[Outcome]"], running: dict["Future[Outcome]", Case], journal: Journal
+    pool: Pool,
+    finished: set["Future[list[Outcome]]"],
+    running: dict["Future[list[Outcome]]", tuple[Case, ...]],
+    journal: Journal,
+    queue: _Queue,
 ) -> None:
-    """Write finished cases, then report the first of those that could not run at all."""
+    """Write finished cases, all at once, then report the first of those that could not run at all."""
     outcomes: list[Outcome] = []
     lost: BaseException | None = None
     for future in finished:
-        case = running.pop(future)
+        batch = running.pop(future)
         try:
-            outcomes.append(future.result())
+            found = future.result()
         except (Exception, CancelledError) as error:
-            outcome = pool.outcome_of_loss(case, error)
-            if outcome is not None:
+            outcome = pool.outcome_of_loss(batch[0], error)
+            if outcome is None:
+                lost = lost or error
+            elif len(batch) == 1:
                 outcomes.append(outcome)
             else:
-                lost = lost or error
+                queue.alone(batch)
+            continue
+        outcomes += found
+        queue.answered(batch, found)
     journal.append(outcomes)
     if isinstance(lost, SimulationError):
-        raise SimulationError(f"{lost}; {_kept(journal)}")
+        raise SimulationError(f"{lost}; {_kept(journal)}", "resume")
     if isinstance(lost, CancelledError):
-        raise SimulationError(f"the connection to the workers is lost; {_kept(journal)}")
+        raise SimulationError(f"the connection to the workers is lost; {_kept(journal)}", "resume")
     if lost is not None:
         raise lost
 
 
 def _kept(journal: Journal) -> str:
     return (
-        f"{journal.done} of {journal.total} cases are kept: go on with --resume"
+        f"{journal.done} of {journal.total} cases are kept: go on with `resume`"
         if journal.done
         else "no case was finished"
     )

@@ -24,11 +24,19 @@ def parse_design(specifications: Sequence[str], samples: int, seed: int) -> Prod
     Lists and ranges make a full grid. All random parameters are drawn together, ``samples`` times, and so are
     all Sobol ones; each grid point is combined with every draw.
 
+    Args:
+        specifications: the texts.
+        samples: number of draws of the random and Sobol parameters.
+        seed: of the draws.
+
+    Returns:
+        The design; its number of rows is the product of those of its parts.
+
     Raises:
         ScenarioError: a specification that cannot be read; the text names it; or a negative seed.
     """
     if seed < 0:
-        raise ScenarioError(f"`--seed` must not be negative, but is {seed}")
+        raise ScenarioError(f"`seed` must not be negative, but is {seed}", "seed")
     axes: list[Design] = []
     drawn: dict[str, list[Bounds]] = {kind: [] for kind in DRAWN}
     for text in specifications:
@@ -48,19 +56,26 @@ def parse_design(specifications: Sequence[str], samples: int, seed: int) -> Prod
     if drawn["sobol"]:
         axes.append(Sobol(tuple(drawn["sobol"]), samples, seed))
     if not axes:
-        raise ScenarioError("`--vary` must name at least one parameter of a sweep, but is not given")
+        raise ScenarioError("`vary` must name at least one parameter of a sweep, but is not given", "vary")
     return Product(tuple(axes))
 
 
 def draws(specifications: Iterable[str]) -> bool:
-    """Return whether any parameter is drawn, so that a number of samples means something."""
+    """Return whether any parameter is drawn, so that a number of samples means something.
+
+    Args:
+        specifications: the texts.
+
+    Returns:
+        True when one is random or Sobol.
+    """
     return any(_split(text)[1].partition(":")[0].removeprefix("log") in DRAWN for text in specifications)
 
 
 def _split(text: str) -> tuple[str, str]:
     name, equals, body = (part.strip() for part in text.partition("="))
     if not (name and equals and body):
-        raise ScenarioError(f"`--vary` must be NAME=SPECIFICATION, but is {text!r}")
+        raise ScenarioError(f"`vary` must be NAME=SPECIFICATION, but is {text!r}", "vary")
     return name, body
 
 
@@ -72,19 +87,20 @@ def _numbers(text: str, body: str, count: int) -> list[float]:
         numbers = []
     if len(numbers) != count or (count == 3 and not numbers[2].is_integer()):
         wanted = "LOW:HIGH:COUNT" if count == 3 else "LOW:HIGH"
-        raise ScenarioError(f"`--vary` must have {wanted} after its kind, but is {text!r}")
+        raise ScenarioError(f"`vary` must have {wanted} after its kind, but is {text!r}", "vary")
     return numbers
 
 
 def _values(text: str, body: str) -> tuple[Value, ...]:
     if re.fullmatch(r"[a-z]+(:[-+.\de]*)+", body):  # a kind that is none, rather than a word with colons
-        raise ScenarioError(f"`--vary` must be a list or of a kind among {', '.join(KINDS)}, but is {text!r}")
+        known = ", ".join(KINDS)
+        raise ScenarioError(f"`vary` must be a list or of a kind among {known}, but is {text!r}", "vary")
     words = [word.strip() for word in body.split(",")]
     if not all(words):
-        raise ScenarioError(f"`--vary` must have a value before and after each comma, but is {text!r}")
+        raise ScenarioError(f"`vary` must have a value before and after each comma, but is {text!r}", "vary")
     values = tuple(_number_or_word(word) for word in words)
     if len({type(value) for value in values}) > 1:  # a column of the table has one type
-        raise ScenarioError(f"`--vary` must be a list of numbers or one of words, but is {text!r}")
+        raise ScenarioError(f"`vary` must be a list of numbers or one of words, but is {text!r}", "vary")
     return values
 
 

@@ -7,19 +7,33 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from orchestrator.engine.cases import Column, Row, Value
+from orchestrator.engine.cases import ResultColumn, Row, Value
 from orchestrator.errors import OutputError, ScenarioError
 
 PARQUET_ROWS = 10_000
 
 
-def header(names: Sequence[str], columns: Sequence[Column]) -> list[str]:
-    """Return the names of the table's columns: case, varied parameters, status, results, message."""
+def header(names: Sequence[str], columns: Sequence[ResultColumn]) -> list[str]:
+    """Return the names of the table's columns: case, varied parameters, status, results, message.
+
+    Args:
+        names: of the varied parameters.
+        columns: of the results.
+
+    Returns:
+        The names.
+    """
     return ["case", *names, "status", *(c.name for c in columns), "message"]
 
 
-def write_csv(path: Path, names: Sequence[str], columns: Sequence[Column], rows: Iterable[Row]) -> None:
+def write_csv(path: Path, names: Sequence[str], columns: Sequence[ResultColumn], rows: Iterable[Row]) -> None:
     """Write the table as CSV: floats with as many digits as they need to be read back exactly, missing ones empty.
+
+    Args:
+        path: the file.
+        names: of the varied parameters.
+        columns: of the results.
+        rows: in case order.
 
     Raises:
         OutputError: the file cannot be written, as when the disk is full.
@@ -31,7 +45,8 @@ def write_csv(path: Path, names: Sequence[str], columns: Sequence[Column], rows:
             for row in rows:
                 writer.writerow(["" if value is None else value for value in _cells(row, names, columns)])
     except OSError as error:
-        raise OutputError(f"cannot write {path.name}: {error.strerror}; --resume writes it from what is kept") from None
+        text = f"cannot write {path.name}: {error.strerror}; `resume` writes it from what is kept"
+        raise OutputError(text, "resume") from None
 
 
 def require_parquet() -> None:
@@ -41,11 +56,17 @@ def require_parquet() -> None:
         ScenarioError: the extra ``parquet`` is not installed.
     """
     if find_spec("pyarrow") is None:
-        raise ScenarioError("`--parquet` needs the extra [parquet]: pip install 'backlash-cosim[parquet]'")
+        raise ScenarioError("`parquet` needs the extra [parquet]: pip install 'backlash-cosim[parquet]'", "parquet")
 
 
-def write_parquet(path: Path, names: Sequence[str], columns: Sequence[Column], rows: Iterable[Row]) -> None:
+def write_parquet(path: Path, names: Sequence[str], columns: Sequence[ResultColumn], rows: Iterable[Row]) -> None:
     """Write the table as Parquet, ``PARQUET_ROWS`` rows at a time. A parameter's type is that of its first value.
+
+    Args:
+        path: the file.
+        names: of the varied parameters.
+        columns: of the results.
+        rows: in case order.
 
     Raises:
         ScenarioError: the extra ``parquet`` is not installed.
@@ -70,7 +91,7 @@ def write_parquet(path: Path, names: Sequence[str], columns: Sequence[Column], r
             writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))
 
 
-def _cells(row: Row, names: Sequence[str], columns: Sequence[Column]) -> list[Value]:
+def _cells(row: Row, names: Sequence[str], columns: Sequence[ResultColumn]) -> list[Value]:
     outcome = row.outcome
     values: Sequence[Any] = outcome.values or (None,) * len(columns)
     return [outcome.index, *(row.case.parameters[n] for n in names), outcome.status.value, *values, outcome.message]

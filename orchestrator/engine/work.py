@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from orchestrator.engine.cases import Case, Column, Outcome, Status, Value
+from orchestrator.engine.cases import Case, Outcome, ResultColumn, Status, Value
 from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 
 MESSAGE_LENGTH = 300
@@ -28,18 +28,29 @@ class Work:
         payload: anything else that ``prepare`` needs.
         files: files that workers need (FMUs), by name; they travel by content hash, once per machine.
         definition: plain JSON data that, with the cases and the files' hashes, determine every result.
+        unpacked: the files are FMUs, and ``prepare`` gets the folders into which they are unpacked.
+        walls: the files hold code that is not ours: workers read and write no other files of the user, and have no
+            network.
     """
 
     prepare: Callable[[Any, Mapping[str, Path]], Any]
     run: Callable[[Any, Case], Mapping[str, Value]]
-    columns: tuple[Column, ...]
+    columns: tuple[ResultColumn, ...]
     payload: Any = None
     files: Mapping[str, Path] = field(default_factory=dict)
     definition: Mapping[str, Any] = field(default_factory=dict)
+    unpacked: bool = False
+    walls: bool = False
 
 
 def file_hash(path: Path) -> str:
     """Return the sha256 of a file's content.
+
+    Args:
+        path: the file.
+
+    Returns:
+        64 hexadecimal digits.
 
     Raises:
         FmuError: the file cannot be read.
@@ -53,6 +64,11 @@ def file_hash(path: Path) -> str:
 
 def evaluate(work: Work, prepared: Any, case: Case) -> tuple[Outcome, bool]:
     """Run one case; whatever goes wrong in it becomes the outcome's status and message.
+
+    Args:
+        work: how to run one case.
+        prepared: what the work's ``prepare`` returned in this process.
+        case: to run.
 
     Returns:
         The outcome, and whether the process can be trusted with another case: not after a slave has failed in it, nor
@@ -70,19 +86,26 @@ def evaluate(work: Work, prepared: Any, case: Case) -> tuple[Outcome, bool]:
     return Outcome(case.index, Status.DONE, "", values), True
 
 
-def _in_column_order(columns: tuple[Column, ...], result: Mapping[str, Value]) -> tuple[Value, ...]:
+def _in_column_order(columns: tuple[ResultColumn, ...], result: Mapping[str, Value]) -> tuple[Value, ...]:
     names = [c.name for c in columns]
     if sorted(result) != sorted(names):
         raise ValueError(f"the work must return the columns {names}, but returned {sorted(result)}")
     return tuple(_plain(column, result[column.name]) for column in columns)
 
 
-def _plain(column: Column, value: Any) -> Value:
+def _plain(column: ResultColumn, value: Any) -> Value:
     return None if value is None else column.kind(value)
 
 
 def one_line(error: BaseException) -> str:
-    """Return an exception as one line that is the same in every run (no memory addresses)."""
+    """Return an exception as one line that is the same in every run (no memory addresses).
+
+    Args:
+        error: any exception.
+
+    Returns:
+        At most ``MESSAGE_LENGTH`` characters.
+    """
     text = " ".join(str(error).split())
     name = type(error).__name__
     line = f"{name}: {text}" if text else name

@@ -1,8 +1,8 @@
-"""A worker process: prepares once, then answers one case after the other over a pipe.
+"""Inside a worker process: prepares once, then runs batches of cases, one case after the other.
 
-Messages from the lane that owns the process: first an ``Assignment``, then one ``Case`` after the other; the end
-of the pipe ends the process, so no worker outlives the sweep that started it. Messages to the lane: ``READY`` or
-an ``OrchestratorError`` after the assignment, then one ``Answer`` per case.
+The process is a jail's child, so its end of the pipe and its limits are the jail's. An answer is plain data:
+``[[[index, status, message, values], ...], spent]``, for the first cases of the batch. How many are finished stands in
+a file, so that the case of which a process dies has a name.
 """
 
 import contextlib
@@ -10,17 +10,25 @@ import faulthandler
 import os
 import pickle
 import resource
-import sys
+import struct
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
-from orchestrator.engine.cases import Outcome
-from orchestrator.engine.work import Work, evaluate, one_line
+from orchestrator.engine.cases import Case, Outcome, Status, Value
+from orchestrator.engine.work import MESSAGE_LENGTH, Work, evaluate, one_line
 from orchestrator.errors import OrchestratorError, SimulationError
 
-READY = "ready"
 ORPHAN_MARGIN = 30.0
+BATCH_TIME = 0.5
+"""Seconds after which a worker begins no further case of a batch: what is finished goes to the disk."""
+
+_FINISHED = "finished"
+_COUNT = struct.Struct("<Q")
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+_WORDS = frozenset(Status)
 
 
 @dataclass(frozen=True)
@@ -33,62 +41,123 @@ class Assignment:
         time_limit: seconds that a case may take; the lane enforces it, the worker only outlives it by
             ``ORPHAN_MARGIN`` when the lane is gone.
         memory: bytes that the process may allocate beyond what it holds when it is prepared; 0 for no limit.
+        columns: number of result columns.
+        walls: whether the work runs what is not ours.
     """
 
     work: bytes
     files: dict[str, Path]
     time_limit: float
     memory: int
+    columns: int
+    walls: bool
 
 
 @dataclass(frozen=True)
 class Answer:
-    """One case's outcome, and whether to replace the process: it has grown too much, or a slave failed in it."""
+    """Outcomes of a batch's first cases, and whether to replace the process: it has grown, or a slave failed in it."""
 
-    outcome: Outcome
+    outcomes: tuple[Outcome, ...]
     spent: bool
 
 
-def main(descriptor: int) -> None:
-    """Serve the lane at the other end of ``descriptor`` until it hangs up."""
-    connection = Connection(descriptor)
-    with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
-        _serve(connection)
-    os._exit(0)  # hung threads or exit handlers of a slave must not keep the process alive
+def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
+    """Prepare the work and return what runs a batch of cases.
 
+    Args:
+        assignment: the work with its files and limits.
 
-def _serve(connection: Connection) -> None:
-    assignment = connection.recv()
+    Returns:
+        A function from cases to the outcomes of as many of them as ``BATCH_TIME`` allows, as plain data.
+
+    Raises:
+        SimulationError: the work cannot be prepared in this process.
+    """
+    work: Work = pickle.loads(assignment.work)
     try:
-        work: Work = pickle.loads(assignment.work)
         prepared = work.prepare(work.payload, assignment.files)
-    except OrchestratorError as error:
-        connection.send(error)
-        return
+    except OrchestratorError:
+        raise
     except Exception as error:
-        connection.send(SimulationError(f"a worker process cannot be prepared: {one_line(error)}"))
-        return
-    base = allocated_memory()
+        raise SimulationError(f"a worker process cannot be prepared: {one_line(error)}") from None
+    base = _allocated_memory()
     _limit_memory(base, assignment.memory)
     silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
     os.dup2(silence, 2)
-    connection.send(READY)
-    while True:
-        case = connection.recv()
-        faulthandler.dump_traceback_later(assignment.time_limit + ORPHAN_MARGIN, exit=True, file=silence)
-        outcome, sound = evaluate(work, prepared, case)
+
+    place = os.open(Path(os.environ["TMPDIR"]) / _FINISHED, os.O_WRONLY | os.O_CREAT, 0o600)
+
+    def run(cases: Sequence[Case]) -> list[Any]:
+        found: list[list[Any]] = []
+        spent, begin = False, time.monotonic()
+        limit = assignment.time_limit + BATCH_TIME + ORPHAN_MARGIN
+        faulthandler.dump_traceback_later(limit, exit=True, file=silence)
+        for case in cases:
+            os.pwrite(place, _COUNT.pack(len(found)), 0)
+            outcome, sound = evaluate(work, prepared, case)
+            found.append([outcome.index, outcome.status.value, outcome.message, list(outcome.values)])
+            spent = not sound or (bool(assignment.memory) and _allocated_memory() - base > assignment.memory // 2)
+            if spent or time.monotonic() - begin > BATCH_TIME:
+                break
         faulthandler.cancel_dump_traceback_later()
-        grown = bool(assignment.memory) and allocated_memory() - base > assignment.memory // 2
-        connection.send(Answer(outcome, grown or not sound))
+        return [found, spent]
+
+    return run
 
 
-def allocated_memory() -> int:
+def finished_cases(temporary: Path) -> int:
+    """Return how many cases of its batch a worker process had finished, as it claims.
+
+    Args:
+        temporary: the process's temporary folder.
+
+    Returns:
+        The number; 0 where the process has left none.
+    """
+    try:
+        return int(_COUNT.unpack((temporary / _FINISHED).read_bytes())[0])
+    except (OSError, struct.error):
+        return 0
+
+
+def read_answer(message: Any, cases: Sequence[Case], columns: int) -> Answer | None:
+    """Return what a worker answered to a batch; ``None`` when it is no such answer.
+
+    Args:
+        message: what came over the wire.
+        cases: that were asked for.
+        columns: number of results of a case that is done.
+
+    Returns:
+        Outcomes of at least one case, and whether the process must be replaced.
+    """
+    match message:
+        case [list() as found, bool() as spent] if 0 < len(found) <= len(cases):
+            outcomes = [_outcome(entry, case, columns) for entry, case in zip(found, cases, strict=False)]
+            kept = tuple(outcome for outcome in outcomes if outcome is not None)
+            return Answer(kept, spent) if len(kept) == len(found) else None
+    return None
+
+
+def _outcome(entry: Any, case: Case, columns: int) -> Outcome | None:
+    match entry:
+        case [int() as index, str() as word, str() as text, list() as values] if (
+            index == case.index and word in _WORDS and len(text) <= MESSAGE_LENGTH
+        ):
+            status = Status(word)
+            wanted = columns if status is Status.DONE else 0
+            if len(values) == wanted and all(v is None or isinstance(v, Value) for v in values):
+                return Outcome(index, status, text, tuple(values))
+    return None
+
+
+def _allocated_memory() -> int:
     """Return the bytes of private writable memory of this process (0 where the kernel does not tell)."""
     try:
-        with open("/proc/self/status", encoding="ascii") as stream:
-            fields = dict(line.split(":", 1) for line in stream)
-        return int(fields["VmData"].split()[0]) * 1024
-    except (OSError, KeyError):
+        with open("/proc/self/statm", "rb", buffering=0) as stream:
+            return int(stream.read(200).split()[5]) * _PAGE
+    except (OSError, IndexError):
         return 0
 
 
@@ -96,7 +165,3 @@ def _limit_memory(base: int, extra: int) -> None:
     if extra and base:
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(resource.RLIMIT_DATA, (base + extra, resource.getrlimit(resource.RLIMIT_DATA)[1]))
-
-
-if __name__ == "__main__":
-    main(int(sys.argv[1]))

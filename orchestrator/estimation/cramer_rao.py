@@ -1,15 +1,17 @@
 """The Cramer-Rao bound of a record: how well any unbiased estimator could measure the gap from it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import ALPHA, STATE_NAMES, Fit, Likelihood, Problem, inverse, make_problem
-from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.estimation.joint import JointLikelihood
+from orchestrator.estimation.likelihood import Fit, Likelihood, inverse
+from orchestrator.estimation.problem import ALPHA, STATE_NAMES, Problem, make_problem
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
 
 MODEST_TORQUE_NOISE = 1e-2  # N.m.s^0.5, where no fit has told
 NOISE_PREFIXES = ("log_noise_", "log_torque_")
@@ -21,24 +23,40 @@ def bound_of_fit(likelihood: Likelihood, fit: Fit) -> float:
     The Fisher information of the innovations form: for Gaussian one-step errors e with variance s,
     ``sum(e' e'^T / s) + sum(s' s'^T / s^2) / 2``, plus that of the priors. Where the fit found no process noise this
     is the information of the deterministic plant.
+
+    Args:
+        likelihood: of the record.
+        fit: its maximum.
+
+    Returns:
+        The bound.
     """
     column = list(fit.free).index(likelihood.problem.index(ALPHA))
     return math.sqrt(fit.covariance[column, column])
 
 
 def bound(
-    problem: Problem, values: Mapping[str, float], noise: tuple[float, float], torque: float = 1e-8, threads: int = 1
+    problem: Problem | Sequence[Problem],
+    values: Mapping[str, float],
+    noise: tuple[float, float],
+    torque: float = 1e-8,
+    threads: int = 1,
 ) -> float:
     """Return the bound [rad] on alpha at known true ``values`` of the unknowns, for a deterministic plant.
 
     Args:
-        problem: record and unknowns; its measured angles play no part beyond the linearisation.
+        problem: record and unknowns, or those of several records of one machine; the measured angles play no part
+            beyond the linearisation.
         values: true value of each parameter, ``alpha`` and initial state by name; others stay at their prior means.
         noise: true standard deviation [rad] of each encoder, rounding included.
         torque: process noise, next to none.
         threads: that share the work.
+
+    Returns:
+        The bound.
     """
-    likelihood = Likelihood(problem, threads)
+    likelihood = Likelihood(problem, threads) if isinstance(problem, Problem) else JointLikelihood(problem, threads)
+    problem = likelihood.problem
     theta = problem.start
     for name, value in values.items():
         if name in problem.names:
@@ -49,12 +67,12 @@ def bound(
         elif name.startswith("log_noise_"):
             theta[n] = math.log(noise[0] if name.endswith("theta_m") else noise[1])
     free = np.array([n for n, name in enumerate(problem.names) if not name.startswith(NOISE_PREFIXES)])
-    information = refined_information(likelihood, theta, free)
+    information = _refined_information(likelihood, theta, free)
     column = list(free).index(problem.index(ALPHA))
     return math.sqrt(inverse(information)[column, column])
 
 
-def refined_information(likelihood: Likelihood, theta: Array, free: NDArray[np.int64]) -> Array:
+def _refined_information(likelihood: Likelihood, theta: Array, free: NDArray[np.int64]) -> Array:
     """Return the Fisher information, its differences matched to the standard errors that it implies."""
     point = likelihood.at(theta)
     information = np.eye(free.size)
@@ -63,13 +81,34 @@ def refined_information(likelihood: Likelihood, theta: Array, free: NDArray[np.i
     return information
 
 
-def truth_values(linear: Mapping[str, float], alpha: float, state: Array) -> dict[str, float]:
-    """Return true values by the names of the unknowns: linear parameters, alpha and initial state (5,)."""
-    return {**linear, ALPHA: alpha, **dict(zip(STATE_NAMES, map(float, state), strict=True))}
+def truth_values(linear: Mapping[str, float], alpha: float, *states: Array) -> dict[str, float]:
+    """Return true values by the names of the unknowns: linear parameters, alpha and initial states (5,).
+
+    Args:
+        linear: true value of each linear parameter.
+        alpha: true half-gap [rad].
+
+    Returns:
+        Value by name.
+    """
+    values = {**linear, ALPHA: alpha}
+    for number, state in enumerate(states, start=1):
+        names = STATE_NAMES if number == 1 else [f"{name}@{number}" for name in STATE_NAMES]
+        values |= dict(zip(names, map(float, state), strict=True))
+    return values
 
 
 def bound_at(record: Record, model: Model, alpha: float) -> float:
-    """Return the bound [rad] for a half-gap ``alpha`` on a record, for the nominal plant and modest torque noise."""
+    """Return the bound [rad] for a half-gap ``alpha`` on a record, for the nominal plant and modest torque noise.
+
+    Args:
+        record: the record.
+        model: of the machine.
+        alpha: [rad].
+
+    Returns:
+        The bound.
+    """
     problem = make_problem(record, model)
     noise = problem.noise.measured
     return bound(problem, {ALPHA: alpha}, noise, MODEST_TORQUE_NOISE)

@@ -17,9 +17,9 @@ import numpy as np
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.innovations import Array, affine_model, simulate
-from orchestrator.estimation.likelihood import make_problem
-from orchestrator.model_file import Model
-from orchestrator.record import MINIMUM_ROWS, Record
+from orchestrator.estimation.problem import make_problem
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import MINIMUM_ROWS, Record
 from pyfmu_sources.drivetrain_parameters import P_ALPHA
 
 TORQUE_NOISE = 1e-2  # N.m.s^0.5
@@ -77,6 +77,9 @@ def design(
         motor_only: whether there is no load encoder.
         tell: called with candidates done and in all.
 
+    Returns:
+        The grid and the candidates.
+
     Raises:
         DesignError: limits, size, duration or rate are not positive, or the record would be too short or too long.
     """
@@ -91,8 +94,7 @@ def design(
         raise DesignError(f"`duration` must be at least {SHORTEST:g} s, but is {duration:g}")
     time = np.arange(n) / rate
     task = _Task(time, model, alpha, limits, motor_only)
-    shapes = [(f"square pulses, period {period:g} s", _pulses(time, period)) for period in PULSE_PERIODS]
-    shapes += [(f"multisine to {top:g} Hz", _multisine(time, top)) for top in BANDS]
+    shapes = _simple_shapes(time)
     candidates = []
     for name, shape in shapes:
         candidates.append(_judge(name, shape, task))
@@ -105,6 +107,33 @@ def design(
 
     candidates.append(_search(task, look))
     return time, sorted(candidates, key=lambda candidate: candidate.bound)
+
+
+def simple_candidates(
+    model: Model, alpha: float, limits: Limits, duration: float, rate: float, motor_only: bool = False
+) -> list[Candidate]:
+    """Return square pulses and multisines alone, without a search; the best first. See ``design``.
+
+    Args:
+        model: of the machine.
+        alpha: half-gap that shall be measured [rad].
+        limits: of torque and speed.
+        duration: of the record [s].
+        rate: samples per second.
+        motor_only: whether there is no load encoder.
+
+    Returns:
+        The candidates.
+    """
+    time = np.arange(round(duration * rate)) / rate
+    task = _Task(time, model, alpha, limits, motor_only)
+    found = [_judge(name, shape, task) for name, shape in _simple_shapes(time)[::2]]
+    return sorted(found, key=lambda candidate: candidate.bound)
+
+
+def _simple_shapes(time: Array) -> list[tuple[str, Array]]:
+    shapes = [(f"square pulses, period {period:g} s", _pulses(time, period)) for period in PULSE_PERIODS]
+    return shapes + [(f"multisine to {top:g} Hz", _multisine(time, top)) for top in BANDS]
 
 
 @dataclass(frozen=True)
@@ -193,11 +222,35 @@ def _judge(name: str, shape: Array, task: _Task) -> Candidate:
     u, fastest = scale * shape, float(np.max(np.abs(states[:, 1])))
     if fastest > task.limits.speed:
         return Candidate(name, u, math.inf, float(np.max(np.abs(u))), fastest)
-    record = Record(task.time, u, states[:, 0].copy(), None if task.motor_only else states[:, 2].copy(), name)
-    noise = tuple(_noise(task.model, column, k) for k, column in enumerate(("theta_m", "theta_l")))
-    truth = cramer_rao.truth_values({}, task.alpha, np.zeros(5))
-    bound = cramer_rao.bound(make_problem(record, task.model), truth, (noise[0], noise[1]), TORQUE_NOISE)
+    noise = (_noise(task.model, "theta_m", 0), _noise(task.model, "theta_l", 1))
+    bound = bound_of_excitation(task.model, task.time, u, task.alpha, noise, task.motor_only)
     return Candidate(name, u, bound, float(np.max(np.abs(u))), fastest)
+
+
+def bound_of_excitation(
+    model: Model, time: Array, u: Array, alpha: float, noise: tuple[float, float], motor_only: bool
+) -> float:
+    """Return the bound [rad] on a half-gap ``alpha`` that a torque would give on the model's plant, from rest.
+
+    Args:
+        model: plant, and how far each parameter may be off.
+        time: (n,) [s], uniform.
+        u: (n,) torque [N.m].
+        alpha: half-gap [rad].
+        noise: standard deviation of each encoder [rad].
+        motor_only: whether there is no load encoder.
+
+    Returns:
+        The bound; infinite where the plant cannot be simulated under this torque.
+    """
+    values = list(model.values)
+    values[P_ALPHA] = alpha
+    states = simulate(affine_model(tuple(values)), u, float(time[1] - time[0]), np.zeros(5))
+    if not np.all(np.isfinite(states)):
+        return math.inf
+    record = Record(time, u, states[:, 0].copy(), None if motor_only else states[:, 2].copy(), "simulated")
+    truth = cramer_rao.truth_values({}, alpha, np.zeros(5))
+    return cramer_rao.bound(make_problem(record, model), truth, noise, TORQUE_NOISE)
 
 
 def _noise(model: Model, column: str, place: int) -> float:

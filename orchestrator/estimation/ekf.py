@@ -8,16 +8,16 @@ from functools import cache
 import numba
 import numpy as np
 
-from orchestrator.compiled import compiled
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import measurement_noise
+from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import LEVEL, Estimate, NotApplicableError
-from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.plants.compiled import compiled
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import NORMAL_95
 from pyfmu_sources.backlash_estimator import FILTERS, SIZE, Settings
 
 UNMEASURED = 1e6  # rad, standard deviation that stands for an encoder that is absent
-NORMAL_QUANTILE = 1.959963984540054
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,15 @@ def _runner() -> Callable[..., None]:
 
     @numba.njit
     def loop(u, theta_m, theta_l, model, settings, step, filters, alpha, deviation, contact):  # type: ignore[no-untyped-def]
-        begin(filters, theta_m[0], theta_l[0], settings)
+        first = 0
+        while first < u.size - 1 and not (theta_m[first] == theta_m[first] and theta_l[first] == theta_l[first]):
+            first += 1
+        begin(filters, theta_m[first], theta_l[first], settings)
         for n in range(u.size):
             if n > 0:
                 advance(filters, model, settings, u[n - 1], step)
-                measure(filters, settings, theta_m[n], theta_l[n])
+                if theta_m[n] == theta_m[n] and theta_l[n] == theta_l[n]:  # NaN: missing, no update
+                    measure(filters, settings, theta_m[n], theta_l[n])
             alpha[n], deviation[n], best = look(filters, filters.shape[0])
             contact[n] = touching(filters[best], model[6])
 
@@ -50,7 +54,16 @@ def _runner() -> Callable[..., None]:
 
 
 def trace(record: Record, model: Model, settings: Settings | None = None) -> OnlineTrace:
-    """Return the online estimate over a record; ``settings`` default to what the record and the model say."""
+    """Return the online estimate over a record; ``settings`` default to what the record and the model say.
+
+    Args:
+        record: the record.
+        model: of the machine.
+        settings: of the filter.
+
+    Returns:
+        Half-gap [rad], its standard deviation and contact at each sample.
+    """
     loop = _runner()
     p = {name: entry.value for name, entry in model.parameters.items()}
     plant = (p["J_m"], p["J_l"], p["k"], p["c"], p["b_m"], p["b_l"], p["i"], p["tau"])
@@ -66,7 +79,15 @@ def trace(record: Record, model: Model, settings: Settings | None = None) -> Onl
 
 
 def default_settings(record: Record, model: Model) -> Settings:
-    """Return the settings for a record: encoder noise as measured, stiffness as uncertain as the model says."""
+    """Return the settings for a record: encoder noise as measured, stiffness as uncertain as the model says.
+
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        The settings.
+    """
     noise_m = measurement_noise(record, model, "theta_m")
     noise_l = UNMEASURED if record.theta_l is None else measurement_noise(record, model, "theta_l")
     stiffness = model.parameters["k"]
@@ -81,14 +102,25 @@ def default_settings(record: Record, model: Model) -> Settings:
 
 
 def estimate(record: Record, model: Model) -> Estimate:
-    """Return the online estimate at the end of the record."""
+    """Return the online estimate at the end of the record.
+
+    Args:
+        record: the measured record.
+        model: of the plant `Drivetrain`.
+
+    Returns:
+        The estimate [rad] with its deviation, and its course in ``curves``.
+
+    Raises:
+        NotApplicableError: the model has no gap, or the filter diverged.
+    """
     if model.fmu != "Drivetrain":
         raise NotApplicableError("the online estimator needs the model `Drivetrain`")
     run = trace(record, model)
     alpha, error = float(run.alpha[-1]), float(run.deviation[-1])
     if not math.isfinite(alpha):
         raise NotApplicableError("the online estimator diverged on this record")
-    half = NORMAL_QUANTILE * error
+    half = NORMAL_95 * error
     flanks = run.contact[run.contact != 0.0]
     traversals = int(np.count_nonzero(np.diff(flanks)))
     settled = error < 0.2 * alpha

@@ -9,9 +9,10 @@ from matplotlib.figure import Figure
 
 from orchestrator.estimation.design import Candidate
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.maximum_likelihood import Profile
+from orchestrator.estimation.profile import Profile
 from orchestrator.estimation.protocol import Estimate
-from orchestrator.record import Record
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import NORMAL_95
 
 BLUE, ORANGE, GREY, SHADE = "#2166ac", "#d6604d", "#555555", "#f4d58d"
 DPI = 130
@@ -25,7 +26,14 @@ def _figure(rows: int, size: tuple[float, float]) -> tuple[Figure, list]:
 
 
 def draw_fit(path: Path, record: Record, estimate: Estimate, ratio: float) -> None:
-    """Draw record against fitted model over the liveliest seconds, time in the gap shaded, and the innovations."""
+    """Draw record against fitted model over the liveliest seconds, time in the gap shaded, and the innovations.
+
+    Args:
+        path: the picture.
+        record: the record.
+        estimate: of the record.
+        ratio: of the gear.
+    """
     states, contacts, errors = (estimate.curves[name] for name in ("states", "contacts", "errors"))
     span = _liveliest(record, contacts)
     t = record.time[span]
@@ -71,7 +79,14 @@ def _shade(axis, time: Array, contacts: Array) -> None:  # type: ignore[no-untyp
 
 
 def draw_profile(path: Path, profile: Profile, estimate: Estimate, limit: float) -> None:
-    """Draw the profile likelihood with the interval that it gives."""
+    """Draw the profile likelihood with the interval that it gives.
+
+    Args:
+        path: the picture.
+        profile: of alpha.
+        estimate: of the record.
+        limit: drop at which the interval ends.
+    """
     figure, (axis,) = _figure(1, (6.5, 4.2))
     signed = np.sign(profile.alpha - estimate.alpha) * np.sqrt(np.maximum(profile.drop, 0.0))
     fine = np.linspace(signed[0], signed[-1], 200)
@@ -92,13 +107,18 @@ def draw_profile(path: Path, profile: Profile, estimate: Estimate, limit: float)
 
 
 def draw_online(path: Path, record: Record, estimate: Estimate) -> None:
-    """Draw the online estimate over time with its 95 % band."""
+    """Draw the online estimate over time with its 95 % band.
+
+    Args:
+        path: the picture.
+        record: the record.
+        estimate: of the record.
+    """
     figure, (axis,) = _figure(1, (8.0, 4.2))
     alpha, deviation = estimate.curves["alpha"], estimate.curves["deviation"]
-    axis.fill_between(
-        record.time, np.maximum(alpha - 1.96 * deviation, 0.0), alpha + 1.96 * deviation, color=BLUE, alpha=0.25,
-        linewidth=0.0, label="95 % band",
-    )  # fmt: skip
+    reach = NORMAL_95 * deviation
+    low, high = np.maximum(alpha - reach, 0.0), alpha + reach
+    axis.fill_between(record.time, low, high, color=BLUE, alpha=0.25, linewidth=0.0, label="95 % band")
     axis.plot(record.time, alpha, color=BLUE, linewidth=1.2, label="online estimate")
     axis.set_xlabel("time [s]")
     axis.set_ylabel("half-gap [rad]")
@@ -110,7 +130,13 @@ def draw_online(path: Path, record: Record, estimate: Estimate) -> None:
 
 
 def draw_design(path: Path, time: Array, best: Candidate) -> None:
-    """Draw the proposed torque record."""
+    """Draw the proposed torque record.
+
+    Args:
+        path: the picture.
+        time: (n,) [s].
+        best: the candidate.
+    """
     figure, (axis,) = _figure(1, (8.0, 3.6))
     axis.step(time, best.u, where="post", color=BLUE, linewidth=0.9)
     axis.set_xlabel("time [s]")

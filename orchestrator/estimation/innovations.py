@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.kernel import run_filter, run_free, transition
-from pyfmu_sources.drivetrain_parameters import DEAD_ZONE, P_ALPHA, P_I, P_J_L, P_J_M, P_MODEL
-from pyfmu_sources.equations import rates
+from pyfmu_sources.drivetrain_parameters import BIG, DEAD_ZONE, P_ALPHA, P_FILTER, P_I, P_J_L, P_J_M, P_MODEL, P_RATE
+from pyfmu_sources.equations import State, rates
 
 Array = NDArray[np.float64]
 STATES = 5
@@ -51,13 +51,21 @@ def affine_model(p: tuple[float, ...], impulse: float = 0.0) -> AffineModel:
     ``impulse`` [N.m.s] is what the shaft lacks at the load when the teeth touch, and has too much when they part,
     beside a damper ``c`` that acts from the first moment of contact on: half of ``c`` times the depth within which a
     real contact's damping sets in (Hunt and Crossley 1975). It fades with the gap: without one, nothing touches.
+
+    Args:
+        p: the plant's parameters.
+        impulse: see above.
+
+    Returns:
+        The matrices of its three modes.
     """
     chosen = list(p)
     chosen[P_MODEL] = float(DEAD_ZONE)
+    chosen[P_FILTER], chosen[P_RATE] = 0.0, BIG
     p = tuple(chosen)
     matrices = np.zeros((3, STATES, STATES))
     constants = np.zeros((3, STATES))
-    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     inputs = np.zeros(STATES)
     for flank in (-1, 0, 1):
         base: tuple[float, ...] = rates(zero, flank, 0.0, 0.0, p, 0.0, 0.0)
@@ -75,9 +83,9 @@ def affine_model(p: tuple[float, ...], impulse: float = 0.0) -> AffineModel:
     return AffineModel(matrices, inputs, constants, normal, p[P_ALPHA], mobility, jump)
 
 
-def _unit(n: int) -> tuple[float, float, float, float, float, float, float, float]:
+def _unit(n: int) -> State:
     a, b, c, d, e = (1.0 if m == n else 0.0 for m in range(STATES))
-    return (a, b, c, d, e, 0.0, 0.0, 0.0)
+    return (a, b, c, d, e, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -119,36 +127,52 @@ def innovations(
     noise: NoiseLevels,
     keep: bool = False,
     soft: bool = False,
+    u_deviation: Array | None = None,
 ) -> Innovations:
     """Run the filter over a record.
 
     Args:
         model: plant.
         u: (n,) requested torque, held over a sample [N.m].
-        y: (n, 2) motor and load angle, or (n, 1) motor angle only [rad].
+        y: (n, 2) motor and load angle, or (n, 1) motor angle only [rad]; NaN: missing, its update is skipped.
         step: sample time [s].
         x0: (5,) state at the first sample, taken as exact (its uncertainty is the fit's business).
         noise: measurement and process noise.
         keep: whether to return the states.
         soft: whether the flanks are blurred by the uncertainty of the twist (statistical linearisation) instead of
             followed sharply: coarser, but smooth in every unknown, so a fit may start with it.
+        u_deviation: (n,) standard deviation of the torque where it is not known [N.m], or None.
+
+    Returns:
+        One-step errors and their variances, (n, outputs) each.
     """
     phi, gain_u, gain_1 = _discrete(model, step)
     intensity = (np.array(noise.torque) * model.mobility) ** 2
     variance = np.array(noise.measured[: y.shape[1]]) ** 2
     n = y.shape[0]
+    u_variance = np.empty(0) if u_deviation is None else u_deviation**2
     errors, variances = np.empty(y.shape), np.empty(y.shape)
     states = np.empty((n if keep else 0, STATES))
     contacts = np.empty(n if keep else 0, dtype=np.int64)
     run_filter(
         model.matrices, model.inputs, model.constants, model.normal, model.alpha, model.jump, phi, gain_u, gain_1, step,
-        u, y, variance, intensity, x0, errors, variances, states, contacts, soft,
+        u, u_variance, y, variance, intensity, x0, errors, variances, states, contacts, soft,
     )  # fmt: skip
     return Innovations(errors, variances, states, contacts)
 
 
 def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:
-    """Return the states (n, 5) of the plant that is fed ``u`` (n,) from ``x0`` (5,), without any measurement."""
+    """Return the states (n, 5) of the plant that is fed ``u`` (n,) from ``x0`` (5,), without any measurement.
+
+    Args:
+        model: plant.
+        u: requested torque, held over a sample [N.m].
+        step: sample time [s].
+        x0: state at the first sample, SI units.
+
+    Returns:
+        The states, SI units.
+    """
     phi, gain_u, gain_1 = _discrete(model, step)
     states = np.empty((u.size, STATES))
     run_free(

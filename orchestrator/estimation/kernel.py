@@ -9,15 +9,23 @@ is the opposite.
 import math
 
 import numpy as np
-from numba import njit
+
+from orchestrator.shared.numba_cache import kept
 
 BLUR = 3e-4  # least standard deviation of the twist [rad] in a soft run
 MOST_EVENTS = 20  # in one sample
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped-def]
-    """Fill the exact transition over ``h`` of ``x' = a x + b_u u + b_1`` from its Taylor series."""
+    """Fill the exact transition over ``h`` of ``x' = a x + b_u u + b_1`` from its Taylor series.
+
+    Args:
+        a: (5, 5) matrix of one mode.
+        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
+        h: [s].
+        phi, gain_u, gain_1: what a sample makes of state, torque and constant rates; of one mode or of all.
+    """
     for r in range(5):
         for c in range(5):
             phi[r, c] = 1.0 if r == c else 0.0
@@ -38,8 +46,8 @@ def transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped-
             break
 
 
-@njit(cache=True, nogil=True)
-def derivative(a, b_u, b_1, x, u, out):  # type: ignore[no-untyped-def]
+@kept(nogil=True)
+def _derivative(a, b_u, b_1, x, u, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with the time derivative of ``x`` in one mode."""
     for r in range(5):
         total = b_u[r] * u + b_1[r]
@@ -48,8 +56,8 @@ def derivative(a, b_u, b_1, x, u, out):  # type: ignore[no-untyped-def]
         out[r] = total
 
 
-@njit(cache=True, nogil=True)
-def first_root(v0, s0, v1, s1, h):  # type: ignore[no-untyped-def]
+@kept(nogil=True)
+def _first_root(v0, s0, v1, s1, h):  # type: ignore[no-untyped-def]
     """Return the first time in (0, h] at which the cubic with these end values and slopes turns negative, or -1.0."""
     c1 = h * s0
     c2 = 3.0 * (v1 - v0) - h * (2.0 * s0 + s1)
@@ -81,8 +89,8 @@ def first_root(v0, s0, v1, s1, h):  # type: ignore[no-untyped-def]
     return -1.0
 
 
-@njit(cache=True, nogil=True)
-def next_event(normal, alpha, flank, x, end, h):  # type: ignore[no-untyped-def]
+@kept(nogil=True)
+def _next_event(normal, alpha, flank, x, end, h):  # type: ignore[no-untyped-def]
     """Return (time, side) of the first meeting of twist and flank between states ``x`` and ``end``; -1.0: none.
 
     ``end`` is where the present mode alone leads in ``h``; the cubic through both ends is close enough to find it.
@@ -101,18 +109,18 @@ def next_event(normal, alpha, flank, x, end, h):  # type: ignore[no-untyped-def]
             s = 1.0 if way == 0 else -1.0
             if alpha - s * d1 > reach and alpha - s * d0 > reach:
                 continue
-            when = first_root(max(alpha - s * d0, 0.0), -s * w0, alpha - s * d1, -s * w1, h)
+            when = _first_root(max(alpha - s * d0, 0.0), -s * w0, alpha - s * d1, -s * w1, h)
             if when >= 0.0 and (hit < 0.0 or when < hit):
                 hit, side = when, s
         return hit, side
     side = 1.0 if flank == 2 else -1.0
     if not (side * d1 - alpha > reach and side * d0 - alpha > reach):
-        hit = first_root(max(side * d0 - alpha, 0.0), side * w0, side * d1 - alpha, side * w1, h)
+        hit = _first_root(max(side * d0 - alpha, 0.0), side * w0, side * d1 - alpha, side * w1, h)
     return hit, side
 
 
-@njit(cache=True, nogil=True)
-def cut_at(mats, b_u, b_1, normal, edge, hit, left, u, x, part, y):  # type: ignore[no-untyped-def]
+@kept(nogil=True)
+def _cut_at(mats, b_u, b_1, normal, edge, hit, left, u, x, part, y):  # type: ignore[no-untyped-def]
     """Fill ``y`` and the transition ``part`` at the event near ``hit``, and return its time; ``edge`` is the flank."""
     part_u = np.empty(5)
     part_1 = np.empty(5)
@@ -132,9 +140,23 @@ def cut_at(mats, b_u, b_1, normal, edge, hit, left, u, x, part, y):  # type: ign
     return hit
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x, total, end):  # type: ignore[no-untyped-def]
-    """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch."""
+    """Advance ``x`` in place over ``h`` and leave its Jacobian in ``total``; ``end`` is scratch.
+
+    Args:
+        mats: (modes, 5, 5) matrices.
+        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
+        normal: (5,) the twist as a row: ``normal @ x``.
+        alpha: half-gap [rad].
+        jump: (5,) what an impulse at the flank does to the state.
+        phi, gain_u, gain_1: what a sample makes of state, torque and constant rates; of one mode or of all.
+        h: [s].
+        u: torque [N.m], of a sample or (n,).
+        x: (5,) state.
+        total: (5, 5) filled with the Jacobian.
+        end: (5,) scratch.
+    """
     d = normal[0] * x[0] + normal[2] * x[2]
     flank = 2
     if alpha > 0.0:
@@ -150,7 +172,7 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
             for c in range(5):
                 acc += f[r, c] * x[c]
             end[r] = acc
-        hit, side = next_event(normal, alpha, flank, x, end, left)
+        hit, side = _next_event(normal, alpha, flank, x, end, left)
         if hit < 0.0:
             if first:
                 for r in range(5):
@@ -163,7 +185,7 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
             return
         part = np.empty((5, 5))
         y = np.empty(5)
-        hit = cut_at(mats[flank], b_u, b_1[flank], normal, side * alpha, hit, left, u, x, part, y)
+        hit = _cut_at(mats[flank], b_u, b_1[flank], normal, side * alpha, hit, left, u, x, part, y)
         if first:
             total[:, :] = part
         else:
@@ -172,12 +194,12 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
         after = (2 if side > 0.0 else 0) if flank == 1 else 1
         speed0 = np.empty(5)
         speed1 = np.empty(5)
-        derivative(mats[flank], b_u, b_1[flank], y, u, speed0)
+        _derivative(mats[flank], b_u, b_1[flank], y, u, speed0)
         rate = normal[0] * y[1] + normal[2] * y[3]
         way = side if flank == 1 else -side
         for r in range(5):
             y[r] += way * jump[r]
-        derivative(mats[after], b_u, b_1[after], y, u, speed1)
+        _derivative(mats[after], b_u, b_1[after], y, u, speed1)
         if abs(rate) > 1e-6:
             for c in range(5):
                 along = (normal[0] * total[0, c] + normal[2] * total[2, c]) / rate
@@ -195,9 +217,21 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
         transition(mats[flank], b_u, b_1[flank], left, f, g_u, g_1)
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore[no-untyped-def]
-    """Advance ``x`` over ``h`` with the dead zone averaged over the twist's distribution (Booton 1954)."""
+    """Advance ``x`` over ``h`` with the dead zone averaged over the twist's distribution (Booton 1954).
+
+    Args:
+        mats: (modes, 5, 5) matrices.
+        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
+        normal: (5,) the twist as a row: ``normal @ x``.
+        alpha: half-gap [rad].
+        cov: (5, 5) covariance of the state.
+        h: [s].
+        u: torque [N.m], of a sample or (n,).
+        x: (5,) state.
+        total: (5, 5) filled with the Jacobian.
+    """
     variance = 0.0
     for r in range(0, 3, 2):
         for c in range(0, 3, 2):
@@ -241,9 +275,22 @@ def blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore
         total[:, :] = one @ total
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
 def run_free(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x0, states):  # type: ignore[no-untyped-def]
-    """Fill ``states`` (n, 5) with the run from ``x0`` under ``u`` (n,), nothing measured."""
+    """Fill ``states`` (n, 5) with the run from ``x0`` under ``u`` (n,), nothing measured.
+
+    Args:
+        mats: (modes, 5, 5) matrices.
+        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
+        normal: (5,) the twist as a row: ``normal @ x``.
+        alpha: half-gap [rad].
+        jump: (5,) what an impulse at the flank does to the state.
+        phi, gain_u, gain_1: what a sample makes of state, torque and constant rates; of one mode or of all.
+        h: [s].
+        u: torque [N.m], of a sample or (n,).
+        x0: (5,) first state.
+        states: (n, 5) filled.
+    """
     x = x0.copy()
     total = np.empty((5, 5))
     end = np.empty(5)
@@ -253,12 +300,50 @@ def run_free(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x0,
         propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u[k], x, total, end)
 
 
-@njit(cache=True, nogil=True)
+@kept(nogil=True)
+def _update(x, cov, row, e, s, gain, work):  # type: ignore[no-untyped-def]
+    """Correct state and covariance in place by the error ``e``, of variance ``s``, of the measured state ``row``."""
+    for r in range(5):
+        gain[r] = cov[r, row] / s
+    for r in range(5):
+        x[r] += gain[r] * e
+        for c in range(5):
+            work[r, c] = cov[r, c] - gain[r] * gain[c] * s
+    for r in range(5):
+        for c in range(5):
+            cov[r, c] = 0.5 * (work[r, c] + work[c, r])
+
+
+@kept(nogil=True)
 def run_filter(  # type: ignore[no-untyped-def]
-    mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, y, variance, intensity, x0, errors, variances,
-    states, contacts, soft,
+    mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, u_variance, y, variance, intensity, x0, errors,
+    variances, states, contacts, soft,
 ):  # fmt: skip
-    """Fill one-step ``errors`` and ``variances`` (n, outputs); and states and contacts where they have n rows."""
+    """Fill one-step ``errors`` and ``variances`` (n, outputs); and states and contacts where they have n rows.
+
+    A measurement that is NaN is skipped: error 0, variance 1. ``u_variance`` is what the torque may be off by: (n,), or
+    (0,) where it is known.
+
+    Args:
+        mats: (modes, 5, 5) matrices.
+        b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
+        normal: (5,) the twist as a row: ``normal @ x``.
+        alpha: half-gap [rad].
+        jump: (5,) what an impulse at the flank does to the state.
+        phi, gain_u, gain_1: what a sample makes of state, torque and constant rates; of one mode or of all.
+        h: [s].
+        u: torque [N.m], of a sample or (n,).
+        u_variance: of the torque [N^2.m^2].
+        y: (n, outputs) measured angles [rad].
+        variance: (outputs,) of the measurement [rad^2].
+        intensity: (2,) of the torque noise at motor and load.
+        x0: (5,) first state.
+        errors: (n, outputs) filled.
+        variances: (n, outputs) filled.
+        states: (n, 5) filled.
+        contacts: (n,) filled, or (0,).
+        soft: whether the flanks are blurred.
+    """
     n, outputs = y.shape
     x = x0.copy()
     cov = np.zeros((5, 5))
@@ -271,17 +356,14 @@ def run_filter(  # type: ignore[no-untyped-def]
             row = 2 * o
             s = cov[row, row] + variance[o]
             e = y[k, o] - x[row]
+            if math.isnan(e):
+                # A state that has become NaN must show; a sample that is missing must not.
+                errors[k, o] = x[row] - x[row]
+                variances[k, o] = 1.0
+                continue
             errors[k, o] = e
             variances[k, o] = s
-            for r in range(5):
-                gain[r] = cov[r, row] / s
-            for r in range(5):
-                x[r] += gain[r] * e
-                for c in range(5):
-                    work[r, c] = cov[r, c] - gain[r] * gain[c] * s
-            for r in range(5):
-                for c in range(5):
-                    cov[r, c] = 0.5 * (work[r, c] + work[c, r])
+            _update(x, cov, row, e, s, gain, work)
         if keep:
             d = normal[0] * x[0] + normal[2] * x[2]
             contacts[k] = 1 if d > alpha else (-1 if d < -alpha else 0)
@@ -304,6 +386,10 @@ def run_filter(  # type: ignore[no-untyped-def]
                     acc += work[r, m] * total[c, m]
                 cov[r, c] = acc
                 cov[c, r] = acc
+        if u_variance.size == n and u_variance[k] > 0.0:
+            for r in range(5):
+                for c in range(5):
+                    cov[r, c] += u_variance[k] * gain_u[1, r] * gain_u[1, c]
         for body in range(2):
             a = 2 * body
             q = intensity[body]

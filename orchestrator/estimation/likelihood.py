@@ -6,152 +6,24 @@ of the innovations; steps are Fisher scoring with Levenberg's damping. See ``doc
 """
 
 import math
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels, affine_model, innovations
-from orchestrator.model_file import Model
-from orchestrator.record import Record, quantisation_step
-from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
+from orchestrator.estimation.problem import IMPULSE, OFFSET, SCALE, STATE_NAMES, Problem
+from orchestrator.estimation.protocol import TimeLimitError
+from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
+from pyfmu_sources.drivetrain_parameters import NAMES
 
-STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
-OFFSET = "effects.sensor_offset.load.offset"
-IMPULSE = "contact_impulse"
-IMPULSE_DEPTH = 2e-3  # rad, within which a contact's damping sets in; prior standard deviation
-OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
-NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
 JUMP = 100.0
 START_DAMPING = 1e-6
 DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
-# White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record, and one whose contact
-# law is not the machine's is too sure of itself; a least noise of motor and load keeps both honest.
-LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-9, 30.0
-LEAST_WHERE_INEXACT = (1e-4, 1e-3)
 LARGEST_LOG_NOISE = 20.0  # beyond the bounds of any unknown, where a difference quotient may look
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """One unknown: its name, prior mean and standard deviation, and the scale in which steps are taken."""
-
-    name: str
-    mean: float
-    deviation: float
-    scale: float
-    lower: float = -math.inf
-    upper: float = math.inf
-
-
-@dataclass(frozen=True)
-class Problem:
-    """A record and what is unknown about it.
-
-    Attributes:
-        record: the record.
-        base: parameter tuple of the model.
-        unknowns: every unknown, in the order of the vector; free or not is decided per fit.
-        outputs: (n, 1 or 2) measured angles [rad].
-        noise: nominal noise levels, for those that are not among the unknowns.
-    """
-
-    record: Record
-    base: tuple[float, ...]
-    unknowns: tuple[Unknown, ...]
-    outputs: Array
-    noise: NoiseLevels
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the unknowns, in order."""
-        return tuple(unknown.name for unknown in self.unknowns)
-
-    @property
-    def start(self) -> Array:
-        """Return the prior means."""
-        return np.array([unknown.mean for unknown in self.unknowns])
-
-    def index(self, name: str) -> int:
-        """Return the place of an unknown in the vector."""
-        return self.names.index(name)
-
-
-def make_problem(record: Record, model: Model) -> Problem:
-    """Return the estimation problem of a record under a model.
-
-    With the motor encoder alone only alpha times the gear ratio can be seen, so the ratio then counts as exact.
-    """
-    both = record.theta_l is not None
-    outputs = record.theta_m[:, None] if record.theta_l is None else np.column_stack([record.theta_m, record.theta_l])
-    unknowns = []
-    for parameter in model.uncertain:
-        if parameter.name == "alpha" or (parameter.name == "i" and not both):
-            continue
-        sd = parameter.standard_deviation
-        lower = max(parameter.minimum, parameter.value - 4.0 * sd) if parameter.value > 0 else parameter.minimum
-        unknowns.append(Unknown(parameter.name, parameter.value, sd, sd, lower, parameter.maximum))
-    ratio = model.parameters["i"].value
-    unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
-    if both:
-        unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
-    damping = model.parameters["c"].value
-    unknowns.append(Unknown(IMPULSE, 0.0, 0.5 * IMPULSE_DEPTH * damping, 0.5 * IMPULSE_DEPTH * damping))
-    unknowns += _initial_state(record, ratio)
-    levels, noises = [], []
-    for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
-        level = measurement_noise(record, model, column)
-        levels.append(level)
-        known = model.encoder(column).noise is not None and model.encoder(column).resolution is not None
-        spread = 0.02 if known else NOISE_SPREAD
-        noises.append(
-            Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0)
-        )
-    least = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE) if both else LEAST_WHERE_INEXACT
-    for side, low in zip(("motor", "load"), least, strict=True):
-        noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(LARGEST_TORQUE_NOISE)))
-    if not both:
-        levels.append(levels[0])
-    return Problem(
-        record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0))
-    )
-
-
-def _initial_state(record: Record, ratio: float) -> list[Unknown]:
-    """Return unknowns for the initial state, centred on a straight line through the first rows."""
-    rows = min(8, record.size)
-    t = record.time[:rows] - record.time[0]
-    speed_m, angle_m = np.polyfit(t, record.theta_m[:rows], 1)
-    if record.theta_l is not None:
-        speed_l, angle_l = np.polyfit(t, record.theta_l[:rows], 1)
-        spread_l = 0.02
-    else:
-        speed_l, angle_l, spread_l = speed_m / ratio, angle_m / ratio, 0.1
-    means = (float(angle_m), float(speed_m), float(angle_l), float(speed_l), 0.0)
-    spreads = (0.02, 3.0, spread_l, 1.0, 30.0)
-    scales = (1e-4, 1e-2, 1e-4, 1e-2, 1e-1)
-    return [Unknown(*entry) for entry in zip(STATE_NAMES, means, spreads, scales, strict=True)]
-
-
-def measurement_noise(record: Record, model: Model, column: str) -> float:
-    """Return the standard deviation of an encoder [rad]: stated noise and rounding, else estimated from the record.
-
-    The estimate takes the third difference of the column, in which motion hardly shows (its gain on white noise
-    is sqrt(20)); rounding adds a twelfth of the squared count.
-    """
-    values = record.theta_m if column == "theta_m" else record.theta_l
-    assert values is not None
-    encoder = model.encoder(column)
-    count = quantisation_step(values) if encoder.resolution is None else encoder.resolution
-    if encoder.noise is not None:
-        level = math.sqrt(encoder.noise**2 + count**2 / 12.0)
-    else:
-        third = np.diff(values, 3)
-        level = 1.4826 * float(np.median(np.abs(third))) / math.sqrt(20.0)
-        level = max(level, count / math.sqrt(12.0))
-    return max(level, 1e-9)
 
 
 @dataclass(frozen=True)
@@ -195,8 +67,9 @@ class Likelihood:
     ``information`` is the last Fisher information of each unknown; the difference quotients are scaled by it.
     """
 
-    def __init__(self, problem: Problem, threads: int = 1) -> None:
+    def __init__(self, problem: Problem, threads: int = 1, settings: EstimationSettings = DEFAULT_SETTINGS) -> None:
         self.problem = problem
+        self.settings = settings
         self.soft = False
         names = problem.names
         self._offset = names.index(OFFSET) if OFFSET in names else None
@@ -208,6 +81,8 @@ class Likelihood:
         self._state = [problem.index(name) for name in STATE_NAMES]
         self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
         self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
+        self._scale = names.index(SCALE) if SCALE in names else None
+        self.deadline = math.inf  # of time.monotonic()
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._mean = problem.start
         self._weight = np.array([u.deviation**-2 if math.isfinite(u.deviation) else 0.0 for u in problem.unknowns])
@@ -223,31 +98,69 @@ class Likelihood:
         return 1e-3 if self.soft else START_DAMPING
 
     def parameters(self, theta: Array) -> tuple[float, ...]:
-        """Return the parameter tuple ``p`` of a vector."""
+        """Return the parameter tuple ``p`` of a vector.
+
+        Args:
+            theta: (unknowns,).
+
+        Returns:
+            The parameters, in the order of the plant's table.
+        """
         p = list(self.problem.base)
         for place, name in self._places:
             p[name] = float(theta[place])
         return tuple(p)
 
     def noise(self, theta: Array) -> NoiseLevels:
-        """Return the noise levels of a vector."""
+        """Return the noise levels of a vector.
+
+        Args:
+            theta: (unknowns,).
+
+        Returns:
+            The levels.
+        """
         measured = [math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._noise]
         motor, load = (math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._torque)
         return NoiseLevels((measured[0], measured[-1]), (motor, load))
 
     def run(self, theta: Array, keep: bool = False) -> Innovations:
-        """Return the innovations at ``theta``."""
+        """Return the innovations at ``theta``.
+
+        Args:
+            theta: values of the unknowns.
+            keep: whether states are kept for figures.
+
+        Returns:
+            The innovations and their variances.
+
+        Raises:
+            TimeLimitError: the time for this record is over.
+        """
+        if time.monotonic() > self.deadline:
+            raise TimeLimitError(
+                "`time_limit` must be longer for this record, or its `rate` lower", "time_limit", "rate"
+            )
         record = self.problem.record
+        u = record.u if self._scale is None else record.u * theta[self._scale]
         model = affine_model(self.parameters(theta), float(theta[self._impulse]))
         outputs, x0 = self.problem.outputs, theta[self._state]
         if self._offset is not None:
             shift = theta[self._offset]
             outputs = outputs - np.array([0.0, shift])
             x0 = x0 - np.array([0.0, 0.0, shift, 0.0, 0.0])
-        return innovations(model, record.u, outputs, record.step, x0, self.noise(theta), keep, self.soft)
+        noise = self.noise(theta)
+        return innovations(model, u, outputs, record.step, x0, noise, keep, self.soft, record.u_deviation)
 
     def at(self, theta: Array) -> Point:
-        """Return the likelihood at ``theta``; infinite where the filter diverges."""
+        """Return the likelihood at ``theta``; infinite where the filter diverges.
+
+        Args:
+            theta: (unknowns,).
+
+        Returns:
+            The point.
+        """
         result = self.run(theta)
         deviance = result.deviance
         if not math.isfinite(deviance):
@@ -260,6 +173,13 @@ class Likelihood:
 
         Differences are taken along the columns of a factor of the covariance that the last information implies, a
         hundredth of a standard deviation far: the unknowns themselves may be correlated to one part in 1e9.
+
+        Args:
+            point: where they are taken.
+            free: (k,) indices of the free unknowns.
+
+        Returns:
+            Both.
         """
         base = point.result
         basis = self._basis(free)
@@ -318,6 +238,16 @@ def maximise(
     """Return the maximum of the likelihood reached from ``start`` over the ``free`` unknowns.
 
     Steps are damped until the objective falls; an unknown at its bound stays there while the score points outward.
+
+    Args:
+        likelihood: of the record.
+        start: (unknowns,).
+        free: indices of the unknowns that are fitted.
+        iterations: at most.
+        tolerance: change of the objective at which it ends.
+
+    Returns:
+        The maximum.
     """
     unknowns = likelihood.problem.unknowns
     places = np.array(list(free), dtype=np.int64)
@@ -372,16 +302,14 @@ def _step(
 
 
 def inverse(information: Array) -> Array:
-    """Return the inverse of an information matrix, scaled first because units differ by many powers of ten."""
+    """Return the inverse of an information matrix, scaled first because units differ by many powers of ten.
+
+    Args:
+        information: (k, k).
+
+    Returns:
+        Shape (k, k).
+    """
     diagonal = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / np.outer(diagonal, diagonal)
     return np.linalg.pinv(scaled, hermitian=True) / np.outer(diagonal, diagonal)
-
-
-def with_least_torque_noise(problem: Problem, least: tuple[float, float]) -> Problem:
-    """Return the problem with at least this much torque noise [N.m.s^0.5] at motor and load."""
-    low = {f"log_torque_{side}": math.log(value) for side, value in zip(("motor", "load"), least, strict=True)}
-    return replace(problem, unknowns=tuple(replace(u, lower=low.get(u.name, u.lower)) for u in problem.unknowns))
-
-
-ALPHA = NAMES[P_ALPHA]

@@ -9,32 +9,26 @@ a sharp flank, so there the first fits blur it.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+import time
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.stats import chi2
 
 from orchestrator.errors import ConvergenceError
-from orchestrator.estimation.cramer_rao import bound_of_fit
+from orchestrator.estimation.description import describe
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import (
+from orchestrator.estimation.joint import JointLikelihood, by_record
+from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
+from orchestrator.estimation.problem import (
     IMPULSE,
-    LEAST_TORQUE_NOISE,
     LEAST_WHERE_INEXACT,
-    Fit,
-    Likelihood,
-    Point,
-    Problem,
     make_problem,
-    maximise,
     with_least_torque_noise,
 )
-from orchestrator.estimation.protocol import LEVEL, Estimate
-from orchestrator.model_file import Model
-from orchestrator.record import Record
-from pyfmu_sources.drivetrain_parameters import P_I
+from orchestrator.estimation.protocol import Estimate
+from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
 
 GRID = (0.0, *(3e-4 * 1.28**n for n in range(31)))  # to half a radian
 # Torque noise [N.m.s^0.5] of motor and load, from the start of the continuation on.
@@ -50,60 +44,136 @@ MOTOR_ENCODER = (
     (3e-4, 2e-3),
     LEAST_WHERE_INEXACT,
 )
-SHARP_STARTS = (2, 1, 0)  # places in MOTOR_ENCODER, tried in turn until the noise at the load gets down to this much:
-CALM_TORQUE_NOISE = 0.011
-# A lower torque noise is preferred unless the objective rises by this much above the least: the 5 % limit of the
-# likelihood ratio for a noise level at its bound, zero.
-ALLOWED_RISE = 2.7
-STEPS_PER_LEVEL = 10
-CLEAR_IMPULSE = 3.0  # standard errors
-ABOUT_AS_GOOD = 15.0  # in the objective
-DIFFERENT = 1.5  # ratio of two sizes
-MISFIT_WIDENING = 1.3
-# What a model that is right but for its parameters' values and its contact law never reaches: torque noise as a share
-# of the drive's torque, and autocorrelation of the one-step errors.
-NOTABLE_TORQUE_NOISE = 1e-3  # s^0.5
-NOTABLE_AUTOCORRELATION = 0.15
-LEAST_TRAVEL_M, LEAST_TRAVEL_L = 100.0, 30.0  # in standard deviations of the encoder's noise
-FLAT_INFORMATION = 0.3
+SHARP_STARTS = (2, 1, 0)  # places in MOTOR_ENCODER, tried in turn until the noise at the load gets down
+# Shares of the work that usually lie before a stage.
+BEFORE_FIT, BEFORE_FREE, BEFORE_WHOLE, BEFORE_INTERVAL = 0.1, 0.5, 0.2, 0.7
+
+Report = Callable[[str, float], None]  # of what is done, and which share of the work that is
 
 
-def estimate(record: Record, model: Model, threads: int = 2) -> Estimate:
+def _quiet(what: str, share: float) -> None:
+    """Report nothing."""
+
+
+def estimate(
+    record: Record,
+    model: Model,
+    threads: int = 2,
+    more: Sequence[Record] = (),
+    time_limit: float = math.inf,
+    report: Report = _quiet,
+    settings: EstimationSettings = DEFAULT_SETTINGS,
+) -> Estimate:
     """Return the maximum-likelihood half-gap with its profile-likelihood interval.
+
+    Args:
+        record: the record.
+        model: what it is compared with.
+        threads: that share the work.
+        more: further records of the same machine, which share everything but their start and the encoders' zeros.
+        time_limit: [s], after which the fit is given up.
+        report: called with each stage that begins, and the share of the work that is behind.
+        settings: thresholds.
+
+    Returns:
+        The estimate.
 
     Raises:
         ConvergenceError: no start led to a finite likelihood.
+        TimeLimitError: there was no time to find it.
     """
-    likelihood = Likelihood(make_problem(record, model), threads)
-    fit = fit_record(likelihood)
-    return describe(likelihood, fit)
+    records = (record, *more)
+    deadline = time.monotonic() + time_limit
+    likelihood = _likelihood(records, model, threads, deadline, settings)
+    fit = None
+    if sum(one.size for one in records) > settings.fit.long_record:
+        # What a long record says first of all, its beginning says too, in a fraction of the time.
+        shorts = [one.part(0, min(one.size, settings.fit.short_record // len(records))) for one in records]
+        report("fitting the beginning", 0.0)
+        fit = _refined(likelihood, _likelihood(shorts, model, threads, deadline, settings), report)
+    if fit is None:
+        fit = fit_record(likelihood, report)
+    report("finding the interval", BEFORE_INTERVAL)
+    found = describe(likelihood, fit)
+    return by_record(found, records) if more else found
 
 
-def fit_record(likelihood: Likelihood) -> Fit:
-    """Return the fit of all unknowns, by grid and continuation in the torque noise."""
+def _likelihood(
+    records: Sequence[Record], model: Model, threads: int, deadline: float, settings: EstimationSettings
+) -> Likelihood:
+    first, *more = (make_problem(one, model) for one in records)
+    if more:
+        likelihood: Likelihood = JointLikelihood([first, *more], threads, settings)
+    else:
+        likelihood = Likelihood(first, threads, settings)
+    likelihood.deadline = deadline
+    return likelihood
+
+
+def _refined(likelihood: Likelihood, short: Likelihood, report: Report) -> Fit | None:
+    """Return the fit that starts from that of the beginning; None where the beginning does not show the gap."""
+    first = fit_record(short)
+    flanks = short.run(first.point.theta, keep=True).contacts
+    flanks = flanks[flanks != 0]
+    if np.count_nonzero(np.diff(flanks)) < likelihood.settings.fit.enough_traversals:
+        return None
+    report("fitting the whole record", BEFORE_WHOLE)
+    likelihood.soft = short.soft
+    likelihood.information = short.information.copy()
+    if short.problem.unknowns[_split(short)[0][-1]].lower >= math.log(LEAST_WHERE_INEXACT[-1]):
+        likelihood.problem = with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT)
+    torque, others = _split(likelihood)
+    start = maximise(likelihood, first.point.theta, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
+    best = _free_fit(likelihood, start, torque, others)
+    return _with_contact(likelihood, best, torque, others) if likelihood.problem.outputs.shape[1] == 2 else best
+
+
+def fit_record(likelihood: Likelihood, report: Report = _quiet) -> Fit:
+    """Return the fit of all unknowns, by grid and continuation in the torque noise.
+
+    Args:
+        likelihood: of the record.
+        report: called with each stage that begins, and the share of the work that is behind.
+
+    Returns:
+        The fit.
+    """
     problem = likelihood.problem
     torque, others = _split(likelihood)
+    report("trying sizes", 0.0)
     if problem.outputs.shape[1] == 2:
-        firsts = _different(_first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0])), problem.index("alpha"))
-        fits = [_continue(likelihood, first, BOTH_ENCODERS[1:]) for first in firsts]
+        tried = _first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
+        firsts = _different(tried, problem.index("alpha"), likelihood.settings.fit.different)
+        fits = []
+        for n, first in enumerate(firsts):
+            report("fitting all values", BEFORE_FIT + (BEFORE_FREE - BEFORE_FIT) * n / len(firsts))
+            fits.append(_continue(likelihood, first, BOTH_ENCODERS[1:]))
+        report("fitting the noise", BEFORE_FREE)
         best = _free_fit(likelihood, min(fits, key=lambda fit: fit.point.objective), torque, others)
-        if not _has_other_contact(problem, best):
-            return best
-        likelihood.problem = with_least_torque_noise(problem, LEAST_WHERE_INEXACT)
-        start = best.point.theta.copy()
-        start[torque] = np.maximum(start[torque], np.log(LEAST_WHERE_INEXACT))
-        best = maximise(likelihood, start, others, 2 * STEPS_PER_LEVEL, tolerance=0.01)
-    else:
-        best = _fit_one_encoder(likelihood, torque, others)
+        return _with_contact(likelihood, best, torque, others)
+    best = _fit_one_encoder(likelihood, torque, others)
     return _free_fit(likelihood, best, torque, others)
 
 
-def _has_other_contact(problem: Problem, fit: Fit) -> bool:
+def _with_contact(likelihood: Likelihood, best: Fit, torque: list[int], others: list[int]) -> Fit:
+    """Return the fit, with a least torque noise where the machine's contact law is not the model's."""
+    if not _has_other_contact(likelihood, best):
+        return best
+    if likelihood.problem.unknowns[torque[-1]].lower >= math.log(LEAST_WHERE_INEXACT[-1]):
+        return best  # it has that already
+    likelihood.problem = with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT)
+    start = best.point.theta.copy()
+    start[torque] = np.maximum(start[torque], np.log(LEAST_WHERE_INEXACT))
+    best = maximise(likelihood, start, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
+    return _free_fit(likelihood, best, torque, others)
+
+
+def _has_other_contact(likelihood: Likelihood, fit: Fit) -> bool:
     """Return whether the machine's contact law is clearly another than the model's."""
-    place = problem.index(IMPULSE)
+    place = likelihood.problem.index(IMPULSE)
     column = list(fit.free).index(place)
     deviation = math.sqrt(max(float(fit.covariance[column, column]), 0.0))
-    return abs(float(fit.point.theta[place])) > CLEAR_IMPULSE * deviation
+    return abs(float(fit.point.theta[place])) > likelihood.settings.fit.clear_impulse * deviation
 
 
 def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, float]]) -> Fit:
@@ -114,9 +184,9 @@ def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, f
         start = best.point.theta.copy()
         start[torque] = np.log(level)
         known = likelihood.information.copy()
-        trial = maximise(likelihood, start, others, STEPS_PER_LEVEL, tolerance=1.0)
+        trial = maximise(likelihood, start, others, likelihood.settings.fit.steps_per_level, tolerance=1.0)
         least = min(least, trial.point.objective)
-        if trial.point.objective < least + ALLOWED_RISE:
+        if trial.point.objective < least + likelihood.settings.fit.allowed_rise:
             best, failures = trial, 0
             continue
         likelihood.information = known
@@ -143,7 +213,7 @@ def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int
         likelihood.soft = False
         sharp = _sharpen(likelihood, blurred, torque, others)
         found.append((sharp, False, likelihood.information.copy()))
-        if likelihood.noise(sharp.point.theta).torque[1] <= CALM_TORQUE_NOISE:
+        if likelihood.noise(sharp.point.theta).torque[1] <= likelihood.settings.fit.calm_torque_noise:
             break
     best, likelihood.soft, likelihood.information = min(found, key=lambda entry: entry[0].point.objective)
     return best
@@ -160,9 +230,9 @@ def _sharpen(likelihood: Likelihood, blurred: Fit, torque: list[int], others: li
         likelihood.information = known.copy()
         start = blurred.point.theta.copy()
         start[torque] = np.log(MOTOR_ENCODER[place])
-        first = maximise(likelihood, start, others, STEPS_PER_LEVEL, tolerance=0.5)
+        first = maximise(likelihood, start, others, likelihood.settings.fit.steps_per_level, tolerance=0.5)
         fits.append(_continue(likelihood, first, MOTOR_ENCODER[place + 1 :]))
-        if likelihood.noise(fits[-1].point.theta).torque[1] <= CALM_TORQUE_NOISE:
+        if likelihood.noise(fits[-1].point.theta).torque[1] <= likelihood.settings.fit.calm_torque_noise:
             break
     return min(fits, key=lambda fit: fit.point.objective)
 
@@ -192,20 +262,20 @@ def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], le
     if not math.isfinite(best):
         raise ConvergenceError("the likelihood must be finite somewhere, but no start led to one; check the units")
     starts = sorted(points, key=lambda point: point.objective)[:2]
-    smallest = next(point for point in points if point.objective < best + ABOUT_AS_GOOD)
+    smallest = next(point for point in points if point.objective < best + likelihood.settings.fit.about_as_good)
     if all(smallest is not start for start in starts):
         starts.append(smallest)
     fits = [maximise(likelihood, point.theta, others, 3, tolerance=1.0) for point in starts]
     return sorted(fits, key=lambda fit: fit.point.objective)
 
 
-def _different(fits: list[Fit], place: int) -> list[Fit]:
+def _different(fits: list[Fit], place: int, ratio: float) -> list[Fit]:
     """Return the fits of which no better one has about the same size; ``place`` is that of alpha."""
     chosen: list[Fit] = []
     for fit in fits:
         size = float(fit.point.theta[place])
         known = [float(other.point.theta[place]) for other in chosen]
-        if all(max(size, other) > DIFFERENT * min(size, other) + GRID[1] for other in known):
+        if all(max(size, other) > ratio * min(size, other) + GRID[1] for other in known):
             chosen.append(fit)
     return chosen
 
@@ -213,181 +283,12 @@ def _different(fits: list[Fit], place: int) -> list[Fit]:
 def _free_fit(likelihood: Likelihood, best: Fit, torque: list[int], others: list[int]) -> Fit:
     """Return the fit with the torque noise free, except where the record cannot tell it from none."""
     _, information = likelihood.derivatives(best.point, np.array(torque))
-    free = [n for n, value in zip(torque, np.diag(information), strict=True) if value > FLAT_INFORMATION]
+    flat = likelihood.settings.fit.flat_information
+    free = [n for n, value in zip(torque, np.diag(information), strict=True) if value > flat]
     while True:
         best = maximise(likelihood, best.point.theta, sorted(others + free), 40, tolerance=2e-3)
         column = {int(n): k for k, n in enumerate(best.free)}
-        told = [n for n in free if best.information[column[n], column[n]] > FLAT_INFORMATION]
+        told = [n for n in free if best.information[column[n], column[n]] > flat]
         if told == free:
             return best
         free = told
-
-
-@dataclass(frozen=True)
-class Profile:
-    """Profile likelihood: for each alpha, twice the drop of the log posterior maximised over all else."""
-
-    alpha: Array
-    drop: Array
-
-    def interval(self, best: float, limit: float) -> tuple[float, float]:
-        """Return where ``drop`` crosses ``limit`` on both sides of ``best`` (linear in its square root)."""
-        signed = np.sign(self.alpha - best) * np.sqrt(np.maximum(self.drop, 0.0))
-        edge = math.sqrt(limit)
-        low = float(np.interp(-edge, signed, self.alpha)) if signed[0] < -edge else float(self.alpha[0])
-        high = float(np.interp(edge, signed, self.alpha)) if signed[-1] > edge else math.inf
-        return low, high
-
-
-def profile(likelihood: Likelihood, fit: Fit, level: float = LEVEL) -> Profile:
-    """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0)."""
-    place = likelihood.problem.index("alpha")
-    column = list(fit.free).index(place)
-    deviation = math.sqrt(fit.covariance[column, column])
-    slope = fit.covariance[:, column] / fit.covariance[column, column]
-    best = float(fit.point.theta[place])
-    edge = MISFIT_WIDENING * math.sqrt(float(chi2.ppf(level, 1)))
-    entries = [(best, 0.0)]
-    for side in (-1.0, 1.0):
-        reach = 0.5 * edge * deviation
-        for _ in range(14):
-            alpha = max(best + side * reach, 0.0)
-            drop = _constrained(likelihood, fit, place, alpha, slope).objective - fit.point.objective
-            entries.append((alpha, drop))
-            if drop > edge**2 or alpha == 0.0:
-                break
-            if drop > 0.05:
-                reach *= min(max(1.06 * edge / math.sqrt(drop), 1.2), 2.5)
-            else:
-                reach *= 2.5
-    entries = sorted(set(entries))
-    return Profile(np.array([e[0] for e in entries]), np.array([e[1] for e in entries]))
-
-
-def _constrained(likelihood: Likelihood, fit: Fit, place: int, alpha: float, slope: Array) -> Point:
-    """Return the best point found with alpha held: the linear prediction, then some scoring steps."""
-    unknowns = likelihood.problem.unknowns
-    theta = fit.point.theta.copy()
-    theta[fit.free] += slope * (alpha - fit.point.theta[place])
-    theta[place] = alpha
-    theta = np.clip(theta, [u.lower for u in unknowns], [u.upper for u in unknowns])
-    others = [n for n in fit.free if n != place]
-    return maximise(likelihood, theta, others, 5, tolerance=0.05).point
-
-
-def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
-    """Return the estimate of a fit: interval, visibility, and what else the fit says."""
-    problem = likelihood.problem
-    place = problem.index("alpha")
-    column = list(fit.free).index(place)
-    alpha = float(fit.point.theta[place])
-    error = math.sqrt(fit.covariance[column, column])
-    curve = profile(likelihood, fit)
-    # Torque noise above the least means that the model is not exact; what it lacks is not white, as the likelihood
-    # takes it to be, so the interval is widened.
-    inexact = max(likelihood.noise(fit.point.theta).torque) > 10.0 * LEAST_TORQUE_NOISE
-    limit = float(chi2.ppf(LEVEL, 1)) * (MISFIT_WIDENING**2 if inexact else 1.0)
-    low, high = curve.interval(alpha, limit)
-    # A profile point that is not quite the maximum makes the interval too short, never too long.
-    half = math.sqrt(limit) * error
-    low, high = min(low, max(alpha - half, 0.0)), max(high, alpha + half)
-    kept = likelihood.run(fit.point.theta, keep=True)
-    flanks = kept.contacts[kept.contacts != 0]
-    traversals = int(np.count_nonzero(np.diff(flanks))) if alpha > 0.0 else 0
-    white = kept.errors / np.sqrt(kept.variances)
-    diagnostics = {
-        "converged": fit.converged,
-        "iterations": fit.iterations,
-        "traversals": traversals,
-        "profile_limit": limit,
-        "cramer_rao": bound_of_fit(likelihood, fit),
-        "deviance": fit.point.deviance,
-        "parameters": _parameters(likelihood, fit),
-        "innovation_autocorrelation": [float(_autocorrelation(white[:, n])) for n in range(white.shape[1])],
-        "torque_noise": list(likelihood.noise(fit.point.theta).torque),
-        "measurement_noise": list(likelihood.noise(fit.point.theta).measured[: white.shape[1]]),
-    }
-    visible, message = _verdict(alpha, low, high, traversals)
-    still = _standing_still(problem.outputs, likelihood.noise(fit.point.theta).measured)
-    if still:
-        visible, message, error, low, high = False, still, math.inf, 0.0, math.inf
-    drive = float(np.sqrt(np.mean(kept.states[:, 4] ** 2)))
-    lacking = _lacking(diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I], problem.record.size)
-    message = "; ".join(text for text in (message, lacking) if text)
-    curves = {"states": kept.states, "contacts": kept.contacts, "errors": kept.errors, "profile": curve}
-    curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
-    curves["model"] = likelihood.parameters(fit.point.theta)
-    return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
-
-
-def _value(likelihood: Likelihood, fit: Fit, name: str) -> float:
-    names = likelihood.problem.names
-    return float(fit.point.theta[names.index(name)]) if name in names else 0.0
-
-
-def _verdict(alpha: float, low: float, high: float, traversals: int) -> tuple[bool, str]:
-    """Return whether the gap is seen, and the sentence that says so."""
-    visible = low > 0.0 and traversals > 0
-    if alpha > 0.0 and traversals == 0:
-        return visible, (
-            "the gap cannot be seen: the record never traverses it (one flank is loaded throughout); "
-            "an excitation that reverses the shaft torque would show it (--design)"
-        )
-    if visible:
-        return True, ""
-    if math.isfinite(high):
-        return False, (
-            f"no gap is seen: with 95 % confidence the half-gap is below {high:.3g} rad; "
-            "--design proposes a record that would show a smaller one"
-        )
-    return False, "the gap cannot be seen: every size fits the record; --design proposes an excitation"
-
-
-def _standing_still(outputs: Array, noise: tuple[float, float]) -> str:
-    """Return the sentence that says which side does not move beyond its noise, or nothing."""
-    for n, (name, least) in enumerate((("motor", LEAST_TRAVEL_M), ("load", LEAST_TRAVEL_L))[: outputs.shape[1]]):
-        travel = float(np.ptp(outputs[:, n])) / noise[n]
-        if travel < least:
-            return (
-                f"the gap cannot be seen: the {name} moves by only {travel:.2g} standard deviations of its encoder's "
-                f"noise, and must by {least:g}; --design proposes an excitation"
-            )
-    return ""
-
-
-def _lacking(diagnostics: dict[str, Any], drive: float, ratio: float, rows: int) -> str:
-    """Return the warning that the model lacks something, or nothing.
-
-    Args:
-        diagnostics: of the fit.
-        drive: effective value of the motor's torque [N.m].
-        ratio: gear ratio.
-        rows: of the record.
-    """
-    worst = max(abs(value) for value in diagnostics["innovation_autocorrelation"])
-    motor, load = diagnostics["torque_noise"]
-    if max(motor, load / ratio) < NOTABLE_TORQUE_NOISE * drive and worst < max(
-        NOTABLE_AUTOCORRELATION, 4.0 / math.sqrt(rows)
-    ):
-        return ""
-    return (
-        f"the model does not explain the record (torque noise {motor:.2g} and {load:.2g} N.m.s^0.5 at motor and load, "
-        f"autocorrelation {worst:.2f} of the one-step errors): the gap may be biased; `diagnose` names what is missing"
-    )
-
-
-def _autocorrelation(white: Array) -> float:
-    """Return the autocorrelation at lag one."""
-    centred = white - white.mean()
-    return float(np.sum(centred[1:] * centred[:-1]) / max(float(np.sum(centred**2)), 1e-300))
-
-
-def _parameters(likelihood: Likelihood, fit: Fit) -> dict[str, dict[str, float]]:
-    """Return value, standard error and nominal of each fitted unknown."""
-    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    table = {}
-    for n, error in zip(fit.free, errors, strict=True):
-        unknown = likelihood.problem.unknowns[n]
-        entry = {"value": float(fit.point.theta[n]), "standard_error": float(error), "nominal": unknown.mean}
-        table[unknown.name] = entry
-    return table

@@ -10,14 +10,22 @@ import numpy as np
 
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.estimation.signals import shaft_signals
-from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import interval_95
 
 LEAST_REVERSALS = 4
 
 
 def estimate(record: Record, model: Model) -> Estimate:
     """Return the half width of the twist's hysteresis.
+
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        The estimate.
 
     Raises:
         NotApplicableError: the drive reverses less than four times, or there is no load encoder.
@@ -36,5 +44,5 @@ def estimate(record: Record, model: Model) -> Estimate:
     alpha = max(float(0.5 * (np.median(centres[signs > 0]) - np.median(centres[signs < 0]))), 0.0)
     error = 1.2533 * float(np.std(halves, ddof=1)) / float(np.sqrt(halves.size))
     diagnostics = {"reversals": len(runs) - 1}
-    interval = (max(alpha - 1.96 * error, 0.0), alpha + 1.96 * error)
+    interval = interval_95(alpha, error, 0.0)
     return Estimate("operating_data", alpha, error, interval, interval[0] > 0.0, "", diagnostics)

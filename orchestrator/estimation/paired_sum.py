@@ -11,17 +11,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from orchestrator.building.build import ensure_built
 from orchestrator.estimation.innovations import Array, affine_model, simulate
-from orchestrator.estimation.likelihood import measurement_noise
+from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
-from orchestrator.fmi.build import ensure_built
-from orchestrator.fmi.slave import fmu_instance
+from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
-from orchestrator.master.system import Source, System
-from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.master.system import SignalSource, System
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import interval_95
 from pyfmu_sources.drivetrain_parameters import P_ALPHA, PARAMETERS
 
 SIZES = (0.0, *(3e-4 * 1.25**n for n in range(34)))  # to half a radian
@@ -29,6 +30,13 @@ SIZES = (0.0, *(3e-4 * 1.25**n for n in range(34)))  # to half a radian
 
 def estimate(record: Record, model: Model) -> Estimate:
     """Return the half-gap at which the twin with a gap differs from the twin without one as much as the record does.
+
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        The estimate.
 
     Raises:
         NotApplicableError: there is no load encoder.
@@ -53,7 +61,7 @@ def estimate(record: Record, model: Model) -> Estimate:
     error = noise / slope if slope > 0.0 else math.inf
     message = "the twin differs from the machine by more than any gap explains" if beyond else ""
     diagnostics = {"sum": measured, "largest_sum": float(monotone[-1])}
-    low, high = max(alpha - 1.96 * error, 0.0), alpha + 1.96 * error
+    low, high = interval_95(alpha, error, 0.0)
     return Estimate("paired_sum", alpha, error, (low, high), not beyond, message, diagnostics)
 
 
@@ -65,12 +73,15 @@ def twin(record: Record, model: Model, start: Mapping[str, float]) -> Array:
         model: gives the FMU's parameters.
         start: initial state, by name of the FMU's start parameter.
 
+    Returns:
+        The angle.
+
     Raises:
         SlaveError: the FMU fails on these values.
     """
     nominal = {entry.name: entry.default for entry in PARAMETERS if entry.name not in ("alpha", "backlash_model")}
     named = {name: model.parameters[name].value for name in nominal if model.parameters[name].value != nominal[name]}
     fmu = fmu_instance("twin", ensure_built(["Drivetrain"])["Drivetrain"], {**named, **start})
-    system = System((fmu,), (), (Source("twin.u", Samples(record.u, record.step)),))
+    system = System((fmu,), (), (SignalSource("twin.u", Samples(record.u, record.step)),))
     with Session(system, ("twin.theta_l",), GaussSeidel(record.step), (record.size - 1) * record.step) as session:
         return session.run()["twin.theta_l"]

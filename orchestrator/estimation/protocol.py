@@ -1,6 +1,7 @@
 """What every estimator takes and gives.
 
-Call order: :func:`orchestrator.record.read_record`, :func:`orchestrator.model_file.read_model`, then any estimator of
+Call order: :func:`orchestrator.records.record.read_record`,
+:func:`orchestrator.records.model_file.read_model`, then any estimator of
 :data:`METHODS` by :func:`estimator`.
 """
 
@@ -9,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from orchestrator.errors import OrchestratorError
-from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.errors import ConvergenceError, OrchestratorError
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
 
 METHODS = {
     "maximum_likelihood": "joint fit of gap, parameters, initial state and noise; profile-likelihood interval",
@@ -22,6 +23,10 @@ METHODS = {
     "operating_data": "width of the twist's hysteresis in normal closed-loop data",
 }
 LEVEL = 0.95
+
+
+class TimeLimitError(ConvergenceError):
+    """An estimate did not come to its end within the time that it was given."""
 
 
 class NotApplicableError(OrchestratorError):
@@ -65,7 +70,14 @@ class Estimator(Protocol):
 
 
 def estimator(name: str) -> Estimator:
-    """Return the estimator called ``name``, a key of ``METHODS``; only its module is imported."""
+    """Return the estimator called ``name``, a key of ``METHODS``; only its module is imported.
+
+    Args:
+        name: of the method.
+
+    Returns:
+        The function.
+    """
     module = importlib.import_module(f"orchestrator.estimation.{name}")
     function: Estimator = module.estimate
     return function

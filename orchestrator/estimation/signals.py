@@ -1,6 +1,5 @@
 """Derived signals that the classical methods share: smoothed speeds and the shaft's torque."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,8 +7,9 @@ from scipy.signal import savgol_filter
 
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.protocol import NotApplicableError
-from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.noise import robust_noise
 
 WINDOW = 0.06  # s, of the Savitzky-Golay derivatives
 
@@ -34,6 +34,13 @@ class ShaftSignals:
 def shaft_signals(record: Record, model: Model) -> ShaftSignals:
     """Return the derived signals of a record with both encoders.
 
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        Twist [rad], its rate [rad/s], the shaft's torque and its noise [N.m].
+
     Raises:
         NotApplicableError: there is no load encoder.
     """
@@ -50,6 +57,4 @@ def shaft_signals(record: Record, model: Model) -> ShaftSignals:
     impulse = np.zeros(4 * width + 1)
     impulse[2 * width] = 1.0
     gain = float(np.linalg.norm(savgol_filter(impulse, width, 3, deriv=2, delta=h)))
-    third = np.diff(record.theta_l, 3)
-    sigma = 1.4826 * float(np.median(np.abs(third))) / math.sqrt(20.0)
-    return ShaftSignals(twist, rate, torque, p["J_l"] * gain * sigma)
+    return ShaftSignals(twist, rate, torque, p["J_l"] * gain * robust_noise(record.theta_l))

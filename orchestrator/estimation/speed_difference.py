@@ -9,8 +9,9 @@ import numpy as np
 
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.estimation.signals import shaft_signals
-from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import interval_95
 
 LEAST_TRAVERSALS = 3
 THRESHOLD = 4.0  # standard deviations of the torque's noise
@@ -19,6 +20,13 @@ LEAST_SHARE = 0.05  # of the torque's effective value
 
 def estimate(record: Record, model: Model) -> Estimate:
     """Return the median half-gap over all traversals.
+
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        The estimate.
 
     Raises:
         NotApplicableError: the gap is traversed less than three times, or there is no load encoder.
@@ -42,5 +50,5 @@ def estimate(record: Record, model: Model) -> Estimate:
     alpha = max(float(np.median(values)), 0.0)
     error = 1.2533 * float(np.std(values, ddof=1)) / float(np.sqrt(values.size))
     diagnostics = {"traversals": len(sizes), "torque_limit": limit}
-    interval = (max(alpha - 1.96 * error, 0.0), alpha + 1.96 * error)
+    interval = interval_95(alpha, error, 0.0)
     return Estimate("speed_difference", alpha, error, interval, interval[0] > 0.0, "", diagnostics)

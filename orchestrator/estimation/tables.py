@@ -1,6 +1,7 @@
 """The curves behind an estimate as CSV, for plots elsewhere and for the report."""
 
 import csv
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -8,7 +9,8 @@ import numpy as np
 
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.protocol import Estimate
-from orchestrator.record import Record
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import NORMAL_95
 
 
 def write_tables(directory: Path, record: Record, estimates: Iterable[Estimate], ratio: float) -> None:
@@ -22,16 +24,16 @@ def write_tables(directory: Path, record: Record, estimates: Iterable[Estimate],
     """
     for estimate in estimates:
         if estimate.method == "maximum_likelihood":
-            _write(directory / "estimate.csv", fit_columns(record, estimate, ratio))
+            _write(directory / "estimate.csv", _fit_columns(record, estimate, ratio))
             profile = estimate.curves["profile"]
             _write(directory / "profile.csv", {"alpha": profile.alpha, "drop": profile.drop})
         elif estimate.method == "ekf":
             alpha, deviation = estimate.curves["alpha"], estimate.curves["deviation"]
-            low, high = np.maximum(alpha - 1.96 * deviation, 0.0), alpha + 1.96 * deviation
+            low, high = np.maximum(alpha - NORMAL_95 * deviation, 0.0), alpha + NORMAL_95 * deviation
             _write(directory / "online.csv", {"time": record.time, "alpha": alpha, "low": low, "high": high})
 
 
-def fit_columns(record: Record, estimate: Estimate, ratio: float) -> dict[str, Array]:
+def _fit_columns(record: Record, estimate: Estimate, ratio: float) -> dict[str, Array]:
     """Return record and fit by column name, each of shape (n,): SI units, contact in (-1, 0, 1)."""
     states, errors = estimate.curves["states"], estimate.curves["errors"]
     columns = {"time": record.time, "u": record.u, "theta_m": record.theta_m, "theta_m_fitted": states[:, 0]}
@@ -48,4 +50,4 @@ def _write(path: Path, columns: Mapping[str, Array]) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns)
         rows: Iterable[Sequence[float]] = zip(*(values.tolist() for values in columns.values()), strict=True)
-        writer.writerows([f"{value:.10g}" for value in row] for row in rows)
+        writer.writerows(["" if math.isnan(value) else f"{value:.10g}" for value in row] for row in rows)

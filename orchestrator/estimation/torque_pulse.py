@@ -9,8 +9,9 @@ import numpy as np
 
 from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.estimation.signals import shaft_signals
-from orchestrator.model_file import Model
-from orchestrator.record import Record
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+from orchestrator.shared.inference.normal import interval_95
 
 LEAST_SAMPLES = 30
 SLOW = 0.25  # change of torque over the shaft's own time, over its effective value
@@ -18,6 +19,13 @@ SLOW = 0.25  # change of torque over the shaft's own time, over its effective va
 
 def estimate(record: Record, model: Model) -> Estimate:
     """Return half the distance between the two lines of twist over torque.
+
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        The estimate.
 
     Raises:
         NotApplicableError: too few samples are quasi-stationary on either flank, or there is no load encoder.
@@ -47,5 +55,5 @@ def estimate(record: Record, model: Model) -> Estimate:
     error = float(np.sqrt(inverse[1, 1] * np.var(left) / independent))
     alpha = max(float(solution[1]), 0.0)
     diagnostics = {"rows": counts, "stiffness": float(1.0 / solution[0]) if solution[0] != 0.0 else None}
-    interval = (max(alpha - 1.96 * error, 0.0), alpha + 1.96 * error)
+    interval = interval_95(alpha, error, 0.0)
     return Estimate("torque_pulse", alpha, error, interval, interval[0] > 0.0, "", diagnostics)

@@ -1,28 +1,28 @@
-"""FMUs unpacked once per process, into a private folder that goes away with the process."""
+"""FMUs unpacked once per process, into a private folder that goes away with the process or with the next run."""
 
 import atexit
 import hashlib
 import os
-import shutil
-import stat
-import tempfile
 import threading
-import zipfile
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 from orchestrator.errors import FmuError
-
-MAXIMUM_BYTES = 4 * 2**30
-MAXIMUM_MEMBERS = 100_000
-CHUNK = 1 << 20
+from orchestrator.shared.isolation.archives import CHUNK, unpack
+from orchestrator.shared.isolation.scratch import Scratch
 
 _lock = threading.Lock()
 _folders: dict[tuple[int, str], Path] = {}
-_root: tuple[int, Path] | None = None
+_root: tuple[int, Scratch] | None = None
 
 
 def content_hash(path: Path) -> str:
     """Return the SHA-256 of a file's content in hexadecimal.
+
+    Args:
+        path: the file.
+
+    Returns:
+        64 hexadecimal digits.
 
     Raises:
         FmuError: the file cannot be read.
@@ -40,9 +40,18 @@ def content_hash(path: Path) -> str:
 def extracted(path: Path) -> Path:
     """Return the folder in which the FMU at ``path`` is unpacked; the same for the same content within a process.
 
+    Args:
+        path: of an FMU, or of the folder of one that is unpacked already.
+
+    Returns:
+        The folder; it is removed when the process ends.
+
     Raises:
         FmuError: the archive cannot be read, or holds what no FMU may hold.
+        OutputError: there is no room for it in the temporary directory.
     """
+    if path.is_dir():
+        return path
     digest = content_hash(path)
     key = (os.getpid(), digest)
     with _lock:
@@ -53,59 +62,9 @@ def extracted(path: Path) -> Path:
         return _folders[key]
 
 
-def unpack(path: Path, target: Path) -> None:
-    """Unpack a zip archive into ``target``, whole or not at all. Links and paths that lead out of it are refused.
-
-    Raises:
-        FmuError: see above; also when it unpacks to more than can be meant.
-    """
-    part = target.with_name(target.name + ".part")
-    try:
-        with zipfile.ZipFile(path) as archive:
-            members = archive.infolist()
-            total = sum(m.file_size for m in members)
-            if len(members) > MAXIMUM_MEMBERS or total > MAXIMUM_BYTES:
-                raise FmuError(f"{path}: must unpack to at most {MAXIMUM_BYTES >> 30} GB, but has {total} bytes")
-            for member in members:
-                _unpack_member(archive, member, part, path)
-        os.replace(part, target)
-    except FileNotFoundError:
-        raise FmuError(f"`fmu` must exist, but {path} does not") from None
-    except FmuError:
-        raise
-    except Exception as error:  # zipfile raises what zlib, struct and the file system do
-        raise FmuError(f"`fmu` must be an intact zip archive, but {path} is not: {error}") from None
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
-
-
-def _unpack_member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path, path: Path) -> None:
-    name = PurePosixPath(member.filename.replace("\\", "/"))
-    linked = stat.S_ISLNK(member.external_attr >> 16)
-    if linked or name.is_absolute() or ".." in name.parts or ":" in member.filename or not name.parts:
-        raise FmuError(f"{path}: members must lie within the archive, but {member.filename!r} does not")
-    target = folder.joinpath(*name.parts)
-    if member.is_dir():
-        target.mkdir(parents=True, exist_ok=True)
-        return
-    target.parent.mkdir(parents=True, exist_ok=True)
-    left = member.file_size
-    with archive.open(member) as source, target.open("wb") as sink:
-        while chunk := source.read(CHUNK):
-            left -= len(chunk)
-            if left < 0:
-                raise FmuError(f"{path}: {member.filename!r} must unpack to its declared size, but is larger")
-            sink.write(chunk)
-
-
 def _private_root() -> Path:
     global _root  # noqa: PLW0603 - one folder per process, made at first use
     if _root is None or _root[0] != os.getpid():
-        _root = (os.getpid(), Path(tempfile.mkdtemp(prefix="fmus-")))
-        atexit.register(_remove, *_root)
-    return _root[1]
-
-
-def _remove(process: int, folder: Path) -> None:
-    if process == os.getpid():
-        shutil.rmtree(folder, ignore_errors=True)
+        _root = (os.getpid(), Scratch("fmus"))
+        atexit.register(_root[1].close)
+    return _root[1].path

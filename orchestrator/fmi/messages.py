@@ -51,7 +51,14 @@ def _shared() -> tuple[Any, ...]:
 
 
 def logging_callbacks(messages: deque[str]) -> Any:
-    """Return callbacks for one instance, which append its warnings and worse to ``messages``."""
+    """Return callbacks for one instance, which append its warnings and worse to ``messages``.
+
+    Args:
+        messages: of the instance; it is written by the FMU's calls.
+
+    Returns:
+        An ``fmi2CallbackFunctions``, which must live as long as the instance.
+    """
     from fmpy import fmi2
 
     shared = _shared()[0]

@@ -2,6 +2,7 @@
 
 import math
 import zipfile
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 from lxml import etree
 
 from orchestrator.errors import FmuError
-from orchestrator.master.protocol import Model, Unit, Value, Variable
+from orchestrator.master.protocol import ModelInterface, Unit, Value, Variable
 
 MAXIMUM_XML = 64 * 2**20
 """Bytes of XML beyond which a model description is refused: ten times the largest seen in the wild."""
@@ -33,7 +34,7 @@ class FmuDescription:
         default_stop: stop time of the default experiment [s], if there is one.
     """
 
-    model: Model
+    model: ModelInterface
     guid: str
     identifier: str
     python: bool
@@ -44,11 +45,19 @@ class FmuDescription:
 
 
 def read_description(path: Path) -> FmuDescription:
-    """Read the model description of the FMU at ``path``.
+    """Read the model description of the FMU at ``path``, a file or the folder of an unpacked one.
+
+    Args:
+        path: a file or a folder.
+
+    Returns:
+        The description.
 
     Raises:
         FmuError: the file is missing, no FMU, not FMI 2.0 or not for co-simulation.
     """
+    if path.is_dir():
+        return _read_unpacked(path)
     try:
         with zipfile.ZipFile(path) as archive:
             info = archive.getinfo("modelDescription.xml")
@@ -67,6 +76,18 @@ def read_description(path: Path) -> FmuDescription:
     return parse_description(content, str(path), python="resources/slavemodule.txt" in names)
 
 
+def _read_unpacked(folder: Path) -> FmuDescription:
+    file = folder / "modelDescription.xml"
+    try:
+        if file.stat().st_size > MAXIMUM_XML:
+            raise FmuError(f"{file}: must be at most {MAXIMUM_XML >> 20} MB, but is larger")
+        content = file.read_bytes()
+    except OSError as error:
+        raise FmuError(f"`fmu` must hold a modelDescription.xml, but {folder} does not: {error.strerror}") from None
+    python = (folder / "resources" / "slavemodule.txt").exists()
+    return parse_description(content, str(folder), python)
+
+
 def parse_description(content: bytes, origin: str, python: bool = False) -> FmuDescription:
     """Parse a model description.
 
@@ -74,6 +95,9 @@ def parse_description(content: bytes, origin: str, python: bool = False) -> FmuD
         content: the XML.
         origin: what to call it in messages.
         python: see ``FmuDescription``.
+
+    Returns:
+        The description.
 
     Raises:
         FmuError: it is no FMI 2.0 co-simulation description.
@@ -99,12 +123,12 @@ def _description(root: etree._Element, cosimulation: etree._Element, origin: str
     variables = _variables(root)
     names = [v.name for v in variables]
     if len(set(names)) < len(names):
-        twice = next(n for n in names if names.count(n) > 1)
+        twice = next(name for name, count in Counter(names).items() if count > 1)
         raise ValueError(f"the variable {twice!r} is declared twice")
     identifier = cosimulation.attrib["modelIdentifier"]
     if not identifier.replace("_", "a").isalnum():
         raise ValueError(f"modelIdentifier {identifier!r} is no C identifier")
-    model = Model(
+    model = ModelInterface(
         name=root.attrib["modelName"],
         variables=dict(zip(names, variables, strict=True)),
         units=_units(root),

@@ -6,6 +6,7 @@ held (``ctypes.PyDLL``): they would take it back at once.
 """
 
 import ctypes
+import operator
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,19 +15,30 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.extraction import content_hash, extracted
 from orchestrator.fmi.farewell import ends_cleanly
 from orchestrator.fmi.messages import logging_callbacks
 from orchestrator.fmi.model_description import FmuDescription, read_description
-from orchestrator.master.protocol import Model, NativeCalls, Signals, StepDiscardedError, Transfer, Value
-from orchestrator.master.system import Instance, Start
+from orchestrator.master.protocol import (
+    KINDS,
+    ModelInterface,
+    NativeCalls,
+    Signals,
+    Slave,
+    StepDiscardedError,
+    Transfer,
+    Value,
+)
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 
 MESSAGES_KEPT = 20
+SETS_KEPT = 16
+"""Lists of names whose call is kept: runs that differ in values alone set the same names."""
 _C_TYPES: dict[str, Any] = {
     "Real": ctypes.c_double,
     "Integer": ctypes.c_int,
@@ -58,7 +70,7 @@ class _Batch:
     function: str
 
 
-class FmuSlave:
+class FmuSlave(Slave):
     """One FMU instance. See ``Slave`` for the order of calls; ``messages`` holds the warnings and worse that it logged.
 
     Args:
@@ -74,11 +86,12 @@ class FmuSlave:
         self.name = name
         self.path = path
         self._description = read_description(path) if description is None else description
-        self.model: Model = self._description.model
+        self.model: ModelInterface = self._description.model
         self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
         self._worst = OK
         self._closed = False
         self._once = ""
+        self._sets: dict[tuple[str, ...], tuple[list[_Batch], list[Value]]] = {}
         self._reserve()
         try:
             self._fmu = self._load()
@@ -99,7 +112,7 @@ class FmuSlave:
 
     def _reserve(self) -> None:
         if self._description.once:
-            digest = content_hash(self.path)
+            digest = str(self.path) if self.path.is_dir() else content_hash(self.path)
             if digest in _only_ones:
                 raise FmuError(f"{self.name}: {self.path} may be instantiated only once per process, but is twice")
             _only_ones.add(digest)
@@ -188,12 +201,25 @@ class FmuSlave:
     def set(self, values: Mapping[str, Value]) -> None:
         """Set variables of any type by name."""
         self._alive("fmi2Set")
-        names = list(values)
-        for batch in self._batches(names, "Set"):
-            for k, position in enumerate(batch.positions):
-                value = values[names[position]]
-                batch.values[k] = value.encode() if isinstance(value, str) else value
-            self._check(batch.call(), self._naming(batch, names))
+        names = tuple(values)
+        kept = self._sets.get(names)
+        if kept is None:
+            if len(self._sets) >= SETS_KEPT:
+                self._sets.clear()
+            kept = self._sets[names] = (self._batches(names, "Set"), [])
+        batches, last = kept
+        given = list(values.values())
+        if not last or not all(map(operator.is_, last, given)):
+            last[:] = []
+            for batch in batches:
+                for k, position in enumerate(batch.positions):
+                    value = given[position]
+                    batch.values[k] = value.encode() if isinstance(value, str) else value
+            last[:] = given
+        for batch in batches:
+            status = batch.call()
+            if status:
+                self._check(status, self._naming(batch, names))
 
     def _naming(self, batch: _Batch, names: Sequence[str]) -> str:
         some = ", ".join(names[p] for p in batch.positions[:3])
@@ -323,59 +349,52 @@ class FmuSlave:
     # The compiled loop -----------------------------------------------------------------------------------------
 
     def native_calls(self, inputs: Sequence[str], outputs: Sequence[str]) -> NativeCalls | None:
-        """Return addresses for calls from machine code; ``None`` where types or language do not allow it."""
-        if not self._description.python or self._worst >= ERROR:
+        """Return addresses for calls from machine code; ``None`` where types do not allow it.
+
+        Args:
+            inputs: names of the inputs: Reals first, then Integers and Enumerations, then Booleans.
+            outputs: names of the outputs, in such an order.
+
+        Returns:
+            The addresses.
+        """
+        lists = [[self._kind(name) for name in names] for names in (inputs, outputs)]
+        if self._worst >= ERROR or any(kinds != sorted(kinds) or kinds[-1:] == [len(KINDS)] for kinds in lists):
             return None
-        kinds = {self.model.variables[name].type for name in (*inputs, *outputs)}
-        if not kinds <= {"Real", "Integer", "Enumeration"} or any(
-            self.model.variables[name].type != "Real" for name in inputs
-        ):
-            return None
-        variables = self.model.variables
-        reals = [variables[n].reference for n in outputs if variables[n].type == "Real"]
-        wholes = [variables[n].reference for n in outputs if variables[n].type != "Real"]
 
         def address(function: str) -> int:
-            return int(ctypes.cast(self._library[function], ctypes.c_void_p).value or 0)
+            found = getattr(self._library, function, None)
+            return 0 if found is None else int(ctypes.cast(found, ctypes.c_void_p).value or 0)
 
+        def references(names: Sequence[str], kind: int) -> NDArray[np.uint32]:
+            variables = self.model.variables
+            return np.array([variables[n].reference for n in names if self._kind(n) == kind], dtype=np.uint32)
+
+        kinds = range(len(KINDS))
         return NativeCalls(
             component=int(self._component.value or 0),
-            set_real=address("fmi2SetReal"),
-            get_real=address("fmi2GetReal"),
-            get_integer=address("fmi2GetInteger"),
+            set=(address("fmi2SetReal"), address("fmi2SetInteger"), address("fmi2SetBoolean")),
+            get=(address("fmi2GetReal"), address("fmi2GetInteger"), address("fmi2GetBoolean")),
             do_step=address("fmi2DoStep"),
-            inputs=np.array([variables[n].reference for n in inputs], dtype=np.uint32),
-            reals=np.array(reals, dtype=np.uint32),
-            integers=np.array(wholes, dtype=np.uint32),
+            inputs=tuple(references(inputs, kind) for kind in kinds),
+            outputs=tuple(references(outputs, kind) for kind in kinds),
+            python=self._description.python,
         )
 
+    def _kind(self, name: str) -> int:
+        """Return the place of a variable's type in ``KINDS``; behind the last for Strings."""
+        return (*KINDS, "String").index(_FUNCTIONS[self.model.variables[name].type])
+
     def failed(self, status: int, function: str) -> None:
-        """Raise for a status that the compiled loop met."""
+        """Raise for a status that the compiled loop met.
+
+        Args:
+            status: an ``fmi2Status``.
+            function: name of the FMI function that returned it.
+        """
         self._check(status, function)
 
 
 def _shares(values: Any, buffer: Signals) -> bool:
     first = int(buffer.ctypes.data)
     return first <= ctypes.addressof(values) < first + max(buffer.nbytes, 1)
-
-
-@dataclass(frozen=True)
-class FmuFactory:
-    """Makes slaves from the FMU at ``path``."""
-
-    path: Path
-    description: FmuDescription
-
-    def __call__(self, name: str) -> FmuSlave:
-        """Return a new slave called ``name``."""
-        return FmuSlave(name, self.path, self.description)
-
-
-def fmu_instance(name: str, path: Path, start: Start | None = None) -> Instance:
-    """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
-
-    Raises:
-        FmuError: see ``read_description``.
-    """
-    description = read_description(path)
-    return Instance(name, description.model, FmuFactory(path, description), start or {})

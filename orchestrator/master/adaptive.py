@@ -1,8 +1,8 @@
 """Continuous loops to a tolerance: windows of iterated waveforms, with rollback and error control.
 
-A window of time is cut into three cells. Each sweep restores all slaves to the start of the window and steps them one
-after the other through it; the outputs read at the four nodes give, by cubic interpolation, the inputs of the slaves
-that take them, as constant pieces with the right moments (``pieces``). The first sweep starts from extrapolated
+A window of time is cut into two cells. Each sweep restores all slaves to the start of the window and steps them one
+after the other through it; the outputs read at the three nodes give, by quadratic interpolation, the inputs of the
+slaves that take them, as constant pieces with the right moments (``pieces``). The first sweep starts from extrapolated
 outputs; two sweeps leave an error of order five in the window's length, so that smooth loops converge with order four.
 
 The error is estimated by step doubling: the window once as a whole, then in two halves, for which the whole is so good
@@ -111,6 +111,18 @@ def run_adaptive(
     record: NDArray[np.int64],
 ) -> Statistics:
     """Run from ``start`` to ``stop`` [s]; ``rows`` has shape (grid points, recorded) with row 0 already there.
+
+    Args:
+        wiring: bound slaves, initialised.
+        signals: signals in place of those of ``System.sources``, by index.
+        start: [s].
+        stop: [s].
+        settings: tolerance and bounds of the step.
+        rows: filled with the recorded signals on the grid.
+        record: (recorded,) slots of the recorded signals.
+
+    Returns:
+        Steps taken, steps refused, sizes.
 
     Raises:
         ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.

@@ -76,6 +76,14 @@ MAXIMUM_STEPS = 100_000_000
 def step_count(start: float, stop: float, step: float) -> int:
     """Return the number of steps of the communication grid ``start + n * step``.
 
+    Args:
+        start: beginning of the run [s].
+        stop: its end [s].
+        step: length of a step [s].
+
+    Returns:
+        The number of steps.
+
     Raises:
         ScenarioError: the times are not finite, not in order, or no whole number of steps fits.
     """

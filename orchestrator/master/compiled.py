@@ -1,181 +1,190 @@
-"""The loop of ``fixed_step`` in machine code: same values, same order, no interpreter between the slaves' calls.
+"""The loop of ``fixed_step`` in machine code (``loop.c``): same values, same order, no interpreter between the calls.
 
-The functions of an FMU are called by address. All else is arithmetic on preallocated arrays. It is worth its
-compilation (once per machine, then cached) wherever slaves are quick.
+It takes slaves whose functions can be called by address: FMUs in any language. Without a C compiler there is none, and
+the Python loop gives the same bits.
 """
 
+import ctypes
+import time
 from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from orchestrator.master.protocol import NativeCalls
+from orchestrator.master.protocol import KINDS, NativeCalls
 from orchestrator.master.wiring import Wiring
+from orchestrator.shared.machine_code import compiled_library
 
 Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
 
-CHUNK = 2000
-"""Steps between two looks at the interpreter's signals, so that an interrupt is heard."""
+SOURCE = Path(__file__).with_name("loop.c")
+FUNCTIONS = (*(f"fmi2Set{kind}" for kind in KINDS), "fmi2DoStep", *(f"fmi2Get{kind}" for kind in KINDS))
 
-FUNCTIONS = ("", "fmi2SetReal", "fmi2DoStep", "fmi2GetReal", "fmi2GetInteger")
-SET_REAL, DO_STEP, GET_REAL, GET_INTEGER = 1, 2, 3, 4
+FIRST_CHUNK, MOST_STEPS = 64, 1 << 20
+CHUNK_TIME = 0.1
+"""Seconds between two looks at the interpreter's signals, so that an interrupt is heard."""
 
-
-def _transfer_code(typing: Any, address: Any, component: Any, references: Any, count: Any, values: Any) -> Any:
-    """Call ``status f(component, references, count, values)`` at ``address``."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        whole = ir.IntType(64)
-        kind = ir.FunctionType(ir.IntType(32), [whole, whole, whole, whole])
-        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
-
-    return types.int32(types.int64, types.int64, types.int64, types.int64, types.int64), generate
+_Address, _Whole, _Real = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
-def _step_code(typing: Any, address: Any, component: Any, time: Any, length: Any) -> Any:
-    """Call ``status f(component, time, length, true)`` at ``address``."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        real, flag = ir.DoubleType(), ir.IntType(32)
-        kind = ir.FunctionType(ir.IntType(32), [ir.IntType(64), real, real, flag])
-        function = builder.inttoptr(arguments[0], kind.as_pointer())
-        return builder.call(function, [*arguments[1:], flag(1)])
-
-    return types.int32(types.int64, types.int64, types.float64, types.float64), generate
-
-
-_transfer: Any = intrinsic(_transfer_code)
-_step: Any = intrinsic(_step_code)
-
-
-@njit(cache=True)
-def _gather(values, table, column, first, last, slots, sources, factors, offsets, quanta, rows):  # type: ignore[no-untyped-def]
-    for k in range(first, last):
-        value = offsets[k]
-        if sources[k] >= 0:
-            value += factors[k] * values[sources[k]]
-        if rows[k] >= 0:
-            value += table[rows[k], column]
-        if quanta[k] > 0.0:
-            scaled = value / quanta[k]
-            if abs(scaled) < 2.0**53:
-                value = quanta[k] * np.rint(scaled)
-        values[slots[k]] = value
+class _Slave(ctypes.Structure):
+    _fields_ = (
+        ("component", _Address),
+        ("step", _Address),
+        ("set", _Address * 3),
+        ("get", _Address * 3),
+        ("inputs", _Address * 3),
+        ("outputs", _Address * 3),
+        ("input_counts", _Whole * 3),
+        ("output_counts", _Whole * 3),
+        ("first_input", _Whole),
+        ("first_output", _Whole),
+        ("first_feed", _Whole),
+        ("feeds", _Whole),
+        ("whole", _Address),
+    )
 
 
-@njit(cache=True)
-def _advance(calls, counts, where, k, time, step):  # type: ignore[no-untyped-def]
-    """Send and step one slave; return ``(status, function)``."""
-    if counts[k, 0]:
-        status = _transfer(calls[k, 1], calls[k, 0], where[k, 0], counts[k, 0], where[k, 3])
-        if status > 1:
-            return status, SET_REAL
-    return _step(calls[k, 4], calls[k, 0], time, step), DO_STEP
+class _Feed(ctypes.Structure):
+    _fields_ = (
+        ("slot", _Whole),
+        ("source", _Whole),
+        ("row", _Whole),
+        ("plain", _Whole),
+        ("factor", _Real),
+        ("offset", _Real),
+        ("quantum", _Real),
+    )
 
 
-@njit(cache=True)
-def _receive(calls, counts, where, k, values, whole):  # type: ignore[no-untyped-def]
-    """Read the outputs of one slave; return ``(status, function)``."""
-    if counts[k, 1]:
-        status = _transfer(calls[k, 2], calls[k, 0], where[k, 1], counts[k, 1], where[k, 4])
-        if status > 1:
-            return status, GET_REAL
-    if counts[k, 2]:
-        status = _transfer(calls[k, 3], calls[k, 0], where[k, 2], counts[k, 2], where[k, 5])
-        if status > 1:
-            return status, GET_INTEGER
-        for j in range(counts[k, 2]):
-            values[counts[k, 3] + j] = whole[counts[k, 4] + j]
-    return np.int32(0), GET_INTEGER
+class _Run(ctypes.Structure):
+    _fields_ = (
+        ("slaves", _Address),
+        ("feeds", _Address),
+        ("values", _Address),
+        ("table", _Address),
+        ("recorded", _Address),
+        ("rows", _Address),
+        ("slave_count", _Whole),
+        ("columns", _Whole),
+        ("records", _Whole),
+        ("start", _Real),
+        ("length", _Real),
+        ("simultaneous", _Whole),
+    )
 
 
-@njit(cache=True)
-def _run(begin, end, start, step, simultaneous, slaves, feeds, gains, table, record, values, whole, out):  # type: ignore[no-untyped-def]
-    """Run steps ``begin`` to ``end - 1``; return ``(status, function, slave, step)``, status 0 when done."""
-    calls, counts, where, ranges = slaves
-    slots, sources, rows = feeds
-    factors, offsets, quanta = gains
-    for n in range(begin, end):
-        time = start + n * step
-        if simultaneous:
-            _gather(values, table, n + 1, 0, len(slots), slots, sources, factors, offsets, quanta, rows)
-        for k in range(len(calls)):
-            if not simultaneous:
-                _gather(values, table, n + 1, ranges[k], ranges[k + 1], slots, sources, factors, offsets, quanta, rows)
-            status, function = _advance(calls, counts, where, k, time, step)
-            if status <= 1 and not simultaneous:
-                status, function = _receive(calls, counts, where, k, values, whole)
-            if status > 1:
-                return status, function, k, n
-        if simultaneous:
-            for k in range(len(calls)):
-                status, function = _receive(calls, counts, where, k, values, whole)
-                if status > 1:
-                    return status, function, k, n
-        for j in range(len(record)):
-            out[n + 1, j] = values[record[j]]
-    return np.int32(0), 0, 0, 0
+class _Failure(ctypes.Structure):
+    _fields_ = (("call", _Whole), ("slave", _Whole), ("step", _Whole))
 
 
-class CompiledLoop:
+@cache
+def _loaded(holds_lock: bool) -> Any:
+    """Return ``run_steps`` of the compiled ``loop.c``, or ``None``.
+
+    Args:
+        holds_lock: keep the interpreter's lock. Python FMUs would take it back at once; others must not have it, since
+            they may wait for threads of their own that log.
+    """
+    path = compiled_library(SOURCE)
+    if path is None:
+        return None
+    try:
+        function = (ctypes.PyDLL if holds_lock else ctypes.CDLL)(str(path)).run_steps
+    except OSError:
+        return None
+    function.argtypes = [ctypes.c_void_p, _Whole, _Whole, ctypes.c_void_p]
+    function.restype = ctypes.c_int
+    return function
+
+
+def prepare() -> None:
+    """Compile the loop now, for child processes behind walls, which cannot."""
+    compiled_library(SOURCE)
+
+
+class CompiledWiring:
     """The slaves of a wiring, ready for machine code.
 
     Args:
         wiring: bound slaves.
         natives: what each of its stages offers, in the same order.
+        run_steps: the function of ``loop.c``.
     """
 
-    def __init__(self, wiring: Wiring, natives: Sequence[NativeCalls]) -> None:
-        self._wiring, self._natives = wiring, list(natives)
+    def __init__(self, wiring: Wiring, natives: Sequence[NativeCalls], run_steps: Any) -> None:
+        self._wiring, self._natives, self._run_steps = wiring, list(natives), run_steps
         blocks = [stage.block for stage in wiring.stages]
-        base = wiring.values.ctypes.data
-        firsts = np.cumsum([0, *(len(n.integers) for n in natives)])
-        self._whole = np.zeros(max(int(firsts[-1]), 1), dtype=np.int32)
-        calls = [[n.component, n.set_real, n.get_real, n.get_integer, n.do_step] for n in natives]
-        counts, where = [], []
-        for n, block, first in zip(natives, blocks, firsts[:-1].tolist(), strict=True):
-            counts.append([len(n.inputs), len(n.reals), len(n.integers), block.first_output + len(n.reals), first])
-            references = [a.ctypes.data for a in (n.inputs, n.reals, n.integers)]
-            memory = [base + 8 * block.first_input, base + 8 * block.first_output, self._whole.ctypes.data + 4 * first]
-            where.append(references + memory)
+        longest = max((len(r) for n in natives for r in (*n.inputs[1:], *n.outputs[1:])), default=0)
+        self._whole = np.zeros(max(longest, 1), dtype=np.int32)
         feeds = [feed for block in blocks for feed in block.feeds]
-        ranges = np.cumsum([0, *(len(block.feeds) for block in blocks)])
-        self._slaves = tuple(np.array(a, dtype=np.int64) for a in (calls, counts, where, ranges))
-        self._feeds = tuple(
-            np.array(a, dtype=np.int64)
-            for a in ([f.slot for f in feeds], [f.source for f in feeds], [f.signal for f in feeds])
+        self._feeds = (_Feed * max(len(feeds), 1))(
+            *(_Feed(f.slot, f.source, f.signal, f.plain, f.factor, f.offset, f.quantum) for f in feeds)
         )
-        self._gains = tuple(
-            np.array(a, dtype=np.float64)
-            for a in ([f.factor for f in feeds], [f.offset for f in feeds], [f.quantum for f in feeds])
-        )
+        self._slaves = (_Slave * len(blocks))()
+        first = 0
+        for slave, native, block in zip(self._slaves, natives, blocks, strict=True):
+            slave.component, slave.step, slave.whole = native.component, native.do_step, self._whole.ctypes.data
+            for kind in range(3):
+                slave.set[kind], slave.get[kind] = native.set[kind], native.get[kind]
+                slave.inputs[kind] = native.inputs[kind].ctypes.data
+                slave.outputs[kind] = native.outputs[kind].ctypes.data
+                slave.input_counts[kind] = len(native.inputs[kind])
+                slave.output_counts[kind] = len(native.outputs[kind])
+            slave.first_input, slave.first_output = block.first_input, block.first_output
+            slave.first_feed, slave.feeds = first, len(block.feeds)
+            first += len(block.feeds)
 
     def run(self, table: Array, start: float, step: float, simultaneous: bool, out: Array, record: Slots) -> None:
         """Run on the grid; ``out`` has shape (steps + 1, recorded), row 0 is already there.
 
+        Args:
+            table: what the sources add to inputs, see ``Layout.signal_table``.
+            start: [s].
+            step: [s].
+            simultaneous: all slaves take their inputs at the start of a step (Jacobi).
+            out: filled with the recorded signals.
+            record: (recorded,) slots of the recorded signals.
+
         Raises:
             SlaveError: a slave refused or failed a call.
         """
-        steps = len(out) - 1
-        for begin in range(0, steps, CHUNK):
-            end = min(begin + CHUNK, steps)
-            status, function, slave, n = _run(
-                begin, end, float(start), float(step), simultaneous, self._slaves, self._feeds, self._gains,
-                table, record, self._wiring.values, self._whole, out,
-            )  # fmt: skip
-            if status > 1:
-                what = f"{FUNCTIONS[function]} at t = {start + n * step:g} s"
-                failed: Any = self._wiring.stages[slave].slave
+        table, record = np.ascontiguousarray(table), np.ascontiguousarray(record)
+        assert out.flags.c_contiguous
+        job = _Run(
+            ctypes.addressof(self._slaves), ctypes.addressof(self._feeds), self._wiring.values.ctypes.data,
+            table.ctypes.data, record.ctypes.data, out.ctypes.data, len(self._slaves), table.shape[1], len(record),
+            start, step, simultaneous,
+        )  # fmt: skip
+        failure = _Failure()
+        steps, begin, chunk = len(out) - 1, 0, FIRST_CHUNK
+        while begin < steps:
+            end, clock = min(begin + chunk, steps), time.perf_counter()
+            status = self._run_steps(ctypes.byref(job), begin, end, ctypes.byref(failure))
+            if status:
+                what = f"{FUNCTIONS[failure.call]} at t = {start + failure.step * step:g} s"
+                failed: Any = self._wiring.stages[failure.slave].slave
                 failed.failed(status, what)
+            taken = time.perf_counter() - clock
+            chunk = (
+                min(2 * chunk, MOST_STEPS) if taken < 0.5 * CHUNK_TIME else max(1, round(chunk * CHUNK_TIME / taken))
+            )
+            begin = end
 
 
-def compiled_loop(wiring: Wiring) -> CompiledLoop | None:
-    """Return the compiled loop, or ``None`` when a slave does not offer native calls."""
+def compiled_loop(wiring: Wiring) -> CompiledWiring | None:
+    """Return the compiled loop, or ``None`` when a slave does not offer native calls or nothing can compile it.
+
+    Args:
+        wiring: bound slaves.
+
+    Returns:
+        The loop.
+    """
     natives = []
     for stage in wiring.stages:
         offer = getattr(stage.slave, "native_calls", None)
@@ -183,4 +192,5 @@ def compiled_loop(wiring: Wiring) -> CompiledLoop | None:
         if native is None:
             return None
         natives.append(native)
-    return CompiledLoop(wiring, natives)
+    run_steps = _loaded(holds_lock=all(native.python for native in natives))
+    return None if run_steps is None else CompiledWiring(wiring, natives, run_steps)

@@ -40,7 +40,17 @@ def run_sequential(
 def run_simultaneous(
     wiring: Wiring, table: Array, start: float, step: float, steps: int, rows: Array, record: Slots
 ) -> None:
-    """Step all instances with the values of the start of the step; arguments as for ``run_sequential``."""
+    """Step all instances with the values of the start of the step; arguments as for ``run_sequential``.
+
+    Args:
+        wiring: bound slaves, initialised.
+        table: what the sources add to inputs, see ``Layout.signal_table``.
+        start: [s].
+        step: [s].
+        steps: their number.
+        rows: (steps + 1, recorded) filled from row 1 on.
+        record: (recorded,) slots of the recorded signals.
+    """
     values, view, stages = wiring.values, wiring.view, wiring.stages
     for n in range(steps):
         time = start + n * step

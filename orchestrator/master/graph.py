@@ -12,6 +12,9 @@ def components(nodes: Sequence[str], edges: Mapping[str, Iterable[str]]) -> list
     Args:
         nodes: all nodes in the order of declaration.
         edges: for each node, the nodes that must come after it.
+
+    Returns:
+        Groups of nodes; a node that is in no circle is a group of its own.
     """
     reach = {node: _reachable(node, edges) for node in nodes}
     groups: list[tuple[str, ...]] = []

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
 
 
-def backward_slots(layout: Layout, names: tuple[str, ...]) -> NDArray[np.int64]:
+def _backward_slots(layout: Layout, names: tuple[str, ...]) -> NDArray[np.int64]:
     """Return the output slots that an instance of ``names`` takes from itself or from one that is stepped later.
 
     Fixing their values fixes what one pass over the instances computes: they are the unknowns of the loop.
@@ -35,11 +35,20 @@ def backward_slots(layout: Layout, names: tuple[str, ...]) -> NDArray[np.int64]:
 def initialise(wiring: Wiring, table: Array, tolerance: float, iterations: int) -> int:
     """Make inputs and outputs agree while all slaves are in initialisation; return the number of passes.
 
+    Args:
+        wiring: bound slaves.
+        table: what the sources add to inputs, see ``Layout.signal_table``.
+        tolerance: largest relative change in the last pass.
+        iterations: the most passes.
+
+    Returns:
+        The number of passes.
+
     Raises:
         ConvergenceError: the initial values of a loop do not settle.
     """
     values, view = wiring.values, wiring.view
-    cut = backward_slots(wiring.layout, tuple(block.name for block in wiring.layout.blocks))
+    cut = _backward_slots(wiring.layout, tuple(block.name for block in wiring.layout.blocks))
     for stage in wiring.stages:
         stage.receive()
 
@@ -60,6 +69,18 @@ def run_iterated(
     """Run on the grid; the instances of each algebraic loop are stepped until what they exchange settles.
 
     Returns the number of passes over loops. Arguments as for ``fixed_step.run_sequential``.
+
+    Args:
+        wiring: bound slaves.
+        table: what the sources add to inputs, see ``Layout.signal_table``.
+        start: [s].
+        settings: step [s], tolerance and number of passes.
+        steps: their number.
+        rows: (steps + 1, recorded) filled from row 1 on.
+        record: (recorded,) slots of the recorded signals.
+
+    Returns:
+        The number of passes.
 
     Raises:
         ScenarioError: an instance of a loop cannot save its state.
@@ -89,7 +110,7 @@ def _groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], NDArray[np.int64]]]
             continue
         loop = next((g for g in loops if name in g), (name,))
         stages = tuple(s for s in wiring.stages if s.block.name in loop)
-        cut = backward_slots(wiring.layout, loop) if loop in loops else np.zeros(0, dtype=np.int64)
+        cut = _backward_slots(wiring.layout, loop) if loop in loops else np.zeros(0, dtype=np.int64)
         for member in stages if len(cut) else ():
             if not member.slave.model.can_save_state:
                 raise ScenarioError(

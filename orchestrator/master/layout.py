@@ -93,15 +93,31 @@ class Layout:
         Args:
             times: communication points [s], shape (steps + 1,).
             replaced: signals that stand in for those of ``System.sources``, by index.
+
+        Returns:
+            Shape (rows of ``signals``, steps + 1), in the units of the inputs.
         """
-        table = np.zeros((len(self.signals), len(times)))
-        for row, parts in zip(table, self.signals, strict=True):
-            for index, factor, offset, at_end in parts:
-                signal = replaced.get(index, self.system.sources[index].signal)
-                values = factor * signal.sample(times) + offset
-                row[0] += values[0]
-                row[1:] += values[1:] if at_end else values[:-1]
-        return table
+        rows = [self.signal_row(row, times, replaced) for row in range(len(self.signals))]
+        return np.array(rows).reshape(len(rows), len(times))
+
+    def signal_row(self, row: int, times: Signals, replaced: Mapping[int, Signal]) -> NDArray[np.float64]:
+        """Return one row of the table.
+
+        Args:
+            row: which.
+            times: communication points [s], shape (steps + 1,).
+            replaced: as for ``signal_table``.
+
+        Returns:
+            Shape (steps + 1,), in the unit of the input.
+        """
+        found = np.zeros(len(times))
+        for index, factor, offset, at_end in self.signals[row]:
+            signal = replaced.get(index, self.system.sources[index].signal)
+            values = factor * signal.sample(times) + offset
+            found[0] += values[0]
+            found[1:] += values[1:] if at_end else values[:-1]
+        return found
 
 
 def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: bool = False) -> Layout:
@@ -112,6 +128,9 @@ def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: b
         record: signals to be recorded, ``instance.variable``.
         simultaneous: all instances take their inputs at the start of a step (Jacobi).
         states: outputs that show an instance's state are needed too, whether or not anybody reads them.
+
+    Returns:
+        The plan.
     """
     shown = _state_outputs(system) if states else []
     needed = _needed(system, [*record, *shown])

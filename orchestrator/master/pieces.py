@@ -25,13 +25,13 @@ CLOSING = 1e-5
 """Length of the closing piece as a fraction of the cell: short beside the cell, long beside the rounding of time."""
 
 
-def breakpoints(closing: bool) -> tuple[float, ...]:
+def _breakpoints(closing: bool) -> tuple[float, ...]:
     """Return where the pieces of a cell begin and end, as fractions of the cell."""
     last = 1.0 - CLOSING
     return (0.0, 0.5 * last, last, 1.0) if closing else (0.0, 0.5, 1.0)
 
 
-def node_basis(nodes: int) -> list[Polynomial]:
+def _node_basis(nodes: int) -> list[Polynomial]:
     """Return, for each of equidistant nodes, the polynomial in ``s`` in [0, 1] that its value is multiplied with."""
     places = np.linspace(0.0, 1.0, nodes)
     basis = []
@@ -52,7 +52,7 @@ def piece_weights(closing: bool) -> Array:
         shape (pieces of the window, nodes).
     """
     columns = []
-    for polynomial in node_basis(NODES):
+    for polynomial in _node_basis(NODES):
         constants: list[float] = []
         for cell in range(CELLS):
             local = polynomial(Polynomial([cell / CELLS, 1.0 / CELLS]))
@@ -62,7 +62,7 @@ def piece_weights(closing: bool) -> Array:
 
 
 def _constants(u: Polynomial, closing: bool) -> list[float]:
-    edges = breakpoints(closing)
+    edges = _breakpoints(closing)
     mean = _integral(u)
     first = _integral(u * Polynomial([0.0, 1.0]))
     if closing:
@@ -81,13 +81,29 @@ def _integral(u: Polynomial) -> float:
 
 @cache
 def dense_matrix(nodes: int) -> Array:
-    """Return the matrix from values at equidistant nodes to the coefficients of the polynomial in ``s``, square."""
-    return np.array([p.coef for p in node_basis(nodes)]).T.copy()
+    """Return the matrix from values at equidistant nodes to the coefficients of the polynomial in ``s``, square.
+
+    Args:
+        nodes: their number.
+
+    Returns:
+        Shape (nodes, nodes); row ``k`` holds the coefficients of ``s**k``, ``s`` being the fraction of the window.
+    """
+    return np.array([p.coef for p in _node_basis(nodes)]).T.copy()
 
 
 def piece_times(start: float, end: float, closing: bool) -> tuple[list[float], list[bool]]:
-    """Return the instants [s] between which a slave is stepped through a window, and whether a node ends there."""
-    edges = breakpoints(closing)
+    """Return the instants [s] between which a slave is stepped through a window, and whether a node ends there.
+
+    Args:
+        start: of the window [s].
+        end: of the window [s].
+        closing: whether cells end with the short piece.
+
+    Returns:
+        The instants, one more than pieces, and a truth value per piece.
+    """
+    edges = _breakpoints(closing)
     length = (end - start) / CELLS
     times, at_node = [start], []
     for cell in range(CELLS):

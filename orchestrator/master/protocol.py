@@ -47,7 +47,7 @@ class Variable:
         name: unique within the slave.
         causality: ``input``, ``output``, ``parameter``, ``calculatedParameter``, ``local`` or ``independent``.
         type: ``Real``, ``Integer``, ``Boolean``, ``Enumeration`` or ``String``.
-        unit: name of the unit of a ``Real``, a key of ``Model.units``; ``None`` when none is declared.
+        unit: name of the unit of a ``Real``, a key of ``ModelInterface.units``; ``None`` when none is declared.
         variability: ``continuous``, ``discrete``, ``tunable``, ``fixed`` or ``constant``.
         start: start value; ``None`` when none is declared.
         minimum: smallest value allowed; ``None`` when none is declared.
@@ -71,7 +71,7 @@ class Variable:
 
 
 @dataclass(frozen=True)
-class Model:
+class ModelInterface:
     """The interface that all slaves made from one model share.
 
     Attributes:
@@ -92,13 +92,31 @@ class Model:
     can_vary_step: bool = True
 
     def named(self, causality: str) -> tuple[str, ...]:
-        """Return the names of the variables with this causality, in the order of declaration."""
+        """Return the names of the variables with this causality, in the order of declaration.
+
+        Args:
+            causality: "input", "output", "parameter" and so on.
+
+        Returns:
+            The names.
+        """
         return tuple(v.name for v in self.variables.values() if v.causality == causality)
 
     def depends_on(self, output: str) -> frozenset[str]:
-        """Return the inputs on which ``output`` depends at the same instant (all of them when it is not declared)."""
+        """Return the inputs on which ``output`` depends at the same instant (all of them when it is not declared).
+
+        Args:
+            output: its name.
+
+        Returns:
+            Names of inputs.
+        """
         declared = self.feedthrough.get(output)
         return frozenset(self.named("input")) if declared is None else declared
+
+
+KINDS = ("Real", "Integer", "Boolean")
+"""Types of signals as functions of FMI 2.0 name them, in the order in which an instance's signals lie."""
 
 
 @dataclass(frozen=True)
@@ -107,23 +125,21 @@ class NativeCalls:
 
     Attributes:
         component: first argument of every call.
-        set_real: address of ``status f(component, references, count, values)``.
-        get_real: address, likewise.
-        get_integer: address, likewise, with 32-bit integers.
+        set: addresses of ``status f(component, references, count, values)``, one for each of ``KINDS``.
+        get: addresses, likewise.
         do_step: address of ``status f(component, time, step, no_rollback)``.
-        inputs: references of the inputs.
-        reals: references of the Real outputs, which come first.
-        integers: references of the Integer outputs.
+        inputs: references of the inputs, those of each of ``KINDS``.
+        outputs: references of the outputs, likewise.
+        python: the functions run Python.
     """
 
     component: int
-    set_real: int
-    get_real: int
-    get_integer: int
+    set: tuple[int, int, int]
+    get: tuple[int, int, int]
     do_step: int
-    inputs: NDArray[np.uint32]
-    reals: NDArray[np.uint32]
-    integers: NDArray[np.uint32]
+    inputs: tuple[NDArray[np.uint32], ...]
+    outputs: tuple[NDArray[np.uint32], ...]
+    python: bool
 
 
 class Slave(Protocol):
@@ -148,22 +164,55 @@ class Slave(Protocol):
     """
 
     name: str
-    model: Model
+    model: ModelInterface
 
     def set(self, values: Mapping[str, Value]) -> None:
-        """Set variables of any type by name."""
+        """Set variables of any type by name.
+
+        Args:
+            values: value by name, in the variable's unit.
+        """
 
     def get(self, names: Sequence[str]) -> list[Value]:
-        """Return variables of any type by name."""
+        """Return variables of any type by name.
+
+        Args:
+            names: of variables.
+
+        Returns:
+            A value per name.
+        """
 
     def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        """Return a call that sets the numeric variables ``names`` from ``buffer``; shape (len(names),)."""
+        """Return a call that sets the numeric variables ``names`` from ``buffer``; shape (len(names),).
+
+        Args:
+            names: of variables.
+            buffer: read at every call.
+
+        Returns:
+            Called without arguments.
+        """
 
     def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
-        """Return a call that reads the numeric variables ``names`` into ``buffer``; shape (len(names),)."""
+        """Return a call that reads the numeric variables ``names`` into ``buffer``; shape (len(names),).
+
+        Args:
+            names: of variables.
+            buffer: written at every call.
+
+        Returns:
+            Called without arguments.
+        """
 
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        """Enter initialisation for a run from ``start`` to ``stop`` [s]."""
+        """Enter initialisation for a run from ``start`` to ``stop`` [s].
+
+        Args:
+            start: [s].
+            stop: [s]; None: open.
+            tolerance: relative, for the slave's own solver; None: its default.
+        """
 
     def start(self) -> None:
         """End initialisation."""
@@ -171,18 +220,34 @@ class Slave(Protocol):
     def do_step(self, time: float, step: float) -> None:
         """Advance from ``time`` to ``time + step`` [s], inputs held.
 
+        Args:
+            time: [s].
+            step: [s], positive.
+
         Raises:
             StepDiscardedError: the step was not done; the slave is well.
         """
 
     def get_state(self) -> Any:
-        """Return a handle of a copy of the whole state."""
+        """Return a handle of a copy of the whole state.
+
+        Returns:
+            The handle, to be given back.
+        """
 
     def set_state(self, state: Any) -> None:
-        """Return to a state; the handle stays valid."""
+        """Return to a state; the handle stays valid.
+
+        Args:
+            state: the handle.
+        """
 
     def free_state(self, state: Any) -> None:
-        """Give a handle back."""
+        """Give a handle back.
+
+        Args:
+            state: the handle.
+        """
 
     def terminate(self) -> None:
         """End the run."""

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+LOOPS = PYTHON, MACHINE_CODE = "Python", "machine code"
+
 
 @dataclass(frozen=True)
 class Statistics:
@@ -16,16 +18,18 @@ class Statistics:
         rejected: communication steps that were undone.
         do_steps: calls of ``do_step`` by instance, undone ones included.
         sweeps: passes over all instances, undone ones included.
+        loop: what called the slaves: ``PYTHON`` or ``MACHINE_CODE``.
     """
 
     steps: int
     rejected: int
     do_steps: Mapping[str, int]
     sweeps: int
+    loop: str = PYTHON
 
 
 @dataclass(frozen=True)
-class Result:
+class Recording:
     """Recorded signals.
 
     Attributes:

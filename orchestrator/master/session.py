@@ -13,14 +13,15 @@ from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Ite
 from orchestrator.master.fixed_step import run_sequential, run_simultaneous
 from orchestrator.master.iterated import initialise, run_iterated
 from orchestrator.master.layout import Layout, lay_out
+from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import Slave, Value
-from orchestrator.master.result import Result, Statistics
+from orchestrator.master.result import MACHINE_CODE, PYTHON, Recording, Statistics
 from orchestrator.master.signals import Signal
-from orchestrator.master.system import Instance, Problem, Quantity, System, raise_problems, split
+from orchestrator.master.system import Instance, Quantity, System, split
 from orchestrator.master.wiring import Wiring, wire
 
 if TYPE_CHECKING:
-    from orchestrator.master.compiled import CompiledLoop
+    from orchestrator.master.compiled import CompiledWiring
 
 Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
@@ -28,8 +29,8 @@ Slots = NDArray[np.int64]
 INITIAL_TOLERANCE = 1e-12
 INITIAL_PASSES = 100
 
-COMPILED_FROM = 100_000
-"""Calls of ``do_step`` in a session from which on loading the compiled loop pays."""
+COMPILED_FROM = 2_000
+"""Calls of ``do_step`` in a session from which on the compiled loop pays: it takes a millisecond to load."""
 
 
 class Session:
@@ -62,9 +63,13 @@ class Session:
         )
         self._slaves: dict[str, Slave] = {}
         self._wiring: Wiring | None = None
-        self._compiled: CompiledLoop | None = None
+        self._compiled: CompiledWiring | None = None
         self._used: set[str] = set()
         self._do_steps = 0
+        self._own: dict[str, dict[str, Value]] | None = None
+        self._units = {name: getattr(system.unit(name), "name", None) for name in names}
+        self._times: Array = start + algorithm.step * np.arange(self.steps + 1, dtype=np.float64)
+        self._table: Array | None = None
 
     def __enter__(self) -> "Session":
         return self
@@ -90,12 +95,15 @@ class Session:
 
     def run(
         self, start: Mapping[str, Value | Quantity] | None = None, signals: Mapping[int, Signal] | None = None
-    ) -> Result:
+    ) -> Recording:
         """Run once.
 
         Args:
             start: parameters and start values by ``instance.variable``, over those of the system.
             signals: signals in place of those of ``System.sources``, by index.
+
+        Returns:
+            Times [s], recorded signals and statistics.
 
         Raises:
             ScenarioError: a start value is wrong.
@@ -104,8 +112,7 @@ class Session:
         """
         values = self._start_values(start or {})
         wiring = self._ready()
-        times: Array = self.start + self.algorithm.step * np.arange(self.steps + 1, dtype=np.float64)
-        table = self.layout.signal_table(times, signals or {})
+        table = self._signal_table(signals or {})
         rows = np.empty((self.steps + 1, len(self.record)))
         try:
             self._initialise(wiring, values, table)
@@ -116,8 +123,17 @@ class Session:
         except SimulationError:
             self.close()
             raise
-        units = {name: getattr(self.system.unit(name), "name", None) for name in self.record}
-        return Result(times, rows.T, self.record, units, statistics)
+        return Recording(self._times.copy(), rows.T, self.record, dict(self._units), statistics)
+
+    def _signal_table(self, replaced: Mapping[int, Signal]) -> Array:
+        """Return the table of signals; what is not replaced is sampled once."""
+        if self._table is None:
+            self._table = self.layout.signal_table(self._times, {})
+        table = self._table.copy()
+        for row, parts in enumerate(self.layout.signals):
+            if not replaced.keys().isdisjoint(part[0] for part in parts):
+                table[row] = self.layout.signal_row(row, self._times, replaced)
+        return table
 
     def _ready(self) -> Wiring:
         if self._wiring is None:
@@ -132,10 +148,16 @@ class Session:
         return self._wiring
 
     def _start_values(self, extra: Mapping[str, Value | Quantity]) -> dict[str, dict[str, Value]]:
-        given: dict[str, Value | Quantity] = {
-            f"{i.name}.{variable}": value for i in self.system.instances for variable, value in i.start.items()
-        }
-        given.update(extra)
+        if self._own is None:
+            own = {f"{i.name}.{v}": value for i in self.system.instances for v, value in i.start.items()}
+            if any(self.system.start_value(address, value)[0] is None for address, value in own.items()):
+                return self._typed({**own, **extra})
+            self._own = self._typed(own)
+        more = self._typed(extra)
+        return {name: {**values, **more[name]} for name, values in self._own.items()}
+
+    def _typed(self, given: Mapping[str, Value | Quantity]) -> dict[str, dict[str, Value]]:
+        """Return values by instance and variable, as the variables take them; raise for those that they do not."""
         values: dict[str, dict[str, Value]] = {i.name: {} for i in self.system.instances}
         problems = []
         for address, raw in given.items():
@@ -168,19 +190,22 @@ class Session:
         np.take(wiring.values, record, out=rows[0], mode="clip")
         match algorithm:
             case GaussSeidel() | Jacobi():
-                self._fixed_step(wiring, table, rows, record, algorithm)
-                sweeps = steps
+                loop = self._fixed_step(wiring, table, rows, record, algorithm)
+                return Statistics(
+                    steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), steps, loop
+                )
             case Iterated():
                 sweeps = run_iterated(wiring, table, self.start, algorithm, steps, rows, record)
             case Adaptive():
                 return run_adaptive(wiring, signals, self.start, self.stop, algorithm, rows, record)
             case _:
                 raise ScenarioError(f"`algorithm` must be a master algorithm, but is {algorithm!r}")
-        return Statistics(steps, 0, dict.fromkeys(self.system.execution_order(), steps), sweeps)
+        return Statistics(steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), sweeps)
 
     def _fixed_step(
         self, wiring: Wiring, table: Array, rows: Array, record: Slots, algorithm: GaussSeidel | Jacobi
-    ) -> None:
+    ) -> str:
+        """Run, and return what ran the loop, see ``Statistics``."""
         simultaneous = isinstance(algorithm, Jacobi)
         self._do_steps += self.steps * len(wiring.stages)
         compiled = self._compiled
@@ -190,6 +215,7 @@ class Session:
             compiled = self._compiled = compiled_loop(wiring)
         if compiled is not None:
             compiled.run(table, self.start, algorithm.step, simultaneous, rows, record)
-        else:
-            run = run_simultaneous if simultaneous else run_sequential
-            run(wiring, table, self.start, algorithm.step, self.steps, rows, record)
+            return MACHINE_CODE
+        run = run_simultaneous if simultaneous else run_sequential
+        run(wiring, table, self.start, algorithm.step, self.steps, rows, record)
+        return PYTHON

@@ -30,14 +30,29 @@ class Signal(Protocol):
     """See the module."""
 
     def sample(self, times: Array) -> Array:
-        """Return the values at ``times`` [s]; both of shape (n,)."""
+        """Return the values at ``times`` [s]; both of shape (n,).
+
+        Args:
+            times: rising.
+
+        Returns:
+            The values, in the signal's unit.
+        """
 
     def breaks(self, start: float, stop: float) -> list[float]:
-        """Return the instants strictly between ``start`` and ``stop`` [s] at which the signal is not smooth."""
+        """Return the instants strictly between ``start`` and ``stop`` [s] at which the signal is not smooth.
+
+        Args:
+            start: of the span.
+            stop: its end.
+
+        Returns:
+            The instants, rising.
+        """
 
 
 @dataclass(frozen=True, slots=True)
-class Constant:
+class Constant(Signal):
     """``value`` at all times."""
 
     value: float
@@ -50,7 +65,7 @@ class Constant:
 
 
 @dataclass(frozen=True, slots=True)
-class Scaled:
+class Scaled(Signal):
     """``factor * signal + offset``."""
 
     signal: Signal
@@ -65,7 +80,7 @@ class Scaled:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class Step(Signal):
     """``before`` until ``time`` [s], ``after`` from then on."""
 
     time: float
@@ -80,7 +95,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Sine:
+class Sine(Signal):
     """``offset + amplitude sin(2 pi frequency t + phase)``; frequency in Hz, phase in rad."""
 
     amplitude: float
@@ -96,7 +111,7 @@ class Sine:
 
 
 @dataclass(frozen=True, slots=True)
-class Square:
+class Square(Signal):
     """``offset + amplitude`` in the first half of every ``period`` [s] after ``delay`` [s], then minus it."""
 
     amplitude: float
@@ -109,6 +124,18 @@ class Square:
         return self.offset + np.where(half % 2 == 0, self.amplitude, -self.amplitude)
 
     def breaks(self, start: float, stop: float) -> list[float]:
+        """Find the jumps within a step.
+
+        Args:
+            start: of a step [s].
+            stop: of the step [s].
+
+        Returns:
+            Times [s] within the step at which the signal jumps.
+
+        Raises:
+            ScenarioError: the period is so short that they are too many.
+        """
         half = 0.5 * self.period
         if (stop - start) / half > MAXIMUM_DRAWS:
             raise ScenarioError(f"`period` must leave at most {MAXIMUM_DRAWS:,} jumps, but is {self.period!r}")
@@ -119,7 +146,7 @@ class Square:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class Table(Signal):
     """Values at given times [s], straight lines (or, with ``hold``, steps) in between, constant outside."""
 
     times: tuple[float, ...]
@@ -139,7 +166,7 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
-class Samples:
+class Samples(Signal):
     """An array of values, one per period [s] from ``start`` on, each held until the next; the last one stays."""
 
     values: Sequence[float] | Array
@@ -163,7 +190,7 @@ class Samples:
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class Noise(Signal):
     """White Gaussian noise of standard deviation ``deviation``, one value per ``period`` [s] from ``start`` on, held.
 
     The value of a period depends on the seed and the number of the period only, not on the length of the run.
@@ -175,6 +202,17 @@ class Noise:
     start: float = 0.0
 
     def sample(self, times: Array) -> Array:
+        """Draw the noise, each value held for a period.
+
+        Args:
+            times: [s], shape (n,).
+
+        Returns:
+            Values at those times, shape (n,).
+
+        Raises:
+            ScenarioError: the period is so short that too many values would be drawn.
+        """
         index = np.floor((times - self.start) / self.period + GRID_SLACK).astype(np.int64)
         count = int(index.max(initial=0)) + 1
         if not 0 < count <= MAXIMUM_DRAWS:
@@ -191,6 +229,15 @@ class Noise:
 
 def read_table(path: Path, column: str, time: str = "time", hold: bool = False) -> Table:
     """Read a ``Table`` from two named columns of a CSV file with a header.
+
+    Args:
+        path: the file.
+        column: name of the values' column.
+        time: name of the times' column [s].
+        hold: whether values are held rather than joined by lines.
+
+    Returns:
+        The signal.
 
     Raises:
         ScenarioError: the file cannot be read, lacks a column, holds what is no number, or its times do not rise.

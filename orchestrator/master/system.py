@@ -4,12 +4,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from orchestrator.errors import ConnectionMismatchError, ScenarioError
 from orchestrator.master import units
 from orchestrator.master.graph import components
-from orchestrator.master.protocol import NUMERIC, READABLE, Model, Slave, Unit, Value, Variable
+from orchestrator.master.problems import Problem, raise_problems
+from orchestrator.master.protocol import NUMERIC, READABLE, ModelInterface, Slave, Unit, Value, Variable
 from orchestrator.master.signals import Signal
-from orchestrator.master.values import nearest, one_line, typed_value, types_fit
+from orchestrator.master.values import nearest, typed_value, types_fit
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Instance:
     """
 
     name: str
-    model: Model
+    model: ModelInterface
     create: Callable[[str], Slave]
     start: Start = field(default_factory=dict)
 
@@ -63,7 +63,7 @@ class Connection:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class SignalSource:
     """A signal that the master feeds into an input, added to what is connected to it.
 
     Attributes:
@@ -81,39 +81,15 @@ class Source:
     at: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """What is wrong with a scenario, and where.
-
-    Attributes:
-        path: such as ``$.connections[2].to``.
-        text: "`x` must ..., but is ...".
-        mismatch: two variables cannot be connected.
-    """
-
-    path: str
-    text: str
-    mismatch: bool = False
-
-    def __str__(self) -> str:
-        return f"{self.path}: {self.text}"
-
-
-def raise_problems(problems: list[Problem], origin: str = "") -> None:
-    """Raise one error that names all ``problems``; none, no error.
-
-    Raises:
-        ConnectionMismatchError: all of them are connections that cannot be made.
-        ScenarioError: otherwise.
-    """
-    if not problems:
-        return
-    text = one_line((f"{origin}: " if origin else "") + "; ".join(str(p) for p in problems))
-    raise ConnectionMismatchError(text) if all(p.mismatch for p in problems) else ScenarioError(text)
-
-
 def split(address: str) -> tuple[str, str]:
-    """Return instance and variable of ``instance.variable``; only the variable's name may contain dots."""
+    """Return instance and variable of ``instance.variable``; only the variable's name may contain dots.
+
+    Args:
+        address: ``instance.variable``.
+
+    Returns:
+        The two names.
+    """
     instance, _, variable = address.partition(".")
     return instance, variable
 
@@ -131,21 +107,42 @@ class System:
 
     instances: tuple[Instance, ...]
     connections: tuple[Connection, ...] = ()
-    sources: tuple[Source, ...] = ()
+    sources: tuple[SignalSource, ...] = ()
     order: tuple[str, ...] = ()
 
     def instance(self, name: str) -> Instance | None:
-        """Return the instance called ``name``, if there is one."""
+        """Return the instance called ``name``, if there is one.
+
+        Args:
+            name: of the instance.
+
+        Returns:
+            The instance.
+        """
         return next((i for i in self.instances if i.name == name), None)
 
     def variable(self, address: str) -> Variable | None:
-        """Return the variable at ``instance.variable``, if there is one."""
+        """Return the variable at ``instance.variable``, if there is one.
+
+        Args:
+            address: ``instance.variable``.
+
+        Returns:
+            The variable.
+        """
         name, variable = split(address)
         instance = self.instance(name)
         return None if instance is None else instance.model.variables.get(variable)
 
     def unit(self, address: str) -> Unit | None:
-        """Return the unit of the variable at ``address``, if it has one."""
+        """Return the unit of the variable at ``address``, if it has one.
+
+        Args:
+            address: ``instance.variable``.
+
+        Returns:
+            The unit.
+        """
         variable = self.variable(address)
         instance = self.instance(split(address)[0])
         if variable is None or variable.unit is None or instance is None:
@@ -153,7 +150,11 @@ class System:
         return units.resolve(variable.unit, instance.model.units)
 
     def loops(self) -> list[tuple[str, ...]]:
-        """Return the algebraic loops: groups of instances whose outputs depend on one another at the same instant."""
+        """Return the algebraic loops: groups of instances whose outputs depend on one another at the same instant.
+
+        Returns:
+            Names of instances, a group per loop.
+        """
         edges = self._feedthrough_edges()
         groups = components([i.name for i in self.instances], edges)
         return [g for g in groups if len(g) > 1 or g[0] in edges.get(g[0], ())]
@@ -163,6 +164,9 @@ class System:
 
         A connection orders two instances only if an output of the receiver depends on the input directly. An input
         that is held over a step, such as a plant's torque, orders nothing: plant, estimator, controller.
+
+        Returns:
+            Every instance's name once.
         """
         if self.order:
             return self.order
@@ -170,7 +174,14 @@ class System:
         return tuple(name for group in groups for name in group)
 
     def fed_through(self, address: str) -> bool:
-        """Return whether the model declares that an output depends on this input at the same instant."""
+        """Return whether the model declares that an output depends on this input at the same instant.
+
+        Args:
+            address: ``instance.variable``.
+
+        Returns:
+            True when one does.
+        """
         name, variable = split(address)
         instance = self.instance(name)
         return instance is not None and any(variable in inputs for inputs in instance.model.feedthrough.values())
@@ -187,7 +198,11 @@ class System:
         return edges
 
     def problems(self) -> list[Problem]:
-        """Return everything that is wrong with names, causalities, types, units, values and order; empty when sound."""
+        """Return everything that is wrong with names, causalities, types, units, values and order; empty when sound.
+
+        Returns:
+            Each problem with the path to its entry.
+        """
         found = self._instance_problems()
         driven: dict[str, int] = {}
         for k, connection in enumerate(self.connections):
@@ -201,11 +216,23 @@ class System:
         return found + self._order_problems()
 
     def check(self, origin: str = "") -> None:
-        """Raise what ``problems`` finds, see ``raise_problems``."""
+        """Raise what ``problems`` finds, see ``raise_problems``.
+
+        Args:
+            origin: what the text begins with, such as a file's name.
+        """
         raise_problems(self.problems(), origin)
 
     def start_value(self, address: str, value: Value | Quantity) -> tuple[Value | None, str | None]:
-        """Return ``value`` as the variable at ``address`` takes it, or ``None`` and what is wrong with it."""
+        """Return ``value`` as the variable at ``address`` takes it, or ``None`` and what is wrong with it.
+
+        Args:
+            address: ``instance.variable``.
+            value: plain, in the variable's unit, or with a unit of its own.
+
+        Returns:
+            The value and None, or None and the reason.
+        """
         variable = self.variable(address)
         if variable is None:
             return None, self._unknown(address)
@@ -285,7 +312,7 @@ class System:
             return [Problem(f"{path}.unit", text, mismatch=True)]
         return []
 
-    def _source_problems(self, k: int, source: Source) -> list[Problem]:
+    def _source_problems(self, k: int, source: SignalSource) -> list[Problem]:
         path = f"$.sources[{k}]"
         found = self._end_problems(f"{path}.to", source.target, "input")
         if source.at not in {None, "start", "end"}:
@@ -322,7 +349,14 @@ class System:
         return []
 
     def record_problems(self, record: tuple[str, ...]) -> list[Problem]:
-        """Return what is wrong with a list of signals to be recorded."""
+        """Return what is wrong with a list of signals to be recorded.
+
+        Args:
+            record: ``instance.variable`` of each.
+
+        Returns:
+            Each problem with the path to its entry.
+        """
         found = []
         for k, address in enumerate(record):
             variable = self.variable(address)

@@ -57,7 +57,15 @@ class Wiring:
 
 
 def wire(layout: Layout, slaves: Mapping[str, Slave]) -> Wiring:
-    """Bind ``slaves`` to the slots of ``layout``."""
+    """Bind ``slaves`` to the slots of ``layout``.
+
+    Args:
+        layout: plan of the signals.
+        slaves: by instance name.
+
+    Returns:
+        Slots, all zero, and stages in execution order.
+    """
     values = np.zeros(layout.size)
     view = values.data
     stages = tuple(_stage(block, slaves[block.name], values, view) for block in layout.blocks)
@@ -95,7 +103,14 @@ def _copies(feeds: tuple[Feed, ...], view: View) -> tuple[Copy, ...]:
 
 
 def gather(stage: Stage, view: View, table: NDArray[np.float64], column: int) -> None:
-    """Fill the input slots of a stage from the outputs and from ``column`` of the table of signals."""
+    """Fill the input slots of a stage from the outputs and from ``column`` of the table of signals.
+
+    Args:
+        stage: whose inputs are filled.
+        view: of all slots.
+        table: see ``Layout.signal_table``.
+        column: 0 for initialisation, ``n + 1`` for step ``n``.
+    """
     for target, source in stage.copies:
         target[:] = source
     for feed in stage.mixed:
@@ -105,11 +120,11 @@ def gather(stage: Stage, view: View, table: NDArray[np.float64], column: int) ->
         if feed.signal >= 0:
             value += table[feed.signal, column]
         if feed.quantum > 0.0:
-            value = quantised(value, feed.quantum)
+            value = _quantised(value, feed.quantum)
         view[feed.slot] = value
 
 
-def quantised(value: float, quantum: float) -> float:
+def _quantised(value: float, quantum: float) -> float:
     """Return the multiple of ``quantum`` nearest to ``value``; what is not finite stays as it is."""
     scaled = value / quantum
     return quantum * round(scaled) if abs(scaled) < 2.0**53 else value

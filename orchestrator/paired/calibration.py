@@ -5,10 +5,14 @@ adds to S, and its spread is modelled over the size; a second, disjoint set of r
 (split conformal prediction: Vovk, Gammerman and Shafer, 2005), so that it covers what it claims.
 """
 
+import contextlib
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any, Protocol
 
 import msgspec
 import numpy as np
@@ -16,27 +20,25 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 import pyfmu_sources
-from orchestrator import __version__
-from orchestrator.cache import cache_directory
+from orchestrator.building.fastest import NATIVE, ensure_fastest
 from orchestrator.errors import CalibrationError
-from orchestrator.output import write_text
-from orchestrator.paired.compiled_loop import CompiledLoop, compiled_loop
+from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import difference_sum
+from orchestrator.paired.native_loop import NativeLoop
+from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.cores import usable_cores
+from orchestrator.shared.output import write_text
+from orchestrator.shared.version import __version__
 
 Array = NDArray[np.float64]
+Each = Callable[[Callable[[Any], float], Iterable[Any]], Iterable[float]]
+"""``map`` of a pool of threads."""
 
 # Seeds of calibration and of tests come from different branches of one tree, so that none is ever shared.
 CALIBRATION_BRANCH = 7
-CLEAN_SIZES = 241
-NOISY_SIZES = 121
-SEEDS_PER_SIZE = 24
-VALIDATION_RUNS = 4000
-LEVEL = 0.95
-MARGIN_BELOW = 0.75
-MARGIN_ABOVE = 1.1
-# How many standard deviations of noise below the smallest calibrated S still count as a very small gap.
-EDGE_DEVIATIONS = 5.0
+DEFAULT_SETTINGS: CalibrationSettings = CalibrationSettings()
 
 
 class Calibration(msgspec.Struct, frozen=True):
@@ -55,6 +57,7 @@ class Calibration(msgspec.Struct, frozen=True):
         level: what the interval claims to cover.
         runs: how many runs it was made from.
         seed_branch: the branch of the seed tree that they came from.
+        settings: of the calibration.
     """
 
     experiment: dict[str, object]
@@ -69,6 +72,7 @@ class Calibration(msgspec.Struct, frozen=True):
     level: float
     runs: int
     seed_branch: int
+    settings: CalibrationSettings
 
 
 @dataclass(frozen=True)
@@ -80,26 +84,83 @@ class GapEstimate:
     upper: float
 
 
+class CalibratedLoop(Protocol):
+    """What is calibrated: a loop of an experiment."""
+
+    @property
+    def experiment(self) -> Experiment:
+        """The experiment."""
+
+    def run(self, alpha: float, errors: tuple[Array, Array]) -> Array:
+        """Return (n, columns) of a run with the half-gap ``alpha``; column 2 is the estimated load angle.
+
+        Args:
+            alpha: half-gap [rad].
+            errors: errors [rad] of both encoders, each (n,).
+
+        Returns:
+            The signals.
+        """
+
+
+class GapMap:
+    """A calibration, ready to be asked many times.
+
+    Args:
+        calibration: the map.
+    """
+
+    def __init__(self, calibration: Calibration) -> None:
+        self._calibration = calibration
+        self._centre = PchipInterpolator(calibration.log_sum, calibration.log_alpha)
+        self._log_sum, self._spread = np.array(calibration.log_sum), np.array(calibration.log_spread)
+        self._room = _noise_below(calibration)
+
+    def estimate(self, total: float) -> GapEstimate:
+        """Return the half-gap that the metric ``total`` [rad] stands for.
+
+        Args:
+            total: the metric S [rad].
+
+        Returns:
+            The half-gap and its interval.
+
+        Raises:
+            CalibrationError: ``total`` lies outside what was calibrated; nothing is extrapolated.
+        """
+        calibration = self._calibration
+        low, high = np.exp(calibration.log_sum[0]), np.exp(calibration.log_sum[-1])
+        if low * np.exp(-self._room) <= total < low:
+            smallest = float(np.exp(calibration.log_alpha[0]))
+            return GapEstimate(smallest, 0.0, smallest * float(np.exp(calibration.width * calibration.log_spread[0])))
+        if not low <= total <= high:
+            raise CalibrationError(
+                f"`S` must lie within the calibrated {low:.6g} to {high:.6g} rad, but is {total:.6g}: the gap is "
+                f"outside {calibration.smallest:g} to {calibration.largest:g} rad"
+            )
+        at = np.log(total)
+        centre = float(self._centre(at))
+        reach = calibration.width * float(np.interp(at, self._log_sum, self._spread))
+        return GapEstimate(float(np.exp(centre)), float(np.exp(centre - reach)), float(np.exp(centre + reach)))
+
+
 def estimate_gap(calibration: Calibration, total: float) -> GapEstimate:
-    """Return the half-gap that the metric ``total`` [rad] stands for.
+    """Return the half-gap that the metric ``total`` [rad] stands for, see ``GapMap.estimate``.
+
+    Args:
+        calibration: of the experiment.
+        total: S [rad].
+
+    Returns:
+        The half-gap and its interval.
+
+    Returns:
+        The half-gap and its 95 % interval [rad].
 
     Raises:
-        CalibrationError: ``total`` lies outside what was calibrated; nothing is extrapolated.
+        CalibrationError: ``total`` lies outside what was calibrated.
     """
-    low, high = np.exp(calibration.log_sum[0]), np.exp(calibration.log_sum[-1])
-    room = _noise_below(calibration)
-    if low * np.exp(-room) <= total < low:
-        smallest = float(np.exp(calibration.log_alpha[0]))
-        return GapEstimate(smallest, 0.0, smallest * float(np.exp(calibration.width * calibration.log_spread[0])))
-    if not low <= total <= high:
-        raise CalibrationError(
-            f"`S` must lie within the calibrated {low:.6g} to {high:.6g} rad, but is {total:.6g}: the gap is outside "
-            f"{calibration.smallest:g} to {calibration.largest:g} rad"
-        )
-    at = np.log(total)
-    centre = float(PchipInterpolator(calibration.log_sum, calibration.log_alpha)(at))
-    reach = calibration.width * float(np.interp(at, calibration.log_sum, calibration.log_spread))
-    return GapEstimate(float(np.exp(centre)), float(np.exp(centre - reach)), float(np.exp(centre + reach)))
+    return GapMap(calibration).estimate(total)
 
 
 def _noise_below(calibration: Calibration) -> float:
@@ -107,20 +168,28 @@ def _noise_below(calibration: Calibration) -> float:
     if not calibration.experiment["encoder_noise"]:
         return 0.0
     slope = (calibration.log_sum[1] - calibration.log_sum[0]) / (calibration.log_alpha[1] - calibration.log_alpha[0])
-    return EDGE_DEVIATIONS * calibration.log_spread[0] * slope
+    return calibration.settings.edge_deviations * calibration.log_spread[0] * slope
 
 
-def load_or_calibrate(experiment: Experiment, progress: Callable[[str], None] | None = None) -> Calibration:
+def load_or_calibrate(
+    experiment: Experiment,
+    progress: Callable[[str], None] | None = None,
+    settings: CalibrationSettings = DEFAULT_SETTINGS,
+) -> Calibration:
     """Return the calibration of ``experiment`` from the user's cache, or make and store it.
 
     Args:
         experiment: what is calibrated.
         progress: told what is going on.
+        settings: of the calibration.
+
+    Returns:
+        The map.
 
     Raises:
         CalibrationError: S is not strictly monotone over the sizes claimed.
     """
-    path = cache_directory("calibrations") / f"{_digest(experiment)}.json"
+    path = cache_directory("calibrations") / f"{_digest(experiment, settings)}.json"
     if path.exists():
         try:
             return msgspec.json.decode(path.read_bytes(), type=Calibration)
@@ -128,43 +197,79 @@ def load_or_calibrate(experiment: Experiment, progress: Callable[[str], None] | 
             path.unlink()
     if progress is not None:
         progress(f"calibrating the {experiment.name} experiment at encoder noise {experiment.encoder_noise:g} rad")
-    calibration = calibrate(experiment)
-    write_text(path, msgspec.json.format(msgspec.json.encode(calibration), indent=1).decode())
+    calibration = calibrate(experiment, settings)
+    with contextlib.suppress(OSError):  # a full cache costs time, no result
+        write_text(path, msgspec.json.format(msgspec.json.encode(calibration), indent=1).decode())
     return calibration
 
 
-def _digest(experiment: Experiment) -> str:
+def _digest(experiment: Experiment, settings: CalibrationSettings) -> str:
     digest = hashlib.sha256(experiment.digest().encode())
+    digest.update(msgspec.json.encode(settings))
     for folder in (Path(pyfmu_sources.__file__).parent, Path(__file__).parent):
         for source in sorted(folder.glob("*.py")):
             digest.update(source.read_bytes())
     return digest.hexdigest()[:24]
 
 
-def calibrate(experiment: Experiment) -> Calibration:
+def calibrate(experiment: Experiment, settings: CalibrationSettings = DEFAULT_SETTINGS) -> Calibration:
     """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds.
+
+    Args:
+        experiment: what is calibrated.
+        settings: of the calibration.
+
+    Returns:
+        The map.
 
     Raises:
         CalibrationError: S is not strictly monotone over the sizes claimed.
     """
-    loop = compiled_loop(experiment)
+    builds = ensure_fastest(FMUS)
+    if builds.kind != NATIVE:
+        from orchestrator.paired.compiled_loop import compiled_loop  # numba takes its time to import
+
+        return calibrate_loop(compiled_loop(experiment), settings)
+    with closing(NativeLoop(experiment, builds.paths)) as loop:
+        return calibrate_loop(loop, settings, usable_cores())
+
+
+def calibrate_loop(loop: CalibratedLoop, settings: CalibrationSettings, threads: int = 1) -> Calibration:
+    """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`.
+
+    Args:
+        loop: what runs it.
+        settings: of the calibration.
+        threads: in which ``loop.run`` is called; the map does not depend on their number.
+
+    Returns:
+        The map.
+    """
+    with ThreadPoolExecutor(threads) as pool:
+        return _calibrated(loop, settings, pool.map)
+
+
+def _calibrated(loop: CalibratedLoop, settings: CalibrationSettings, each: Each) -> Calibration:
+    experiment = loop.experiment
     zero = (np.zeros(experiment.steps + 1), np.zeros(experiment.steps + 1))
     twin = loop.run(0.0, zero)[:, 2]
-    sizes = np.geomspace(experiment.smallest * MARGIN_BELOW, experiment.largest * MARGIN_ABOVE, CLEAN_SIZES)
-    sums = np.array([difference_sum(loop.run(a, zero)[:, 2], twin) for a in sizes])
+    sizes = np.geomspace(
+        experiment.smallest * settings.margin_below, experiment.largest * settings.margin_above, settings.clean_sizes
+    )
+    sums = np.array(list(each(lambda alpha: difference_sum(loop.run(alpha, zero)[:, 2], twin), sizes)))
     _require_monotone(sums, sizes, experiment)
     log_alpha, log_sum = np.log(sizes), np.log(sums)
     runs = len(sizes)
     if experiment.encoder_noise == 0.0:
-        spread = _interpolation_error(log_sum, log_alpha)
+        spread = _interpolation_error(log_sum, log_alpha, settings.least_spread)
     else:
-        log_sum, spread = _noisy_map(loop, twin, log_alpha, log_sum)
+        log_sum, spread = _noisy_map(loop, twin, log_alpha, log_sum, settings, each)
         _require_monotone(np.exp(log_sum), sizes, experiment)
-        runs += NOISY_SIZES * SEEDS_PER_SIZE
-    width = _conformal_width(loop, twin, log_alpha, log_sum, spread)
+        runs += settings.noisy_sizes * settings.seeds_per_size
+    width = _conformal_width(loop, twin, log_alpha, log_sum, spread, settings, each)
     return Calibration(
         experiment=asdict(experiment),
-        digest=_digest(experiment),
+        digest=_digest(experiment, settings),
         version=__version__,
         smallest=experiment.smallest,
         largest=experiment.largest,
@@ -172,9 +277,10 @@ def calibrate(experiment: Experiment) -> Calibration:
         log_alpha=log_alpha.tolist(),
         log_spread=spread.tolist(),
         width=width,
-        level=LEVEL,
-        runs=runs + VALIDATION_RUNS,
+        level=settings.level,
+        runs=runs + settings.validation_runs,
         seed_branch=CALIBRATION_BRANCH,
+        settings=settings,
     )
 
 
@@ -188,40 +294,43 @@ def _require_monotone(sums: Array, sizes: Array, experiment: Experiment) -> None
         )
 
 
-def _interpolation_error(log_sum: Array, log_alpha: Array) -> Array:
+def _interpolation_error(log_sum: Array, log_alpha: Array, least: float) -> Array:
     """Return how far every second node lies from the map through the others, as the larger of neighbours."""
     coarse = PchipInterpolator(log_sum[::2], log_alpha[::2])
     error = np.abs(coarse(log_sum) - log_alpha)
     nearby = np.array([error[max(0, n - 2) : n + 3].max() for n in range(len(error))])
-    return np.maximum(nearby, 1e-12)
+    return np.maximum(nearby, least)
 
 
 def _generator(*key: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(0, spawn_key=(CALIBRATION_BRANCH, *key)))
 
 
-def _noisy_sum(loop: CompiledLoop, twin: Array, alpha: float, generator: np.random.Generator) -> float:
+def _noisy_sum(loop: CalibratedLoop, twin: Array, alpha: float, generator: np.random.Generator) -> float:
     noise = loop.experiment.encoder_noise
     errors = generator.normal(0.0, noise, (2, len(twin)))
     return difference_sum(loop.run(alpha, (errors[0], errors[1]))[:, 2], twin)
 
 
-def _noisy_map(loop: CompiledLoop, twin: Array, log_alpha: Array, log_sum: Array) -> tuple[Array, Array]:
+def _noisy_map(
+    loop: CalibratedLoop, twin: Array, log_alpha: Array, log_sum: Array, settings: CalibrationSettings, each: Each
+) -> tuple[Array, Array]:
     """Return (mean of log S under noise, spread of log alpha_hat), both at the clean map's nodes."""
-    nodes = np.linspace(log_alpha[0], log_alpha[-1], NOISY_SIZES)
+    nodes = np.linspace(log_alpha[0], log_alpha[-1], settings.noisy_sizes)
     clean = PchipInterpolator(log_alpha, log_sum)
-    shift = np.empty(NOISY_SIZES)
-    variance = np.empty(NOISY_SIZES)
-    for n, node in enumerate(nodes):
-        draws = [
-            np.log(_noisy_sum(loop, twin, float(np.exp(node)), _generator(0, n, s))) for s in range(SEEDS_PER_SIZE)
-        ]
-        shift[n] = np.mean(draws) - clean(node)
-        variance[n] = np.var(draws, ddof=1)
+    count = settings.seeds_per_size
+
+    def drawn(job: int) -> float:
+        n, seed = divmod(job, count)
+        return float(np.log(_noisy_sum(loop, twin, float(np.exp(nodes[n])), _generator(0, n, seed))))
+
+    draws = np.array(list(each(drawn, range(settings.noisy_sizes * count)))).reshape(-1, count)
+    shift = draws.mean(axis=1) - clean(nodes)
+    variance = draws.var(axis=1, ddof=1)
     moved = log_sum + PchipInterpolator(nodes, _smoothed(shift))(log_alpha)
     slope = PchipInterpolator(log_alpha, moved).derivative()(log_alpha)
     deviation = np.exp(0.5 * PchipInterpolator(nodes, np.log(_smoothed(variance)))(log_alpha))
-    return moved, deviation / np.maximum(np.abs(slope), 1e-6)
+    return moved, deviation / np.maximum(np.abs(slope), settings.least_slope)
 
 
 def _smoothed(values: Array) -> Array:
@@ -230,15 +339,25 @@ def _smoothed(values: Array) -> Array:
     return np.convolve(padded, np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0, mode="valid")
 
 
-def _conformal_width(loop: CompiledLoop, twin: Array, log_alpha: Array, log_sum: Array, spread: Array) -> float:
-    """Return the multiple of the spread that covers ``LEVEL`` of runs that the map has not seen."""
+def _conformal_width(
+    loop: CalibratedLoop,
+    twin: Array,
+    log_alpha: Array,
+    log_sum: Array,
+    spread: Array,
+    settings: CalibrationSettings,
+    each: Each = map,
+) -> float:
+    """Return the multiple of the spread that covers ``settings.level`` of runs that the map has not seen."""
     inverse = PchipInterpolator(log_sum, log_alpha)
     low, high = np.log(loop.experiment.smallest), np.log(loop.experiment.largest)
-    scores = np.empty(VALIDATION_RUNS)
-    for n in range(VALIDATION_RUNS):
+
+    def score(n: int) -> float:
         generator = _generator(1, n)
         actual = generator.uniform(low, high)
         at = np.clip(np.log(_noisy_sum(loop, twin, float(np.exp(actual)), generator)), log_sum[0], log_sum[-1])
-        scores[n] = abs(float(inverse(at)) - actual) / float(np.interp(at, log_sum, spread))
-    rank = int(np.ceil((VALIDATION_RUNS + 1) * LEVEL)) - 1
-    return float(np.sort(scores)[min(rank, VALIDATION_RUNS - 1)])
+        return abs(float(inverse(at)) - actual) / float(np.interp(at, log_sum, spread))
+
+    scores = np.array(list(each(score, range(settings.validation_runs))))
+    rank = int(np.ceil((settings.validation_runs + 1) * settings.level)) - 1
+    return float(np.sort(scores)[min(rank, settings.validation_runs - 1)])

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.compiled import compiled
 from orchestrator.paired.experiment import Experiment
+from orchestrator.plants.compiled import compiled
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS, parameters
 
 Array = NDArray[np.float64]
@@ -33,9 +33,12 @@ class CompiledLoop:
         Args:
             alpha: half-gap [rad].
             errors: errors [rad] of both encoders, each of shape (steps + 1,).
+
+        Returns:
+            The signals.
         """
         e = self.experiment
-        p = plant_parameters(e, alpha)
+        p = _plant_parameters(e, alpha)
         drivetrain = compiled("drivetrain")
         x = drivetrain.consistent_start((0.0,) * 8, p)
         table = drivetrain.prepare(p, e.sample_time)
@@ -55,7 +58,7 @@ class CompiledLoop:
         return out
 
 
-def plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]:
+def _plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]:
     """Return the plant's flat parameter tuple for a half-gap ``alpha`` [rad]."""
     v = experiment.values
     return parameters(
@@ -73,7 +76,14 @@ def plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]:
 
 
 def compiled_loop(experiment: Experiment) -> CompiledLoop:
-    """Return the loop of ``experiment``, designed and ready to run."""
+    """Return the loop of ``experiment``, designed and ready to run.
+
+    Args:
+        experiment: what is run.
+
+    Returns:
+        The loop.
+    """
     estimator = experiment.estimator()
     S = estimator.S_inverse
     reference, speed = experiment.reference()

@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.design import Estimator
-from orchestrator.fmi.slave import fmu_instance
+from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.protocol import Value
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
-from orchestrator.master.system import Connection, Instance, Source, System
+from orchestrator.master.system import Connection, Instance, SignalSource, System
 from orchestrator.paired.experiment import Experiment
+from orchestrator.plants.design import KalmanFilter
 
 Array = NDArray[np.float64]
 FMUS = ("Drivetrain", "KalmanEstimator", "LqrController")
+PARTS = ("plant", "estimator", "controller")
 ESTIMATES = ("theta_m_hat", "omega_m_hat", "theta_l_hat", "omega_l_hat", "T_l_hat", "T_m_hat")
 # Signals that a loop records, by the names that results use.
 RECORDED = {
@@ -42,18 +43,32 @@ def loop_system(experiment: Experiment, fmus: Mapping[str, Path], prefixes: tupl
         experiment: what is run.
         fmus: paths of the three ``FMUS``.
         prefixes: ``(MACHINE,)``, ``(TWIN,)`` or both.
+
+    Returns:
+        The system.
     """
+    values = loop_values(experiment)
     instances: list[Instance] = []
     connections: list[Connection] = []
-    sources: list[Source] = []
+    sources: list[SignalSource] = []
     for prefix in prefixes:
-        instances += _instances(experiment, fmus, prefix)
-        connections += _connections(prefix)
+        instances += [
+            fmu_instance(f"{prefix}{part}", fmus[fmu], values[fmu]) for fmu, part in zip(FMUS, PARTS, strict=True)
+        ]
+        connections += [Connection(source, target) for source, target in loop_connections(prefix)]
         sources += _sources(experiment, prefix)
     return System(tuple(instances), tuple(connections), tuple(sources))
 
 
-def _instances(experiment: Experiment, fmus: Mapping[str, Path], prefix: str) -> list[Instance]:
+def loop_values(experiment: Experiment) -> dict[str, dict[str, Any]]:
+    """Return the parameters of a loop without a gap.
+
+    Args:
+        experiment: what is run.
+
+    Returns:
+        Values by name, for each of the three ``FMUS``.
+    """
     e, v = experiment, experiment.values
     gains = {f"K[{n}]": gain for n, gain in enumerate(e.regulator().gains, start=1)}
     controller = gains | {
@@ -62,18 +77,14 @@ def _instances(experiment: Experiment, fmus: Mapping[str, Path], prefix: str) ->
         "u_max": e.torque_limit,
         "sample_time": e.sample_time,
     }
-    plant: dict[str, Value] = {
+    plant: dict[str, Any] = {
         "J_m": v.J_m, "J_l": v.J_l, "k": v.k, "c": v.c, "b_m": v.b_m, "b_l": v.b_l, "i": v.i, "tau": v.tau,
         "alpha": 0.0, "backlash_model": "none",
     }  # fmt: skip
-    return [
-        fmu_instance(f"{prefix}plant", fmus["Drivetrain"], plant),
-        fmu_instance(f"{prefix}estimator", fmus["KalmanEstimator"], estimator_parameters(e.estimator())),
-        fmu_instance(f"{prefix}controller", fmus["LqrController"], controller),
-    ]
+    return dict(zip(FMUS, (plant, _estimator_parameters(e.estimator()), controller), strict=True))
 
 
-def estimator_parameters(estimator: Estimator) -> dict[str, Any]:
+def _estimator_parameters(estimator: KalmanFilter) -> dict[str, Any]:
     """Return the parameters of ``KalmanEstimator`` for a designed filter."""
     rows = range(6)
     return (
@@ -85,27 +96,35 @@ def estimator_parameters(estimator: Estimator) -> dict[str, Any]:
     )
 
 
-def _connections(prefix: str) -> list[Connection]:
-    plant, estimator, controller = f"{prefix}plant", f"{prefix}estimator", f"{prefix}controller"
-    return [
-        Connection(f"{controller}.u", f"{plant}.u"),
-        Connection(f"{controller}.u", f"{estimator}.u"),
-        Connection(f"{plant}.theta_m", f"{estimator}.theta_m"),
-        Connection(f"{plant}.theta_l", f"{estimator}.theta_l"),
-        *(Connection(f"{estimator}.{name}", f"{controller}.{name}") for name in ESTIMATES),
-    ]
+def loop_connections(prefix: str) -> tuple[tuple[str, str], ...]:
+    """Return what is connected in one loop.
+
+    Args:
+        prefix: of its instances.
+
+    Returns:
+        Outputs and the inputs that they feed, ``instance.variable``.
+    """
+    plant, estimator, controller = (f"{prefix}{part}" for part in PARTS)
+    return (
+        (f"{controller}.u", f"{plant}.u"),
+        (f"{controller}.u", f"{estimator}.u"),
+        (f"{plant}.theta_m", f"{estimator}.theta_m"),
+        (f"{plant}.theta_l", f"{estimator}.theta_l"),
+        *((f"{estimator}.{name}", f"{controller}.{name}") for name in ESTIMATES),
+    )
 
 
-def _sources(experiment: Experiment, prefix: str) -> list[Source]:
+def _sources(experiment: Experiment, prefix: str) -> list[SignalSource]:
     angle, speed = experiment.reference()
     h = experiment.sample_time
     found = [
-        Source(f"{prefix}controller.reference", Samples(angle, h)),
-        Source(f"{prefix}controller.reference_speed", Samples(speed, h)),
+        SignalSource(f"{prefix}controller.reference", Samples(angle, h)),
+        SignalSource(f"{prefix}controller.reference_speed", Samples(speed, h)),
     ]
     if prefix == MACHINE:
         zero = Samples(np.zeros(experiment.steps + 1), h)
-        found += [Source("estimator.theta_m", zero), Source("estimator.theta_l", zero)]
+        found += [SignalSource("estimator.theta_m", zero), SignalSource("estimator.theta_l", zero)]
     return found
 
 
@@ -165,6 +184,9 @@ class LoopSession:
             errors: errors [rad] of both encoders at the communication points; default none.
             start: further parameters by ``instance.variable``.
 
+        Returns:
+            Times [s] and the recorded signals.
+
         Raises:
             SlaveError: a slave refused or failed a call.
         """
@@ -178,6 +200,14 @@ class LoopSession:
 
 
 def plant_values(experiment: Experiment, alpha: float) -> dict[str, Value]:
-    """Return the parameters of the plant with a half-gap ``alpha`` [rad]."""
+    """Return the parameters of the plant with a half-gap ``alpha`` [rad].
+
+    Args:
+        experiment: gives the backlash model.
+        alpha: half-gap [rad]; zero for the loop without a gap.
+
+    Returns:
+        Value by ``instance.variable``.
+    """
     model = experiment.backlash_model if alpha else "none"
     return {"plant.alpha": alpha, "plant.backlash_model": model}

@@ -17,20 +17,21 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.design import (
+from orchestrator.errors import CalibrationError, ScenarioError
+from orchestrator.plants.design import (
     DrivetrainValues,
-    Estimator,
+    KalmanFilter,
     Regulator,
     design_estimator,
     design_regulator,
     five_state_model,
     six_state_model,
 )
-from orchestrator.errors import CalibrationError, ScenarioError
+from pyfmu_sources.backlash_models import MODELS
 
 Array = NDArray[np.float64]
 THESIS_SCALE = 48.0
-BACKLASH_MODELS = ("dead_zone", "nordin", "hysteresis", "rigid_impact", "elastic_impact")
+BACKLASH_MODELS = tuple(model.name for model in MODELS if model.gap)
 
 
 @dataclass(frozen=True)
@@ -82,25 +83,44 @@ class Experiment:
         return np.arange(self.steps + 1, dtype=np.float64) * self.sample_time
 
     def reference(self) -> tuple[Array, Array]:
-        """Return the wanted load angle [rad] and speed [rad/s] at the communication points."""
+        """Return the wanted load angle [rad] and speed [rad/s] at the communication points.
+
+        Returns:
+            Angle and speed, each (steps + 1,).
+        """
         phase = 2.0 * np.pi * self.frequency * self.times
         angle = 0.5 * self.amplitude * (1.0 - np.cos(phase))
         return angle, self.amplitude * np.pi * self.frequency * np.sin(phase)
 
     def regulator(self) -> Regulator:
-        """Return the state feedback of both loops."""
+        """Return the state feedback of both loops.
+
+        Returns:
+            The gains.
+        """
         weights = np.diag(self.state_weights)
         return design_regulator(five_state_model(self.values), weights, self.torque_weight, self.sample_time)
 
-    def estimator(self) -> Estimator:
-        """Return the Kalman filter of both loops; it assumes no backlash and is never told of any."""
+    def estimator(self) -> KalmanFilter:
+        """Return the Kalman filter of both loops; it assumes no backlash and is never told of any.
+
+        Returns:
+            The filter.
+        """
         variance = self.assumed_encoder_noise**2
         return design_estimator(
             six_state_model(self.values), np.array(self.process_noise), np.full(2, variance), self.sample_time
         )
 
     def encoder_errors(self, seed: int) -> tuple[Array, Array]:
-        """Return the errors [rad] of motor and load encoder at the communication points, for one ``seed``."""
+        """Return the errors [rad] of motor and load encoder at the communication points, for one ``seed``.
+
+        Args:
+            seed: of the noise.
+
+        Returns:
+            Two arrays (steps + 1,).
+        """
         shape = self.steps + 1
         if self.encoder_noise == 0.0:
             return np.zeros(shape), np.zeros(shape)
@@ -108,7 +128,14 @@ class Experiment:
         return draws[0], draws[1]
 
     def require_size(self, alpha: float) -> None:
-        """Raise a CalibrationError unless ``alpha`` is zero or a size that the experiment claims."""
+        """Raise a CalibrationError unless ``alpha`` is zero or a size that the experiment claims.
+
+        Args:
+            alpha: half-gap [rad].
+
+        Raises:
+            CalibrationError: it is neither 0 nor within what the experiment claims.
+        """
         if alpha != 0.0 and not self.smallest <= alpha <= self.largest:
             raise CalibrationError(
                 f"`alpha` must be 0 or within the calibrated {self.smallest:g} to {self.largest:g} rad of the "
@@ -116,12 +143,20 @@ class Experiment:
             )
 
     def digest(self) -> str:
-        """Return a hash of all values, by which calibrations are stored."""
+        """Return a hash of all values, by which calibrations are stored.
+
+        Returns:
+            16 hexadecimal digits.
+        """
         return hashlib.sha256(msgspec.json.encode(asdict(self))).hexdigest()[:16]
 
 
 def thesis_experiment() -> Experiment:
-    """Return the default experiment scaled to the sizes of the thesis's Table 4.1."""
+    """Return the default experiment scaled to the sizes of the thesis's Table 4.1.
+
+    Returns:
+        The experiment.
+    """
     default = Experiment()
     return replace(
         default,
@@ -138,6 +173,12 @@ EXPERIMENTS = ("default", "thesis")
 
 def named_experiment(name: str) -> Experiment:
     """Return the experiment ``name``.
+
+    Args:
+        name: a key of ``EXPERIMENTS``.
+
+    Returns:
+        The experiment.
 
     Raises:
         ScenarioError: there is no such experiment.

@@ -15,12 +15,21 @@ from orchestrator.paired.cosimulation import LoopRun
 
 Array = NDArray[np.float64]
 BLUE, ORANGE, GREY = "#2166ac", "#d6604d", "#555555"
+MOST_POINTS = 2000  # of a noise level: more are a blot, and take minutes
 SHADE = "#f4d58d"
 DPI = 150
 
 
 def draw_pair(path: Path, with_gap: LoopRun, without_gap: LoopRun, reference: Array, title: str) -> None:
-    """Draw both load positions against time, their difference and the torques, with the time in the gap shaded."""
+    """Draw both load positions against time, their difference and the torques, with the time in the gap shaded.
+
+    Args:
+        path: the picture.
+        with_gap: the loop with a gap.
+        without_gap: the loop without one.
+        reference: (n,) wanted load angle [rad].
+        title: above the picture.
+    """
     figure, axes = _figure(3, (8.0, 7.5))
     time = with_gap.time
     axes[0].plot(time, reference, color=GREY, linewidth=1.0, linestyle=":", label="reference")
@@ -38,14 +47,14 @@ def draw_pair(path: Path, with_gap: LoopRun, without_gap: LoopRun, reference: Ar
     axes[2].set_ylabel("torque [N.m]")
     axes[2].set_xlabel("time [s]")
     for axis in axes:
-        shade_gap(axis, time, with_gap["contact"])
+        _shade_gap(axis, time, with_gap["contact"])
         axis.legend(loc="best", fontsize=8, framealpha=0.9)
         axis.margins(x=0.0)
         axis.grid(alpha=0.25)
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
-def shade_gap(axis: Axes, time: Array, contact: Array) -> None:
+def _shade_gap(axis: Axes, time: Array, contact: Array) -> None:
     """Shade the spans of time in which no teeth touch."""
     free = np.concatenate([[False], contact == 0, [False]])
     edges = np.flatnonzero(free[1:] != free[:-1])
@@ -58,7 +67,17 @@ def shade_gap(axis: Axes, time: Array, contact: Array) -> None:
 def draw_estimates(
     path: Path, actual: Array, estimated: Array, lower: Array, upper: Array, noise: Array, title: str
 ) -> None:
-    """Draw estimated against actual half-gap, and below it their relative deviation, each with its interval."""
+    """Draw estimated against actual half-gap, and below it their relative deviation, each with its interval.
+
+    Args:
+        path: the picture.
+        actual: (n,) half-gaps [rad].
+        estimated: (n,) [rad].
+        lower: (n,) ends of the intervals [rad].
+        upper: (n,) ends of the intervals [rad].
+        noise: (n,) encoder noise of each case [rad].
+        title: above the picture.
+    """
     figure, axes = _figure(2, (6.6, 7.4))
     ends = np.array([actual.min(), actual.max()])
     axes[0].plot(ends, ends, color=GREY, linewidth=0.8, label="estimated = actual")
@@ -103,7 +122,15 @@ def _decimal_ticks(axis: Axis) -> None:
 
 
 def draw_errors(path: Path, actual: Array, estimated: Array, noise: Array, title: str) -> None:
-    """Draw the error in percent against the actual half-gap, one colour for each noise level."""
+    """Draw the error in percent against the actual half-gap, one colour for each noise level.
+
+    Args:
+        path: the picture.
+        actual: (n,) half-gaps [rad].
+        estimated: (n,) [rad].
+        noise: (n,) encoder noise of each case [rad].
+        title: above the picture.
+    """
     figure, (axis,) = _figure(1, (7.0, 4.2))
     percent = 100.0 * np.abs(estimated - actual) / actual
     floor = 1e-7
@@ -132,9 +159,14 @@ def _figure(rows: int, size: tuple[float, float]) -> tuple[Figure, Sequence[Axes
     return figure, list(axes)
 
 
-def _by_noise(noise: Array) -> list[tuple[str, float, NDArray[np.bool_]]]:
+def _by_noise(noise: Array) -> list[tuple[str, float, NDArray[np.intp]]]:
+    """Return colour, noise level and cases of each level, evenly thinned to what can be told apart."""
     colours = (BLUE, ORANGE, "#4d9221", "#762a83", "#8c510a")
-    return [(colours[k % len(colours)], float(level), noise == level) for k, level in enumerate(np.unique(noise))]
+    found = []
+    for k, level in enumerate(np.unique(noise)):
+        cases = np.flatnonzero(noise == level)
+        found.append((colours[k % len(colours)], float(level), cases[:: -(-len(cases) // MOST_POINTS)]))
+    return found
 
 
 def _noise_label(level: float) -> str:
@@ -142,7 +174,14 @@ def _noise_label(level: float) -> str:
 
 
 def draw_signals(path: Path, time: Array, signals: Mapping[str, Array], units: Mapping[str, str]) -> None:
-    """Draw signals against time, those of one unit in one panel."""
+    """Draw signals against time, those of one unit in one panel.
+
+    Args:
+        path: the picture.
+        time: (n,) [s].
+        signals: (n,) each, by name.
+        units: unit by name.
+    """
     names = list(dict.fromkeys(units[name] for name in signals))
     figure, axes = _figure(len(names), (8.0, 1.2 + 2.2 * len(names)))
     for axis, unit in zip(axes, names, strict=True):

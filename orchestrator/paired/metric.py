@@ -1,15 +1,27 @@
 """The metric S and the statistics of estimates."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtr
+
+from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 Array = NDArray[np.float64]
 
 
 def difference_sum(with_gap: Array, without_gap: Array) -> float:
-    """Return S, the sum over samples of ``|theta_l_hat(with) - theta_l_hat(without)|`` [rad]."""
+    """Return S, the sum over samples of ``|theta_l_hat(with) - theta_l_hat(without)|`` [rad].
+
+    Args:
+        with_gap: (n,) estimated load angle of the loop with a gap [rad].
+        without_gap: (n,) that of the loop without one [rad].
+
+    Returns:
+        S [rad].
+    """
     return float(np.abs(with_gap - without_gap).sum())
 
 
@@ -30,6 +42,15 @@ class ErrorStatistics:
 def error_statistics(actual: Array, estimated: Array, lower: Array, upper: Array) -> ErrorStatistics:
     """Return the statistics of estimates of half-gaps, all arrays of one shape [rad].
 
+    Args:
+        actual: (n,) half-gaps.
+        estimated: (n,) their estimates.
+        lower: (n,) lower ends of the intervals.
+        upper: (n,) upper ends.
+
+    Returns:
+        Errors [%] and the share of intervals that hold the actual size.
+
     Raises:
         ValueError: the arrays are empty or differ in shape.
     """
@@ -44,3 +65,24 @@ def error_statistics(actual: Array, estimated: Array, lower: Array, upper: Array
         mse=float(np.mean((estimated - actual) ** 2)),
         coverage=float(inside.mean()),
     )
+
+
+def trust_of_sweep(statistics: Iterable[ErrorStatistics], level: float, failed: int, unlikely: float = 1e-3) -> Trust:
+    """Return how far the estimates of a sweep can be trusted: whether their intervals hold the sizes that were run.
+
+    Args:
+        statistics: of the estimates, at each noise level.
+        level: share of the intervals that should hold the size.
+        failed: cases without an estimate.
+        unlikely: probability of so few held intervals at that level, below which they count as wrong.
+
+    Returns:
+        The trust, with a reason for each noise level whose intervals hold too few sizes.
+    """
+    found = [Reason(Level.AMBER, f"{failed} cases failed")] if failed else []
+    for entry in statistics:
+        held = round(entry.coverage * entry.count)
+        if bdtr(held, entry.count, level) < unlikely:
+            text = f"{held} of {entry.count} intervals hold the size: the twin is not the machine's"
+            found.append(Reason(Level.RED, text))
+    return trust_of(found)

@@ -42,6 +42,9 @@ def run_pair(
         seed: of the encoder noise of the loop with a gap.
         start: further parameters by ``instance.variable``.
 
+    Returns:
+        Both loops, S and the estimate.
+
     Raises:
         SlaveError: a slave refused or failed a call.
     """
@@ -68,7 +71,16 @@ def _prefixed(prefix: str, address: str) -> str:
 
 
 def with_settings(experiment: Experiment, backlash_model: str | None = None, noise: float | None = None) -> Experiment:
-    """Return ``experiment`` with another backlash model or another encoder noise [rad]."""
+    """Return ``experiment`` with another backlash model or another encoder noise [rad].
+
+    Args:
+        experiment: to start from.
+        backlash_model: its name; None: unchanged.
+        noise: [rad]; None: unchanged.
+
+    Returns:
+        The experiment.
+    """
     if backlash_model is not None:
         experiment = replace(experiment, backlash_model=backlash_model)
     if noise is not None:

@@ -26,6 +26,13 @@ def read_sizes(text: str, experiment: Experiment) -> Sizes:
     Random sizes are drawn from all that the experiment claims, evenly in the logarithm; those of the thesis's
     experiment evenly from 1.2 to 4.8 rad, as the thesis did.
 
+    Args:
+        text: in one of these forms.
+        experiment: which claims a range of sizes.
+
+    Returns:
+        The sizes as the engine reads them.
+
     Raises:
         ScenarioError: the text has none of these forms, or a size that is not finite and positive.
         CalibrationError: a size that the experiment does not claim.
@@ -49,7 +56,7 @@ def read_sizes(text: str, experiment: Experiment) -> Sizes:
 
 
 def _unreadable(text: str) -> ScenarioError:
-    return ScenarioError(f"`--sizes` must be {FORMS}, but is {text!r}")
+    return ScenarioError(f"`sizes` must be {FORMS}, but is {text!r}", "sizes")
 
 
 def _count(text: str, word: str) -> int:
@@ -58,7 +65,7 @@ def _count(text: str, word: str) -> int:
     except ValueError:
         raise _unreadable(text) from None
     if not 1 <= count <= MAX_CASES:
-        raise ScenarioError(f"`--sizes` must have a count of 1 to {MAX_CASES:,}, but is {text!r}")
+        raise ScenarioError(f"`sizes` must have a count of 1 to {MAX_CASES:,}, but is {text!r}", "sizes")
     return count
 
 
@@ -71,9 +78,10 @@ def _number(text: str, word: str) -> float:
 
 def _require(alpha: float, experiment: Experiment) -> None:
     if not (math.isfinite(alpha) and alpha > 0.0):
-        raise ScenarioError(f"`--sizes` must be finite and positive, but one is {alpha:g}")
+        raise ScenarioError(f"`sizes` must be finite and positive, but one is {alpha:g}", "sizes")
     if not experiment.smallest <= alpha <= experiment.largest:
         raise CalibrationError(
-            f"`--sizes` must lie within the calibrated {experiment.smallest:g} to {experiment.largest:g} rad of the "
-            f"{experiment.name} experiment, but one is {alpha:g}"
+            f"`sizes` must lie within the calibrated {experiment.smallest:g} to {experiment.largest:g} rad of the "
+            f"{experiment.name} experiment, but one is {alpha:g}",
+            "sizes",
         )

@@ -3,6 +3,7 @@
 The twin without a gap has no noise and is the same for every case, so each worker process runs it once.
 """
 
+from array import array
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,25 +12,26 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.engine import Case, Column, DesignCases, Row, Status, Work, parse_design
+from orchestrator.engine import Case, DesignCases, ResultColumn, Row, Status, Work, parse_design
 from orchestrator.engine.cases import Value
 from orchestrator.engine.grid import MAX_CASES
 from orchestrator.errors import ScenarioError
-from orchestrator.paired.calibration import Calibration, estimate_gap, load_or_calibrate
+from orchestrator.paired.calibration import DEFAULT_SETTINGS, Calibration, GapMap, load_or_calibrate
 from orchestrator.paired.cosimulation import LoopSession
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, difference_sum, error_statistics
 from orchestrator.paired.pair import with_settings
+from orchestrator.paired.settings import CalibrationSettings
 from orchestrator.paired.sizes import read_sizes
 
 Array = NDArray[np.float64]
 COLUMNS = (
-    Column("S", "rad"),
-    Column("estimate", "rad"),
-    Column("lower", "rad"),
-    Column("upper", "rad"),
-    Column("error", "rad"),
-    Column("error_percent", "%"),
+    ResultColumn("S", "rad"),
+    ResultColumn("estimate", "rad"),
+    ResultColumn("lower", "rad"),
+    ResultColumn("upper", "rad"),
+    ResultColumn("error", "rad"),
+    ResultColumn("error_percent", "%"),
 )
 OWN_PARAMETERS = frozenset({"alpha", "noise", "repetition"})
 
@@ -59,15 +61,18 @@ class SweepPlan:
     def cases(self) -> DesignCases:
         """Return the cases, checked against the range that the experiment claims.
 
+        Returns:
+            The cases.
+
         Raises:
             ScenarioError: a specification that cannot be read, or a count below 1.
             CalibrationError: a size outside the calibrated range.
         """
         if not 1 <= self.repetitions <= MAX_CASES:
-            raise ScenarioError(f"`--seeds` must be 1 to {MAX_CASES:,}, but is {self.repetitions:g}")
+            raise ScenarioError(f"`seeds` must be 1 to {MAX_CASES:,}, but is {self.repetitions:g}", "seeds")
         for level in self.noise:
             if not (np.isfinite(level) and level >= 0.0):
-                raise ScenarioError(f"`--noise` must be finite and not negative, but is {level}")
+                raise ScenarioError(f"`noise` must be finite and not negative, but is {level}", "noise")
         sizes = read_sizes(self.sizes, self.experiment)
         specifications = [
             f"alpha={sizes.specification}",
@@ -77,17 +82,36 @@ class SweepPlan:
         ]
         return DesignCases(parse_design(specifications, sizes.count or self.samples, self.seed), self.seed)
 
-    def calibrations(self, progress: Callable[[str], None] | None = None) -> dict[float, Calibration]:
+    def calibrations(
+        self, progress: Callable[[str], None] | None = None, settings: CalibrationSettings = DEFAULT_SETTINGS
+    ) -> dict[float, Calibration]:
         """Return the calibration of each noise level; ``progress`` is told of those that must be made.
+
+        Args:
+            progress: is told what is calibrated.
+            settings: of the calibration.
+
+        Returns:
+            Calibration by noise level [rad].
 
         Raises:
             CalibrationError: S is not monotone for this experiment.
         """
-        return {level: load_or_calibrate(with_settings(self.experiment, noise=level), progress) for level in self.noise}
+        levels = {level: with_settings(self.experiment, noise=level) for level in self.noise}
+        return {level: load_or_calibrate(experiment, progress, settings) for level, experiment in levels.items()}
 
 
 def sweep_work(plan: SweepPlan, fmus: Mapping[str, Path], calibrations: Mapping[float, Calibration]) -> Work:
-    """Return what a worker process does for each case."""
+    """Return what a worker process does for each case.
+
+    Args:
+        plan: what is varied.
+        fmus: paths of the three ``FMUS``.
+        calibrations: by noise level [rad].
+
+    Returns:
+        Columns, files and functions.
+    """
     return Work(
         prepare=_prepare,
         run=_run,
@@ -98,6 +122,7 @@ def sweep_work(plan: SweepPlan, fmus: Mapping[str, Path], calibrations: Mapping[
             "experiment": asdict(plan.experiment),
             "calibrations": {repr(level): c.digest for level, c in calibrations.items()},
         },
+        unpacked=True,
     )
 
 
@@ -106,13 +131,14 @@ class _Prepared:
     session: LoopSession
     twin: Array
     experiment: Experiment
-    calibrations: Mapping[float, Calibration]
+    maps: Mapping[float, GapMap]
 
 
 def _prepare(payload: tuple[Experiment, dict[float, Calibration]], files: Mapping[str, Path]) -> _Prepared:
     experiment, calibrations = payload
     session = LoopSession(experiment, files, ("theta_l_hat",))
-    return _Prepared(session, session.run(0.0)["theta_l_hat"].copy(), experiment, calibrations)
+    maps = {level: GapMap(calibration) for level, calibration in calibrations.items()}
+    return _Prepared(session, session.run(0.0)["theta_l_hat"].copy(), experiment, maps)
 
 
 def _run(prepared: _Prepared, case: Case) -> dict[str, Value]:
@@ -126,7 +152,7 @@ def _run(prepared: _Prepared, case: Case) -> dict[str, Value]:
     total = difference_sum(loop["theta_l_hat"], prepared.twin)
     if not np.isfinite(total):
         return dict.fromkeys((c.name for c in COLUMNS), total)
-    gap = estimate_gap(prepared.calibrations[noise], total)
+    gap = prepared.maps[noise].estimate(total)
     error = abs(gap.alpha - alpha)
     return {
         "S": total,
@@ -149,7 +175,11 @@ class SweepArrays:
     upper: Array
 
     def statistics(self) -> dict[float, ErrorStatistics]:
-        """Return the statistics of each noise level."""
+        """Return the statistics of each noise level.
+
+        Returns:
+            Statistics by noise level [rad].
+        """
         found = {}
         for level in np.unique(self.noise):
             chosen = self.noise == level
@@ -160,14 +190,21 @@ class SweepArrays:
 
 
 def gather(rows: Iterable[Row]) -> SweepArrays:
-    """Return the columns of all rows that are done."""
-    collected: list[tuple[float, ...]] = []
+    """Return the columns of all rows that are done.
+
+    Args:
+        rows: of the sweep.
+
+    Returns:
+        Columns of one length.
+    """
+    collected = array("d")  # eight bytes a number: a million rows as tuples take a quarter of a gigabyte
     for row in rows:
         if row.outcome.status is Status.DONE:
             values: dict[str, Any] = dict(zip((c.name for c in COLUMNS), row.outcome.values, strict=True))
             parameters: Mapping[str, Any] = row.case.parameters
-            collected.append(
+            collected.extend(
                 (parameters["alpha"], parameters["noise"], values["estimate"], values["lower"], values["upper"])
             )
-    table = np.array(collected, dtype=float).reshape(-1, 5)
+    table = np.frombuffer(collected).reshape(-1, 5)
     return SweepArrays(*table.T)

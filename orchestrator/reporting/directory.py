@@ -6,16 +6,41 @@ from pathlib import Path
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
-from orchestrator.reporting.pages import bench, check, diagnose, estimate, generic, simulate, sweep, thesis
-from orchestrator.reporting.source import Source, load
+from orchestrator.reporting.pages import (
+    bench,
+    calibrate,
+    check,
+    diagnose,
+    estimate,
+    generic,
+    inspect,
+    simulate,
+    sweep,
+    thesis,
+)
+from orchestrator.reporting.source import ResultDocument, load
 
 PAGE = "report.html"
-COMMANDS = ("build", "check", "simulate", "sweep", "estimate", "diagnose", "thesis", "ssp", "bench")
-_BUILDERS: dict[str, Callable[[Source], Report]] = {
+COMMANDS = (
+    "build",
+    "check",
+    "simulate",
+    "sweep",
+    "inspect",
+    "estimate",
+    "diagnose",
+    "calibrate",
+    "thesis",
+    "ssp",
+    "bench",
+)
+_BUILDERS: dict[str, Callable[[ResultDocument], Report]] = {
     "bench": bench.build,
+    "calibrate": calibrate.build,
     "check": check.build,
     "diagnose": diagnose.build,
     "estimate": estimate.build,
+    "inspect": inspect.build,
     "simulate": simulate.build,
     "ssp": simulate.build,
     "sweep": sweep.build,
@@ -30,17 +55,20 @@ def report_from_directory(directory: Path, command: str | None = None) -> Report
         directory: where a command left its results.
         command: which command's results; needed only where there are several.
 
+    Returns:
+        The report.
+
     Raises:
         ScenarioError: there are no results, or several and ``command`` is not given, or they are damaged.
     """
     if not directory.is_dir():
-        raise ScenarioError(f"`DIR` must be an existing folder, but {directory} is not")
+        raise ScenarioError(f"`directory` must be an existing folder, but {directory} is not", "directory")
     if command is not None and command not in COMMANDS:
-        raise ScenarioError(f"`--command` must be one of {', '.join(COMMANDS)}, but is {command!r}")
+        raise ScenarioError(f"`command` must be one of {', '.join(COMMANDS)}, but is {command!r}", "command")
     found = [name for name in COMMANDS if (directory / f"{name}.json").is_file()]
     if command is None and len(found) != 1:
-        what = f"has those of {', '.join(found)}: choose with --command" if found else "has none"
-        raise ScenarioError(f"{directory} must hold the results of one command, but {what}")
+        what = f"has those of {', '.join(found)}: choose with `command`" if found else "has none"
+        raise ScenarioError(f"{directory} must hold the results of one command, but {what}", "command")
     source = load(directory, command or found[0])
     try:
         return _BUILDERS.get(source.command, generic.build)(source)
@@ -51,6 +79,13 @@ def report_from_directory(directory: Path, command: str | None = None) -> Report
 
 def write_report(directory: Path, command: str | None = None) -> Path:
     """Write ``report.html`` into a result directory, whole or not at all, and return its path.
+
+    Args:
+        directory: where a command left its results.
+        command: which command's results; needed only where there are several.
+
+    Returns:
+        The page's path.
 
     Raises:
         ScenarioError: as ``report_from_directory``.

@@ -7,7 +7,7 @@ from typing import Literal
 
 Cell = float | int | str | bool | None
 Numbers = Sequence[float | None]
-Badge = Literal["good", "bad", "neutral"]
+Badge = Literal["good", "warn", "bad", "neutral"]
 Severity = Literal["error", "warning", "info"]
 
 ROW_LIMIT = 500
@@ -31,7 +31,7 @@ class Facts:
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """A table's column; ``digits`` are significant ones, of numbers."""
 
     name: str
@@ -40,14 +40,14 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """A table that the reader can sort. Only the first ``limit`` rows are shown, and the table says so.
 
     ``total`` is the number of rows that there are, where ``rows`` are not all of them.
     """
 
     title: str
-    columns: tuple[Column, ...]
+    columns: tuple[TableColumn, ...]
     rows: tuple[tuple[Cell, ...], ...]
     note: str = ""
     limit: int = ROW_LIMIT
@@ -106,7 +106,7 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Finding:
+class Remark:
     """One problem or remark; ``more`` says where else the same was found, one line each."""
 
     severity: Severity
@@ -121,7 +121,7 @@ class Findings:
     """Problems and remarks, worst first as given."""
 
     title: str
-    items: tuple[Finding, ...]
+    items: tuple[Remark, ...]
     empty: str = "Nothing was found."
 
 
@@ -152,7 +152,113 @@ class Picture:
     note: str = ""
 
 
-Section = Text | Facts | Table | Plot | Findings | Bars | Picture
+@dataclass(frozen=True)
+class Control:
+    """A slider of a live section.
+
+    Attributes:
+        label: what it moves.
+        unit: of its value.
+        value: where it begins: the value of the results.
+        low, high: its ends.
+        places: in the plan, where its value goes; none for a weight.
+        when_zero: places in the plan and what goes there while the value is zero.
+        log: whether it moves by factors.
+        weight: which of the regulator's weights it is; -1 for none.
+    """
+
+    label: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    places: tuple[int, ...] = ()
+    when_zero: tuple[tuple[int, float], ...] = ()
+    log: bool = False
+    weight: int = -1
+
+
+@dataclass(frozen=True)
+class LiveRun:
+    """One run of a live section: where its first row stands in time, and what is special about it.
+
+    Attributes:
+        start: time [s] of its first row.
+        steps: how many rows follow.
+        changes: places in the plan and the values that go there.
+        table: outer signals, flat, (steps + 1) numbers each.
+    """
+
+    start: float
+    steps: int
+    changes: tuple[tuple[int, float], ...]
+    table: Sequence[float]
+
+
+@dataclass(frozen=True)
+class LiveCurve:
+    """A curve made of rows: the sum of factor times row; rows of the simulation count from 0, of the record from -1."""
+
+    name: str
+    terms: tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True)
+class LivePlot:
+    """A plot of a live section."""
+
+    title: str
+    y_label: str
+    curves: tuple[LiveCurve, ...]
+
+
+@dataclass(frozen=True)
+class LiveRegulator:
+    """What a live section computes gains from: ``given`` as ``riccati.regulator_gains`` takes them, flat.
+
+    Attributes:
+        given: state matrix (25) and input vector (5).
+        weights: of the five states and the input, as the sliders show them.
+        scale: what they are multiplied by.
+        places: in the plan, of the five gains of each controller.
+    """
+
+    given: tuple[float, ...]
+    weights: tuple[float, ...]
+    scale: float
+    places: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class Live:
+    """A simulation that the reader moves by sliders.
+
+    Attributes:
+        module: WebAssembly, see ``building.live_module``.
+        plan: what it simulates, see ``building.live_system``.
+        step: communication step [s].
+        records: how many outputs the plan records.
+        runs: one after the other.
+        recorded: rows to compare with, each as long as all runs together.
+        controls: the sliders.
+        plots: what is drawn.
+        regulator: None where no gains depend on the sliders.
+    """
+
+    title: str
+    note: str
+    module: bytes = field(repr=False)
+    plan: tuple[float, ...]
+    step: float
+    records: int
+    runs: tuple[LiveRun, ...]
+    recorded: tuple[Sequence[float], ...]
+    controls: tuple[Control, ...]
+    plots: tuple[LivePlot, ...]
+    regulator: LiveRegulator | None = None
+
+
+Section = Text | Facts | ReportTable | Plot | Findings | Bars | Picture | Live
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import ScenarioError
-from orchestrator.reporting.model import Cell, Column, Table
+from orchestrator.reporting.model import Cell, ReportTable, TableColumn
 
 DATA_SUFFIXES = (".csv", ".json", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")
 
@@ -32,7 +32,7 @@ UNITS = {  # of arguments
 
 
 @dataclass(frozen=True)
-class Source:
+class ResultDocument:
     """One command's result: ``document`` is ``COMMAND.json`` of ``directory``."""
 
     directory: Path
@@ -49,6 +49,12 @@ class Source:
         """Yield the heading and then the rows of a CSV file of the directory; nothing when there is no such file.
 
         Numbers become floats, what is empty or not finite becomes ``None``.
+
+        Args:
+            name: of the CSV file.
+
+        Yields:
+            A list of cells, the heading first.
 
         Raises:
             ScenarioError: the file is not CSV with a heading and equally long rows.
@@ -69,20 +75,35 @@ class Source:
             raise ScenarioError(f"{path} must be a CSV table, but is not: {error}") from None
 
     def columns(self, name: str) -> dict[str, list[Cell]]:
-        """Return a whole CSV file by column, empty when there is no such file; see ``rows``."""
+        """Return a whole CSV file by column, empty when there is no such file; see ``rows``.
+
+        Args:
+            name: of the CSV file.
+
+        Returns:
+            The cells of each column by its heading.
+        """
         rows = self.rows(name)
         header = next(rows, [])
         return by_column(header, rows)
 
     def origin(self) -> tuple[tuple[str, Cell], ...]:
-        """Return what was run and with what."""
+        """Return what was run and with what.
+
+        Returns:
+            Name and value of each fact.
+        """
         arguments = self.document.get("arguments") or {}
         given = {n: plain(v) for n, v in arguments.items() if n != "out" and v not in (None, False, [], {})}
         head = {"command": self.command, "version": self.document.get("version"), "seed": self.document.get("seed")}
         return tuple((_with_unit(name), value) for name, value in (head | given).items() if value is not None)
 
     def downloads(self) -> tuple[Path, ...]:
-        """Return the data files of the directory, by name."""
+        """Return the data files of the directory, by name.
+
+        Returns:
+            Their paths.
+        """
         return tuple(
             path
             for path in sorted(self.directory.iterdir())
@@ -90,8 +111,15 @@ class Source:
         )
 
 
-def load(directory: Path, command: str) -> Source:
+def load(directory: Path, command: str) -> ResultDocument:
     """Read ``COMMAND.json`` of a result directory.
+
+    Args:
+        directory: where the command left its results.
+        command: its name.
+
+    Returns:
+        The results.
 
     Raises:
         ScenarioError: it is not there, or not what a command of this project writes.
@@ -105,11 +133,19 @@ def load(directory: Path, command: str) -> Source:
         raise ScenarioError(f"{path} must be JSON, but is not: {error}") from None
     if not isinstance(document, dict) or document.get("command") != command or "results" not in document:
         raise ScenarioError(f'{path} must be the result of `{command}` (with "command" and "results"), but is not')
-    return Source(directory, command, document)
+    return ResultDocument(directory, command, document)
 
 
 def by_column(header: Sequence[Cell], rows: Iterable[Sequence[Cell]]) -> dict[str, list[Cell]]:
-    """Return rows as columns by name."""
+    """Return rows as columns by name.
+
+    Args:
+        header: names of the columns.
+        rows: each as long as the header.
+
+    Returns:
+        The cells of each column by name.
+    """
     columns: list[list[Cell]] = [[] for _ in header]
     for row in rows:
         for column, value in zip(columns, row, strict=True):
@@ -126,7 +162,14 @@ def _cell(text: str) -> Cell:
 
 
 def plain(value: Any) -> Cell:
-    """Return any JSON value as one cell."""
+    """Return any JSON value as one cell.
+
+    Args:
+        value: of a JSON document.
+
+    Returns:
+        A number, a text or None.
+    """
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, Mapping):
@@ -139,7 +182,14 @@ def _short(value: Cell) -> str:
 
 
 def words(name: str) -> str:
-    """Return an identifier as words; a symbol with an index, such as ``J_m``, and a path stay as they are."""
+    """Return an identifier as words; a symbol with an index, such as ``J_m``, and a path stay as they are.
+
+    Args:
+        name: as in the JSON document.
+
+    Returns:
+        The words.
+    """
     parts = name.split("_")
     return name if "." in name or any(len(part) < 2 for part in parts) else " ".join(parts)
 
@@ -149,14 +199,31 @@ def _with_unit(name: str) -> str:
 
 
 def numbers(values: Sequence[Any]) -> list[float | None]:
-    """Return a column's numbers, ``None`` for everything else."""
+    """Return a column's numbers, ``None`` for everything else.
+
+    Args:
+        values: cells of a column.
+
+    Returns:
+        As many entries as ``values``.
+    """
     return [float(v) if isinstance(v, (int, float)) and not isinstance(v, bool) else None for v in values]
 
 
 def table_of(
     title: str, items: Sequence[Mapping[str, Any]], *, units: Mapping[str, str] | None = None, note: str = ""
-) -> Table:
-    """Return a table of equally shaped JSON objects, one column per key in order of first appearance."""
+) -> ReportTable:
+    """Return a table of equally shaped JSON objects, one column per key in order of first appearance.
+
+    Args:
+        title: of the table.
+        items: the rows.
+        units: unit by key.
+        note: a sentence under the table.
+
+    Returns:
+        The table.
+    """
     names = list(dict.fromkeys(name for item in items for name in item))
-    columns = tuple(Column(words(name), (units or {}).get(name, "")) for name in names)
-    return Table(title, columns, tuple(tuple(plain(item.get(name)) for name in names) for item in items), note)
+    columns = tuple(TableColumn(words(name), (units or {}).get(name, "")) for name in names)
+    return ReportTable(title, columns, tuple(tuple(plain(item.get(name)) for name in names) for item in items), note)

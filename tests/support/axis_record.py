@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orchestrator.record import Record, record_from_columns
+from orchestrator.records.record import Record, record_from_columns
 from pyfmu_sources import servo_axis as axis
 
 MODEL = """
@@ -22,7 +22,7 @@ def axis_record(p: Sequence[float], seed: int, name: str) -> Record:
     """Return 8 s at 200 Hz of an axis with parameters ``p``, its encoder with a noise of 0.1 mrad."""
     rng = np.random.default_rng(seed)
     u = np.repeat(rng.uniform(-8.0, 8.0, 100), 16)
-    x, mode, y = (0.0, 0.0, 0.0), 0, []
+    x, mode, y = axis.start(0.0, 0.0, 0.0, tuple(p)), 0, []
     for value in u:
         y.append(x[0])
         x, mode = axis.advance(x, mode, tuple(p), float(value), 0.0, 0.005)

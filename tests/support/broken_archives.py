@@ -97,6 +97,8 @@ ARCHIVES: list[tuple[str, str, Callable[[Path], None]]] = [
     ("cut off", "archive.not-a-zip", _cut),
     ("flipped byte", "archive.corrupt", _flipped_byte),
     ("folder zipped", "archive.no-model-description", _nested),
+    ("no name", "archive.corrupt", _with_entry(zipfile.ZipInfo(""))),
+    ("double slash", "archive.odd-name", _with_entry("resources//file")),
     ("traversal", "archive.traversal", _with_entry("resources/../../outside.txt")),
     ("absolute", "archive.absolute", _with_entry("/tmp/outside.txt")),
     ("drive letter", "archive.absolute", _with_entry("C:/outside.txt")),

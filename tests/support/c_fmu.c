@@ -44,6 +44,8 @@ static char *volatile hoard = NULL; /* volatile, or the compiler removes the lea
 static double shared = 0.0;
 #endif
 
+#include "hostile.h"
+
 #ifdef FAULT_marks_loading
 __attribute__((constructor)) static void mark(void) {
     const char *path = getenv("LOADING_MARK");
@@ -87,6 +89,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const 
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
+    AT(instantiate);
     (void)visible; (void)logging;
 #ifdef FAULT_instantiate_null
     return NULL;
@@ -117,6 +120,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 }
 
 void fmi2FreeInstance(fmi2Component c) {
+    AT(free);
     if (!c) return;
     instances--;
 #ifdef FAULT_crash_free
@@ -126,6 +130,7 @@ void fmi2FreeInstance(fmi2Component c) {
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real tol, fmi2Real start, fmi2Boolean sd, fmi2Real stop) {
+    AT(setup);
     Instance *self = c;
     (void)td; (void)tol; (void)sd; (void)stop;
     if (self->phase != INSTANTIATED) return refuse(self, "fmi2SetupExperiment must come before initialisation");
@@ -134,6 +139,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean td, fmi2Real tol, fm
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    AT(enter);
     Instance *self = c;
 #ifdef FAULT_init_error
     return refuse(self, "cannot initialise");
@@ -144,6 +150,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    AT(exit);
     Instance *self = c;
     if (self->phase != INITIALISING) return refuse(self, "fmi2ExitInitializationMode without Enter");
     self->phase = STEPPING;
@@ -151,6 +158,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {
+    AT(terminate);
     Instance *self = c;
 #ifdef FAULT_terminate_error
     return refuse(self, "cannot terminate");
@@ -197,6 +205,7 @@ static double real_value(const Instance *self, fmi2ValueReference vr, int *known
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    AT(get);
     Instance *self = c;
     int known = 1;
 #ifdef FAULT_crash_get
@@ -204,6 +213,9 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 #endif
     for (size_t i = 0; i < n; i++) {
         value[i] = real_value(self, vr[i], &known);
+#ifdef HOSTILE
+        if (orders.forced && vr[i] == VR_X) value[i] = orders.value;
+#endif
 #ifdef FAULT_crash_unknown_reference
         if (!known) abort();
 #endif
@@ -234,6 +246,7 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
+    AT(set);
     Instance *self = c;
     State *s = &self->s;
     for (size_t i = 0; i < n; i++) {

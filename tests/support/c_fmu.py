@@ -45,13 +45,19 @@ def compile_library(behaviour: str = "good", guid: str = GUID) -> bytes:
             "-Wno-unused",
             f'-DFMU_GUID="{guid}"',
         ]
-        if behaviour != "good":
+        if behaviour == "hostile":
+            command += ["-DHOSTILE", "-D_GNU_SOURCE"]
+        elif behaviour != "good":
             command.append(f"-DFAULT_{behaviour}")
         command += [
+            "-I",
+            str(HERE),
             "-I",
             str(Path(fmpy.__file__).parent / "c-code"),
             str(HERE / "c_fmu.c"),
             "-lm",
+            "-ldl",
+            "-lpthread",
             "-o",
             str(target),
         ]

@@ -17,6 +17,7 @@ static void integrate(State *s, double duration) {
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean no_set_state) {
+    AT(step);
     Instance *self = c;
     (void)no_set_state;
 #ifndef FAULT_step_before_init

@@ -16,8 +16,9 @@ ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
 class DaskProcesses:
     """A scheduler and workers of one thread each; use as a context manager."""
 
-    def __init__(self, directory: Path, workers: int) -> None:
+    def __init__(self, directory: Path, workers: int, options: list[str] | None = None) -> None:
         self._directory = directory
+        self._options = options or []
         self._scheduler = self._start("scheduler", ["--host", "127.0.0.1", "--port", "0"])
         self.address = self._address()
         self._workers = [
@@ -51,14 +52,13 @@ class DaskProcesses:
 
     def _start(self, name: str, options: list[str]) -> "subprocess.Popen[bytes]":
         kind = name.rstrip("0123456789")
-        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options]
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *self._options, *options]
         with (self._directory / f"{name}.log").open("wb") as log:
             return subprocess.Popen(command, cwd=self._directory, env=ENVIRONMENT, stdout=log, stderr=log)
 
     def _address(self) -> str:
-        end = time.monotonic() + 60.0
-        while time.monotonic() < end:
-            found = re.search(r"Scheduler at:\s+(tcp://\S+)", (self._directory / "scheduler.log").read_text())
+        while self._scheduler.poll() is None:  # it says where it listens, or ends
+            found = re.search(r"Scheduler at:\s+((?:tcp|tls)://\S+)", (self._directory / "scheduler.log").read_text())
             if found:
                 return found.group(1)
             time.sleep(0.05)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.signal import butter, decimate, filtfilt
 
-from pyfmu_sources import servo_axis as sa
+from pyfmu_sources import servo_axis_parameters as sa
 
 Array = NDArray[np.float64]
 
@@ -65,15 +65,17 @@ def r_squared(simulated: Array, measured: Array) -> float:
 
 def open_loop(p: Array, which: str) -> float:
     """Return R2 of the free run over a whole record, driven by its force; the initial state lies closest to it."""
-    from orchestrator.diagnosis.free_run import free_run
-    from orchestrator.diagnosis.likelihood import signals_of
-    from orchestrator.diagnosis.plants import SERVO_AXIS
-    from orchestrator.record import record_from_columns
+    from orchestrator.diagnosis.fit.record_likelihood import signals_of
+    from orchestrator.diagnosis.proof.free_run import free_run
+    from orchestrator.diagnosis.settings import DiagnosisSettings
+    from orchestrator.plants.known.servo_axis import PLANT
+    from orchestrator.records.record import record_from_columns
 
+    settings = DiagnosisSettings()
     data = read(which)
     columns = {"time": data["time"], "u": data["force"], "theta_m": data["position"]}
-    signals = signals_of(record_from_columns(columns, which), 0.0)
+    signals = signals_of(record_from_columns(columns, which), 0.0, settings.likelihood)
     first = np.zeros(8)
     first[0] = data["position"][0]
-    run = free_run(SERVO_AXIS, p, first, signals, slice(0, signals.size))
+    run = free_run(PLANT, PLANT.extended(p.tolist()), first, signals, slice(0, signals.size), settings.proof.free_run)
     return r_squared(run.outputs[:, 0], data["position"])

@@ -5,7 +5,11 @@ import sys
 import time
 from pathlib import Path
 
+from orchestrator.shared.processes import alive
+
 ROOT = Path(__file__).parents[2]
+# What is waited for comes or does not, however slow the machine; this only ends a test that hangs.
+HANGS = 600.0
 
 
 def start(directory: Path, cases: int, wait: float, workers: int, *options: str) -> subprocess.Popen[str]:
@@ -20,7 +24,7 @@ def finished_cases(directory: Path) -> int:
     return max(0, path.read_bytes().count(b"\n") - 1) if path.exists() else 0
 
 
-def wait_for_cases(directory: Path, count: int, limit: float = 60.0) -> None:
+def wait_for_cases(directory: Path, count: int, limit: float = HANGS) -> None:
     """Wait until the journal holds ``count`` cases."""
     end = time.monotonic() + limit
     while finished_cases(directory) < count:
@@ -36,15 +40,7 @@ def children(pid: int) -> list[int]:
     return found
 
 
-def alive(pid: int) -> bool:
-    """Return whether a process exists and is not a zombie."""
-    try:
-        return "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-
-
-def wait_until_gone(pids: list[int], limit: float = 10.0) -> None:
+def wait_until_gone(pids: list[int], limit: float = HANGS) -> None:
     """Wait until none of the processes is alive."""
     end = time.monotonic() + limit
     while any(alive(pid) for pid in pids):

@@ -5,13 +5,19 @@ import os
 import signal
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from orchestrator.engine import Case, Column, Work
+from orchestrator.engine import Case, ResultColumn, Work
 from orchestrator.errors import FmuError, SlaveError
 
-COLUMNS = (Column("square"), Column("noise"), Column("label", kind=str), Column("count", kind=int))
+COLUMNS = (
+    ResultColumn("square"),
+    ResultColumn("noise"),
+    ResultColumn("label", kind=str),
+    ResultColumn("count", kind=int),
+)
 
 
 def prepare(payload: Any, files: Mapping[str, Path]) -> dict[str, Any]:
@@ -47,6 +53,11 @@ def run_busy(prepared: dict[str, Any], case: Case) -> dict[str, Any]:
     for turn in range(prepared["payload"]["loops"]):
         total += turn * 1e-9
     return run(prepared, case) | {"square": total}
+
+
+def run_faulty_of_size_two(prepared: dict[str, Any], case: Case) -> dict[str, Any]:
+    """As ``run_faulty``, with a size that is not varied."""
+    return run_faulty(prepared, replace(case, parameters={**case.parameters, "size": 2.0}))
 
 
 def run_faulty(prepared: dict[str, Any], case: Case) -> dict[str, Any]:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from orchestrator.engine import Case, Column, Work
-from orchestrator.fmi.slave import fmu_instance
+from orchestrator.engine import Case, ResultColumn, Work
+from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
 from orchestrator.master.system import System
@@ -26,7 +26,7 @@ def build(directory: Path) -> Path:
 
 def work(fmu: Path) -> Work:
     """Return the work of a sweep over ``faulty.fault`` and ``faulty.gain``."""
-    return Work(prepare, run, (Column("y"),), files={"faulty": fmu})
+    return Work(prepare, run, (ResultColumn("y"),), files={"faulty": fmu})
 
 
 def prepare(payload: Any, files: Mapping[str, Path]) -> Session:

@@ -11,10 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.record import Record, record_from_columns
-from tests.support.independent_plant import NOISE, SUBSTEPS, make_record
+from orchestrator.records.record import Record, record_from_columns
+from tests.support.independent_plant import NOISE, NOMINAL, SUBSTEPS, make_record
 
 TIMES_NOISE = 3.0
+TORQUE_NOISE = False  # set by the benchmark: half of the cases have a coloured torque noise
+SHIFTS = False  # the same: half have signals that are late by up to two samples
+GAIN = False  # the same: half have a drive whose torque is up to 10 % off
 RATE = 200.0  # samples per second
 EXCITATIONS = ("multisine", "multisine", "levels", "closed_loop")
 
@@ -37,16 +40,29 @@ SINGLE: dict[str, tuple[dict[str, float], str, tuple[str, ...]]] = {
     "gravity": ({"grav": 8.0, "grav_ph": 0.7}, "grav", ("gravity_load@load",)),
     "resonance": ({"J3": 1.5, "w3": 60.0}, "J3", ("extra_resonance@load",)),
     "drag": ({"qd": 1.0}, "qd", ("quadratic_drag@load",)),
+    "second_lag": ({"tau2": 0.06}, "tau2", ("drive_filter@actuator",)),
+    "directional_motor": ({"dv_m": 0.1}, "dv_m", ("directional_friction@motor",)),
+    "directional_load": ({"dv_l": 1.0}, "dv_l", ("directional_friction@load",)),
+    "spring": ({"ks": 30.0}, "ks", ("spring_load@load",)),
+    "varying_inertia": ({"jvar": 0.2}, "jvar", ("varying_inertia@load",)),
+    "shaft_hysteresis": ({"bw": 60.0, "bw_x": 0.01}, "bw", ("shaft_hysteresis@shaft",)),
     "offset": ({"off_m": 0.05}, "off_m", ("sensor_offset@motor", "sensor_offset@load")),
 }  # fmt: skip
 
 UNKNOWN: dict[str, dict[str, float]] = {
-    "inertia_varies": {"jvar": 0.15},
-    "hysteresis": {"bw": 40.0, "bw_x": 0.01},
     "late_friction": {"late_Fc": 0.6},
     "stiffness_with_speed": {"kspeed": 0.15},
     "knocks": {"knock": 15.0},
 }
+
+
+# Machines of the records with one encoder -> nominal parameters, and the factor on the thesis's excitation.
+MACHINES: dict[str, tuple[dict[str, float], float]] = {
+    "thesis": (dict(NOMINAL), 1.0),
+    "servo": ({"J_m": 0.02, "J_l": 1.5, "k": 1200.0, "c": 0.6, "b_m": 0.02, "b_l": 0.4, "i": 10.0, "tau": 0.05}, 0.035),
+    "press": ({"J_m": 0.5, "J_l": 1.0, "k": 4000.0, "c": 4.0, "b_m": 0.2, "b_l": 0.5, "i": 2.0, "tau": 0.2}, 1.0),
+}
+GAPS = (0.3, 3.0)  # half-gaps of the records with one encoder, in typical (rms) twists
 
 
 @dataclass(frozen=True)
@@ -98,6 +114,46 @@ def unknown_case(kind: str, seed: int, duration: float = 30.0) -> Case:
     return _case(kind, seed, effects, (), str(rng.choice(EXCITATIONS)), duration)
 
 
+def one_encoder_case(seed: int, duration: float = 30.0) -> Case:
+    """Return a record of the motor's encoder alone with a gap of 0.3 to 3 times the typical twist.
+
+    Machines take turns, and so do excitations; ``truth`` has the machine's nominal parameters.
+    """
+    rng = np.random.default_rng([seed, 6])
+    machine = tuple(MACHINES)[seed % len(MACHINES)]
+    nominal, torque = MACHINES[machine]
+    excitation = EXCITATIONS[1:][seed // len(MACHINES) % 3]
+    ways: dict[str, Any] = {"excitation": excitation, "nominal": nominal, "torque": torque}
+    _, plain = make_record({}, seed, duration, substeps=25, **ways)
+    states = plain["states"]
+    typical = float(np.sqrt(np.mean((states[:, 0] / nominal["i"] - states[:, 2]) ** 2)))
+    share = float(np.exp(rng.uniform(*np.log(GAPS))))
+    columns, truth = make_record({"alpha": share * typical}, seed, duration, **ways)
+    record = record_from_columns(columns, f"{machine}-{excitation}-{seed}").without_load_encoder()
+    truth |= {"torque_noise": 0.0, "shifts": (0.0, 0.0), "gain": 1.0}
+    return Case(f"{machine}, {excitation}", seed, record, truth, (SINGLE["backlash"][2],), share)
+
+
+def torque_noise_of(seed: int) -> float:
+    """Return the rms of the torque noise of a case, as a share of the drive's: 0.5 to 3 % on half of them."""
+    rng = np.random.default_rng([seed, 5])
+    return float(np.exp(rng.uniform(np.log(0.005), np.log(0.03)))) if rng.random() < 0.5 else 0.0
+
+
+def shifts_of(seed: int) -> tuple[float, float]:
+    """Return how late [samples] motor and load are in a case: up to two samples, on half of them, one or both."""
+    rng = np.random.default_rng([seed, 6])
+    motor, load = rng.uniform(-2.0, 2.0, 2)
+    either = ((motor, motor), (0.0, load), (motor, load))[int(rng.integers(3))]
+    return (float(either[0]), float(either[1])) if rng.random() < 0.5 else (0.0, 0.0)
+
+
+def gain_of(seed: int) -> float:
+    """Return the torque of a case's drive over what it is taken for: up to 10 % off, on half of them."""
+    rng = np.random.default_rng([seed, 7])
+    return float(1.0 + rng.uniform(-0.1, 0.1)) if rng.random() < 0.5 else 1.0
+
+
 def draw_size(
     effects: dict[str, float], size: str, seed: int, excitation: str, rng: np.random.Generator, duration: float,
     least: float = TIMES_NOISE, largest: float = 1.0,
@@ -111,9 +167,9 @@ def draw_size(
         return times_noise(plain, _raw(scaled(effects, size, share), seed, excitation, duration))
 
     share = 1.0
-    for _ in range(2 if size != "sat" else 0):
+    for _ in range(2 if size not in ("sat", "slew") else 0):
         share = min(max(share * least / max(change(share), 1e-3), 1e-4), 1.0)
-    if size == "sat":
+    if size in ("sat", "slew"):
         inside, outside = 1.0, 0.0
         for _ in range(6):
             middle = 0.5 * (inside + outside)
@@ -131,6 +187,9 @@ def scaled(effects: dict[str, float], size: str, share: float) -> dict[str, floa
     if size == "sat":
         # Largest torque of the records is 259 N.m; the share is what is cut off of it.
         changed["sat"] = 259.0 * (1.0 - effects["sat"] * share)
+    elif size == "slew":
+        # The request of the records changes by up to 9000 N.m/s.
+        changed["slew"] = 9000.0 * (1.0 - effects["slew"] * share)
     elif size == "hard":
         changed["hard"] = effects["hard"] / np.sqrt(share)
     else:
@@ -184,7 +243,13 @@ def _case(
     kind: str, seed: int, effects: dict[str, float], right: tuple[tuple[str, ...], ...], excitation: str,
     duration: float, ratio: float = 0.0,
 ) -> Case:  # fmt: skip
-    columns, truth = make_record(effects, seed, duration, excitation=excitation)
+    noise = torque_noise_of(seed) if TORQUE_NOISE else 0.0
+    shifts = shifts_of(seed) if SHIFTS else (0.0, 0.0)
+    gain = gain_of(seed) if GAIN else 1.0
+    columns, truth = make_record(
+        effects, seed, duration, excitation=excitation, torque_noise=noise, shifts=shifts, torque_gain=gain
+    )
+    truth |= {"torque_noise": noise, "shifts": shifts, "gain": gain}
     if "delay" in effects:
         # The simulator applies a dead time in whole internal steps.
         truth["effects"]["delay"] = round(effects["delay"] * RATE * SUBSTEPS) / (RATE * SUBSTEPS)

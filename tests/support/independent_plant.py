@@ -17,6 +17,14 @@ with the names used in ``truth``::
     J3 w3 z3              third inertia [kg.m2], its frequency [rad/s] and damping ratio (0.02)
     qd                    quadratic drag of the load [N.m.s2/rad2]
     off_m off_l           encoder offsets [rad]
+    ks ks3 ks_x           spring that pulls the load back [N.m/rad, N.m/rad3], its angle at rest [rad]
+    stop stop_k stop_d    end stops of the load at +stop and -stop [rad, 0: none], stiffness, dissipation [s/rad]
+    dv_m dv_l             viscous friction that differs by direction [N.m.s/rad]
+    mu_m mu_l             dry friction per torque of the shaft (motor side and load side)
+    wav_m wav_n wav_ph    part of the motor's dry friction that repeats with its angle [N.m, 1, rad]
+    rip2 rip2_ph rip3 rip3_ph   harmonics of the ripple
+    kvar kvar_n kvar_ph   relative part of the stiffness that turns with the motor
+    tau2 slew             second lag of the drive [s], fastest change of its request [N.m/s]
   that no library is meant to hold:
     jvar                  load inertia times 1 + jvar*cos(theta_l)
     bw bw_x               Bouc-Wen hysteresis in the shaft [N.m], yield twist [rad]
@@ -33,6 +41,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from tests.support.excitations import coloured, levels, multisine
+
 NOMINAL = {"J_m": 0.4, "J_l": 5.6, "k": 3300.0, "c": 1.0, "b_m": 0.1, "b_l": 1.0, "i": 3.984, "tau": 1.0}
 MISMATCHED = ("J_m", "J_l", "k", "c", "b_m", "b_l", "tau")
 EFFECTS = {
@@ -41,6 +51,9 @@ EFFECTS = {
     "hard": 0.0, "rip": 0.0, "rip_n": 6.0, "rip_ph": 0.0, "ecc": 0.0, "ecc_n": 1.0, "ecc_ph": 0.0, "T0": 0.0,
     "grav": 0.0, "grav_ph": 0.0, "J3": 0.0, "w3": 60.0, "z3": 0.02, "qd": 0.0, "off_m": 0.0, "off_l": 0.0,
     "jvar": 0.0,
+    "ks": 0.0, "ks3": 0.0, "ks_x": 0.0, "stop": 0.0, "stop_k": 1e4, "stop_d": 0.1, "dv_m": 0.0, "dv_l": 0.0,
+    "mu_m": 0.0, "mu_l": 0.0, "wav_m": 0.0, "wav_n": 1.0, "wav_ph": 0.0, "rip2": 0.0, "rip2_ph": 0.0, "rip3": 0.0,
+    "rip3_ph": 0.0, "kvar": 0.0, "kvar_n": 1.0, "kvar_ph": 0.0, "tau2": 0.0, "slew": 0.0,
     "bw": 0.0, "bw_x": 0.01, "late_Fc": 0.0, "alpha_end": -1.0, "kspeed": 0.0, "knock": 0.0,
 }  # fmt: skip
 LINEAR = tuple(NOMINAL)
@@ -52,7 +65,9 @@ SUBSTEPS = 100  # per sample
 (
     J_M, J_L, K, C, B_M, B_L, RATIO, TAU, ALPHA, FC_M, FS_M, VS_M, FC_L, FS_L, VS_L, DELAY, SAT, HARD,
     RIP, RIP_N, RIP_PH, ECC, ECC_N,
-    ECC_PH, T0, GRAV, GRAV_PH, J3, W3, Z3, QD, OFF_M, OFF_L, JVAR, BW, BW_X, LATE, ALPHA_END, KSPEED, KNOCK,
+    ECC_PH, T0, GRAV, GRAV_PH, J3, W3, Z3, QD, OFF_M, OFF_L, JVAR, KS, KS3, KS_X, STOP, STOP_K, STOP_D, DV_M, DV_L,
+    MU_M, MU_L, WAV_M, WAV_N, WAV_PH, RIP2, RIP2_PH, RIP3, RIP3_PH, KVAR, KVAR_N, KVAR_PH, TAU2, SLEW,
+    BW, BW_X, LATE, ALPHA_END, KSPEED, KNOCK,
 ) = range(len(NAMES))  # fmt: skip
 SIGMA_M, SIGMA_L = 4000.0, 20000.0  # LuGre bristle stiffness [N.m/rad]
 
@@ -94,6 +109,8 @@ def _rates(t, x, v, torque_request, fm, fl, end, flank):
     if v[ALPHA_END] >= 0.0:
         alpha += (v[ALPHA_END] - v[ALPHA]) * t / end
     shaft = _spring(d, w, v, alpha, flank) * (1.0 + v[KSPEED] * abs(wl)) + v[BW] * z
+    if v[KVAR] != 0.0:
+        shaft += v[K] * v[KVAR] * np.sin(v[KVAR_N] * tm + v[KVAR_PH]) * d
     dz = 0.0
     if v[BW] != 0.0:
         dz = (w - 0.5 * abs(w) * z - 0.5 * w * abs(z)) / v[BW_X]
@@ -106,6 +123,13 @@ def _rates(t, x, v, torque_request, fm, fl, end, flank):
         load += link
         a3 = link / v[J3]
     ripple = v[RIP] * np.sin(v[RIP_N] * tm + v[RIP_PH])
+    ripple += v[RIP2] * np.sin(2.0 * v[RIP_N] * tm + v[RIP2_PH]) + v[RIP3] * np.sin(3.0 * v[RIP_N] * tm + v[RIP3_PH])
+    load += v[KS] * (tl - v[KS_X]) + v[KS3] * (tl - v[KS_X]) ** 3 + v[DV_L] * abs(wl)
+    if v[STOP] > 0.0 and abs(tl) > v[STOP]:
+        inwards = wl if tl > 0.0 else -wl
+        push = v[STOP_K] * (abs(tl) - v[STOP]) * (1.0 + v[STOP_D] * inwards)
+        load += max(push, 0.0) if tl > 0.0 else -max(push, 0.0)
+    fm += v[DV_M] * abs(wm)
     am = (T + ripple - v[B_M] * wm - fm - shaft / i) / v[J_M]
     inertia = v[J_L] * (1.0 + v[JVAR] * np.cos(tl))
     al = (shaft - load - v[B_L] * wl - fl + 0.5 * v[J_L] * v[JVAR] * np.sin(tl) * wl * wl) / inertia
@@ -162,6 +186,15 @@ def _bristle(z, w, h, sigma, coulomb, extra, vs):
 
 
 @njit(cache=True)
+def _followed(asked, request, h, tau2, slew):
+    """Return a request behind a second lag or a slew limit, ``h`` later (small steps)."""
+    change = (request - asked) * (1.0 - np.exp(-h / tau2)) if tau2 > 0.0 else request - asked
+    if slew > 0.0:
+        change = min(max(change, -slew * h), slew * h)
+    return asked + change
+
+
+@njit(cache=True)
 def _control(state, measured, target, step, p, inertia, tau, limit):
     """Return the torque of a third-order pole-placement position loop on the motor encoder."""
     raw = (measured - state[0]) / step
@@ -174,13 +207,14 @@ def _control(state, measured, target, step, p, inertia, tau, limit):
 
 
 @njit(cache=True)
-def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp):
+def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp, push, torque_gain, seen):
     """Return measured-before-rounding (n, 2), the true states (n, 8), and u as applied."""
     n = u.size
     h = step / substeps
     end = n * step
     x = x0.copy()
     zm, zl = 0.0, 0.0
+    asked = u[0]
     out = np.empty((n, 2))
     states = np.empty((n, 8))
     loop = np.zeros(3)
@@ -191,16 +225,27 @@ def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp):
         out[n_k, 0] = x[0] + v[OFF_M] + noise_m[n_k]
         out[n_k, 1] = x[2] + v[OFF_L] + noise_l[n_k]
         if gain > 0.0:
-            ask = _control(loop, out[n_k, 0], target[n_k], step, gain, 0.753, 1.0, 300.0)
+            ask = _control(loop, out[n_k, 0], target[n_k], step, gain, *seen)
             applied[n_k] = float(round(ask * 1e4)) / 1e4 + u[n_k]
         for m in range(substeps):
             t = (n_k * substeps + m) * h
             back = int(np.floor((n_k * substeps + m + 0.5 - v[DELAY] / h) / substeps))
             request = applied[back] if back >= 0 else 0.0
-            request = min(max(request, -v[SAT]), v[SAT])
+            request = torque_gain * min(max(request, -v[SAT]), v[SAT])
+            if v[TAU2] > 0.0 or v[SLEW] > 0.0:
+                before = asked
+                asked = _followed(asked, request, h, v[TAU2], v[SLEW])
+                request = 0.5 * (before + asked)
             coulomb = v[FC_M] + (v[LATE] if t > 0.5 * end else 0.0)
+            coulomb_l = v[FC_L]
+            if v[MU_M] > 0.0 or v[MU_L] > 0.0:
+                carried = abs(_spring(x[0] / v[RATIO] - x[2], x[1] / v[RATIO] - x[3], v, v[ALPHA], 9))
+                coulomb += v[MU_M] * carried / v[RATIO]
+                coulomb_l += v[MU_L] * carried
+            coulomb = max(0.0, coulomb + v[WAV_M] * np.sin(v[WAV_N] * x[0] + v[WAV_PH]))
             zm, fm = _bristle(zm, x[1], h, SIGMA_M, coulomb, v[FS_M], v[VS_M])
-            zl, fl = _bristle(zl, x[3], h, SIGMA_L, v[FC_L], v[FS_L], v[VS_L])
+            fm -= push[n_k]
+            zl, fl = _bristle(zl, x[3], h, SIGMA_L, coulomb_l, v[FS_L], v[VS_L])
             cut = _sharp_step(t, x, v, request, fm, fl, end, h) if sharp else x
             x = cut if sharp else _step(t, x, v, request, fm, fl, end, 9, h)
     return out, states, applied
@@ -209,30 +254,20 @@ def _simulate(v, u, step, substeps, x0, target, gain, noise_m, noise_l, sharp):
 Array = np.ndarray
 
 
-def multisine(rng: np.random.Generator, n: int, step: float, std: float = 70.0, top: float = 9.0) -> Array:
-    """Return a random-phase multisine, 0.1 Hz to ``top`` Hz, rising with the motor's lag."""
-    frequency = np.fft.rfftfreq(n, step)
-    amplitude = np.sqrt(1.0 + (frequency / 1.33) ** 2) * np.where(frequency < 1.0, 1.8, 1.0)
-    amplitude[(frequency < 0.1) | (frequency > top)] = 0.0
-    u = np.fft.irfft(amplitude * np.exp(2j * np.pi * rng.random(frequency.size)), n)
-    return np.clip(u * std / u.std(), -3.7 * std, 3.7 * std)
+def late(angles: Array, shifts: tuple[float, float]) -> Array:
+    """Return angles (n, 2) as a log has them that is late by ``shifts`` samples."""
+    from scipy.interpolate import CubicSpline
+
+    at = np.arange(len(angles))
+    moved = [CubicSpline(at, angles[:, n])(np.clip(at - shift, 0, at[-1])) for n, shift in enumerate(shifts)]
+    return np.column_stack([moved[n] if shift else angles[:, n] for n, shift in enumerate(shifts)])
 
 
-def levels(rng: np.random.Generator, n: int, step: float, std: float = 50.0, hold: float = 0.6) -> Array:
-    """Return random levels held for ``hold`` seconds plus a multisine, mean zero, their sum kept small."""
-    held = max(1, round(hold / step))
-    random = np.empty(n // held + 1)
-    total = 0.0
-    for m in range(random.size):
-        random[m] = std * (rng.uniform(-1.6, 1.6) - 0.8 * total)
-        total += random[m] / std
-    u = np.repeat(random, held)[:n] + multisine(rng, n, step, std)
-    return u - u.mean()
-
-
-def draw_parameters(rng: np.random.Generator, mismatch: float, names=MISMATCHED) -> dict[str, float]:
+def draw_parameters(
+    rng: np.random.Generator, mismatch: float, names=MISMATCHED, nominal: Mapping[str, float] = NOMINAL
+) -> dict[str, float]:
     """Return the nominal parameters, each of ``names`` off by a uniform draw of up to ``mismatch``."""
-    drawn = dict(NOMINAL)
+    drawn = dict(nominal)
     for name in names:
         drawn[name] *= 1.0 + mismatch * rng.uniform(-1.0, 1.0)
     return drawn
@@ -253,6 +288,10 @@ def make_record(
     x0: Mapping[str, float] | None = None,
     linear: Mapping[str, float] | None = None,
     substeps: int = SUBSTEPS,
+    torque_noise: float = 0.0,
+    shifts: tuple[float, float] = (0.0, 0.0),
+    torque_gain: float = 1.0,
+    nominal: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Return one record (time, u, theta_m, theta_l) and the truth that made it.
 
@@ -271,12 +310,21 @@ def make_record(
         x0: initial state by name (theta_m, omega_m, theta_l, omega_l, T_m).
         linear: linear parameters to set outright, instead of the draw.
         substeps: Runge-Kutta steps per sample.
+        torque_noise: rms of a coloured torque on the motor that is not in ``u``, as a share of the rms of the drive's.
+        shifts: how late [samples] the log has the motor's and the load's angle, against ``u``; may be negative.
+        torque_gain: torque of the drive over ``u``.
+        nominal: linear parameters of another machine than ``NOMINAL``, before they are drawn off.
 
     Returns:
         the columns, and truth: ``effects``, ``linear``, ``nominal``, ``states`` (n, 8), ``noise``, ...
     """
     rng = np.random.default_rng(seed)
-    drawn = draw_parameters(rng, mismatch) | dict(linear or {})
+    machine = dict(nominal or NOMINAL)
+    drawn = draw_parameters(rng, mismatch, nominal=machine) | dict(linear or {})
+    # What the position loop takes the machine for: inertia at the motor, lag, limit (the thesis's, rounded).
+    seen = (0.753, 1.0, 300.0)
+    if nominal is not None:
+        seen = (machine["J_m"] + machine["J_l"] / machine["i"] ** 2, machine["tau"], 300.0 * torque)
     chosen = dict(EFFECTS)
     for name, value in (effects or {}).items():
         if name not in chosen:
@@ -301,9 +349,17 @@ def make_record(
     v = np.array([{**drawn, **chosen}[name] for name in NAMES])
     disturbance = rng.standard_normal((2, n)) * np.array(noise)[:, None]
     sharp = contact == "dead_zone"
+    push = np.zeros(n)
+    if torque_noise > 0.0:
+        # A first run without noise tells the rms of the drive's torque.
+        _, plain, _ = _simulate(
+            v, request, step, min(substeps, 25), start, target, gain, *disturbance, sharp, push, torque_gain, seen
+        )
+        push = torque_noise * float(np.std(plain[:, 4])) * coloured(np.random.default_rng([seed, 9]), n, step)
     raw, states, applied = _simulate(
-        v, request, step, substeps, start, target, gain, disturbance[0], disturbance[1], sharp
+        v, request, step, substeps, start, target, gain, *disturbance, sharp, push, torque_gain, seen
     )
+    raw = raw + late(states[:, [0, 2]], shifts) - states[:, [0, 2]]
     if counts is not None:
         unit = 2.0 * np.pi / np.array(counts)
         raw = np.round(raw / unit) * unit
@@ -316,7 +372,7 @@ def make_record(
     truth = {
         "effects": dict(effects or {}),
         "linear": drawn,
-        "nominal": dict(NOMINAL),
+        "nominal": machine,
         "states": states,
         "noise": noise,
         "counts": counts,

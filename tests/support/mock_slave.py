@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from orchestrator.errors import SlaveError
-from orchestrator.master.protocol import Model, Signals, Transfer, Unit, Value, Variable
+from orchestrator.master.protocol import ModelInterface, Signals, Transfer, Unit, Value, Variable
 from orchestrator.master.system import Instance
 
 Step = Callable[[dict[str, Any], float, float], None]
@@ -25,11 +25,11 @@ def model(
     feedthrough: Mapping[str, Sequence[str]] | None = None,
     units: Sequence[Unit] = (),
     **more: Any,
-) -> Model:
+) -> ModelInterface:
     """Return a model; ``feedthrough=None`` means that no output depends on an input at once."""
     outputs = [v.name for v in variables if v.causality == "output"]
     direct = {o: frozenset((feedthrough or {}).get(o, ())) for o in outputs}
-    return Model(name, {v.name: v for v in variables}, {u.name: u for u in units}, direct, **more)
+    return ModelInterface(name, {v.name: v for v in variables}, {u.name: u for u in units}, direct, **more)
 
 
 class MockSlave:
@@ -39,7 +39,12 @@ class MockSlave:
     """
 
     def __init__(
-        self, name: str, model: Model, step: Step, outputs: Outputs | None = None, calls: list[str] | None = None
+        self,
+        name: str,
+        model: ModelInterface,
+        step: Step,
+        outputs: Outputs | None = None,
+        calls: list[str] | None = None,
     ) -> None:
         self.name, self.model = name, model
         self._step, self._outputs = step, outputs or (lambda values: None)
@@ -113,7 +118,7 @@ class MockSlave:
 
 def instance(
     name: str,
-    model: Model,
+    model: ModelInterface,
     step: Step,
     outputs: Outputs | None = None,
     calls: list[str] | None = None,

@@ -3,8 +3,8 @@
 import numpy as np
 
 from orchestrator.estimation.ekf import trace
-from orchestrator.model_file import default_model
-from orchestrator.record import record_from_columns
+from orchestrator.records.model_file import default_model
+from orchestrator.records.record import record_from_columns
 from tests.support.independent_plant import make_record
 
 RATE = 1000.0

@@ -4,7 +4,7 @@ import math
 import random
 from pathlib import Path
 
-from orchestrator.reporting import Column, Facts, Finding, Findings, Plot, Report, Series, Span, Table, Text
+from orchestrator.reporting import Facts, Findings, Plot, Remark, Report, ReportTable, Series, Span, TableColumn, Text
 
 
 def example(directory: Path) -> Report:
@@ -34,8 +34,11 @@ def example(directory: Path) -> Report:
         "100 sizes were estimated; 2 cases failed.",
         (
             Facts("Overview", (("cases", 100), ("mean squared error", 1.234567e-9), ("missing", None))),
-            Table(
-                "Cases", (Column("case"), Column("alpha", "rad"), Column("status"), Column("inside")), rows, "A note."
+            ReportTable(
+                "Cases",
+                (TableColumn("case"), TableColumn("alpha", "rad"), TableColumn("status"), TableColumn("inside")),
+                rows,
+                "A note.",
             ),
             Plot("Estimated against actual", "actual [rad]", "estimated [rad]", (estimate,), diagonal=True),
             Plot("Load position", "time [s]", "position [rad]", curves, (Span(3.0, 4.0, "out of contact"),)),
@@ -51,9 +54,9 @@ def example(directory: Path) -> Report:
             Findings(
                 "Problems",
                 (
-                    Finding("error", "modelDescription.xml", "A unit must be defined, but is not.", "Define it."),
-                    Finding("warning", "x", "A warning."),
-                    Finding("info", "y", "A remark."),
+                    Remark("error", "modelDescription.xml", "A unit must be defined, but is not.", "Define it."),
+                    Remark("warning", "x", "A warning."),
+                    Remark("info", "y", "A remark."),
                 ),
             ),
             Text("Notes", ("One paragraph.",)),

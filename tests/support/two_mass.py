@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from orchestrator.master.signals import Signal, Sine, Square
-from orchestrator.master.system import Connection, Instance, Source, System
+from orchestrator.master.system import Connection, Instance, SignalSource, System
 from tests.support.load_side import B_L, J_L, C, K, load_after, shaft_torque
 from tests.support.mock_slave import instance, model, variable
 from tests.support.motor_side import B_M, J_M, RATIO, TAU, motor_after
@@ -62,7 +62,7 @@ def loop(alpha: float = 0.0, signal: Signal = TORQUE) -> System:
         Connection("motor.omega_m", "load.omega_m"),
         Connection("load.T_shaft", "motor.T_shaft"),
     )
-    return System(instances, connections, (Source("motor.u", signal),))
+    return System(instances, connections, (SignalSource("motor.u", signal),))
 
 
 def solution(times: NDArray[np.float64], alpha: float, signal: Signal = TORQUE) -> NDArray[np.float64]:

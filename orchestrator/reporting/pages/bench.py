@@ -1,26 +1,36 @@
 """The page of ``bench``: each tool's time against ours, and how our cost grows."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from orchestrator.reporting.model import Column, Plot, Report, Section, Series, Table
-from orchestrator.reporting.source import Source, table_of, words
+from orchestrator.paired.bench.alone import RecordCost, SweepCost
+from orchestrator.paired.bench.measure import ToolRow
+from orchestrator.paired.bench.results import BenchFound
+from orchestrator.paired.bench.scaling import Cost
+from orchestrator.reporting.model import Plot, Report, ReportTable, Section, Series, TableColumn
+from orchestrator.reporting.source import ResultDocument, table_of, words
+from orchestrator.shared.results import as_plain, read
 
-Json = Mapping[str, Any]
 
+def build(source: ResultDocument) -> Report:
+    """Return the page.
 
-def build(source: Source) -> Report:
-    """Return the page."""
-    rows: list[Json] = list(source.results.get("rows") or [])
-    measured = [row for row in rows if row.get("wall") is not None]
+    Args:
+        source: results of `bench`.
+
+    Returns:
+        The report.
+    """
+    results = read(source.results, BenchFound)
+    rows = results.rows
+    measured = [row for row in rows if row.wall is not None]
     sections: list[Section] = [_tools(rows, measured)]
     if measured:
-        names = tuple(str(row["title"]) for row in measured)
-        wall: list[float | None] = [1e3 * float(row["wall"]) for row in measured]
+        names = tuple(row.title for row in measured)
+        wall: list[float | None] = [_milliseconds(row.wall) for row in measured]
         series = Series("wall time", list(range(len(measured))), wall, "bars")
         sections.append(Plot("Wall time of one run", "tool", "time [ms]", (series,), categories=names))
-    sections += _scaling(list(source.results.get("scaling") or []))
-    sections += _growth(list(source.results.get("sweeps") or []), list(source.results.get("records") or []))
+    sections += _scaling(results.scaling)
+    sections += _growth(results.sweeps, results.records)
     return Report(
         title="Benchmark",
         summary=_summary(rows, measured),
@@ -30,38 +40,40 @@ def build(source: Source) -> Report:
     )
 
 
-def _summary(rows: Sequence[Json], measured: Sequence[Json]) -> str:
+def _summary(rows: Sequence[ToolRow], measured: Sequence[ToolRow]) -> str:
     missing = len(rows) - len(measured)
     left_out = f" {missing} could not be measured here." if missing else ""
     return f"{len(measured)} tools ran the same FMUs and the same scenario, in turn.{left_out}"
 
 
-def _tools(rows: Sequence[Json], measured: Sequence[Json]) -> Table:
+def _tools(rows: Sequence[ToolRow], measured: Sequence[ToolRow]) -> ReportTable:
     columns = (
-        Column("tool"),
-        Column("version"),
-        Column("scheme"),
-        Column("wall", "ms"),
-        Column("processor", "ms"),
-        Column("wall ratio", "", 3),
-        Column("processor ratio", "", 3),
-        Column("deviation", "rad", 1),
-        Column("note"),
+        TableColumn("tool"),
+        TableColumn("version"),
+        TableColumn("scheme"),
+        TableColumn("wall", "ms"),
+        TableColumn("processor", "ms"),
+        TableColumn("wall ratio", "", 3),
+        TableColumn("processor ratio", "", 3),
+        TableColumn("deviation", "rad", 1),
+        TableColumn("note"),
     )
-    base = measured[0] if measured else {}
+    wall, cpu = (measured[0].wall, measured[0].cpu) if measured else (None, None)
     cells = tuple(
         (
-            row["title"],
-            row.get("version") or None,
-            row.get("scheme"),
-            *(_milliseconds(row.get(name)) for name in ("wall", "cpu")),
-            *(_ratio(base.get(name), row.get(name)) for name in ("wall", "cpu")),
-            row.get("deviation"),
-            row.get("note") or None,
+            row.title,
+            row.version or None,
+            row.scheme,
+            _milliseconds(row.wall),
+            _milliseconds(row.cpu),
+            _ratio(wall, row.wall),
+            _ratio(cpu, row.cpu),
+            row.deviation,
+            row.note or None,
         )
         for row in rows
     )
-    return Table("Tools", columns, cells, "Medians. Ratio: the time of the first tool over that of the row's.")
+    return ReportTable("Tools", columns, cells, "Medians. Ratio: the time of the first tool over that of the row's.")
 
 
 def _milliseconds(seconds: float | None) -> float | None:
@@ -72,35 +84,35 @@ def _ratio(base: float | None, value: float | None) -> float | None:
     return base / value if base is not None and value else None
 
 
-def _scaling(costs: Sequence[Json]) -> list[Section]:
+def _scaling(costs: Sequence[Cost]) -> list[Section]:
     if not costs:
         return []
-    by_fmus: dict[int, list[Json]] = {}
+    by_fmus: dict[int, list[Cost]] = {}
     for cost in costs:
-        by_fmus.setdefault(int(cost["fmus"]), []).append(cost)
+        by_fmus.setdefault(cost.fmus, []).append(cost)
     series = tuple(
         Series(
             f"{count} FMUs",
-            [float(c["steps"]) for c in found],
-            [float(c["microseconds"]) for c in found],
+            [float(c.steps) for c in found],
+            [c.microseconds for c in found],
             "points",
-            labels=[f"{c['steps']} steps" for c in found],
+            labels=[f"{c.steps} steps" for c in found],
         )
         for count, found in by_fmus.items()
     )
     units = {"microseconds": "µs"}
     return [
         Plot("Cost per FMU and step", "steps", "cost [µs]", series, log_x=True),
-        table_of("Cost of our master", [{words(k): v for k, v in c.items()} for c in costs], units=units),
+        table_of("Cost of our master", [{words(k): v for k, v in as_plain(c).items()} for c in costs], units=units),
     ]
 
 
-def _growth(sweeps: Sequence[Json], records: Sequence[Json]) -> list[Section]:
+def _growth(sweeps: Sequence[SweepCost], records: Sequence[RecordCost]) -> list[Section]:
     sections: list[Section] = []
     if sweeps:
         units = {"total": "s", "per_case": "s", "peak": "MiB"}
-        sections.append(table_of("Sweeps", sweeps, units=units))
+        sections.append(table_of("Sweeps", [as_plain(s) for s in sweeps], units=units))
     if records:
         units = {"growth": "MiB", "expected": "MiB"}
-        sections.append(table_of("Memory of records", records, units=units))
+        sections.append(table_of("Memory of records", [as_plain(r) for r in records], units=units))
     return sections

@@ -1,4 +1,4 @@
-"""The page of ``diagnose``: what the model lacks, how far the gap shrinks, where, and what is left."""
+"""The page of ``diagnose``: what the model lacks, how far the misfit shrinks, where, and what is left."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,21 +8,39 @@ from orchestrator.reporting.model import (
     Bar,
     Bars,
     Cell,
-    Column,
     Facts,
     Picture,
     Report,
+    ReportTable,
     Section,
-    Table,
+    TableColumn,
     Text,
 )
+from orchestrator.reporting.pages import any_fmu
 from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.pages.live import plant_section
 from orchestrator.reporting.pages.record import record_plots
-from orchestrator.reporting.source import Source, words
+from orchestrator.reporting.source import ResultDocument, words
+from orchestrator.reporting.trust import trust_badge, trust_section
 
 Json = Mapping[str, Any]
-PLACED = "verdict effects parameters where gap model suspects warnings candidates validation remainder"
-SHOWN_ELSEWHERE = frozenset((*PLACED.split(), "cosimulation", "also_seen", "torque_error", "seconds"))
+PLACED = (
+    "schema_version verdict effects parameters where misfit model suspects warnings candidates validation remainder"
+)
+SHOWN_ELSEWHERE = frozenset(
+    (
+        *PLACED.split(),
+        "cosimulation",
+        "also_seen",
+        "live",
+        "torque_error",
+        "seconds",
+        "trust",
+        "told",
+        "records",
+        "repeats",
+    )
+)
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "none": ("good", "nothing is missing", "The model explains the record to its noise."),
     "parameters": (
@@ -31,34 +49,49 @@ VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
         "The model explains the record once its parameters are re-fitted.",
     ),
     "effects": ("neutral", "effects are missing", ""),
-    "unknown": ("bad", "unexplained", "A gap is left that nothing in the library explains."),
+    "unknown": ("bad", "unexplained", "A misfit is left that nothing in the library explains."),
 }
 SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the actuator"}
 SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
 STAGES = {"nominal": "model as given", "parameters": "with re-fitted parameters"}
 COMPARED = {"before": "as given", "parameters": "re-fitted", "after": "with effects"}
-MISSING = "For each effect: the torque that the model misses without it, and the law that was fitted."
+MISSING = (
+    "For each effect: the torque that the model misses without it, and how much of that the fitted law accounts for."
+)
 HELD_OUT = "Root mean square of simulated minus measured, on the part of the record that no fit has seen."
 
 
-def build(source: Source) -> Report:
-    """Return the page."""
+def build(source: ResultDocument) -> Report:
+    """Return the page.
+
+    Args:
+        source: results of `diagnose`.
+
+    Returns:
+        The report.
+    """
     results = source.results
+    if results.get("kind") == "fmu":
+        return any_fmu.build(source)
     badge, label, sentence = VERDICTS[results["verdict"]]
     effects: list[Json] = list(results.get("effects") or [])
     suspects: list[Json] = list(results.get("suspects") or [])
-    gap: Json = results.get("gap") or {}
-    sections: list[Section] = []
+    misfit: Json = results.get("misfit") or {}
+    sections: list[Section] = _in_short(results)
+    sections += trust_section(results.get("trust"))
     if effects:
         sections.append(_lacking(effects))
     if results.get("warnings"):
         sections.append(Text("Take note", tuple(_sentence(str(w)) for w in results["warnings"])))
-    sections += [*_shrinking(gap), *_gap_table("Gap before and after", gap, HELD_OUT)]
+    sections += [*_shrinking(misfit), *_misfit_table("Misfit before and after", misfit, HELD_OUT)]
+    sections += _each_record(results)
     note = "Root mean square of simulated minus measured, over the whole of the other record."
-    sections += _gap_table("Gap on the other record", results.get("validation") or {}, note)
+    sections += _misfit_table("Misfit on the other record", results.get("validation") or {}, note)
     sections += _free_runs(results.get("validation") or {})
     sections += _picture(source, "missing_torque", "Missing torque", MISSING)
+    sections += _learned(source, results.get("learned_law"))
     sections += record_plots(source, "diagnose.csv")
+    sections += plant_section(source, "diagnose.csv", results)
     sections += _where(list(results.get("where") or []))
     sections += [_evidence("Why these effects", effects)] if effects else []
     sections += [_evidence("What came nearest, too little to be named", suspects)] if suspects else []
@@ -69,12 +102,26 @@ def build(source: Source) -> Report:
     sections += sections_of("More", {n: v for n, v in results.items() if n not in SHOWN_ELSEWHERE})
     return Report(
         title="Diagnosis",
-        summary=" ".join(filter(None, [sentence, _found(effects), _closed(gap)])),
-        badge=(badge, label),
+        summary=" ".join(filter(None, [sentence, _found(effects), _closed(misfit)])),
+        badge=trust_badge(results.get("trust"), label, badge),
         sections=tuple(sections),
         origin=(*source.origin(), *_made(results)),
         downloads=source.downloads(),
     )
+
+
+def _in_short(results: Json) -> list[Section]:
+    """Return the answer in words, and how the corrected model is used."""
+    lines = [str(line).strip() for line in results.get("told") or ()]
+    if not lines:
+        return []
+    if results.get("model"):
+        lines.append(
+            f"The corrected model is {results['model']}: variables as in the model that was given, corrected values as "
+            "start values, for any FMI 2.0 tool. corrected.toml beside it is its model file: a diagnosis with it "
+            "as the model, without search, judges a new record."
+        )
+    return [Text("In short", tuple(lines))]
 
 
 def _made(results: Json) -> list[tuple[str, Cell]]:
@@ -97,21 +144,23 @@ def _found(effects: Sequence[Json]) -> str:
     return f"The model lacks {listed}." if named else ""
 
 
-def _closed(gap: Json) -> str:
+def _closed(misfit: Json) -> str:
     parts = []
-    for signal, g in gap.items():
+    for signal, g in misfit.items():
         before, after = g.get("before"), g.get("after")
         if before is None or after is None:
             continue
         way = "falls" if after < before else "goes"
         noise = f" (noise: {g['noise']:.3g})" if g.get("noise") is not None else ""
         parts.append(f"of the {SIGNALS.get(signal, signal)} {way} from {before:.3g} to {after:.3g} {g['unit']}{noise}")
-    return f"On data that no fit has seen, the rms gap {'; that '.join(parts)}." if parts else ""
+    return f"On data that no fit has seen, the rms misfit {'; that '.join(parts)}." if parts else ""
 
 
-def _lacking(effects: Sequence[Json]) -> Table:
+def _lacking(effects: Sequence[Json]) -> ReportTable:
     rows = tuple((_place(e), words(name), _quantity(p)) for e in effects for name, p in e["parameters"].items())
-    return Table("What the model lacks", (Column("effect"), Column("quantity"), Column("value")), rows)
+    return ReportTable(
+        "What the model lacks", (TableColumn("effect"), TableColumn("quantity"), TableColumn("value")), rows
+    )
 
 
 def _quantity(p: Json) -> str:
@@ -125,10 +174,10 @@ def _quantity(p: Json) -> str:
     return f"{p['value']:.5g}{error}{unit}"
 
 
-def _shrinking(gap: Json) -> list[Section]:
-    """Return bars of the gap from model to model, as multiples of the noise."""
+def _shrinking(misfit: Json) -> list[Section]:
+    """Return bars of the misfit from model to model, as multiples of the noise."""
     made: list[Section] = []
-    for signal, g in gap.items():
+    for signal, g in misfit.items():
         stages, noise = list(g.get("stages") or []), g.get("noise")
         if not stages or not noise:
             continue
@@ -137,7 +186,7 @@ def _shrinking(gap: Json) -> list[Section]:
             Bar(_stage(s["model"]), s["rms"] / largest if largest > 0.0 else 0.0, f"{s['rms'] / noise:.3g} times noise")
             for s in stages
         )
-        made.append(Bars(f"Gap of the {SIGNALS.get(signal, signal)}, from model to model", items))
+        made.append(Bars(f"Misfit of the {SIGNALS.get(signal, signal)}, from model to model", items))
     return made
 
 
@@ -148,15 +197,33 @@ def _stage(model: str) -> str:
     return f"and {_place({'name': name, 'site': site})}".rstrip()
 
 
-def _gap_table(title: str, gap: Json, note: str) -> list[Section]:
-    if not gap:
+def _each_record(results: Json) -> list[Section]:
+    """Return what each of several records says of the common model, and what repeats differ by."""
+    floor = (results.get("repeats") or {}).get("floor") or {}
+    rows = [
+        (one["source"], signal, g["before"], g["after"], g["noise"], floor.get(signal))
+        for one in results.get("records") or []
+        for signal, g in one["misfit"].items()
+    ]
+    if not rows:
         return []
-    columns = tuple(Column(n) for n in ("signal", "before", "after", "noise", "unit", "times smaller"))
+    note = "Held-out part of each record; one set of values for all, a start and a noise level for each."
+    if floor:
+        same = ", ".join((results.get("repeats") or {}).get("sources") or [])
+        note += f" {same} had the same input: no model can do better than what they differ by."
+    names = ("record", "signal", "before", "after", "encoder's noise", "repeats differ by")
+    return [ReportTable("Misfit of each record", tuple(TableColumn(name) for name in names), tuple(rows), note)]
+
+
+def _misfit_table(title: str, misfit: Json, note: str) -> list[Section]:
+    if not misfit:
+        return []
+    columns = tuple(TableColumn(n) for n in ("signal", "before", "after", "noise", "unit", "times smaller"))
     rows = tuple(
         (s, *(g.get(n) for n in ("before", "after", "noise", "unit")), _quotient(g.get("before"), g.get("after")))
-        for s, g in gap.items()
+        for s, g in misfit.items()
     )
-    return [Table(title, columns, rows, note)]
+    return [ReportTable(title, columns, rows, note)]
 
 
 def _quotient(before: float | None, after: float | None) -> float | None:
@@ -170,22 +237,22 @@ def _free_runs(validation: Json) -> list[Section]:
         for signal, g in validation.items()
         if g.get("r_squared")
     )
-    columns = tuple(Column(n, "", 6) for n in ("signal", *COMPARED.values()))
-    return [Table("R² of one free run over all of the other record", columns, rows)] if rows else []
+    columns = tuple(TableColumn(n, "", 6) for n in ("signal", *COMPARED.values()))
+    return [ReportTable("R² of one free run over all of the other record", columns, rows)] if rows else []
 
 
 def _torque_errors(errors: Json) -> list[Section]:
     """Return the relative error of the torque that the inverse model computes from the motion."""
     rows = tuple((words(record), *(_percent(e.get(n)) for n in COMPARED)) for record, e in errors.items())
-    columns = tuple(Column(n) for n in ("on", *(f"{name} [%]" for name in COMPARED.values())))
-    return [Table("Relative torque error of the inverse model", columns, rows)] if rows else []
+    columns = tuple(TableColumn(n) for n in ("on", *(f"{name} [%]" for name in COMPARED.values())))
+    return [ReportTable("Relative torque error of the inverse model", columns, rows)] if rows else []
 
 
 def _percent(share: float | None) -> float | None:
     return None if share is None else 100.0 * share
 
 
-def _also_seen(source: Source, terms: Sequence[Json]) -> list[Section]:
+def _also_seen(source: ResultDocument, terms: Sequence[Json]) -> list[Section]:
     """Return what the final model leaves that follows position or direction, and the gain at every period."""
     if not terms:
         return []
@@ -201,25 +268,45 @@ def _also_seen(source: Source, terms: Sequence[Json]) -> list[Section]:
     )
     note = "Too little to be named as an effect."
     made: list[Section] = [
-        Table("What else follows position or direction", tuple(Column(n) for n in names), rows, note)
+        ReportTable("What else follows position or direction", tuple(TableColumn(n) for n in names), rows, note)
     ]
     return made + _picture(source, "ripple", "Gain of a ripple at each period", "")
 
 
-def _picture(source: Source, name: str, title: str, note: str) -> list[Section]:
+def _picture(source: ResultDocument, name: str, title: str, note: str) -> list[Section]:
     path = source.directory / f"diagnose_{name}.png"
     return [Picture(title, path, note)] if path.is_file() else []
+
+
+def _learned(source: ResultDocument, law: Json | None) -> list[Section]:
+    """Return the law that was learned from what no effect explains: sentence, curve and knots."""
+    if not law:
+        return []
+    title = "A law learned from what is left"
+    columns = (
+        TableColumn("argument", law["argument_unit"]),
+        *(TableColumn(name, law["unit"]) for name in ("value", "95 % from", "to")),
+    )
+    rows = tuple(zip(law["knots"], law["values"], *law["band"], strict=True))
+    note = (
+        "Straight lines between the knots, and on beyond the last. It is no name: nothing in the library has this law."
+    )
+    return [
+        Text(title, (_sentence(law["words"]),)),
+        *_picture(source, "learned_law", "Learned law", note),
+        ReportTable("Knots of the learned law", columns, rows),
+    ]
 
 
 def _where(places: Sequence[Json]) -> list[Section]:
     if not places:
         return []
-    names = ("signal", "regime", "from", "to", "unit", "share of the gap [%]")
+    names = ("signal", "regime", "from", "to", "unit", "share of the misfit [%]")
     rows = tuple(
-        (p["signal"], p["regime"], *_interval(p.get("interval")), p.get("unit"), 100.0 * p["share_of_gap"])
+        (p["signal"], p["regime"], *_interval(p.get("interval")), p.get("unit"), 100.0 * p["share_of_misfit"])
         for p in places
     )
-    return [Table("Where model and record disagree", tuple(Column(n) for n in names), rows)]
+    return [ReportTable("Where model and record disagree", tuple(TableColumn(n) for n in names), rows)]
 
 
 def _interval(interval: Any) -> tuple[Cell, Cell]:
@@ -228,17 +315,19 @@ def _interval(interval: Any) -> tuple[Cell, Cell]:
     return interval, None
 
 
-def _evidence(title: str, effects: Sequence[Json]) -> Table:
+def _evidence(title: str, effects: Sequence[Json]) -> ReportTable:
     columns = ("effect", "gain in log-likelihood", "runner-up", "which gains less by", "cannot be told from")
     rows = []
     for e in effects:
         family = ", ".join(words(name) for name in e.get("family") or () if name != e["name"])
         rows.append((_place(e), e.get("score"), e.get("runner_up"), e.get("margin"), family or None))
     shown = [i for i in range(len(columns)) if i < 4 or any(row[i] for row in rows)]
-    return Table(title, tuple(Column(columns[i]) for i in shown), tuple(tuple(row[i] for i in shown) for row in rows))
+    return ReportTable(
+        title, tuple(TableColumn(columns[i]) for i in shown), tuple(tuple(row[i] for i in shown) for row in rows)
+    )
 
 
-def _parameters(parameters: Json) -> Table:
+def _parameters(parameters: Json) -> ReportTable:
     columns = ("parameter", "nominal", "value", "standard error", "lower", "upper", "change [%]", "unit")
     rows = tuple(
         (
@@ -251,8 +340,8 @@ def _parameters(parameters: Json) -> Table:
         for name, p in parameters.items()
     )
     note = "Lower and upper: ends of the 95 % interval."
-    shown = tuple(Column(c, "", 3 if c in ("standard error", "change [%]") else 6) for c in columns)
-    return Table("Parameters", shown, rows, note)
+    shown = tuple(TableColumn(c, "", 3 if c in ("standard error", "change [%]") else 6) for c in columns)
+    return ReportTable("Parameters", shown, rows, note)
 
 
 def _change(p: Json) -> float | None:
@@ -268,7 +357,7 @@ def _candidates(steps: Sequence[Json]) -> list[Section]:
     if not rows:
         return []
     columns = ("step", "on top of", "tried", "gain in log-likelihood", "gain on data that decide")
-    return [Table("What was tried", tuple(Column(c) for c in columns), tuple(rows), limit=200)]
+    return [ReportTable("What was tried", tuple(TableColumn(c) for c in columns), tuple(rows), limit=200)]
 
 
 def _remainder(results: Json) -> list[Section]:
@@ -286,7 +375,12 @@ def _remainder(results: Json) -> list[Section]:
     made: list[Section] = [Facts("What is left", tuple(facts))] if facts else []
     follows = list(remainder.get("predictable") or [])
     if follows:
-        columns = (Column("site"), Column("follows"), Column("gain in log-likelihood"), Column("share of the rest [%]"))
+        columns = (
+            TableColumn("site"),
+            TableColumn("follows"),
+            TableColumn("gain in log-likelihood"),
+            TableColumn("share of the rest [%]"),
+        )
         rows = tuple((p["site"], p["kind"], p["gain"], 100.0 * p["share"]) for p in follows)
-        made.append(Table("What the rest follows", columns, rows))
+        made.append(ReportTable("What the rest follows", columns, rows))
     return made

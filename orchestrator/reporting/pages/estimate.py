@@ -5,29 +5,49 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.reporting.model import Badge, Cell, Column, Facts, Plot, Report, Section, Series, Table, Text
+from orchestrator.reporting.model import (
+    Badge,
+    Cell,
+    Facts,
+    Plot,
+    Report,
+    ReportTable,
+    Section,
+    Series,
+    TableColumn,
+    Text,
+)
 from orchestrator.reporting.pages.generic import sections_of
+from orchestrator.reporting.pages.live import plant_section
 from orchestrator.reporting.pages.record import record_plots
-from orchestrator.reporting.source import Source, numbers, words
+from orchestrator.reporting.source import ResultDocument, numbers, words
+from orchestrator.reporting.trust import trust_badge, trust_section
 
 Json = Mapping[str, Any]
 CURVE_POINTS = 121
 CHI_SQUARE_95 = 3.841458820694124  # of one degree of freedom
+OFFERED = ("effects.coulomb_friction.motor.torque", "effects.coulomb_friction.load.torque")  # live, beside the gap
 ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
 
 
-def build(source: Source) -> Report:
-    """Return the page."""
+def build(source: ResultDocument) -> Report:
+    """Return the page.
+
+    Args:
+        source: results of `estimate`.
+
+    Returns:
+        The report.
+    """
     results = source.results
     estimates: Json = results.get("estimates") or {}
     found = {name: e for name, e in estimates.items() if e.get("alpha") is not None}
-    sections: list[Section] = []
-    messages = [f"{words(name)}: {e['message']}" for name, e in found.items() if e.get("message")]
-    if messages:
-        sections.append(Text("Remarks", tuple(messages)))
+    sections: list[Section] = trust_section(results.get("trust"))
+    sections += [*_missing(results.get("diagnosis")), *_repeats(results)]
     if estimates:
-        sections += [_methods(estimates), *_comparison(found)]
+        sections += [_methods(estimates), *_remarks(estimates), *_comparison(found)]
     sections += [*_profile(source), *_online(source), *record_plots(source, "estimate.csv"), *_errors(source)]
+    sections += plant_section(source, "estimate.csv", results, OFFERED)
     parameters = (results.get("diagnostics") or {}).get("parameters")
     if parameters:
         sections.append(_parameters(parameters))
@@ -35,6 +55,35 @@ def build(source: Source) -> Report:
     sections += _diagnostics(found)
     badge, summary = _answer(results)
     return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads())
+
+
+def _missing(diagnosis: Json | None) -> list[Section]:
+    """Return what the model lacks, where a diagnosis followed the estimate."""
+    if not diagnosis:
+        return []
+    named = [f"{words(e['name'])} ({e['site']})" for e in diagnosis.get("effects") or ()]
+    said = f"It lacks {', '.join(named)}." if named else f"The diagnosis says: {diagnosis['verdict']}."
+    place = "The folder diagnosis beside this page has its report and the corrected FMU."
+    return [Text("The model does not explain the record", (said, place))]
+
+
+def _repeats(results: Json) -> list[Section]:
+    """Return what repeats of one experiment differ by, beside the encoders' noise."""
+    repeats: Json = results.get("repeats") or {}
+    if not repeats:
+        return []
+    noise = ((results.get("diagnostics") or {}).get("measurement_noise")) or []
+    rows = tuple(
+        (words(name), value, noise[n] if n < len(noise) else None)
+        for n, (name, value) in enumerate(repeats["floor"].items())
+    )
+    columns = (
+        TableColumn("signal"),
+        TableColumn("what does not repeat", "rad", 3),
+        TableColumn("encoder's noise as fitted", "rad", 3),
+    )
+    note = f"{', '.join(repeats['sources'])} have the same torque. No model explains more than they have in common."
+    return [ReportTable("Repeats", columns, rows, note)]
 
 
 def _answer(results: Json) -> tuple[tuple[Badge, str] | None, str]:
@@ -51,9 +100,9 @@ def _answer(results: Json) -> tuple[tuple[Badge, str] | None, str]:
         said = f"{message[:1].upper()}{message[1:]}"
         if "confidence" not in message:
             said = f"No gap is seen: it is {interval}. {said}".strip()
-        return ("neutral", "no gap is seen"), f"{said}{source}."
+        return trust_badge(results.get("trust"), "no gap is seen"), f"{said}{source}."
     summary = f"The half-gap is {results['alpha']:.6g} rad, {interval}{source}."
-    return ("good", "the gap is seen"), " ".join(filter(None, [summary, message]))
+    return trust_badge(results.get("trust"), "the gap is seen", "good"), " ".join(filter(None, [summary, message]))
 
 
 def _interval(estimate: Json) -> tuple[float | None, float | None]:
@@ -65,22 +114,39 @@ def _number(value: float | None) -> str:
     return "any size" if value is None else f"{value:.6g}"
 
 
-def _methods(estimates: Json) -> Table:
+def _methods(estimates: Json) -> ReportTable:
     columns = (
-        Column("method"),
-        Column("half-gap", "rad", 6),
-        Column("standard error", "rad", 3),
-        Column("Cramér-Rao bound", "rad", 3),
-        Column("lower", "rad", 6),
-        Column("upper", "rad", 6),
-        Column("gap is seen"),
-        Column("note"),
+        TableColumn("method"),
+        TableColumn("half-gap", "rad", 6),
+        TableColumn("trust"),
+        TableColumn("lower", "rad", 6),
+        TableColumn("upper", "rad", 6),
+        TableColumn("standard error", "rad", 3),
+        TableColumn("Cramér-Rao", "rad", 3),
     )
     rows = []
     for name, e in estimates.items():
-        numbers_ = (e.get("alpha"), e.get("standard_error"), e.get("cramer_rao"), *_interval(e))
-        rows.append((words(name), *numbers_, e.get("visible"), e.get("not_applicable") or e.get("message") or None))
-    return Table("Estimates", columns, tuple(rows))
+        if e.get("alpha") is None:
+            continue
+        level = (e.get("trust") or {}).get("level")
+        rows.append((words(name), e["alpha"], level, *_interval(e), e.get("standard_error"), e.get("cramer_rao")))
+    note = "Lower and upper: ends of the 95 % interval. Cramér-Rao: the least standard error that the record allows."
+    return ReportTable("Estimates", columns, tuple(rows), note)
+
+
+def _remarks(estimates: Json) -> list[Section]:
+    """Return what is to be said of single methods: messages, what keeps them from green, why they do not apply."""
+    said = []
+    for name, e in estimates.items():
+        if e.get("alpha") is None:
+            said.append(f"{words(name)} does not apply: {e.get('not_applicable')}.")
+            continue
+        message = str(e.get("message") or "")
+        said += [f"{words(name)}: {message}."] if message else []
+        trust: Json = e.get("trust") or {}
+        reasons = [str(reason) for reason in trust.get("reasons") or () if reason not in message]
+        said += [f"{words(name)} is {trust.get('level')}: {'; '.join(reasons)}."] if reasons else []
+    return [Text("Remarks", tuple(text[:1].upper() + text[1:] for text in said))] if said else []
 
 
 def _comparison(found: Json) -> list[Section]:
@@ -90,12 +156,12 @@ def _comparison(found: Json) -> list[Section]:
     low, high = zip(*(_interval(e) for e in found.values()), strict=True)
     series = Series("half-gap", list(range(len(found))), alpha, "points", low, high)
     positive = [v for v in alpha if v > 0.0]
-    wide = bool(positive) and max(positive) > 30.0 * min(positive)
+    wide = bool(positive) and max(positive) > 5.0 * min(positive)
     names = tuple(words(name) for name in found)
     return [Plot("Estimates by method", "method", "half-gap [rad]", (series,), log_y=wide, categories=names)]
 
 
-def _profile(source: Source) -> list[Section]:
+def _profile(source: ResultDocument) -> list[Section]:
     """Return the profile; between its points the root of the drop, with its side's sign, is interpolated linearly."""
     table = source.columns("profile.csv")
     if not {"alpha", "drop"} <= set(table):
@@ -116,7 +182,7 @@ def _profile(source: Source) -> list[Section]:
     return [Plot("Profile likelihood", "half-gap [rad]", "twice the drop", series, note=note)]
 
 
-def _online(source: Source) -> list[Section]:
+def _online(source: ResultDocument) -> list[Section]:
     table = source.columns("online.csv")
     if not {"time", "alpha", "low", "high"} <= set(table):
         return []
@@ -126,7 +192,7 @@ def _online(source: Source) -> list[Section]:
     return [Plot("Online estimate", "time [s]", "half-gap [rad]", curves, log_y=True)]
 
 
-def _errors(source: Source) -> list[Section]:
+def _errors(source: ResultDocument) -> list[Section]:
     table = source.columns("estimate.csv")
     found = [name for name in ERRORS if name in table]
     if not found:
@@ -137,27 +203,27 @@ def _errors(source: Source) -> list[Section]:
     return [Plot("One-step errors", "time [s]", "error [rad]", curves, note=note)]
 
 
-def _parameters(parameters: Json) -> Table:
+def _parameters(parameters: Json) -> ReportTable:
     columns = ("parameter", "nominal", "fitted", "standard error")
     rows: list[tuple[Cell, ...]] = [
         (name, p.get("nominal"), p.get("value"), p.get("standard_error")) for name, p in parameters.items()
     ]
-    return Table("Parameters fitted with the gap", tuple(Column(c, "", 6) for c in columns), tuple(rows))
+    return ReportTable("Parameters fitted with the gap", tuple(TableColumn(c, "", 6) for c in columns), tuple(rows))
 
 
-def _design(source: Source, candidates: Sequence[Json]) -> list[Section]:
+def _design(source: ResultDocument, candidates: Sequence[Json]) -> list[Section]:
     if not candidates:
         return []
     columns = (
-        Column("excitation"),
-        Column("bound on the half-gap", "rad", 3),
-        Column("peak torque", "N.m"),
-        Column("peak motor speed", "rad/s"),
+        TableColumn("excitation"),
+        TableColumn("bound on the half-gap", "rad", 3),
+        TableColumn("peak torque", "N.m"),
+        TableColumn("peak motor speed", "rad/s"),
     )
     rows = tuple((c["name"], c["bound"], c["peak_torque"], c["peak_motor_speed"]) for c in candidates)
     note = "Best first: the smallest standard error of the half-gap that any estimator can have."
     table = source.columns("design.csv")
-    made: list[Section] = [Table("Proposed excitations", columns, rows, note)]
+    made: list[Section] = [ReportTable("Proposed excitations", columns, rows, note)]
     if {"time", "u"} <= set(table):
         torque = Series("requested torque", numbers(table["time"]), numbers(table["u"]), "steps")
         made.append(Plot("The best excitation", "time [s]", "u [N.m]", (torque,)))

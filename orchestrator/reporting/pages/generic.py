@@ -4,11 +4,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.reporting.model import Facts, Report, Section
-from orchestrator.reporting.source import Source, plain, table_of, words
+from orchestrator.reporting.source import ResultDocument, plain, table_of, words
 
 
-def build(source: Source) -> Report:
-    """Return the page."""
+def build(source: ResultDocument) -> Report:
+    """Return the page.
+
+    Args:
+        source: results of any command.
+
+    Returns:
+        The report.
+    """
     return Report(
         title=source.command.capitalize(),
         summary=f"Results of `{source.command}`.",
@@ -19,7 +26,15 @@ def build(source: Source) -> Report:
 
 
 def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
-    """Return an object's plain values as facts, its lists of objects as tables, its objects as further sections."""
+    """Return an object's plain values as facts, its lists of objects as tables, its objects as further sections.
+
+    Args:
+        title: of the section with the plain values.
+        value: a JSON object.
+
+    Returns:
+        The sections.
+    """
     facts: list[tuple[str, Any]] = []
     further: list[Section] = []
     for name, item in value.items():
@@ -36,7 +51,14 @@ def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
 
 
 def sentence(text: str) -> str:
-    """Return text with a capital first letter, the rest as it is."""
+    """Return text with a capital first letter, the rest as it is.
+
+    Args:
+        text: words.
+
+    Returns:
+        The text.
+    """
     return text[:1].upper() + text[1:]
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from orchestrator.reporting.model import Cell, Plot, Section, Series, Span
-from orchestrator.reporting.source import Source, numbers
+from orchestrator.reporting.source import ResultDocument, numbers
 
 SIGNALS = {
     "theta_m": ("Motor angle", "rad"),
@@ -20,11 +20,18 @@ Table = Mapping[str, list[Cell]]
 Numbers = Sequence[float | None]
 
 
-def record_plots(source: Source, name: str) -> list[Section]:
+def record_plots(source: ResultDocument, name: str) -> list[Section]:
     """Return plots against ``time`` of a file with measured columns (``theta_m``) and simulated (``theta_m_after``).
 
     For each signal with simulated columns a plot of simulated minus measured comes first. Empty where there is no
     such file, or no column ``time``.
+
+    Args:
+        source: results of a command.
+        name: of the CSV file.
+
+    Returns:
+        The plots.
     """
     table = source.columns(name)
     return list(_plots(table)) if "time" in table else []
@@ -55,7 +62,15 @@ def _difference(values: Numbers, measured: Numbers) -> list[float | None]:
 
 
 def out_of_contact(time: Sequence[float | None], contact: Sequence[float | None]) -> tuple[Span, ...]:
-    """Return the spans of time in which ``contact`` is zero: the teeth do not touch. At most ``MOST_SPANS``."""
+    """Return the spans of time in which ``contact`` is zero: the teeth do not touch. At most ``MOST_SPANS``.
+
+    Args:
+        time: (n,) [s]; None: unknown.
+        contact: (n,) flank of each sample, 0 inside the gap.
+
+    Returns:
+        Begin and end of each span [s].
+    """
     spans, start = [], None
     for t, c in zip(time, contact, strict=True):
         if t is None:

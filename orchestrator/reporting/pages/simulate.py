@@ -1,43 +1,77 @@
 """The pages of ``simulate`` and ``ssp``: the paired loops, or any system's signals, against time."""
 
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
 
 from orchestrator.reporting.model import Cell, Facts, Plot, Report, Section, Series, Span
 from orchestrator.reporting.pages import generic
+from orchestrator.reporting.pages import live as live_pages
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.record import out_of_contact
-from orchestrator.reporting.source import Source, numbers
+from orchestrator.reporting.source import ResultDocument, numbers
+from orchestrator.shared.results import PairFound, SignalsFound, as_plain, read
 
 SIGNALS_PER_PLOT = 6
 Columns = Mapping[str, list[Cell]]
 
 
-def build(source: Source) -> Report:
-    """Return the page."""
+def build(source: ResultDocument) -> Report:
+    """Return the page.
+
+    Args:
+        source: results of `simulate` or `ssp`.
+
+    Returns:
+        The report.
+    """
     table = source.columns(f"{source.command}.csv")
     results = source.results
+    file = Path(str((source.document.get("arguments") or {}).get("file") or results.get("file") or "")).name
     if not table:
-        return generic.build(source)
-    sections, summary = _pair(results, table) if "alpha" in results else _scenario(results, table)
-    return Report("Simulation", summary, tuple(sections), None, source.origin(), source.downloads())
+        return _written(source, file) if source.command == "ssp" and file else generic.build(source)
+    if "alpha" in results:
+        sections, summary = _pair(source, read(results, PairFound), table)
+    else:
+        sections, summary = _scenario(read(results, SignalsFound), table)
+    title = "Simulation"
+    if source.command == "ssp":
+        title, summary = f"SSP file {file}", f"{_what_ran(file, read(results, SignalsFound), table)} {summary}"
+    return Report(title, summary, tuple(sections), None, source.origin(), source.downloads())
 
 
-def _pair(results: Mapping[str, Any], table: Columns) -> tuple[list[Section], str]:
-    alpha, estimate = float(results["alpha"]), results.get("estimate")
+def _what_ran(file: str, results: SignalsFound, table: Columns) -> str:
+    """Return which components of a file ran, for how long and in which steps."""
+    components = dict.fromkeys(s.signal.split(".")[0] for s in results.signals if "." in s.signal)
+    end = max((t for t in numbers(table["time"]) if t is not None), default=0.0)
+    step = f" of {end / results.steps:.6g} s" if results.steps else ""
+    named = f", with signals of {', '.join(components)}" if components else ""
+    return f"The system in {file} was run from 0 to {end:g} s in steps{step}{named}."
+
+
+def _written(source: ResultDocument, file: str) -> Report:
+    """Return the page of an SSP file that was written, not run."""
+    results = source.results
+    components = ", ".join(str(name) for name in results.get("components") or ())
+    summary = f"{file} was written: {components}; {results.get('connections', 0)} connections. It was not run."
+    sections = tuple(sections_of("The file", results))
+    return Report(f"SSP file {file}", summary, sections, None, source.origin(), source.downloads())
+
+
+def _pair(source: ResultDocument, results: PairFound, table: Columns) -> tuple[list[Section], str]:
+    alpha, estimate = results.alpha, results.estimate
     facts: list[tuple[str, Cell]] = [
         ("actual half-gap [rad]", alpha),
-        ("S, sum of differences [rad]", results["S"]),
-        ("crossings of the gap", results.get("crossings")),
+        ("S, sum of differences [rad]", results.S),
+        ("crossings of the gap", results.crossings),
     ]
     if estimate:
         summary = (
-            f"The half-gap of {alpha:g} rad is estimated as {estimate['alpha']:.8g} rad "
-            f"(interval {estimate['lower']:.8g} to {estimate['upper']:.8g} rad)."
+            f"The half-gap of {alpha:g} rad is estimated as {_digits(estimate.alpha)} rad "
+            f"(interval {_digits(estimate.lower)} to {_digits(estimate.upper)} rad)."
         )
-        facts += [(f"estimate: {name} [rad]", estimate[name]) for name in ("alpha", "lower", "upper")]
+        facts += [(f"estimate: {name} [rad]", getattr(estimate, name)) for name in ("alpha", "lower", "upper")]
     else:
-        summary = f"Two loops, one with a half-gap of {alpha:g} rad. No estimate: {results.get('no_estimate')}."
+        summary = f"Two loops, one with a half-gap of {alpha:g} rad. No estimate: {results.no_estimate}."
     time = numbers(table["time"])
     spans = out_of_contact(time, numbers(table["contact"])) if "contact" in table else ()
     gap = "Shaded: the teeth of the loop with backlash are not in contact."
@@ -57,8 +91,9 @@ def _pair(results: Mapping[str, Any], table: Columns) -> tuple[list[Section], st
             plots.append(Plot(title, "time [s]", label, series, spans, note=gap if spans else ""))
     if {"theta_l_hat", "twin_theta_l_hat"} <= set(table):
         plots.insert(1, _difference(time, table, spans))
-    experiment = sections_of("Experiment", results.get("experiment") or {})
-    return [Facts("Overview", tuple(facts)), *plots, *experiment], summary
+    experiment = sections_of("Experiment", results.experiment)
+    live = live_pages.pair_section(source, results)
+    return [Facts("Overview", tuple(facts)), *plots, *live, *experiment], summary
 
 
 def _difference(time: list[float | None], table: Columns, spans: tuple[Span, ...]) -> Plot:
@@ -69,13 +104,12 @@ def _difference(time: list[float | None], table: Columns, spans: tuple[Span, ...
     return Plot("Difference of the loops", "time [s]", "difference [rad]", (series,), spans, note=note)
 
 
-def _scenario(results: Mapping[str, Any], table: Columns) -> tuple[list[Section], str]:
-    signals: list[Mapping[str, Any]] = list(results.get("signals", []))
+def _scenario(results: SignalsFound, table: Columns) -> tuple[list[Section], str]:
     time = numbers(table["time"])
     by_unit: dict[str, list[str]] = {}
-    for signal in signals:
-        if signal["signal"] in table:
-            by_unit.setdefault(signal.get("unit") or "1", []).append(signal["signal"])
+    for signal in results.signals:
+        if signal.signal in table:
+            by_unit.setdefault(signal.unit or "1", []).append(signal.signal)
     plots: list[Section] = []
     for unit, names in by_unit.items():
         for start in range(0, len(names), SIGNALS_PER_PLOT):
@@ -84,5 +118,10 @@ def _scenario(results: Mapping[str, Any], table: Columns) -> tuple[list[Section]
             which = f", part {start // SIGNALS_PER_PLOT + 1}" if len(names) > SIGNALS_PER_PLOT else ""
             title = f"Signals in {unit}{which}" if unit != "1" else f"Signals without unit{which}"
             plots.append(Plot(title, "time [s]", f"value [{unit}]", series))
-    summary = f"{results.get('steps')} communication steps, {len(signals)} recorded signals."
-    return [*plots, *sections_of("Results", results)], summary
+    summary = f"{results.steps} communication steps, {len(results.signals)} recorded signals."
+    shown = {name: value for name, value in as_plain(results).items() if name != "schema_version" and value != {}}
+    return [*plots, *sections_of("Results", shown)], summary
+
+
+def _digits(value: float | None) -> str:
+    return "unbounded" if value is None else f"{value:.8g}"

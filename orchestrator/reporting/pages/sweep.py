@@ -4,9 +4,22 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from orchestrator.errors import ScenarioError
-from orchestrator.reporting.model import POINT_LIMIT, ROW_LIMIT, Cell, Column, Plot, Report, Section, Series, Table
+from orchestrator.reporting.model import (
+    POINT_LIMIT,
+    ROW_LIMIT,
+    Badge,
+    Cell,
+    Plot,
+    Report,
+    ReportTable,
+    Section,
+    Series,
+    TableColumn,
+)
 from orchestrator.reporting.pages.generic import sections_of
-from orchestrator.reporting.source import Source, by_column, numbers, plain, table_of, words
+from orchestrator.reporting.source import ResultDocument, by_column, numbers, plain, table_of, words
+from orchestrator.reporting.trust import trust_badge, trust_section
+from orchestrator.shared.results import SweepFound, as_plain, read
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
@@ -24,15 +37,23 @@ STATISTICS = {
 }
 
 
-def build(source: Source) -> Report:
-    """Return the page."""
-    results = source.results
-    failed, total = int(results["failed"]), int(results["cases"])
+def build(source: ResultDocument) -> Report:
+    """Return the page.
+
+    Args:
+        source: results of `sweep`.
+
+    Returns:
+        The report.
+    """
+    results = read(source.results, SweepFound)
+    failed, total = results.failed, results.cases
     first, failures, table = _excerpts(source, total)
-    statistics: list[Mapping[str, Any]] = list(results.get("statistics", []))
-    name = (results.get("scenario") or {}).get("name")
-    units = {c["name"]: c["unit"] for c in results.get("columns", [])}
-    sections: list[Section] = [_cases("Failed cases", failures, UNITS | units, failed)] if failed else []
+    statistics: list[Mapping[str, Any]] = [as_plain(s) for s in results.statistics]
+    name = results.scenario.name if results.scenario is not None else ""
+    units = {c.name: c.unit for c in results.columns}
+    sections: list[Section] = trust_section(results.trust)
+    sections += [_cases("Failed cases", failures, UNITS | units, failed)] if failed else []
     if statistics:
         sections.append(_statistics(statistics))
     if {"alpha", "noise", "estimate", "lower", "upper", "error_percent"} <= set(table):
@@ -44,11 +65,18 @@ def build(source: Source) -> Report:
     return Report(
         title="Backlash sweep" if statistics else f"Sweep of {name}" if name else "Sweep",
         summary=_summary(statistics, total, failed) if statistics else _count(source.document, total, failed),
-        badge=("bad", f"{failed} of {total} cases failed") if failed else ("good", f"all {total} cases done"),
+        badge=_badge(results.trust, failed, total),
         sections=tuple(sections),
         origin=source.origin(),
         downloads=source.downloads(),
     )
+
+
+def _badge(trust: Mapping[str, Any] | None, failed: int, total: int) -> tuple[Badge, str]:
+    """Return the colour of the worse of trust and failures, and how many cases are done."""
+    if failed:
+        return "bad", f"{failed} of {total} cases failed"
+    return trust_badge(trust, f"all {total} cases done", "good")
 
 
 def _count(document: Mapping[str, Any], total: int, failed: int) -> str:
@@ -66,11 +94,11 @@ def _summary(statistics: Sequence[Mapping[str, Any]], total: int, failed: int) -
     return " ".join([f"The half-gap was estimated in {total - failed} of {total} cases.", *parts])
 
 
-def _statistics(statistics: Sequence[Mapping[str, Any]]) -> Table:
+def _statistics(statistics: Sequence[Mapping[str, Any]]) -> ReportTable:
     names = [name for name in STATISTICS if name in statistics[0]]
-    columns = tuple(Column(*STATISTICS[name]) for name in names)
+    columns = tuple(TableColumn(*STATISTICS[name]) for name in names)
     rows = [{**s, "coverage": 100.0 * s["coverage"]} for s in statistics]
-    return Table("Errors by noise level", columns, tuple(tuple(row[name] for name in names) for row in rows))
+    return ReportTable("Errors by noise level", columns, tuple(tuple(row[name] for name in names) for row in rows))
 
 
 def _plots(table: Columns) -> list[Section]:
@@ -157,7 +185,7 @@ def _axis(values: Sequence[Cell]) -> tuple[list[float | None], tuple[str, ...]]:
     return numbers(values), ()
 
 
-def _excerpts(source: Source, total: int) -> tuple[Columns, Columns, Columns]:
+def _excerpts(source: ResultDocument, total: int) -> tuple[Columns, Columns, Columns]:
     """Return the first rows, the first failed rows, and rows spread over all for the plots; memory stays bounded."""
     rows = source.rows("sweep.csv")
     header = next(rows, [])
@@ -180,12 +208,12 @@ def _excerpts(source: Source, total: int) -> tuple[Columns, Columns, Columns]:
     return by_column(header, first), by_column(header, failures), by_column(header, spread)
 
 
-def _cases(title: str, table: Columns, units: Mapping[str, str], total: int) -> Table:
+def _cases(title: str, table: Columns, units: Mapping[str, str], total: int) -> ReportTable:
     """Return rows as a table, without the columns that are empty in all of them."""
     names = [n for n in dict.fromkeys((*FIRST, *table)) if n in table and any(v is not None for v in table[n])]
     rows = zip(*(table[n] for n in names), strict=True)
-    columns = tuple(Column(words(n), units.get(n, ""), 6) for n in names)
-    return Table(title, columns, tuple(_row(names, row) for row in rows), total=total)
+    columns = tuple(TableColumn(words(n), units.get(n, ""), 6) for n in names)
+    return ReportTable(title, columns, tuple(_row(names, row) for row in rows), total=total)
 
 
 def _row(names: Sequence[str], row: Sequence[Cell]) -> tuple[Cell, ...]:
@@ -196,20 +224,20 @@ def _whole(value: Cell) -> Cell:
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
-def _provenance(results: Mapping[str, Any]) -> list[Section]:
+def _provenance(results: SweepFound) -> list[Section]:
     made: list[Section] = []
-    calibrations = results.get("calibrations") or {}
+    calibrations = {noise: as_plain(calibration) for noise, calibration in results.calibrations.items()}
     if calibrations:
         made.append(
             table_of("Calibrations", [{"noise [rad]": n, **c} for n, c in calibrations.items()], note=CALIBRATION_NOTE)
         )
-    if isinstance(results.get("experiment"), Mapping):
-        settings = dict(results["experiment"])
+    if results.experiment is not None:
+        settings = dict(results.experiment)
         plant = settings.pop("values", None)
         made += sections_of("Experiment", settings)
         made += sections_of("Plant", plant) if plant else []
-    if isinstance(results.get("fmus"), Mapping):
-        made += sections_of("FMUs by content", results["fmus"])
+    if results.fmus is not None:
+        made += sections_of("FMUs by content", results.fmus)
     return made
 
 

@@ -3,12 +3,19 @@
 from collections.abc import Mapping
 from typing import Any
 
-from orchestrator.reporting.model import Column, Plot, Report, Section, Series, Table
-from orchestrator.reporting.source import Source, plain, table_of
+from orchestrator.reporting.model import Plot, Report, ReportTable, Section, Series, TableColumn
+from orchestrator.reporting.source import ResultDocument, plain, table_of
 
 
-def build(source: Source) -> Report:
-    """Return the page."""
+def build(source: ResultDocument) -> Report:
+    """Return the page.
+
+    Args:
+        source: results of `thesis`.
+
+    Returns:
+        The report.
+    """
     results = source.results
     gains: list[Mapping[str, Any]] = list(results["gains"])
     agree = sum(bool(g["agrees"]) for g in gains)
@@ -34,14 +41,14 @@ def build(source: Source) -> Report:
     )
 
 
-def _table_4_1(published: list[Mapping[str, Any]], ours: list[float]) -> Table:
+def _table_4_1(published: list[Mapping[str, Any]], ours: list[float]) -> ReportTable:
     columns = (
-        Column("alpha", "rad", 5),
-        Column("S", "", 5),
-        Column("published estimate", "rad", 5),
-        Column("published error", "%"),
-        Column("our estimate", "rad", 6),
-        Column("our error", "%"),
+        TableColumn("alpha", "rad", 5),
+        TableColumn("S", "", 5),
+        TableColumn("published estimate", "rad", 5),
+        TableColumn("published error", "%"),
+        TableColumn("our estimate", "rad", 6),
+        TableColumn("our error", "%"),
     )
     rows = tuple(
         (
@@ -51,7 +58,7 @@ def _table_4_1(published: list[Mapping[str, Any]], ours: list[float]) -> Table:
         )
         for row, own in zip(published, ours, strict=True)
     )
-    return Table("Table 4.1", columns, rows)
+    return ReportTable("Table 4.1", columns, rows)
 
 
 def _errors(published: list[Mapping[str, Any]], ours: list[float]) -> Plot:

@@ -70,4 +70,5 @@ function remember(mode) {
 
 themeButton(document.getElementById("theme"));
 document.querySelectorAll("table.sortable").forEach(sortable);
-document.querySelectorAll("figure.plot").forEach((figure) => new Plot(figure));
+document.querySelectorAll("figure.plot:not(.simulated)").forEach((figure) => new Plot(figure));
+document.querySelectorAll(".live").forEach((host) => new Live(host));

@@ -68,7 +68,16 @@ class Plot {
     let y = extent([...series.flatMap((s) => [s.y, s.low ?? [], s.high ?? []]), ...flat], logY);
     if (diagonal) x = y = [Math.min(x[0], y[0]), Math.max(x[1], y[1])];
     this.range = { x, y };
+    this.home = this.range;
     this.draw();
+  }
+
+  // Show other numbers, with everything in view unless the reader has zoomed.
+  show(series) {
+    series.forEach((found, n) => Object.assign(this.data.series[n], found));
+    this.cursor = null;
+    if (this.range === this.home) this.reset();
+    else this.draw();
   }
 
   zoom(factor) {

@@ -1,0 +1,485 @@
+"""Plants of five domains as equations of their own, around which effects are hidden: records for FMUs of any exporter.
+
+Nothing is shared with the library. A sample is solved in ``FINE`` midpoint steps; friction is LuGre, series effects are
+streamed from step to step, so that records in closed loop can be made. FMUs of others are read from a folder by file
+name; those in C come from :mod:`tests.support.box_fmu`.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numba
+import numpy as np
+
+from tests.support.box_fmu import DOMAINS, write_fmu
+
+FINE = 40
+INPUTS = ("input_gain", "input_offset", "input_delay", "input_lag", "input_saturation", "input_dead_zone",
+          "input_rate_limit", "input_quantisation", "unknown_dropouts")  # fmt: skip
+OUTPUTS = ("output_gain", "output_offset", "output_delay", "output_lag", "output_quantisation")
+PORTS = ("coulomb_friction", "stribeck_friction", "quadratic_drag", "viscous_drag", "spring", "hardening_spring",
+         "gravity", "ripple", "load", "directional_friction", "unknown_coming_load", "unknown_growing_drag",
+         "unknown_patchy_drag", "unknown_sticking_spot")  # fmt: skip
+INSIDE = "unknown_inside"
+SERIES = ("input_delay", "input_saturation", "input_dead_zone", "input_lag", "input_rate_limit", "input_quantisation")
+MOTION = ("coulomb_friction", "stribeck_friction", "quadratic_drag", "hardening_spring", "ripple", "output_delay")
+
+
+@dataclass(frozen=True)
+class Plant:
+    """One plant: number of its equations, FMU, and what is needed to drive and map it.
+
+    Attributes:
+        parameters: FMU's name -> nominal value, 5 % uncertain.
+        inputs: name, drive and offset of each recorded input; effects act on the first.
+        outputs: name, place of the state, noise.
+        port: input, position, velocity; and the place of the position's state.
+        loop: gains of a position controller; () where there is none.
+        inside: something within it can be changed that no port reaches.
+    """
+
+    number: int
+    name: str
+    exporter: str
+    domain: str
+    parameters: dict[str, float]
+    inputs: tuple[tuple[str, float, float], ...]
+    outputs: tuple[tuple[str, int, float], ...]
+    port: tuple[str, str, str, int]
+    h: float
+    effects: tuple[str, ...]
+    loop: tuple[float, ...] = ()
+    inside: bool = False
+    fixed: dict[str, float] = field(default_factory=dict)
+    start: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    unknown: tuple[str, ...] = ()
+    options: str = ""
+    quiet: float = 1.0
+
+    def fmu(self, folder: Path, foreign: Path | None) -> Path | None:
+        """Return its FMU, made or found; None where it is not at hand."""
+        if self.exporter == "own C":
+            return write_fmu(folder / self.name, next(d for d in DOMAINS if f"{d.name}.fmu" == self.name))
+        path = None if foreign is None else foreign / self.name
+        return path if path is not None and path.exists() else None
+
+    def map(self, path: Path) -> Path:
+        """Write the map that a user would."""
+        lines = ["[inputs]", *(f'"{name}" = {{ hold = "zero" }}' for name, _, _ in self.inputs), "[outputs]"]
+        lines += [f'"{name}" = {{ noise = {noise} }}' for name, _, noise in self.outputs]
+        lines += ["[parameters]", *(f'"{name}" = {{ uncertainty = "5 %" }}' for name in self.parameters)]
+        lines += [f'"{name}" = {{ value = {value} }}' for name, value in self.fixed.items()]
+        effort, position, velocity, _ = self.port
+        lines += ["[ports.port]", f'input = "{effort}"', f'position = "{position}"']
+        lines += [f'velocity = "{velocity}"'] if velocity else []
+        path.write_text("\n".join([*lines, "[options]", self.options]) + "\n", encoding="utf-8")
+        return path
+
+
+MECHANICAL = ("unknown_coming_load", "unknown_growing_drag", "unknown_patchy_drag", "unknown_sticking_spot",
+              "unknown_dropouts")  # fmt: skip
+FLOWS = ("unknown_coming_load", "unknown_dropouts")
+PLANTS = (
+    Plant(0, "Spring.fmu", "own C", "translation", {"m": 1.0, "k": 20.0, "c": 0.8}, (("F", 6.0, 0.0),),
+          (("x", 0, 2e-4),), ("F", "x", "", 0), 0.01, (*SERIES, *MOTION, "load"), (60.0, 6.0), unknown=MECHANICAL),
+    Plant(1, "TwoMass.fmu", "own C", "rotation", {"J1": 0.02, "J2": 0.05, "k": 60.0, "c": 0.05, "b": 0.04},
+          (("M", 0.7, 0.0),), (("phi1", 0, 3e-4), ("phi2", 2, 3e-4)), ("M", "phi1", "", 0), 0.005,
+          (*SERIES, *MOTION, "gravity", "load", "spring"), (3.0, 0.25), True, unknown=MECHANICAL),
+    Plant(2, "Circuit.fmu", "own C", "electricity", {"L": 0.5, "R": 2.0, "C": 0.02}, (("U", 10.0, 0.0),),
+          (("q", 0, 3e-4),), ("U", "q", "", 0), 0.02, (*SERIES, "quadratic_drag", "output_delay"),
+          unknown=MECHANICAL),
+    Plant(3, "Tanks.fmu", "own C", "hydraulics", {"A1": 1.5, "A2": 1.0, "k1": 0.02, "k2": 0.03},
+          (("qin", 0.02, 1.0),), (("h1", 0, 1e-3), ("h2", 1, 1e-3)), ("qin", "h1", "", 0), 2.0,
+          ("input_delay", "input_saturation", "input_lag", "input_rate_limit", "output_delay"), (), True,
+          unknown=FLOWS),
+    Plant(4, "edrive_mass_dymola.fmu", "Dymola", "rotation", {"inertia.J": 0.002, "damper.d": 0.001},
+          (("M_A", 0.1, 0.0),), (("phiA", 0, 2e-4),), ("M_B", "phiA", "wA", 0), 0.005,
+          (*SERIES, *MOTION, "gravity", "load"), (0.5, 0.03), unknown=MECHANICAL, options="tolerance = 1e-8"),
+    Plant(5, "Pendulum_pythonfmu.fmu", "PythonFMU", "rotation", {"J": 0.05, "d": 0.04, "mgl": 0.9},
+          (("tau", 0.45, 0.0),), (("phi", 0, 1e-3),), ("tau", "phi", "", 0), 0.01,
+          (*SERIES, "coulomb_friction", "stribeck_friction", "quadratic_drag", "load", "output_delay"), (3.0, 0.4),
+          unknown=MECHANICAL),
+    Plant(6, "QuarterCar_ownc.fmu", "other C", "translation",
+          {"ms": 300.0, "mu": 40.0, "ks": 16000.0, "cs": 1200.0, "kt": 150000.0},
+          (("f", 300.0, 0.0), ("road", 0.01, 0.0)), (("zs", 0, 1e-4), ("zu", 1, 1e-4)), ("f", "zs", "", 0), 0.01,
+          (*SERIES, "coulomb_friction", "quadratic_drag", "spring", "load", "output_delay"), (), True,
+          unknown=MECHANICAL),
+    Plant(7, "TwoRooms_ownc.fmu", "other C", "heat",
+          {"Ca": 6e4, "Cw": 6e5, "Gaw": 120.0, "Gwo": 40.0, "Ga": 15.0}, (("heater", 1500.0, 1.0), ("Tout", 3.0, 1.5)),
+          (("Tair", 0, 0.05),), ("heater", "Tair", "", 0), 300.0,
+          ("input_delay", "input_saturation", "input_lag", "input_rate_limit", "output_lag"), (), True,
+          start=(18.0, 16.0, 0.0, 0.0), unknown=FLOWS),
+    Plant(9, "tank3_20sim.fmu", "20-sim", "hydraulics",
+          {"WaterTank3.Tank3.area": 1.0, "WaterTank3.Valve.resistance": 7.0},
+          (("inFlow", 1.0, 1.2), ("valveControl", 0.0, 1.0)), (("level", 0, 2e-3),), ("inFlow", "level", "", 0), 0.1,
+          ("input_delay", "input_saturation", "input_lag", "input_rate_limit"), unknown=FLOWS),
+    Plant(10, "emachine.fmu", "Dymola", "electricity", {"resistor.R": 1.0, "inductor.L": 0.001},
+          (("U", 10.0, 0.0), ("w", 100.0, 0.0)), (("I", 0, 5e-3),), ("U", "I", "", 0), 1e-4,
+          (*SERIES, "output_delay", "output_lag"), unknown=FLOWS, options="tolerance = 1e-8"),
+    Plant(11, "cosim_chassis.fmu", "C++ framework", "translation", {"mass": 400.0},
+          (("force", 600.0, 0.0),), (("position", 0, 2e-4),), ("force", "position", "velocity", 0), 0.01,
+          (*SERIES, "coulomb_friction", "quadratic_drag", "spring", "load", "output_delay"), (40000.0, 5000.0),
+          unknown=MECHANICAL, fixed={"gravity": 0.0}),
+)  # fmt: skip
+
+
+@numba.njit(cache=True)
+def rates(number, x, u, f, p, inside):
+    """Return the rates of the state under inputs ``u`` and effort ``f`` at the port."""
+    d = np.zeros(4)
+    if number == 0:
+        d[0], d[1] = x[1], (u[0] + f - p[1] * x[0] - p[2] * x[1]) / p[0]
+    elif number == 1:
+        twist = x[0] - x[2]
+        if inside > 0.0:
+            twist = np.sign(twist) * max(abs(twist) - inside, 0.0)
+        t = p[2] * twist + p[3] * (x[1] - x[3])
+        d[0], d[2] = x[1], x[3]
+        d[1] = (u[0] + f - t - p[4] * x[1]) / p[0]
+        d[3] = t / p[1]
+    elif number == 2:
+        d[0], d[1] = x[1], (u[0] + f - p[1] * x[1] - x[0] / p[2]) / p[0]
+    elif number == 3:
+        gap = x[0] - x[1]
+        a = p[2] * np.sign(gap) * (np.sqrt(abs(gap)) if abs(gap) > 0.01 else abs(gap) * 10.0)
+        b = p[3] * (np.sqrt(x[1]) if x[1] > 0.01 else x[1] * 10.0)
+        b *= 1.0 + inside * x[1]
+        d[0], d[1] = (u[0] + f - a) / p[0], (a - b) / p[1]
+    elif number == 4:
+        d[0], d[1] = x[1], (u[0] + f - p[1] * x[1]) / p[0]
+    elif number == 5:
+        d[0], d[1] = x[1], (u[0] + f - p[1] * x[1] - p[2] * np.sin(x[0])) / p[0]
+    elif number == 6:
+        y, v = x[0] - x[1], x[2] - x[3]
+        s = -p[2] * y - p[3] * v - inside * 1e8 * y * y * y
+        d[0], d[1] = x[2], x[3]
+        d[2], d[3] = (s + u[0] + f) / p[0], (-s - p[4] * (x[1] - u[1])) / p[1]
+    elif number == 7:
+        g = p[3] * (1.0 + inside * (x[1] - 16.0))
+        d[0] = (u[0] + f - p[2] * (x[0] - x[1]) - p[4] * (x[0] - u[1])) / p[0]
+        d[1] = (p[2] * (x[0] - x[1]) - g * (x[1] - u[1])) / p[1]
+    elif number == 9:
+        d[0] = (u[0] + f - 9.81 * x[0] / p[1]) / p[0]
+    elif number == 10:
+        d[0] = (u[0] + f - p[0] * x[0] - 0.01 * u[1]) / p[1]
+    else:
+        d[0], d[1] = x[1], (f - u[0]) / p[0]
+    return d
+
+
+@numba.njit(cache=True)
+def force(kind, x, v, z, q, t):
+    """Return the effort against the motion, and the rate of the bristles of friction."""
+    if kind == 0 or kind == 1:
+        level = q[0]
+        if kind == 1:
+            level = q[0] + (q[1] - q[0]) * np.exp(-((v / q[2]) ** 2))
+        rate = v - abs(v) * z / q[3]
+        return level * (z / q[3] + q[4] * rate), rate
+    if kind == 2:
+        return q[0] * v * abs(v), 0.0
+    if kind == 3:
+        return q[0] * v, 0.0
+    if kind == 4:
+        return q[0] * x, 0.0
+    if kind == 5:
+        return q[0] * x**3, 0.0
+    if kind == 6:
+        return q[0] * np.sin(x) + q[0] * q[1] * np.cos(x), 0.0
+    if kind == 7:
+        return q[0] * np.sin(q[1] * x + q[2]), 0.0
+    if kind == 8:
+        return q[0], 0.0
+    if kind == 9:
+        return q[0] * abs(v), 0.0
+    if kind == 10:
+        return (q[0] if t > q[1] else 0.0), 0.0
+    if kind == 11:
+        return q[0] * v * (t / q[1]) ** 3, 0.0
+    if kind == 12:
+        return (q[0] * v if np.sin(x * q[1]) > 0.3 else 0.0), 0.0
+    return q[0] * v / (1.0 + ((x - q[1]) / q[2]) ** 2), 0.0
+
+
+@numba.njit(cache=True)
+def arrives(kind, u, size, held, buffer, at, step, drop):
+    """Return what arrives of ``u`` behind an effect in series, one fine step later; ``held`` is its memory."""
+    if kind == 0:
+        return u * (1.0 + size)
+    if kind == 1:
+        return u + size
+    if kind == 2:
+        buffer[at % len(buffer)] = u
+        late = at - int(np.rint(size / step))
+        return buffer[late % len(buffer)] if late >= 0 else buffer[0]
+    if kind == 3:
+        gap = held[0] - u
+        held[0] = u + gap * np.exp(-step / size)
+        return u + gap * size / step * (1.0 - np.exp(-step / size))
+    if kind == 4:
+        return min(max(u, -size), size)
+    if kind == 5:
+        return np.sign(u) * max(abs(u) - size, 0.0)
+    if kind == 6:
+        before = held[0]
+        held[0] += min(max(u - before, -size * step), size * step)
+        return 0.5 * (before + held[0])
+    if kind == 7:
+        return size * np.rint(u / size)
+    return 0.0 if drop else u
+
+
+@numba.njit(cache=True)
+def solved(number, p, start, given, loop, h, fine, series, size, port, q, place, speed, inside, added, noise,
+           sensed, drops):  # fmt: skip
+    """Return inputs (n, inputs) and states (n, 4); in closed loop the first input follows the noisy first output."""
+    n = len(given)
+    u, out = given.copy(), np.zeros((n, 4))
+    x, z, step = start.copy(), 0.0, h / fine
+    held, buffer = np.zeros(1), np.zeros(64 * fine)
+    turn = -1.0 if number == 11 else 1.0  # the input pushes against the position
+    before, now = 0.0, np.zeros(given.shape[1])
+    for k in range(n):
+        out[k] = x
+        if len(loop):
+            y = x[sensed] + noise[k]
+            rate = (y - before) / h if k else 0.0
+            u[k, 0] = turn * (loop[0] * (given[k, 0] - y) - loop[1] * rate)
+            before = y
+        if k == 0:
+            held[0] = u[0, 0]
+        now[:] = u[k]
+        for j in range(fine):
+            t = k * h + j * step
+            now[0] = u[k, 0]
+            if series >= 0:
+                now[0] = arrives(series, u[k, 0], size, held, buffer, k * fine + j, step, drops[k])
+            now[0] += added[k]
+            v = x[speed] if speed >= 0 else 0.0
+            f, rate1 = force(port, x[place], v, z, q, t) if port >= 0 else (0.0, 0.0)
+            w = x + 0.5 * step * rates(number, x, now, -f, p, inside)
+            v = w[speed] if speed >= 0 else 0.0
+            g, rate2 = force(port, w[place], v, z + 0.5 * step * rate1, q, t + 0.5 * step) if port >= 0 else (0.0, 0.0)
+            x = x + step * rates(number, w, now, -g, p, inside)
+            z += step * rate2
+    return u, out
+
+
+SPEEDS = {0: 1, 1: 1, 2: 1, 4: 1, 5: 1, 6: 2, 11: 1}
+
+
+@dataclass(frozen=True)
+class Case:
+    """A record and what is hidden in it; ``ratio``: what the effect changes, over the noise; ``told``: beyond what
+    parameters can take up."""
+
+    plant: Plant
+    names: tuple[str, ...]
+    sizes: tuple[float, ...]
+    parameters: tuple[float, ...]
+    closed: bool
+    ratio: float
+    told: float
+    time: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+
+    def write(self, path: Path) -> Path:
+        """Write the record as CSV."""
+        header = ",".join(["time", *(i[0] for i in self.plant.inputs), *(o[0] for o in self.plant.outputs)])
+        table = np.column_stack([self.time, self.u, self.y])
+        np.savetxt(path, table, fmt="%.10g", delimiter=",", header=header, comments="")
+        return path
+
+
+def excitation(drive: float, offset: float, h: float, rng, n: int) -> np.ndarray:
+    """Return steps and a few sines, held over the samples."""
+    u = np.zeros(n)
+    at = 0
+    while at < n:
+        length = int(rng.integers(8, 120))
+        u[at : at + length] = rng.uniform(-1.0, 1.0)
+        at += length
+    t = np.arange(n) * h
+    for _ in range(3):
+        u += 0.3 * np.sin(2 * np.pi * rng.uniform(0.002, 0.06) / h * t + rng.uniform(0, 6.28))
+    return drive * (u + offset) if offset == 0.0 else drive * np.maximum(u + offset, 0.0)
+
+
+class Maker:
+    """Makes one record: a plant with true parameters and a drive, and effects of chosen sizes."""
+
+    def __init__(self, plant: Plant, rng, n: int, closed: bool, disturbance: float) -> None:
+        from scipy.signal import lfilter
+
+        self.plant, self.rng, self.n, self.closed = plant, rng, n, closed
+        nominal = np.array(list(plant.parameters.values()))
+        self.p = nominal * (1.0 + rng.uniform(-0.05, 0.05, len(nominal)))
+        self.given = np.column_stack([excitation(d, o, plant.h, rng, n) for _, d, o in plant.inputs])
+        for k, (_, drive, offset) in enumerate(plant.inputs):
+            if drive == 0.0:
+                self.given[:, k] = offset
+        self.loop = np.zeros(0)
+        self.sigma = np.array([s for _, _, s in plant.outputs])
+        self.noise = rng.standard_normal((n, len(self.sigma))) * self.sigma
+        self.places = [place for _, place, _ in plant.outputs]
+        self.drops = np.zeros(n, dtype=np.bool_)
+        for at in rng.integers(0, n - 10, 12):
+            self.drops[at : at + int(rng.integers(2, 8))] = True
+        self.added = np.zeros(n)
+        plain = self.run((), ())[1]
+        if closed:
+            self.loop = np.array(plant.loop)
+            wish = lfilter([0.1], [1.0, -0.9], self.given[:, 0])
+            free = plant.loop[0] if plant.number in (4, 11) else 0.0
+            way = np.std(self.given[:, 0]) / free if free else np.std(plain[:, 0])
+            self.given[:, 0] = 2.0 * way * wish / np.std(wish)
+        used, self.plain = self.run((), ())
+        self.drive = float(np.std(used[:, 0]))
+        self.command = used[:, 0]
+        speed = SPEEDS.get(plant.number, -1)
+        place = plant.port[3]
+        self.way = float(np.std(self.plain[:, place]))
+        self.span = float(np.max(np.abs(self.plain[:, place] - np.mean(self.plain[:, place]))))
+        self.speed = float(np.std(self.plain[:, speed])) if speed >= 0 else 1.0
+        if disturbance:
+            white = rng.standard_normal(n)
+            self.added = disturbance * self.drive * lfilter([np.sqrt(1 - 0.8**2)], [1.0, -0.8], white)
+        self.shape = rng.uniform(0.0, 1.0, 4)
+
+    def law(self, name: str, size: float) -> tuple[int, np.ndarray]:
+        """Return number and parameters of the law at the port for a size (an effort)."""
+        q, s = np.zeros(5), self.shape
+        q[0] = size
+        q[3], q[4] = (0.003 + 0.04 * s[0]) * self.way, 0.1 * self.plant.h
+        if name == "stribeck_friction":
+            q[1], q[2] = size * (1.4 + s[1]), (0.1 + 0.3 * s[2]) * self.speed
+        elif name == "quadratic_drag":
+            q[0] = size / self.speed**2
+        elif name in ("viscous_drag", "directional_friction", "unknown_growing_drag", "unknown_patchy_drag",
+                      "unknown_sticking_spot"):  # fmt: skip
+            q[0] = size / self.speed
+            q[1], q[2] = {"unknown_growing_drag": (0.7 * self.n * self.plant.h, 0.0),
+                          "unknown_patchy_drag": (4.0 / self.way, 0.0),
+                          "unknown_sticking_spot": (0.7 * self.way, 0.15 * self.way)}.get(name, (0.0, 0.0))  # fmt: skip
+        elif name == "spring":
+            q[0] = size / self.way
+        elif name == "hardening_spring":
+            q[0] = size / self.way**3
+        elif name == "gravity":
+            q[1] = 2.0 * s[1] - 1.0
+        elif name == "ripple":
+            q[1], q[2] = (3.0 + 6.0 * s[1]) / self.span, 6.28 * s[2]
+        elif name == "unknown_coming_load":
+            q[1] = (0.3 + 0.4 * s[1]) * self.n * self.plant.h
+        return PORTS.index(name), q
+
+    def series(self, name: str, share: float) -> float:
+        """Return the size of an effect in series for a share of the drive."""
+        top, h = float(np.max(np.abs(self.command))), self.plant.h
+        if name == "input_saturation":
+            return top * (1.0 - min(share, 0.8))
+        if name in ("input_dead_zone", "input_quantisation"):
+            return share * self.drive
+        if name in ("input_delay", "input_lag"):
+            size = 8.0 * share * h
+            return max(round(size * FINE / h), 1) * h / FINE if name == "input_delay" else size
+        if name == "input_rate_limit":
+            return 0.1 * self.drive / h / max(share, 1e-3)
+        return share if name == "input_gain" else share * self.drive
+
+    def run(self, names: tuple[str, ...], shares: tuple[float, ...], p=None, noisy: bool = False):
+        """Return inputs and outputs without measurement noise (``noisy``: it goes round the loop)."""
+        plant, (series, size), (port, q), inside = self.plant, (-1, 0.0), (-1, np.zeros(5)), 0.0
+        for name, share in zip(names, shares, strict=True):
+            if name in INPUTS:
+                series, size = INPUTS.index(name), self.series(name, share)
+            elif name in PORTS:
+                port, q = self.law(name, share * self.drive)
+            elif name == INSIDE:
+                inside = share * {1: 0.05, 3: 0.5, 6: 1.0, 7: 0.2}[plant.number]
+        noise = self.noise[:, 0] if noisy else np.zeros(self.n)
+        u, x = solved(
+            plant.number, self.p if p is None else p, np.array(plant.start), self.given, self.loop, plant.h, FINE,
+            series, size, port, q, plant.port[3], SPEEDS.get(plant.number, -1), inside,
+            self.added if noisy else np.zeros(self.n), noise, self.places[0], self.drops,
+        )  # fmt: skip
+        y = x[:, self.places]
+        for name, share in zip(names, shares, strict=True):
+            if name in OUTPUTS:
+                y = self.behind(name, x, share)
+        return u, (x if not names and not noisy and p is None else y)
+
+    def behind(self, name: str, x: np.ndarray, share: float) -> np.ndarray:
+        """Return outputs, the first behind an effect in series: its samples interpolated by splines."""
+        from scipy.interpolate import CubicSpline
+
+        y, h = x[:, self.places], self.plant.h
+        time = np.arange(self.n) * h
+        line = CubicSpline(time, y[:, 0])
+        found = y.copy()
+        if name == "output_delay":
+            found[:, 0] = line(np.maximum(time - 4.0 * share * h, 0.0))
+        elif name == "output_lag":
+            fine = np.arange(self.n * FINE) * h / FINE
+            held, decay, late = y[0, 0], np.exp(-h / FINE / (8.0 * share * h)), line(fine)
+            for k in range(self.n * FINE):
+                if k % FINE == 0:
+                    found[k // FINE, 0] = held
+                held = late[k] + (held - late[k]) * decay
+        else:
+            found[:, 0] = y[:, 0] * (1.0 + share) if name == "output_gain" else y[:, 0] + share * self.sigma[0]
+        return found
+
+    def size(self, name: str, share: float) -> float:
+        """Return the size as the bank counts it."""
+        if name in INPUTS:
+            return self.series(name, share) if name != "unknown_dropouts" else 0.0
+        if name in PORTS:
+            return float(self.law(name, share * self.drive)[1][0])
+        if name == "output_quantisation":
+            return share * self.sigma[0]
+        return share * {"output_delay": 4.0 * self.plant.h, "output_lag": 8.0 * self.plant.h}.get(name, 1.0)
+
+    def share_for(self, names: tuple[str, ...], at: int, shares: list[float], wanted: float) -> float:
+        """Return the share at which effect ``at`` changes an output by ``wanted`` times its noise, at most 0.6."""
+        low, high = 1e-5, 0.6
+        one = (names[at],)
+        base = self.run((), ())[1][:, self.places]
+
+        def ratio(share: float) -> float:
+            y = self.run(one, (share,))[1]
+            return float(np.max(np.sqrt(np.mean((y - base) ** 2, axis=0)) / self.sigma))
+
+        if ratio(high) < wanted:
+            return high
+        for _ in range(14):
+            middle = np.sqrt(low * high)
+            low, high = (low, middle) if ratio(middle) > wanted else (middle, high)
+        return float(high)
+
+    def case(self, names: tuple[str, ...], low: float, high: float) -> Case:
+        """Return the record with effects of ``low`` to ``high`` times the noise."""
+        shares: list[float] = []
+        for at, _ in enumerate(names):
+            wanted = float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
+            shares.append(self.share_for(names, at, shares, wanted))
+        given = tuple(shares)
+        base = self.run((), ())[1][:, self.places]
+        bare = self.run(names, given)[1] if names else base
+        change = (bare - base) / self.sigma
+        columns = []
+        for k in range(len(self.p)):
+            p = self.p.copy()
+            p[k] *= 1.001
+            columns.append(((self.run((), (), p)[1] - base) / self.sigma).ravel())
+        J = np.column_stack(columns)
+        left = change.ravel() - J @ np.linalg.lstsq(J, change.ravel(), rcond=None)[0]
+        u, y = self.run(names, given, noisy=True)
+        if not names:
+            y = y if y.shape[1] == len(self.places) else y[:, self.places]
+        ratio = float(np.max(np.sqrt(np.mean(change**2, axis=0))))
+        told = float(np.sqrt(np.mean(left**2) * change.shape[1]))
+        sizes = tuple(self.size(n, s) for n, s in zip(names, given, strict=True))
+        time = np.arange(self.n) * self.plant.h
+        return Case(self.plant, names, sizes, tuple(self.p), self.closed, ratio, told, time, u, y + self.noise)

@@ -1,0 +1,1 @@
+"""The public workflows, one module each; ``import orchestrator as oc`` gives their functions and results."""

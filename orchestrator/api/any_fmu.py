@@ -1,0 +1,383 @@
+"""What any FMU misses, and its parameters, from a measured record."""
+
+import csv
+import weakref
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.shown import Block, Result, table
+from orchestrator.diagnosis.blackbox.calibrate import Calibration
+from orchestrator.diagnosis.blackbox.calibrate import calibrate as calibrating
+from orchestrator.diagnosis.blackbox.deliver import Delivered, deliver
+from orchestrator.diagnosis.blackbox.diagnose import Outcome
+from orchestrator.diagnosis.blackbox.diagnose import diagnose as diagnosing
+from orchestrator.diagnosis.blackbox.draft import drafted
+from orchestrator.diagnosis.blackbox.estimates import Estimate, Found, Misfit, validated
+from orchestrator.diagnosis.blackbox.figures import draw_signals
+from orchestrator.diagnosis.blackbox.mapping import Map, read_map
+from orchestrator.diagnosis.blackbox.problem import Data
+from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
+from orchestrator.diagnosis.blackbox.search import counted
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
+from orchestrator.fmi.model_description import read_description
+from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.settings import as_tables
+
+MEANING = {
+    "none": "the FMU explains the record to its noise",
+    "parameters": "re-fitted parameters explain the record",
+    "effects": "effects are missing around the FMU",
+    "unknown": "something is missing that no effect at a port explains",
+}
+Progress = Callable[[str], None]
+
+
+def _estimate(e: Estimate) -> dict[str, Any]:
+    found: dict[str, Any] = {"value": e.value, "standard_error": e.standard_error, "interval": list(e.interval)}
+    return found | {"unit": e.unit} | ({} if e.nominal is None else {"nominal": e.nominal})
+
+
+def _found(f: Found) -> dict[str, Any]:
+    return {
+        "name": f.effect.kind.name,
+        "site": f.effect.place,
+        "parameters": {e.name: _estimate(e) for e in f.estimates},
+        "score": f.gain,
+        "family": list(f.family),
+    }
+
+
+def _misfits(misfit: Sequence[Misfit]) -> dict[str, Any]:
+    return {
+        m.output: {
+            "nominal": m.nominal,
+            "refitted": m.refitted,
+            "corrected": m.corrected,
+            "noise": m.noise,
+            "unit": m.unit,
+        }
+        for m in misfit
+    }
+
+
+@dataclass(frozen=True, repr=False)
+class FmuDiagnosisResult(Result):
+    """What a record says of an FMU.
+
+    Attributes:
+        outcome: verdict, effects, parameters, misfit and what is left.
+        data: the record's columns.
+        fmu: the FMU.
+        delivered: the corrected system, once it has been written.
+        validation: misfit on a second record, if one was given.
+        settings: thresholds that were used.
+        arguments: what was asked for.
+    """
+
+    command: ClassVar[str] = "diagnose"
+    outcome: Outcome
+    data: Data
+    fmu: Path
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    delivered: list[Delivered] = field(default_factory=list)
+    validation: tuple[Misfit, ...] = ()
+    settings: BoxSettings = DEFAULT
+
+    @property
+    def verdict(self) -> str:
+        """One of "none", "parameters", "effects" and "unknown"."""
+        return self.outcome.verdict
+
+    @property
+    def effects(self) -> tuple[Found, ...]:
+        """The effects that are missing: where, how large, and what cannot be told from them."""
+        return self.outcome.effects
+
+    @property
+    def harm(self) -> tuple[str, ...]:
+        """Sentences: on which outputs of the second record the corrected model is worse than without effects."""
+        worse = self.settings.rest.worse
+        return tuple(
+            f"on the second record `{m.output}` is worse with the effects: {m.corrected:.3g} times its noise, "
+            f"{m.refitted:.3g} without"
+            for m in self.validation
+            if self.effects and m.corrected > worse * max(m.refitted, 1.0)
+        )
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the verdict, the effects and the misfit."""
+        o = self.outcome
+        lines: list[Block] = [f"Verdict: {o.verdict}: {MEANING[o.verdict]}"]
+        for found in o.effects:
+            values = ", ".join(
+                f"{e.name} = {e.value:.5g} +- {e.standard_error:.2g} {e.unit}".rstrip() for e in found.estimates
+            )
+            lines.append(f"  {found.effect.kind.name} at {found.effect.place}: {values}")
+            if found.family:
+                lines.append(f"    this record does not tell it from {', '.join(found.family)}")
+        lines += [f"  nearest, and not it: {name}" for name in o.suspects]
+        lines += [f"Where: {text}" for text in o.where]
+        lines += [f"Note: {text}" for text in o.warnings]
+        rows = [(e.name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.standard_error:.2g}", e.unit) for e in o.parameters]
+        lines.append(table("Parameters", ("name", "nominal", "re-fitted", "standard error", "unit"), rows))
+        shown = [("held-out quarter", o.misfit)] + [("second record", self.validation)] * bool(self.validation)
+        for which, misfit in shown:
+            cells = [
+                (m.output, *(f"{v:.3f}" for v in (m.nominal, m.refitted, m.corrected)), f"{m.noise:.3g} {m.unit}")
+                for m in misfit
+            ]
+            head = ("output", "nominal", "re-fitted", "corrected", "noise")
+            lines.append(table(f"Misfit over noise, {which}", head, cells))
+        lines += [f"Note: {text}" for text in self.harm]
+        for d in self.delivered:
+            lines.append(f"Corrected system: {d.path.name}; differs from the fit by {d.difference:.2g} of the noise")
+        return lines
+
+    def results(self, place: Path) -> dict[str, Any]:
+        """Return what goes into ``diagnose.json``."""
+        o = self.outcome
+        return {
+            "kind": "fmu",
+            "verdict": o.verdict,
+            "effects": [_found(f) for f in o.effects],
+            "suspects": list(o.suspects),
+            "parameters": {e.name: _estimate(e) for e in o.parameters},
+            "misfit": _misfits(o.misfit),
+            "validation": _misfits(self.validation),
+            "remainder": {
+                "explained": o.rest.explained,
+                "disturbance": o.rest.share if o.rest.disturbed else None,
+                "reasons": list(o.rest.reasons),
+                "power": o.rest.blocks.tolist(),
+            },
+            "where": list(o.where),
+            "warnings": [*o.warnings, *self.harm],
+            "settings": as_tables(self.settings),
+            "candidates": self._candidates(),
+            "model": None if not self.delivered else str(place / self.delivered[0].path.name),
+            "delivery": [d.as_json() for d in self.delivered],
+            "step_cost": o.probe.step_cost,
+            "walls": support().in_words,
+            "runs": o.runs,
+            "seconds": o.seconds,
+        }
+
+    def _candidates(self) -> list[dict[str, Any]]:
+        search = self.outcome.search
+        if search is None:
+            return []
+        return [
+            {
+                "on_top_of": [e.label for e in step.before.model.effects],
+                "accepted": step.accepted,
+                "tried": [
+                    {
+                        "effect": fit.model.effects[-1].label,
+                        "values": fit.model.values[-1].tolist(),
+                        "gain": search.score(fit) - search.score(step.before),
+                        "decided": fit.decided - step.before.decided,
+                        "parameters": counted(fit.model),
+                    }
+                    for fit in step.tried
+                ],
+            }
+            for step in search.steps
+        ]
+
+    def write_files(self, folder: Path) -> None:
+        """Write the held-out part, a figure and the corrected system."""
+        write_signals(folder / "diagnose.csv", self.outcome, self.data)
+        draw_signals(folder / "diagnose_signals.png", self.outcome, self.data)
+        if self.outcome.verdict != "unknown":
+            self.delivered[:] = [deliver(folder / "corrected.ssp", self.fmu, self.outcome)]
+
+    def close(self) -> None:
+        """End the child processes now; else they end with the result."""
+        self.outcome.problem.runner.close()
+
+
+def write_signals(path: Path, outcome: Outcome, data: Data) -> None:
+    """Write measured and simulated outputs of all rows.
+
+    Args:
+        path: the CSV file.
+        outcome: of the diagnosis.
+        data: the record's rows.
+    """
+    problem = outcome.problem
+    header = ["time", *problem.inputs]
+    columns = [data.time, *data.inputs.T]
+    for k, name in enumerate(problem.outputs):
+        header += [name, f"{name}_nominal", f"{name}_refitted", f"{name}_corrected"]
+        columns += [data.outputs[:, k], *(y[:, k] for y in outcome.stages)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows([f"{v:.9g}" for v in row] for row in np.column_stack(columns))
+
+
+def diagnose_fmu(
+    record: Path | str,
+    fmu: Path | str,
+    map: Path | str,  # noqa: A002 - as on the command line
+    *,
+    validate: Path | str | None = None,
+    settings: BoxSettings | Path | str | None = None,
+    progress: Progress = lambda what: None,
+) -> FmuDiagnosisResult:
+    """Return what a record says of an FMU, and which effects are missing around it.
+
+    Args:
+        record: CSV file with the columns that the map names.
+        fmu: any FMI 2.0 co-simulation FMU; it runs in a child process.
+        map: TOML file: columns, uncertain parameters, ports.
+        validate: a second record of the same columns, to show the misfit on; nothing is fitted to it.
+        settings: thresholds, or the path of a TOML file of them.
+        progress: called with what is being done.
+
+    Returns:
+        What is missing around the FMU, with how it was found.
+
+    Raises:
+        InputError: record, FMU, map or settings cannot be used.
+        SimulationError: the FMU fails again and again.
+
+    Example:
+        >>> found = oc.diagnose_fmu("axis.csv", "axis.fmu", "axis_map.toml")
+        >>> found.verdict, [effect.name for effect in found.effects]
+        ('effects', ['coulomb_friction'])
+    """
+    used = chosen_settings(settings, BoxSettings)
+    description = read_description(Path(fmu))
+    given = read_map(Path(map), description)
+    data = read_data(Path(record), given)
+    second = None if validate is None else read_data(Path(validate), given)
+    outcome = diagnosing(Path(fmu), given, data, units_of(given, description), used, progress)
+    try:
+        models = (outcome.problem.nominal, outcome.refitted, outcome.model)
+        shown = () if second is None else validated(outcome.problem, models, second)
+    except BaseException:
+        outcome.problem.runner.close()
+        raise
+    files = {"record": record, "fmu": fmu, "map": map, "validate": validate}
+    arguments = {name: str(path) for name, path in files.items() if path is not None}
+    result = FmuDiagnosisResult(outcome, data, Path(fmu), arguments, validation=shown, settings=used)
+    weakref.finalize(result, outcome.problem.runner.close)  # child processes end with the result, or at exit
+    return result
+
+
+def units_of(given: Map, description: Any) -> dict[str, str]:
+    """Return the unit of every variable that has one.
+
+    Args:
+        given: the map of the record.
+        description: of the FMU.
+
+    Returns:
+        Unit by variable.
+    """
+    del given
+    return {v.name: v.unit for v in description.model.variables.values() if v.unit}
+
+
+def draft_map(record: Path | str, fmu: Path | str) -> str:
+    """Return a first map from units, causality and names, as TOML.
+
+    Args:
+        record: path of the log.
+        fmu: path of the FMU.
+
+    Returns:
+        The TOML text.
+
+    Raises:
+        InputError: record or FMU cannot be read.
+
+    Example:
+        >>> "[ports.port_1]" in oc.draft_map("axis.csv", "axis.fmu")
+        True
+    """
+    return drafted(read_description(Path(fmu)), columns_of(Path(record)))
+
+
+@dataclass(frozen=True, repr=False)
+class CalibrationResult(Result):
+    """Parameters of an FMU from a record.
+
+    Attributes:
+        calibration: values, intervals, what the record does not determine, misfit.
+        arguments: what was asked for.
+    """
+
+    command: ClassVar[str] = "calibrate"
+    calibration: Calibration
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    def blocks(self) -> Sequence[Block]:
+        """Return parameters and misfit."""
+        c = self.calibration
+        rows = [
+            (e.name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.interval[0]:.6g} to {e.interval[1]:.6g}",
+             f"{100.0 * c.learned[e.name]:.0f} %", e.unit)
+            for e in c.parameters
+        ]  # fmt: skip
+        head = ("name", "nominal", "value", "95 % interval", "learned", "unit")
+        lines: list[Block] = [f"Parameters {'explain' if c.explained else 'do not explain'} the record to its noise"]
+        lines.append(table("Parameters", head, rows))
+        lines += [f"Note: {text}" for text in c.warnings]
+        found = [(m.output, f"{m.nominal:.3f}", f"{m.refitted:.3f}", f"{m.noise:.3g} {m.unit}") for m in c.misfit]
+        lines.append(table("Misfit over noise, held-out quarter", ("output", "nominal", "calibrated", "noise"), found))
+        return lines
+
+    def results(self, place: Path) -> dict[str, Any]:
+        """Return what goes into ``calibrate.json``."""
+        del place
+        c = self.calibration
+        return {
+            "explained": c.explained,
+            "parameters": {e.name: _estimate(e) | {"learned": c.learned[e.name]} for e in c.parameters},
+            "not_told_apart": [list(pair) for pair in c.confounded],
+            "misfit": {m.output: {"nominal": m.nominal, "calibrated": m.refitted, "noise": m.noise} for m in c.misfit},
+            "warnings": list(c.warnings),
+            "seconds": c.seconds,
+            "walls": support().in_words,
+        }
+
+
+def calibrate(
+    record: Path | str,
+    fmu: Path | str,
+    map: Path | str,  # noqa: A002 - as on the command line
+    *,
+    progress: Progress = lambda what: None,
+) -> CalibrationResult:
+    """Return the parameters of an FMU that explain a record, with intervals.
+
+    Args:
+        record: path of the log.
+        fmu: path of the FMU.
+        map: path of the map.
+        progress: called with what is done.
+
+    Returns:
+        The parameters with their intervals.
+
+    Raises:
+        InputError: record, FMU or map cannot be used.
+        SimulationError: the FMU fails again and again.
+
+    Example:
+        >>> fit = oc.calibrate("axis.csv", "axis.fmu", "axis_map.toml")
+        >>> [p.name for p in fit.calibration.parameters], fit.calibration.explained
+        (['J', 'b'], False)
+    """
+    description = read_description(Path(fmu))
+    given = read_map(Path(map), description)
+    data = read_data(Path(record), given)
+    found = calibrating(Path(fmu), given, data, units_of(given, description), progress)
+    return CalibrationResult(found, {"record": str(record), "fmu": str(fmu), "map": str(map)})

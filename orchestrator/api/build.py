@@ -1,0 +1,109 @@
+"""The FMUs of this project, built."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestrator.api.shown import Block, Result
+from orchestrator.building.build import ROOT, default_directory, ensure_built
+from orchestrator.building.launcher import find_toolchain
+from orchestrator.building.native_build import ensure_native, native_directory, native_remark
+from orchestrator.building.sources import catalogue
+from orchestrator.errors import FmuError, OutputError
+
+PLATFORMS = ("all", "here")
+
+
+@dataclass(frozen=True, repr=False)
+class BuildResult(Result):
+    """FMUs that are up to date; ``result["Drivetrain"]`` is the path of one.
+
+    Attributes:
+        paths: path by name.
+        remark: what this machine cannot give an FMU, or None.
+        arguments: what was asked for.
+    """
+
+    command: ClassVar[str] = "build"
+    paths: Mapping[str, Path]
+    remark: str | None = None
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Path:
+        return self.paths[name]
+
+    def blocks(self) -> Sequence[Block]:
+        """Return a line for each FMU, and the remark."""
+        lines = [f"{n:<20}{shown(p)}  {p.stat().st_size / 1024:.0f} kB" for n, p in self.paths.items()]
+        return lines if self.remark is None else [*lines, f"note: {self.remark}"]
+
+    def results(self, place: Path) -> dict[str, Any]:
+        """Return what ``build.json`` says."""
+        return {"fmus": {name: str(path) for name, path in self.paths.items()}, "remark": self.remark}
+
+
+def shown(path: Path) -> str:
+    """Return a path for the reader.
+
+    Args:
+        path: of an FMU or a folder.
+
+    Returns:
+        The path within the repository where it lies in it, else the path as it is.
+    """
+    try:
+        return str(path.resolve().relative_to(ROOT))
+    except ValueError:
+        return str(path)
+
+
+def build(
+    names: Sequence[str] | None = None,
+    *,
+    directory: Path | str | None = None,
+    force: bool = False,
+    native: bool = False,
+    platforms: str = "all",
+) -> BuildResult:
+    """Build the FMUs that are missing or older than what they are made from.
+
+    Args:
+        names: which FMUs (default: all).
+        directory: where they go (default: ``fmus/`` of the repository, or of the current folder; native ones
+            ``fmus/native/``).
+        force: build also what is up to date.
+        native: translate the sources to C and compile them, so that the FMUs need no Python at run time.
+        platforms: of native FMUs: "all" that the compiler can make, or this one alone ("here"), which is quicker.
+
+    Returns:
+        The path of each FMU, by name.
+
+    Raises:
+        FmuError: a name is unknown, a build fails, or a native one lacks a compiler.
+        OutputError: ``directory`` is a file.
+
+    Example:
+        >>> oc.build(["Drivetrain"])["Drivetrain"].name
+        'Drivetrain.fmu'
+    """
+    usual = native_directory() if native else default_directory()
+    folder = usual if directory is None else Path(directory)
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"`directory` must be a folder, but {folder} is a file", "directory")
+    unknown = [name for name in names or () if name not in catalogue()]
+    if unknown:
+        raise FmuError(f"`names` must be among {', '.join(catalogue())}, but has {unknown[0]!r}", "names")
+    if platforms not in PLATFORMS:
+        raise FmuError(f"`platforms` must be one of {', '.join(PLATFORMS)}, but is {platforms!r}", "platforms")
+    if native:
+        return _native(list(names) if names else None, folder, force, platforms)
+    paths = ensure_built(list(names) if names else None, folder, force=force)
+    given = {"names": list(paths), "directory": str(folder), "force": force}
+    return BuildResult(paths, find_toolchain().remark, given)
+
+
+def _native(names: Sequence[str] | None, folder: Path, force: bool, platforms: str) -> BuildResult:
+    paths = ensure_native(names, folder, force=force, here=platforms == "here")
+    given = {"names": list(paths), "directory": str(folder), "force": force, "native": True, "platforms": platforms}
+    return BuildResult(paths, native_remark() if platforms == "all" else None, given)

@@ -1,0 +1,194 @@
+"""The excitation that would show a gap."""
+
+import csv
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.api.arguments import within
+from orchestrator.api.estimate import UNSEEN, require_linear
+from orchestrator.api.shown import Block, Result, table
+from orchestrator.errors import OutputError, ScenarioError
+from orchestrator.estimation import design as designing
+from orchestrator.estimation.design import LONGEST, SHORTEST, Candidate, Limits
+from orchestrator.records.model_file import Model, read_model
+from orchestrator.records.plausibility import LONGEST_STEP, own_frequency
+from orchestrator.records.record import MINIMUM_ROWS
+
+DEFAULT_SIZE = 0.005  # rad
+# Least and largest value of each argument: rad, N.m, rad/s, s, Hz.
+RANGES = {
+    "size": (1e-5, 0.5),
+    "torque_limit": (1e-3, 1e6),
+    "speed_limit": (1e-3, 1e5),
+    "duration": (SHORTEST, 1e4),
+    "rate": (1.0, 1e5),
+}
+
+
+@dataclass(frozen=True, repr=False)
+class DesignResult(Result):
+    """Excitations for one gap, the best first.
+
+    Attributes:
+        size: half-gap that is to be seen [rad].
+        time: the grid [s], shape (n,).
+        candidates: what was judged: torque ``u`` [N.m] of shape (n,), and the bound on the half-gap [rad].
+        arguments: what was asked for.
+    """
+
+    command: ClassVar[str] = "estimate"
+    size: float
+    time: NDArray[np.float64]
+    candidates: tuple[Candidate, ...]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def best(self) -> Candidate:
+        """The excitation with the smallest bound."""
+        return self.candidates[0]
+
+    @property
+    def shows(self) -> bool:
+        """Whether the best excitation shows a gap of this size: its bound is below half of it."""
+        return self.best.bound <= 0.5 * self.size
+
+    def write_csv(self, path: Path | str) -> None:
+        """Write the record to run: ``time`` [s] and ``u`` [N.m].
+
+        Args:
+            path: the file.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        try:
+            with Path(path).open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file)
+                writer.writerow(("time", "u"))
+                rows = zip(self.time.tolist(), self.best.u.tolist(), strict=True)
+                writer.writerows((f"{t:.9g}", f"{u:.6g}") for t, u in rows)
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {error.strerror}") from None
+
+    def plot(self, path: Path | str) -> None:
+        """Draw the torque of the best excitation against time.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+        """
+        from orchestrator.estimation.figures import draw_design
+
+        draw_design(Path(path), self.time, self.best)
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the table of the candidates."""
+        rows = [
+            [c.name, f"{c.bound:.2g}" if c.bound < UNSEEN else "not seen", f"{c.torque:.4g}", f"{c.speed:.4g}"]
+            for c in self.candidates
+        ]
+        head = ("excitation", "bound on the half-gap [rad]", "peak torque [N.m]", "peak motor speed [rad/s]")
+        duration = float(self.arguments["duration"])
+        return [table(f"To see a half-gap of {self.size:g} rad in {duration:g} s", head, rows)]
+
+    def entries(self) -> list[dict[str, Any]]:
+        """List the candidates that see anything, as ``estimate.json`` does.
+
+        Returns:
+            Name, bound [rad], peak torque [N.m] and peak motor speed [rad/s] of each.
+        """
+        return [
+            {"name": c.name, "bound": c.bound, "peak_torque": c.torque, "peak_motor_speed": c.speed}
+            for c in self.candidates
+            if c.bound < UNSEEN
+        ]
+
+    def results(self, place: Path | None = None) -> dict[str, Any]:
+        """Return what ``estimate.json`` says of the design."""
+        return {"design": self.entries()}
+
+    def write_files(self, folder: Path) -> None:
+        """Write ``design.csv`` and ``design.png``."""
+        self.write_csv(folder / "design.csv")
+        self.plot(folder / "design.png")
+
+
+def check_design(
+    model: Model, size: float | None, torque_limit: float, speed_limit: float, duration: float, rate: float
+) -> None:
+    """Refuse a design that cannot be made.
+
+    Args:
+        model: of the machine.
+        size: half-gap that is to be seen [rad], or None where it is not known yet.
+        torque_limit: [N.m].
+        speed_limit: [rad/s] of the motor.
+        duration: [s].
+        rate: samples per second [Hz].
+
+    Raises:
+        ScenarioError: a number is out of its range, or the rate too low for the machine's own frequency.
+    """
+    given = {"torque_limit": torque_limit, "speed_limit": speed_limit, "duration": duration, "rate": rate}
+    for name, value in (({} if size is None else {"size": size}) | given).items():
+        within(name, value, *RANGES[name])
+    rows = duration * rate
+    if not MINIMUM_ROWS <= round(rows) <= LONGEST:
+        text = f"`duration` times `rate` must be {MINIMUM_ROWS} to {LONGEST} samples, but is {rows:g}"
+        raise ScenarioError(text, "duration", "rate")
+    own = own_frequency(model)
+    if rate * LONGEST_STEP < own:
+        raise ScenarioError(
+            f"`rate` must be at least {own / LONGEST_STEP:.3g} to show a shaft that oscillates at {own:.3g} rad/s, "
+            f"but is {rate:g}",
+            "rate",
+        )
+
+
+def design(
+    model: Model | None = None,
+    size: float = DEFAULT_SIZE,
+    *,
+    torque_limit: float = 250.0,
+    speed_limit: float = 50.0,
+    duration: float = 10.0,
+    rate: float = 200.0,
+    motor_only: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> DesignResult:
+    """Propose the torque record that shows a gap best.
+
+    Args:
+        model: of the machine (default: ``read_model()``).
+        size: half-gap that is to be seen [rad].
+        torque_limit: largest torque to ask for [N.m].
+        speed_limit: largest speed of the motor [rad/s].
+        duration: length of the record [s].
+        rate: its samples per second [Hz].
+        motor_only: whether there is no load encoder.
+        progress: called with (candidates done, in all).
+
+    Returns:
+        All candidates, the best first, each with the bound on the half-gap that its record would give.
+
+    Raises:
+        ScenarioError: a number is out of its range, or the model has effects that estimators would not see.
+
+    Example:
+        >>> plan = oc.design(size=0.005, duration=4.0)
+        >>> plan.shows
+        True
+        >>> plan.write_csv("excitation.csv")
+    """
+    model = read_model(None) if model is None else model
+    require_linear(model)
+    check_design(model, size, torque_limit, speed_limit, duration, rate)
+    limits = Limits(torque_limit, speed_limit)
+    time, candidates = designing.design(model, size, limits, duration, rate, motor_only, progress)
+    given = {"size": size, "torque_limit": torque_limit, "speed_limit": speed_limit, "duration": duration}
+    given |= {"rate": rate, "motor_only": motor_only}
+    return DesignResult(size, time, tuple(candidates), given)

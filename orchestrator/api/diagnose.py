@@ -1,0 +1,374 @@
+"""What a model misses, from a measured record."""
+
+import csv
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar, overload
+
+import msgspec
+
+from orchestrator.api.any_fmu import FmuDiagnosisResult, diagnose_fmu
+from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.live import corrected_live
+from orchestrator.api.numerics import fitting
+from orchestrator.api.records import as_record
+from orchestrator.api.remains import also_seen, described_term, of_each_record
+from orchestrator.api.shown import Block, Result, table
+from orchestrator.diagnosis import diagnose as diagnosing
+from orchestrator.diagnosis.diagnose import evidence_of
+from orchestrator.diagnosis.figures import (
+    draw_candidates,
+    draw_innovations,
+    draw_learned,
+    draw_lines,
+    draw_missing,
+    draw_signals,
+)
+from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Named
+from orchestrator.diagnosis.proof.corrected import BeforeAfter, before_and_after, build_corrected, fmu_name
+from orchestrator.diagnosis.proof.model_text import corrected_model
+from orchestrator.diagnosis.proof.other_record import STAGES, Validation, torque_errors, unharmed
+from orchestrator.diagnosis.proof.other_record import validate as validated_on
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.diagnosis.verdict.admission import check_comparable
+from orchestrator.diagnosis.verdict.evidence import Evidence
+from orchestrator.diagnosis.verdict.told import told
+from orchestrator.errors import OutputError, ScenarioError
+from orchestrator.records.model_file import Model, read_model
+from orchestrator.records.plausibility import check_plausible
+from orchestrator.records.record import Record
+from orchestrator.shared.trust import Trust
+
+SHOWN = 5
+
+
+@dataclass(frozen=True, repr=False)
+class DiagnosisResult(Result):
+    """What a record says of a model.
+
+    Attributes:
+        diagnosis: verdict, effects, parameters, misfit and how they were found.
+        record: the measured record.
+        validation: how the models do on another record, or None.
+        torque_error: relative torque error of each inverse model on the record; empty for plants without one.
+        evidence: what the final model leaves at the motor, and what it follows.
+        seconds: wall time of the diagnosis [s].
+        arguments: what was asked for.
+        model: what it was compared with.
+        more: further records of the same machine, fitted together with the first.
+    """
+
+    command: ClassVar[str] = "diagnose"
+    diagnosis: Diagnosis
+    record: Record
+    validation: Validation | None
+    torque_error: Mapping[str, float]
+    evidence: Evidence
+    seconds: float
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    model: Model | None = None
+    more: tuple[Record, ...] = ()
+
+    @property
+    def verdict(self) -> str:
+        """One of "none", "parameters", "effects" and "unknown"."""
+        return self.diagnosis.verdict
+
+    @property
+    def effects(self) -> tuple[Named, ...]:
+        """The effects that the model misses: name, site and parameters, each with its interval and unit."""
+        return self.diagnosis.effects
+
+    @property
+    def misfit(self) -> tuple[Misfit, ...]:
+        """Rms of simulated minus measured on held-out data [rad], by signal, before and after."""
+        return self.diagnosis.misfit
+
+    @property
+    def trust(self) -> Trust:
+        """How far the corrected model can be trusted."""
+        return self.diagnosis.trust
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to bear in mind, a sentence each."""
+        return self.diagnosis.warnings
+
+    def build(self, out: Path | str) -> Path:
+        """Build the corrected plant as an FMU and check it.
+
+        Args:
+            out: the folder; made when it does not exist.
+
+        Returns:
+            The path of the FMU.
+
+        Raises:
+            OutputError: the folder cannot be made.
+            FmuError: the FMU cannot be built.
+            SimulationError: the check found an error in it.
+        """
+        folder = Path(out)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"`out` must be a folder, but {folder} is not: {error.strerror}", "out") from None
+        with fitting(f"{self.record.source}: the corrected model cannot be built"):
+            return build_corrected(self.diagnosis, self.record.source, folder)
+
+    @cached_property
+    def runs(self) -> BeforeAfter:
+        """The held-out part, measured and co-simulated with the nominal and the corrected FMU."""
+        with tempfile.TemporaryDirectory(prefix="diagnose-") as folder:
+            return self._co_simulated(self.build(folder))
+
+    def _co_simulated(self, fmu: Path) -> BeforeAfter:
+        with fitting(f"{self.record.source}: no model can be fitted to this record"):
+            return before_and_after(self.diagnosis, fmu)
+
+    def plot(self, path: Path | str) -> None:
+        """Draw the held-out part: measured, of the nominal model and of the corrected one.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+        """
+        draw_signals(Path(path), self.runs, self.diagnosis)
+
+    def write_csv(self, path: Path | str) -> None:
+        """Write what ``plot`` draws as CSV.
+
+        Args:
+            path: the file.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        runs = self.runs
+        names: Sequence[str] = ("theta_m", "theta_l")[: runs.measured.shape[1]]
+        header = ["time", "u"] + [f"{name}{suffix}" for name in names for suffix in ("", "_before", "_after")]
+        columns = [runs.time, runs.u]
+        for n in range(len(names)):
+            columns += [runs.measured[:, n], runs.before[:, n], runs.after[:, n]]
+        try:
+            with Path(path).open("w", newline="", encoding="utf-8") as file:
+                writer = csv.writer(file, lineterminator="\n")
+                writer.writerow(header)
+                writer.writerows([f"{value:.9g}" for value in row] for row in zip(*columns, strict=True))
+        except OSError as error:
+            raise OutputError(f"cannot write {path}: {error.strerror}") from None
+
+    def summary(self) -> Iterator[str]:
+        """Yield what was found, one sentence a line.
+
+        Yields:
+            What is missing, how sure, what it does, what is left and open; where the misfit is, and the warnings.
+        """
+        d = self.diagnosis
+        yield from told(d)
+        if d.where and d.verdict not in ("none", "parameters"):
+            yield "Where:"
+            for place in d.where[:SHOWN]:
+                yield f"  {place.words}"
+        if d.learned:
+            yield f"Learned law: {d.learned.words}"
+        for warning in d.warnings:
+            yield f"Note: {warning}"
+        yield f"Trust: {self.trust.level.word}"
+        yield from (f"  {reason}" for reason in self.trust.reasons if reason not in d.warnings)
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the summary, and the tables of candidates, misfit and what else was seen."""
+        return [*self.summary(), *_tables(self)]
+
+    def results(self, place: Path) -> dict[str, Any]:
+        """Return what ``diagnose.json`` says; the corrected FMU is in ``place``."""
+        found = self.diagnosis.as_json() | {"model": str(place / self.fmu_name)}
+        found["cosimulation"] = {"largest_difference_from_compiled": self.runs.difference, "unit": "rad"}
+        errors: dict[str, Any] = {"record": dict(self.torque_error)} if self.torque_error else {}
+        if self.validation is not None:
+            found["validation"] = _signals(self.validation)
+            if self.validation.torque_error:
+                errors["validation"] = self.validation.torque_error
+        if errors:
+            found["torque_error"] = errors
+        found["also_seen"] = [described_term(term, self.diagnosis) for term in self.evidence.terms]
+        found["live"] = corrected_live(self.diagnosis, self.runs)
+        found["told"] = list(told(self.diagnosis))
+        found["trust"] = self.trust.as_json()
+        found["seconds"] = self.seconds
+        return found
+
+    @property
+    def fmu_name(self) -> str:
+        """File name of the corrected FMU."""
+        return f"{fmu_name(self.diagnosis.workings.plant.name, self.record.source)}.fmu"
+
+    def write_files(self, folder: Path) -> None:
+        """Write the corrected FMU, its model file ``corrected.toml``, ``diagnose.csv`` and the figures."""
+        fmu = self.build(folder)
+        if "runs" not in self.__dict__:  # else it would be built again
+            self.__dict__["runs"] = self._co_simulated(fmu)
+        self.write_csv(folder / "diagnose.csv")
+        if self.model is not None:
+            (folder / "corrected.toml").write_text(corrected_model(self.model, self.diagnosis), encoding="utf-8")
+        self.plot(folder / "diagnose_signals.png")
+        draw_innovations(folder / "diagnose_innovations.png", self.diagnosis)
+        draw_candidates(folder / "diagnose_candidates.png", self.diagnosis)
+        draw_missing(folder / "diagnose_missing_torque.png", self.diagnosis)
+        draw_learned(folder / "diagnose_learned_law.png", self.diagnosis)
+        draw_lines(folder / "diagnose_ripple.png", self.evidence, self.misfit[0].unit)
+
+
+@overload
+def diagnose(
+    record: Record | Path | str | Sequence[Record | Path | str],
+    model: Model | None = None,
+    *,
+    validate: Record | Path | str | None = None,
+    settings: DiagnosisSettings | Path | str | None = None,
+    search: bool = True,
+    progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
+) -> DiagnosisResult:
+    """Of a model of ours."""
+
+
+@overload
+def diagnose(record: Path | str, *, fmu: Path | str, map: Path | str) -> FmuDiagnosisResult:
+    """Of an FMU of others."""
+
+
+def diagnose(
+    record: Record | Path | str | Sequence[Record | Path | str],
+    model: Model | None = None,
+    *,
+    validate: Record | Path | str | None = None,
+    settings: DiagnosisSettings | Path | str | None = None,
+    search: bool = True,
+    progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
+    fmu: Path | str | None = None,
+    map: Path | str | None = None,  # noqa: A002 - as on the command line
+) -> DiagnosisResult | FmuDiagnosisResult:
+    """Find out which effects a model misses, and prove it on data that was not fitted.
+
+    Args:
+        record: a measured record, or its path; one encoder or two, at least 200 rows. Or several of one machine, which
+            then share parameters and effects.
+        model: what it is compared with (default: ``read_model()``).
+        validate: another record, or its path, on which the misfit is shown too.
+        settings: thresholds, or the path of a TOML file with those that differ from the default.
+        search: False: the model is re-fitted and judged as it stands, no effect is looked for.
+        progress: called with (fits done, expected, what was fitted).
+        fmu: any FMI 2.0 co-simulation FMU in place of a model of ours; ``diagnose_fmu`` says more.
+        map: with it, the TOML file that says which column is which variable.
+
+    Returns:
+        Verdict, named effects with intervals, the misfit before and after, and the corrected model.
+
+    Raises:
+        RecordError: a record is wrong, nothing moves in it, or nothing drives.
+        ScenarioError: the model cannot be compared with this record.
+        ConvergenceError: no model can be fitted.
+
+    Example:
+        >>> found = oc.diagnose("machine.csv", oc.read_model("machine.toml"))
+        >>> found.verdict, sorted(effect.name for effect in found.effects)
+        ('effects', ['backlash', 'coulomb_friction'])
+    """
+    if fmu is not None or map is not None:
+        if fmu is None or map is None or model or not isinstance(record, (Path, str)) or validate or settings:
+            raise ScenarioError("`fmu` must come with a record's path and a `map` alone, but does not", "fmu", "map")
+        return diagnose_fmu(record, fmu, map)
+    model = read_model(None) if model is None else model
+    chosen = chosen_settings(settings, DiagnosisSettings)
+    if not search:
+        none = msgspec.structs.replace(chosen.search, most_effects=0, most_in_a_repeat=0)
+        chosen = msgspec.structs.replace(chosen, search=none)
+    records = [record] if isinstance(record, (Record, Path, str)) else list(record)
+    if not records:
+        raise ScenarioError("`record` must be at least one record, but is empty", "record")
+    measured, *more = (comparable_record(one, model, chosen) for one in records)
+    other = None if validate is None else comparable_record(validate, model, chosen)
+    begun = time.monotonic()
+    with fitting(f"{measured.source}: no model can be fitted to this record"):
+        found = diagnosing.diagnose([measured, *more], model, progress, chosen)
+        validated = None if other is None else validated_on(other, found)
+        if other is not None and validated is not None and unharmed(found, validated) is not found:
+            found = unharmed(found, validated)
+            validated = validated_on(other, found)
+        errors = torque_errors(measured, found)
+        evidence = evidence_of(found)
+    given = {"record": measured.source, "model": model.source, "validate": None if other is None else other.source}
+    seconds = time.monotonic() - begun
+    return DiagnosisResult(found, measured, validated, errors, evidence, seconds, given, model, tuple(more))
+
+
+def comparable_record(given: Record | Path | str, model: Model, settings: DiagnosisSettings, **reading: Any) -> Record:
+    """Return a record that the model can be compared with.
+
+    Args:
+        given: a record or its path.
+        model: the model.
+        settings: thresholds of the diagnosis.
+        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+
+    Returns:
+        The record.
+
+    Raises:
+        RecordError: it is wrong, too poor for a diagnosis, or cannot be of this machine.
+    """
+    record = as_record(given, model, **reading)
+    check_comparable(record, settings)
+    check_plausible(record, model)
+    return record
+
+
+def _signals(found: Validation) -> dict[str, Any]:
+    return {
+        misfit.signal: {
+            "before": misfit.before,
+            "after": misfit.after,
+            "noise": misfit.noise,
+            "unit": misfit.unit,
+            "r_squared": {name: values[n] for name, values in found.r_squared.items()},
+        }
+        for n, misfit in enumerate(found.misfit)
+    }
+
+
+def _tables(found: DiagnosisResult) -> Iterator[Block]:
+    diagnosis, unit = found.diagnosis, found.misfit[0].unit
+    rows = [
+        [
+            ", ".join(step["on_top_of"]) or "parameters",
+            tried["effect"],
+            f"{tried['gain']:.1f}",
+            f"{tried['decided']:.1f}",
+            "added" if step["accepted"] and n == 0 else "",
+        ]
+        for step in diagnosis.as_json()["candidates"]
+        for n, tried in enumerate(step["tried"][:SHOWN])
+    ]
+    if rows:
+        yield table("Candidates", ("on top of", "effect", "gain", "of it on deciding part", ""), rows)
+    rows = [[m.signal, name, f"{rms:.4g}", f"{rms / m.noise:.2f}"] for m in found.misfit for name, rms in m.stages]
+    yield table("Misfit on held-out data", ("signal", "model", f"rms [{unit}]", "times noise"), rows)
+    yield from of_each_record(diagnosis)
+    yield from also_seen([described_term(term, diagnosis) for term in found.evidence.terms])
+    errors: dict[str, Mapping[str, float]] = {"record": found.torque_error} if found.torque_error else {}
+    if found.validation is not None:
+        signals = _signals(found.validation)
+        rows = [[name, f"{g['before']:.4g}", f"{g['after']:.4g}", f"{g['noise']:.4g}"] for name, g in signals.items()]
+        head = ("signal", *(f"{name} [{unit}]" for name in ("before", "after", "noise")))
+        yield table("Misfit on the other record", head, rows)
+        rows = [[name, *(f"{g['r_squared'][stage]:.4f}" for stage in STAGES)] for name, g in signals.items()]
+        yield table("R2 of one free run over all of the other record", ("signal", *STAGES), rows)
+        if found.validation.torque_error:
+            errors["validation"] = found.validation.torque_error
+    if errors:
+        rows = [[name, *(f"{100.0 * of[stage]:.2f} %" for stage in STAGES)] for name, of in errors.items()]
+        yield table("Relative torque error of the inverse model", ("on", *STAGES), rows)

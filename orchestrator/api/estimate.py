@@ -1,0 +1,386 @@
+"""The gap, with interval, from a measured record."""
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.diagnose import DiagnosisResult
+from orchestrator.api.diagnose import diagnose as find_missing
+from orchestrator.api.live import fitted_live
+from orchestrator.api.methods import HEAD, MethodResult, described, method_entry, method_row
+from orchestrator.api.numerics import fitting
+from orchestrator.api.records import as_record
+from orchestrator.api.shown import Block, Result, table
+from orchestrator.errors import ScenarioError
+from orchestrator.estimation import cramer_rao, maximum_likelihood
+from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
+from orchestrator.estimation.repeats import Repeats, repeats_of
+from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
+from orchestrator.estimation.tables import write_tables
+from orchestrator.estimation.trust import FITTED, trust_of_estimates
+from orchestrator.records.model_file import Model, read_model
+from orchestrator.records.plausibility import check_plausible
+from orchestrator.records.record import Record
+from orchestrator.shared.play import Play
+from orchestrator.shared.settings import as_tables
+from orchestrator.shared.trust import Level, Trust
+
+DEFAULT_METHOD = FITTED
+DIAGNOSIS = "diagnosis"  # the row of a corrected model's half-gap, and the folder of its diagnosis
+SKIPS_MISSING = ("maximum_likelihood", "ekf")
+UNSEEN = 1.0  # rad, bound from which on a record says nothing
+
+
+@dataclass(frozen=True, repr=False)
+class EstimateResult(Result):
+    """The half-gap at the load; of several methods, that of the first that applies.
+
+    Attributes:
+        record: the measured record.
+        model: what it was compared with.
+        methods: what each method says.
+        diagnosis: what the model misses, where it does not explain the record; else None.
+        arguments: what was asked for.
+        more: further records of the same machine, fitted together with the first.
+        repeats: what records with the same torque differ by, or None.
+        settings: the thresholds that were used.
+    """
+
+    command: ClassVar[str] = "estimate"
+    record: Record
+    model: Model
+    methods: tuple[MethodResult, ...]
+    diagnosis: DiagnosisResult | None = None
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    more: tuple[Record, ...] = ()
+    repeats: Repeats | None = None
+    settings: EstimationSettings = DEFAULT_SETTINGS
+
+    @property
+    def estimates(self) -> tuple[Estimate, ...]:
+        """The estimates of the methods that apply."""
+        return tuple(m.estimate for m in self.methods if m.estimate is not None)
+
+    @property
+    def best(self) -> Estimate:
+        """The estimate of the first method that applies.
+
+        Raises:
+            NotApplicableError: none does.
+        """
+        if not self.estimates:
+            raise NotApplicableError("; ".join(f"{m.method}: {m.reason}" for m in self.methods))
+        return self.estimates[0]
+
+    @property
+    def alpha(self) -> float:
+        """Half-gap [rad] at the load."""
+        return self.best.alpha
+
+    @property
+    def standard_error(self) -> float:
+        """Standard error of ``alpha`` [rad]."""
+        return self.best.standard_error
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of ``alpha`` [rad]; from 0.0 where no gap is compatible with the record."""
+        return self.best.interval
+
+    @property
+    def visible(self) -> bool:
+        """Whether the record shows a gap at all."""
+        return self.best.visible
+
+    @property
+    def message(self) -> str:
+        """One sentence on the estimate; empty when there is nothing to add."""
+        return self.best.message
+
+    @property
+    def trust(self) -> Trust:
+        """How far the answer can be trusted, with the reasons; red where no method applies."""
+        found = next((m.trust for m in self.methods if m.trust is not None), None)
+        return found or Trust(Level.RED, ("no method can be applied to this record",))
+
+    def plot(self, path: Path | str) -> None:
+        """Draw record against fitted model, time in the gap shaded.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+
+        Raises:
+            ScenarioError: only ``maximum_likelihood`` fits all of the record, and it is not among the methods.
+        """
+        from orchestrator.estimation.figures import draw_fit
+
+        fits = [e for e in self.estimates if e.method == "maximum_likelihood"]
+        if not fits:
+            raise ScenarioError("`method` must be maximum_likelihood for a plot of the fit, but is another", "method")
+        draw_fit(Path(path), self.record, fits[0], self._ratio(fits[0]))
+
+    def _ratio(self, estimate: Estimate) -> float:
+        return float(
+            estimate.diagnostics.get("parameters", {}).get("i", {}).get("value", self.model.parameters["i"].value)
+        )
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the table of the methods and their messages."""
+        r = self.record
+        encoders = "one encoder" if r.theta_l is None else "two encoders"
+        title = f"{r.source}: {r.duration:g} s at {1.0 / r.step:g} Hz, {encoders}"
+        title += "".join(f"; with {other.source}, {other.duration:g} s" for other in self.more)
+        messages = [f"{e.method}: {e.message}" for e in self.estimates if e.message]
+        doubts = [
+            f"{m.method} is {m.trust.level.word}: {reason}"
+            for m in self.methods
+            if m.trust is not None and m.estimate is not None
+            for reason in m.trust.reasons
+            if reason not in m.estimate.message
+        ]
+        missing = [] if self.diagnosis is None else ["The model does not explain the record; what it lacks:"]
+        missing += [] if self.diagnosis is None else self.diagnosis.summary()
+        rows = [method_row(m) for m in self.methods if m.estimate is not None]
+        unfit = [f"{m.method} does not apply: {m.reason}" for m in self.methods if m.estimate is None]
+        shown = self.estimates[:1] if self.estimates and self.best.visible else ()
+        sizes = [f"{e.method}: {Play(e.alpha, self._ratio(e))}" for e in shown]
+        floor = [] if self.repeats is None else [f"{self.repeats}{_beside(self.estimates)}"]
+        return [table(title, HEAD, rows), *sizes, *floor, *messages, *doubts, *unfit, *missing]
+
+    def results(self, place: Path | None = None) -> dict[str, Any]:
+        """Return what ``estimate.json`` says."""
+        entries = {m.method: method_entry(m) for m in self.methods}
+        r = self.record
+        found: dict[str, Any] = {"record": described(r), "estimates": entries}
+        if self.more:
+            found["more_records"] = [described(other) for other in self.more]
+        if self.repeats is not None:
+            found["repeats"] = {"sources": list(self.repeats.sources), "floor": self.repeats.floor, "unit": "rad"}
+        if self.estimates:
+            found |= entries[self.best.method] | {"method": self.best.method}
+            found["play"] = Play(self.alpha, self._ratio(self.best)).as_json()
+        fit = next((e for e in self.estimates if e.method == "maximum_likelihood"), None)
+        if fit is not None and not r.missing:
+            found["live"] = fitted_live(r, fit)
+        if self.diagnosis is not None:
+            found["diagnosis"] = self.diagnosis.results((place or Path()) / DIAGNOSIS)
+        return found | {"trust": self.trust.as_json(), "settings": as_tables(self.settings)}
+
+    def write_diagnosis(self, folder: Path, place: Path) -> None:
+        """Write the diagnosis, if there is one, as a folder of its own.
+
+        Args:
+            folder: the folder of the estimate.
+            place: the folder that it will be moved to.
+        """
+        if self.diagnosis is not None:
+            (folder / DIAGNOSIS).mkdir()
+            self.diagnosis.write(folder / DIAGNOSIS, place / DIAGNOSIS)
+
+    def write(self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None) -> None:
+        """Write data, figures, ``estimate.json``, ``report.html`` and the diagnosis into a folder that exists.
+
+        Args:
+            folder: where to.
+            place: the folder that they will be moved to.
+            arguments: what was asked for (default: the arguments of the call).
+        """
+        self.write_diagnosis(folder, place)
+        super().write(folder, place, arguments)
+
+    def write_files(self, folder: Path) -> None:
+        """Write the fitted signals as CSV, and the figures."""
+        from orchestrator.estimation.figures import draw_online, draw_profile
+
+        for estimate in self.estimates:
+            if estimate.method == "maximum_likelihood":
+                self.plot(folder / "estimate_fit.png")
+                write_tables(folder, self.record, [estimate], self._ratio(estimate))
+                limit = estimate.diagnostics["profile_limit"]
+                draw_profile(folder / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
+            elif estimate.method == "ekf":
+                draw_online(folder / "estimate_online.png", self.record, estimate)
+                write_tables(folder, self.record, [estimate], self.model.parameters["i"].value)
+
+
+def estimate(
+    record: Record | Path | str | Sequence[Record | Path | str],
+    model: Model | None = None,
+    *,
+    method: str = DEFAULT_METHOD,
+    motor_only: bool = False,
+    time_limit: float = math.inf,
+    diagnose: bool = True,
+    settings: EstimationSettings | Path | str | None = None,
+    progress: Callable[[str, str, float], None] = lambda work, stage, share: None,
+) -> EstimateResult:
+    """Estimate the half-gap of a machine from a measured record.
+
+    Args:
+        record: a measured record, or its path; several of one machine are fitted together.
+        model: what it is compared with (default: ``read_model()``).
+        method: a key of ``METHODS``, such as "maximum_likelihood" or "ekf", or "all".
+        motor_only: leave the load encoder out.
+        time_limit: [s], after which ``maximum_likelihood`` gives up (default: never).
+        diagnose: where ``maximum_likelihood`` shows that the model does not explain the record, find what it misses
+            and give the half-gap of the corrected model. This takes some ten seconds more.
+        settings: thresholds, or the path of a TOML file with those that differ from the default.
+        progress: called with the piece of work (a method, or "diagnosis"), its stage, and the share that is behind.
+
+    Returns:
+        The half-gap with standard error and interval, and what each method says.
+
+    Raises:
+        RecordError: the record is wrong, or does not fit the model at all.
+        ScenarioError: there is no such method, or the model has effects that estimators would not see.
+        ConvergenceError: a method finds no solution, or not within the time limit.
+
+    Example:
+        >>> gap = oc.estimate("machine.csv", oc.read_model("machine.toml"))
+        >>> gap.interval[0] < gap.alpha < gap.interval[1]
+        True
+    """
+    model = read_model(None) if model is None else model
+    chosen = chosen_settings(settings, EstimationSettings)
+    if method != "all" and method not in METHODS:
+        raise ScenarioError(f"`method` must be one of {', '.join(METHODS)}, all, but is {method!r}", "method")
+    require_linear(model)
+    given_records = [record] if isinstance(record, (Record, Path, str)) else list(record)
+    if not given_records:
+        raise ScenarioError("`record` must be at least one record, but is none", "record")
+    measured, *more = (plausible_record(one, model, motor_only) for one in given_records)
+    if any((other.theta_l is None) != (measured.theta_l is None) for other in more):
+        raise ScenarioError("`record` must be records with the same encoders, or `motor_only`", "record", "motor_only")
+    found: list[MethodResult] = []
+    for name in METHODS if method == "all" else (method,):
+        begun = time.perf_counter()
+        try:
+            with fitting(f"{measured.source}: `{name}` finds no solution for this record"):
+                progress(name, name.replace("_", " "), 0.0)
+                fitted = _fitted(name, measured, more, model, time_limit, chosen, partial(progress, name))
+                bound = _bound(measured, model, [*(m.estimate for m in found if m.estimate is not None), fitted])
+        except NotApplicableError as error:
+            found.append(MethodResult(name, None, math.inf, time.perf_counter() - begun, str(error)))
+        else:
+            found.append(MethodResult(name, fitted, bound, time.perf_counter() - begun))
+    trust = trust_of_estimates([m.estimate for m in found if m.estimate is not None], model, chosen.trust)
+    judged = tuple(replace(m, trust=trust.get(m.method)) for m in found)
+    given = {"record": measured.source, "model": model.source, "method": method, "motor_only": motor_only}
+    whole = not more and not measured.missing  # a diagnosis takes one record with all its samples
+    missing = None
+    if whole and diagnose and _unexplained(judged):
+        progress(DIAGNOSIS, "diagnosing", 0.0)
+        missing = find_missing(
+            measured,
+            model,
+            progress=lambda done, most, what: progress(DIAGNOSIS, f"fitted {what}", done / max(most, 1)),
+        )
+    first = () if missing is None else _of_diagnosis(missing)
+    repeats = repeats_of([measured, *more])
+    return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen)
+
+
+def _beside(estimates: Sequence[Estimate]) -> str:
+    """Return the encoders' noise as the likelihood fitted it, to be read beside the floor of repeats."""
+    noise = next((e.diagnostics["measurement_noise"] for e in estimates if e.method == FITTED), None)
+    return "" if noise is None else f"; the encoders' noise as fitted: {' and '.join(f'{x:.3g}' for x in noise)} rad"
+
+
+def _unexplained(methods: Sequence[MethodResult]) -> bool:
+    """Return whether the fit of all parameters shows that the model does not explain the record."""
+    fit = next((m for m in methods if m.method == FITTED and m.estimate is not None), None)
+    if fit is None or fit.estimate is None or fit.trust is None:
+        return False
+    return bool(fit.estimate.diagnostics["lacking"]) or fit.trust.level is Level.RED
+
+
+def _of_diagnosis(found: DiagnosisResult) -> tuple[MethodResult, ...]:
+    """Return the half-gap of the corrected model, where one is named among what the model misses."""
+    gap = next((e.parameters["alpha"] for e in found.effects if e.name == "backlash"), None)
+    if gap is None:
+        return ()
+    estimate = Estimate(DIAGNOSIS, gap.value, gap.standard_error, gap.interval)
+    return (MethodResult(DIAGNOSIS, estimate, math.inf, found.seconds, trust=found.trust),)
+
+
+def _fitted(
+    name: str,
+    record: Record,
+    more: Sequence[Record],
+    model: Model,
+    time_limit: float,
+    settings: EstimationSettings,
+    report: Callable[[str, float], None],
+) -> Estimate:
+    """Return the estimate of one method; all but the likelihood take one whole record.
+
+    Raises:
+        NotApplicableError: there are several records, or samples are missing.
+    """
+    if name == DEFAULT_METHOD:
+        return maximum_likelihood.estimate(
+            record, model, more=more, time_limit=time_limit, report=report, settings=settings
+        )
+    if more:
+        raise NotApplicableError("takes one record; several are fitted together by maximum_likelihood")
+    if record.missing and name not in SKIPS_MISSING:
+        raise NotApplicableError(f"takes records without missing samples, but {record.missing} rows have some")
+    return estimator(name)(record, model)
+
+
+def plausible_record(record: Record | Path | str, model: Model, motor_only: bool, **reading: Any) -> Record:
+    """Return a record that fits the model at all.
+
+    Args:
+        record: a record or its path.
+        model: what it is compared with.
+        motor_only: leave the load encoder out.
+        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+
+    Returns:
+        The record.
+
+    Raises:
+        RecordError: the record is wrong, or cannot be of this machine.
+    """
+    measured = as_record(record, model, **reading)
+    measured = measured.without_load_encoder() if motor_only else measured
+    check_plausible(measured, model)
+    return measured
+
+
+def require_linear(model: Model) -> None:
+    """Refuse models that the estimators would not see whole.
+
+    Args:
+        model: the model.
+
+    Raises:
+        ScenarioError: it has no gap, or nonlinear effects.
+    """
+    if model.fmu != "Drivetrain":
+        raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain to have a gap, but is {model.fmu}")
+    for name, entry in model.parameters.items():
+        active = name.startswith("effects.") and name.rsplit(".", 1)[1] in (
+            "delay", "amplitude", "coulomb", "breakaway", "cubic", "coefficient", "inertia"
+        )  # fmt: skip
+        active = active or (name.startswith("effects.coulomb") and name.endswith("torque"))
+        if active and (entry.value != 0.0 or entry.uncertainty > 0.0):
+            raise ScenarioError(
+                f"{model.source}: `estimate` fits the plant without nonlinear effects, but `{name}` is "
+                f"{entry.value:g}; `diagnose` fits the gap together with them"
+            )
+
+
+def _bound(record: Record, model: Model, estimates: Sequence[Estimate]) -> float:
+    """Return the record's Cramer-Rao bound: at the fit of the likelihood, or else at the newest estimate."""
+    for estimate in estimates:
+        if "cramer_rao" in estimate.diagnostics:
+            return float(estimate.diagnostics["cramer_rao"])
+    bound = cramer_rao.bound_at(record, model, estimates[-1].alpha)
+    return bound if bound < UNSEEN else math.inf

@@ -1,0 +1,242 @@
+"""What is in a record, what it would show, and a model file to start from."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from orchestrator.api.records import as_record
+from orchestrator.api.shown import Block, Result, table
+from orchestrator.estimation.inspection.channels import (
+    Band,
+    Channel,
+    channels_of,
+    delay_between,
+    excitation_of,
+    reversals_of,
+)
+from orchestrator.estimation.inspection.figures import draw_record
+from orchestrator.estimation.inspection.machine import as_model, fits, rough_machine, visible_effects
+from orchestrator.estimation.inspection.starter import assumed_columns, starter
+from orchestrator.estimation.inspection.sufficiency import SEEN, SIZES, Sufficiency, sufficiency
+from orchestrator.records.model_file import Model, read_model
+from orchestrator.records.record import Record
+
+STARTER = "model.toml"
+SHOWN_EXPERIMENTS = 3
+
+
+@dataclass(frozen=True, repr=False)
+class InspectResult(Result):
+    """What a record holds and would show.
+
+    Attributes:
+        record: the record.
+        model: the machine that the judgement is for: the given one, or a rough one from the record.
+        channels: facts of each column.
+        excitation: the torque's power by frequency.
+        delay: lag of the load's angle behind the motor's and its standard error [s], or None.
+        reversals: sign changes of torque and of motor speed.
+        sufficiency: which gaps would be seen, and which experiment would do better.
+        effects: the smallest size of each effect that would show, with its unit.
+        assumed: what was assumed, a sentence each.
+        starter: text of a model file to start from.
+        arguments: what was asked for.
+    """
+
+    command: ClassVar[str] = "inspect"
+    record: Record
+    model: Model
+    channels: tuple[Channel, ...]
+    excitation: tuple[Band, ...]
+    delay: tuple[float, float] | None
+    reversals: tuple[int, int]
+    sufficiency: Sufficiency
+    effects: tuple[tuple[str, float, str], ...]
+    assumed: tuple[str, ...]
+    starter: str
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def smallest_gap(self) -> float:
+        """Smallest half-gap that the record would show [rad], or infinity."""
+        return self.sufficiency.smallest
+
+    def plot(self, path: Path | str) -> None:
+        """Draw the channels over time and the excitation by frequency.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+        """
+        draw_record(Path(path), self.record, list(self.excitation))
+
+    def verdict(self) -> list[str]:
+        """Say whether the record suffices, and what would do better.
+
+        Returns:
+            A sentence each.
+        """
+        found = self.sufficiency
+        if found.smallest <= SIZES[0]:
+            said = [f"The record shows half-gaps of {SIZES[0]:g} rad and larger, and perhaps smaller ones."]
+        elif math.isfinite(found.smallest):
+            said = [
+                f"The record shows half-gaps from about {found.smallest:.2g} rad on (bound below {SEEN:g} of the size)."
+            ]
+        else:
+            said = [
+                "The record shows no gap of any size that was tried: its torque does not move the teeth through one."
+            ]
+        best = found.better[0] if found.better else None
+        if best is not None and best.bound < 0.9 * found.own:
+            said.append(
+                f"Better, of the same length and within the same torque and speed: {best.name}, bound {best.bound:.2g} "
+                f"instead of {found.own:.2g} rad for a half-gap of {found.design_size:g} rad; `estimate` with `design` "
+                "searches further."
+            )
+        else:
+            said.append("No simple excitation of the same length, torque and speed would show the gap clearly better.")
+        return said
+
+    def blocks(self) -> Sequence[Block]:
+        """Return what was read, the tables and the verdict."""
+        r = self.record
+        read = [f"{r.source}: {'; '.join(r.notes)}"] if r.notes else []
+        timing = "" if r.timing is None else f"; {r.timing.describe()}"
+        read.append(f"{r.size} rows, {r.duration:g} s{timing}; {r.missing} rows with missing samples")
+        channels = table(
+            "Channels",
+            ("channel", "unit", "least", "most", "rounded to", "noise", "at an end [%]", "missing"),
+            [
+                (c.name, c.unit, f"{c.least:.5g}", f"{c.most:.5g}", f"{c.count:.4g}" if c.count else "no",
+                 f"{c.noise:.2g}", f"{100.0 * c.saturated:.2g}", str(c.missing))
+                for c in self.channels
+            ],
+        )  # fmt: skip
+        bands = table(
+            "Excitation",
+            ("band [Hz]", "share of the torque's power [%]", "motor follows (coherence)"),
+            [(f"{b.low:g} to {b.high:g}", f"{100.0 * b.share:.1f}", f"{b.coherence:.2f}") for b in self.excitation],
+        )
+        gaps = table(
+            "Half-gaps that would show",
+            ("half-gap [rad]", "bound [rad]", "seen"),
+            [
+                (f"{size:g}", f"{bound:.2g}" if bound < 1.0 else "none", "yes" if bound < SEEN * size else "no")
+                for size, bound in self.sufficiency.bounds
+            ],
+        )
+        effects = table(
+            "Effects that would show",
+            ("effect", "clearly from"),
+            [(name, f"{size:.2g} {unit}") for name, size, unit in self.effects],
+        )
+        assumed = [f"Assumed: {'; '.join(self.assumed)}."] if self.assumed else []
+        return [*read, channels, *self._between(), bands, gaps, effects, *assumed, *self.verdict()]
+
+    def _between(self) -> list[str]:
+        torque, speed = self.reversals
+        said = [f"The torque changes sign {torque} times, the motor's speed {speed} times."]
+        if self.delay is not None:
+            lag, error = self.delay
+            said.append(
+                f"The load's angle lags the motor's by {1e3 * lag:.3g} ms (standard error {1e3 * error:.2g} ms, "
+                f"{lag / self.record.step:.2g} samples), the shaft's own share included."
+            )
+        return said
+
+    def results(self, place: Path | None = None) -> dict[str, Any]:
+        """Return what ``inspect.json`` says."""
+        r, found = self.record, self.sufficiency
+        return {
+            "record": {
+                "source": r.source,
+                "rows": r.size,
+                "step": r.step,
+                "missing": r.missing,
+                "notes": list(r.notes),
+            },
+            "channels": [dict(vars(c)) for c in self.channels],
+            "excitation": [dict(vars(b)) for b in self.excitation],
+            "reversals": {"torque": self.reversals[0], "motor_speed": self.reversals[1]},
+            "delay": None
+            if self.delay is None
+            else {"value": self.delay[0], "standard_error": self.delay[1], "unit": "s"},
+            "smallest_gap": found.smallest if math.isfinite(found.smallest) else None,
+            "gaps": [
+                {"half_gap": size, "bound": bound if math.isfinite(bound) else None, "seen": bound < SEEN * size}
+                for size, bound in found.bounds
+            ],
+            "effects": [{"name": name, "smallest": size, "unit": unit} for name, size, unit in self.effects],
+            "better_experiments": [
+                {"name": c.name, "bound": c.bound, "peak_torque": c.torque, "peak_motor_speed": c.speed}
+                for c in found.better[:SHOWN_EXPERIMENTS]
+            ],
+            "assumed": list(self.assumed),
+            "verdict": self.verdict(),
+        }
+
+    def write_files(self, folder: Path) -> None:
+        """Write the model file to start from, and the picture."""
+        (folder / STARTER).write_text(self.starter, encoding="utf-8")
+        self.plot(folder / "inspect_record.png")
+
+
+def inspect(
+    record: Record | Path | str,
+    model: Model | None = None,
+    *,
+    part: tuple[float, float] | None = None,
+    resample: str | None = None,
+    rate: float | None = None,
+) -> InspectResult:
+    """Look at a record before any fit: what is in it, what it would show, what is assumed.
+
+    Args:
+        record: a measured record, or its path; with a path, missing factors of units are assumed and said.
+        model: the machine (default: the thesis's where the record fits it, else a rough one from the record).
+        part: first and last time to keep [s] (default: all).
+        resample: as ``read_record`` has it.
+        rate: as ``read_record`` has it [Hz].
+
+    Returns:
+        Channels, excitation, the smallest gap and effects that would show, better experiments and a model file.
+
+    Raises:
+        RecordError: the record cannot be read, or a column is missing or ambiguous.
+        ScenarioError: the model cannot be read.
+
+    Example:
+        >>> seen = oc.inspect("machine.csv")
+        >>> seen.smallest_gap < 0.001
+        True
+    """
+    base = read_model(None) if model is None else model
+    assumed: tuple[str, ...] = ()
+    columns = dict(base.columns)
+    if not isinstance(record, Record):
+        columns, assumed = assumed_columns(Path(record), columns)
+        base = Model(base.fmu, base.parameters, base.encoders, columns, base.source)
+    measured = as_record(record, base, part=part, resample=resample, rate=rate)
+    origin: Mapping[str, str] = {}
+    machine = base
+    if model is None:
+        why = fits(measured, base)
+        if why or assumed:
+            rough = rough_machine(measured)
+            machine, origin = as_model(rough, base), rough.origin
+            assumed = (*assumed, "inertias, stiffness, friction and lag roughly, from the record; see the model file")
+        else:
+            assumed = (*assumed, "the default model's values, each known to 5 %")
+    with np.errstate(all="ignore"):
+        enough = sufficiency(measured, machine)
+        effects = visible_effects(measured, machine)
+    text = starter(machine, columns, origin, assumed, measured.source)
+    return InspectResult(
+        measured, machine, tuple(channels_of(measured)), tuple(excitation_of(measured)), delay_between(measured),
+        reversals_of(measured), enough, tuple(effects), assumed, text,
+        {"record": measured.source, "model": base.source, "part": part, "resample": resample, "rate": rate},
+    )  # fmt: skip

@@ -1,0 +1,93 @@
+"""What one method says of a record, and the rows and entries that show it."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from orchestrator.estimation.protocol import LEVEL, Estimate
+from orchestrator.records.record import Record
+from orchestrator.shared.trust import Trust
+
+HEAD = ("method", "half-gap [rad]", "trust", "95 % interval", "standard error", "Cramer-Rao")
+
+
+@dataclass(frozen=True)
+class MethodResult:
+    """What one method says.
+
+    Attributes:
+        method: its name.
+        estimate: the estimate, or None where the method does not apply.
+        bound: the record's Cramer-Rao bound on the standard error [rad].
+        seconds: wall time [s].
+        reason: why the method does not apply, or empty.
+        trust: how far the estimate can be trusted, or None where there is none.
+    """
+
+    method: str
+    estimate: Estimate | None
+    bound: float
+    seconds: float
+    reason: str = ""
+    trust: Trust | None = None
+
+
+def described(record: Record) -> dict[str, Any]:
+    """Return rows, step, source of a record, and what was detected and assumed when it was read.
+
+    Args:
+        record: the record.
+
+    Returns:
+        The entry of ``estimate.json``.
+    """
+    entry: dict[str, Any] = {"rows": record.size, "step": record.step, "source": record.source}
+    return entry | {"missing": record.missing, "notes": list(record.notes)}
+
+
+def method_row(result: MethodResult) -> list[str]:
+    """Return the row of a method that applies, under ``HEAD``.
+
+    Args:
+        result: of the method.
+
+    Returns:
+        The cells.
+    """
+    estimate = result.estimate
+    assert estimate is not None
+    low, high = estimate.interval
+    errors = [f"{estimate.standard_error:.2g}", f"{result.bound:.2g}" if math.isfinite(result.bound) else ""]
+    name = estimate.method.replace("_", " ")
+    return [name, f"{estimate.alpha:.6g}", _word(result), f"{low:.6g} to {high:.6g}", *errors]
+
+
+def _word(result: MethodResult) -> str:
+    return "" if result.trust is None else result.trust.level.word
+
+
+def method_entry(result: MethodResult) -> dict[str, Any]:
+    """Return what ``estimate.json`` says of a method.
+
+    Args:
+        result: of the method.
+
+    Returns:
+        The entry.
+    """
+    estimate = result.estimate
+    if estimate is None:
+        return {"not_applicable": result.reason}
+    return {
+        "alpha": estimate.alpha,
+        "standard_error": estimate.standard_error,
+        "cramer_rao": result.bound,
+        "interval": list(estimate.interval),
+        "level": LEVEL,
+        "unit": "rad",
+        "visible": estimate.visible,
+        "message": estimate.message,
+        "trust": None if result.trust is None else result.trust.as_json(),
+        "seconds": result.seconds,
+        "diagnostics": dict(estimate.diagnostics),
+    }

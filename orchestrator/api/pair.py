@@ -1,0 +1,199 @@
+"""One paired run: the loop with a gap beside the loop without one."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.api.arguments import chosen_experiment, not_negative
+from orchestrator.api.shown import Block, Result, table, write_columns
+from orchestrator.building.build import ensure_built
+from orchestrator.errors import ScenarioError
+from orchestrator.master.protocol import Value
+from orchestrator.paired import pair
+from orchestrator.paired.apart import run_pair_within
+from orchestrator.paired.calibration import GapEstimate
+from orchestrator.paired.cosimulation import FMUS, LoopRun
+from orchestrator.paired.experiment import Experiment
+from orchestrator.paired.figures import draw_pair
+from orchestrator.paired.pair import PairRun, with_settings
+from orchestrator.shared.play import Play
+from orchestrator.shared.results import GapFound, PairFound
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, repr=False)
+class PairResult(Result):
+    """A paired run.
+
+    Attributes:
+        alpha: actual half-gap [rad] at the load.
+        experiment: what both loops share.
+        seed: of the encoder noise.
+        run: both loops, the metric and the estimate.
+        arguments: what was asked for.
+    """
+
+    command: ClassVar[str] = "simulate"
+    alpha: float
+    experiment: Experiment
+    run: PairRun
+    seed: int | None = 0
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def total(self) -> float:
+        """The metric S [rad]: sum of the absolute differences of the estimated load angles."""
+        return self.run.total
+
+    @property
+    def estimate(self) -> GapEstimate | None:
+        """The half-gap [rad] that S stands for, with its 95 % interval; None outside the calibration."""
+        return self.run.estimate
+
+    @property
+    def machine(self) -> LoopRun:
+        """The loop with the gap: ``time`` [s] and signals by name, each of shape (n,)."""
+        return self.run.machine
+
+    @property
+    def twin(self) -> LoopRun:
+        """The loop without a gap, as ``machine``."""
+        return self.run.twin
+
+    @property
+    def crossings(self) -> int:
+        """How often the teeth went from one flank to the other."""
+        flank = self.machine["contact"][self.machine["contact"] != 0]
+        return int(np.sum(flank[1:] != flank[:-1]))
+
+    def signals(self) -> dict[str, Array]:
+        """Return time [s], reference [rad] and the signals of both loops, those of the twin as ``twin_NAME``.
+
+        Returns:
+            Arrays of shape (n,) by name.
+        """
+        signals = {"time": self.machine.time, "reference": self.experiment.reference()[0]}
+        signals |= self.machine.signals
+        return signals | {f"twin_{name}": values for name, values in self.twin.signals.items()}
+
+    def write_csv(self, path: Path | str) -> None:
+        """Write the signals as CSV.
+
+        Args:
+            path: the file.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        write_columns(Path(path), self.signals())
+
+    def plot(self, path: Path | str) -> None:
+        """Draw both load angles, their difference and the torques against time.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+        """
+        title = f"Paired loops, {self.experiment.backlash_model}, half-gap {self.alpha:g} rad"
+        draw_pair(Path(path), self.machine, self.twin, self.experiment.reference()[0], title)
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the table of the run."""
+        machine, twin = self.machine, self.twin
+        apart = np.abs(machine["theta_l"] - twin["theta_l"]).max()
+        rows = [
+            ["actual half-gap", f"{self.alpha:.6g}", "rad"],
+            ["S, sum of differences", f"{self.total:.6g}", "rad"],
+            ["largest difference of the load angles", f"{apart:.6g}", "rad"],
+            ["time in the gap", f"{100.0 * np.mean(machine['contact'] == 0):.1f}", "%"],
+            ["crossings of the gap", str(self.crossings), ""],
+            ["largest torque request", f"{np.abs(machine['u']).max():.4g}", "N.m"],
+        ]
+        found = self.estimate
+        said = [f"Actual: {self._play(self.alpha)}"]
+        if found is None:
+            rows.append(["estimate", f"none: {self.run.no_estimate}", ""])
+        else:
+            interval = f"(95 %: {found.lower:.8g} .. {found.upper:.8g})"
+            rows.append(["estimated half-gap", f"{found.alpha:.8g}  {interval}", "rad"])
+            said.append(f"Estimated: {self._play(found.alpha)}")
+            if self.alpha > 0.0 and math.isfinite(found.alpha):
+                rows.append(["error", f"{100.0 * abs(found.alpha - self.alpha) / self.alpha:.4f}", "%"])
+        return [table("Paired run", ("", "value", "unit"), rows), *said]
+
+    def _play(self, alpha: float) -> Play:
+        return Play(alpha, self.experiment.values.i)
+
+    def results(self, place: Path | None = None) -> PairFound:
+        """Return what ``simulate.json`` says of the run."""
+        return PairFound(
+            alpha=self.alpha,
+            play={
+                "actual": self._play(self.alpha).as_json(),
+                "estimated": None if self.estimate is None else self._play(self.estimate.alpha).as_json(),
+            },
+            S=self.total,
+            estimate=None if self.estimate is None else GapFound(**asdict(self.estimate)),
+            no_estimate=self.run.no_estimate,
+            crossings=self.crossings,
+            experiment=asdict(self.experiment),
+        )
+
+    def write_files(self, folder: Path) -> None:
+        """Write ``simulate.csv`` and ``simulate.png``."""
+        self.write_csv(folder / "simulate.csv")
+        self.plot(folder / "simulate.png")
+
+
+def run_pair(
+    alpha: float = 0.02,
+    *,
+    noise: float = 0.0,
+    seed: int = 0,
+    experiment: str | Experiment = "default",
+    backlash_model: str | None = None,
+    start: Mapping[str, Value] | None = None,
+    time_limit: float | None = None,
+) -> PairResult:
+    """Co-simulate the loop with a half-gap and its twin without one, and estimate the half-gap from their difference.
+
+    Args:
+        alpha: half-gap [rad] at the load.
+        noise: standard deviation of the encoder noise of the loop with a gap [rad].
+        seed: of that noise.
+        experiment: "default", "thesis" or an ``Experiment``.
+        backlash_model: "dead_zone", "nordin", "hysteresis", "rigid_impact" or "elastic_impact" (default: the
+            experiment's).
+        start: further start values by ``instance.variable``, in the FMUs' units.
+        time_limit: wall time that the run may take [s]; it is done in a process of its own then.
+
+    Returns:
+        Both loops, the metric S and the estimate.
+
+    Raises:
+        ScenarioError: an argument is out of its range, or names nothing.
+        SimulationError: the run went wrong.
+
+    Example:
+        >>> pair = oc.run_pair(alpha=0.02)
+        >>> round(pair.estimate.alpha, 4)
+        0.02
+    """
+    not_negative("alpha", alpha)
+    not_negative("noise", noise)
+    if seed < 0:
+        raise ScenarioError(f"`seed` must not be negative, but is {seed}", "seed")
+    chosen = with_settings(chosen_experiment(experiment, backlash_model), noise=noise)
+    given = {"alpha": alpha, "noise": noise, "experiment": chosen.name, "backlash_model": chosen.backlash_model}
+    given |= {"start": dict(start)} if start else {}
+    fmus = ensure_built(FMUS)
+    if time_limit is None:
+        run = pair.run_pair(chosen, fmus, alpha, seed, start)
+    else:
+        run = run_pair_within(time_limit, chosen, fmus, alpha, seed, start)
+    return PairResult(alpha, chosen, run, seed, given)

@@ -1,0 +1,83 @@
+"""Records and models: what a user brings."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from orchestrator.records import model_file, record
+from orchestrator.records.columns import Column
+from orchestrator.records.loading import Reading
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+
+
+def read_record(
+    path: Path | str,
+    columns: Mapping[str, Column] | None = None,
+    *,
+    part: tuple[float, float] | None = None,
+    resample: str | None = None,
+    rate: float | None = None,
+) -> Record:
+    """Read a measured record.
+
+    Args:
+        path: a log: CSV of any dialect, Parquet, MDF, MAT or NumPy, with time [s], requested torque [N.m], motor
+            angle [rad] and, where there is a load encoder, load angle [rad]; at least 200 rows.
+        columns: for some of ``time``, ``u``, ``theta_m`` and ``theta_l``, their names and units in the file, as
+            ``Model.columns`` has them (default: recognised).
+        part: first and last time to keep [s], from the first row on (default: all).
+        resample: "uniform" where only the stamps jitter, "linear" or "cubic" (default: refuse times that are not
+            uniform).
+        rate: samples per second to come down to [Hz] (default: as in the file).
+
+    Returns:
+        The record in SI units; its arrays have shape (n,).
+
+    Raises:
+        RecordError: the file cannot be read or is no such record; the text names row and column.
+
+    Example:
+        >>> record = oc.read_record("machine.csv")
+        >>> record.size, round(record.duration, 2)
+        (4000, 20.0)
+    """
+    return record.read_record(Path(path), columns or {}, reading=Reading(part, resample, rate))
+
+
+def read_model(path: Path | str | None = None) -> Model:
+    """Read the model that a record is compared with.
+
+    Args:
+        path: a TOML file as ``docs/estimation.md`` describes it; without one, the plant ``Drivetrain`` with the
+            thesis's values, no backlash, and each linear parameter known to 5 %.
+
+    Returns:
+        Every parameter of the plant with value, unit and largest error.
+
+    Raises:
+        ScenarioError: the file cannot be read, or a name, value or unit in it is wrong.
+
+    Example:
+        >>> model = oc.read_model("machine.toml")
+        >>> model.fmu, model.parameters["J_l"].unit
+        ('Drivetrain', 'kg.m2')
+    """
+    return model_file.read_model(None if path is None else Path(path))
+
+
+def as_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
+    """Return a record, read with the model's columns where a path is given.
+
+    Args:
+        given: a record or the path of one.
+        model: whose ``columns`` say what the file calls them.
+        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+
+    Returns:
+        The record.
+
+    Raises:
+        RecordError: as ``read_record``.
+    """
+    return given if isinstance(given, Record) else read_record(given, model.columns, **reading)

@@ -1,0 +1,112 @@
+"""A sweep over any scenario of FMUs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, varied
+from orchestrator.api.shown import Block, table
+from orchestrator.engine import DesignCases, Row, Status, Sweep, parse_design
+from orchestrator.scenarios.isolated import Safety, described
+from orchestrator.scenarios.scenario import Scenario, load_scenario
+from orchestrator.scenarios.sweep import SUMMARIES, scenario_work
+from orchestrator.shared.results import SweepFound, SweptScenario
+
+
+@dataclass(frozen=True, repr=False)
+class ScenarioSweepResult(AnySweepResult):
+    """A sweep of a scenario; of each recorded signal the last value, the extremes, the mean and the rms.
+
+    Attributes:
+        scenario: what was run.
+        cases: the cases, indexable.
+        sweep: the finished cases.
+        seed: of random parameters.
+        parquet: whether ``save`` writes Parquet too.
+        arguments: what was asked for.
+        isolation: the walls around the FMUs that are not ours.
+    """
+
+    scenario: Scenario
+    cases: DesignCases
+    sweep: Sweep
+    seed: int | None = 0
+    parquet: bool = False
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    isolation: Mapping[str, Any] = field(default_factory=dict)
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the table of the first cases."""
+        rows: list[list[str]] = []
+        for row in self.rows():
+            if len(rows) == MOST_ROWS_SHOWN:
+                break
+            rows.append(_last_values(row, len(self.scenario.record)))
+        name = self.scenario.name
+        title = f"{name}: {len(self.cases)} cases, {self.failed} failed; last values, more in sweep.csv"
+        return [table(title, [*self.cases.names, *self.scenario.record], rows)]
+
+    def results(self, place: Path | None = None) -> SweepFound:
+        """Return what ``sweep.json`` says."""
+        return SweepFound(
+            cases=len(self.cases),
+            failed=self.failed,
+            columns=self.columns(),
+            scenario=SweptScenario(self.scenario.name, list(self.scenario.record), self.scenario.stop),
+            isolation=dict(self.isolation),
+        )
+
+    def write_files(self, folder: Path) -> None:
+        """Write the table."""
+        self.write_tables(folder)
+
+
+def sweep_scenario(
+    scenario: Scenario | Path | str,
+    vary: Varied,
+    *,
+    samples: int | None = None,
+    seed: int = 0,
+    options: RunOptions | None = None,
+    **more: Any,
+) -> ScenarioSweepResult:
+    """Run a scenario over a design of its FMUs' parameters.
+
+    Args:
+        scenario: a ``Scenario`` or a TOML scenario file.
+        vary: parameters by ``instance.variable``, as in ``sweep``.
+        samples: draws of what ``vary`` makes random or sobol (default: 16).
+        seed: of random parameters.
+        options: where and how cases run.
+        **more: fields of ``RunOptions`` instead of ``options``.
+
+    Returns:
+        The table of cases.
+
+    Raises:
+        ScenarioError: the scenario or an argument is wrong.
+        SimulationError: the place where cases run is gone. A case that fails is a row, not an error.
+
+    Example:
+        >>> result = oc.sweep_scenario("loop.toml", {"plant.J_l": "range:5.3:5.9:3"})
+        >>> len(result), result.failed
+        (3, 0)
+    """
+    options = options or RunOptions(**more)
+    words = varied(vary)
+    cases = DesignCases(parse_design(words, draws_of(samples, words), seed), seed)
+    chosen = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
+    done = options.run(cases, scenario_work(chosen, cases, options.trust))
+    given = {"scenario": chosen.origin or chosen.name, "vary": list(words), "samples": samples}
+    walls = described(chosen.system, Safety(trust=options.trust))
+    return ScenarioSweepResult(chosen, cases, done, seed, options.parquet, given, walls)
+
+
+def _last_values(row: Row, count: int) -> list[str]:
+    start = [f"{v:.6g}" if isinstance(v, float) else str(v) for v in row.case.parameters.values()]
+    if row.outcome.status is not Status.DONE:
+        message = f"{row.outcome.status.value}: {row.outcome.message}"
+        return [*start, message, *[""] * (count - 1)]
+    last = row.outcome.values[:: len(SUMMARIES)]
+    return start + [f"{v:.6g}" if isinstance(v, float) else str(v) for v in last]

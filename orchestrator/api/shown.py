@@ -1,0 +1,160 @@
+"""What results show of themselves: the same tables on a terminal, as text and in a notebook."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestrator.reporting import write_report
+from orchestrator.shared.output import staged, write_result
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table whose cells are ready to be read."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+Block = TextTable | str
+
+
+class Result:
+    """Base of what the workflows return: it prints itself, and saves itself as the command of its name does.
+
+    A subclass gives ``blocks``, ``results`` and ``write_files``.
+    """
+
+    command: ClassVar[str]
+    arguments: Mapping[str, Any]
+
+    @property
+    def seed(self) -> int | None:
+        """Seed of what is random; None where nothing is."""
+        return None
+
+    def blocks(self) -> Sequence[Block]:
+        """Show the result.
+
+        Returns:
+            Lines of text and tables, in the order in which they are read.
+
+        Raises:
+            NotImplementedError: of this base alone.
+        """
+        raise NotImplementedError
+
+    def results(self, place: Path) -> Any:
+        """Collect what goes into ``COMMAND.json``.
+
+        Args:
+            place: the folder in which the result will be, for paths in it.
+
+        Returns:
+            The results by name.
+
+        Raises:
+            NotImplementedError: of this base alone.
+        """
+        raise NotImplementedError
+
+    def write_files(self, folder: Path) -> None:
+        """Write data and figures.
+
+        Args:
+            folder: where to; it exists.
+        """
+
+    def write(self, folder: Path, place: Path, arguments: Mapping[str, Any] | None = None) -> None:
+        """Write data, figures, ``COMMAND.json`` and ``report.html`` into a folder that exists.
+
+        Args:
+            folder: where to.
+            place: the folder that they will be moved to, which the JSON file names.
+            arguments: what was asked for, as the JSON file says it (default: the arguments of the call).
+        """
+        self.write_files(folder)
+        given = self.arguments if arguments is None else arguments
+        write_result(folder, self.command, given, self.seed, self.results(place))
+        write_report(folder, self.command)
+
+    def save(self, out: Path | str) -> Path:
+        """Write data, figures, JSON and ``report.html`` into a folder, all of them or none.
+
+        Args:
+            out: the folder; made when it does not exist.
+
+        Returns:
+            The path of ``report.html``.
+
+        Raises:
+            OutputError: the folder cannot be written.
+        """
+        place = Path(out)
+        with staged(place) as folder:
+            self.write(folder, place)
+        return place / "report.html"
+
+    def __str__(self) -> str:
+        return "\n".join(_text(block) for block in self.blocks())
+
+    def _repr_html_(self) -> str:
+        return "\n".join(_html(block) for block in self.blocks())
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:
+    """Make a table from any sequences of texts.
+
+    Args:
+        title: above the table.
+        columns: headings, with units in brackets.
+        rows: one text for each column.
+
+    Returns:
+        The table.
+    """
+    return TextTable(title, tuple(columns), tuple(tuple(row) for row in rows))
+
+
+def _text(block: Block) -> str:
+    if isinstance(block, str):
+        return block
+    lines = [block.columns, *block.rows]
+    widths = [max(len(line[n]) for line in lines) for n in range(len(block.columns))]
+    body = ["  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip() for line in lines]
+    rule = "  ".join("-" * width for width in widths)
+    return "\n".join([block.title, body[0], rule, *body[1:]])
+
+
+def _html(block: Block) -> str:
+    if isinstance(block, str):
+        return f"<p>{escape(block)}</p>"
+    head = "".join(f"<th>{escape(name)}</th>" for name in block.columns)
+    rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in block.rows)
+    return f"<table><caption>{escape(block.title)}</caption><tr>{head}</tr>{rows}</table>"
+
+
+def write_columns(path: Path, columns: Mapping[str, Any]) -> None:
+    """Write arrays as CSV with exact numbers.
+
+    Args:
+        path: the file.
+        columns: arrays of shape (n,) by heading, in their order.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    import csv
+
+    from orchestrator.errors import OutputError
+
+    try:
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            writer = csv.writer(stream, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror}") from None

@@ -1,0 +1,218 @@
+"""Any scenario of FMUs, or any SSP file, run once."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.api.shown import Block, Result, table, write_columns
+from orchestrator.errors import ScenarioError
+from orchestrator.master import result as master
+from orchestrator.master.signals import Constant
+from orchestrator.paired.figures import draw_signals
+from orchestrator.scenarios import scenario as scenarios
+from orchestrator.scenarios.isolated import Safety, described
+from orchestrator.scenarios.scenario import Scenario, load_scenario
+from orchestrator.scenarios.ssp.read import opened_ssp
+from orchestrator.shared.results import SignalFound, SignalsFound
+
+Array = NDArray[np.float64]
+HEAD = ("signal", "unit", "first", "last", "smallest", "largest")
+
+
+@dataclass(frozen=True, repr=False)
+class SimulationResult(Result):
+    """Recorded signals of one run; ``result["plant.theta_l"]`` is one of them, shape (n,).
+
+    Attributes:
+        run: times, signals, units and what the run took.
+        title: of the table.
+        isolation: the walls around the run: which FMUs are not ours, and what the system could not enforce.
+        command: whose result directory ``save`` makes.
+        arguments: what was asked for.
+    """
+
+    run: master.Recording
+    title: str
+    isolation: Mapping[str, Any] = field(default_factory=dict)
+    command: str = "simulate"  # type: ignore[misc]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Array:
+        """Return a recorded signal.
+
+        Args:
+            name: ``instance.variable``.
+
+        Returns:
+            Its values at ``time``, shape (n,), in ``units[name]``.
+
+        Raises:
+            KeyError: it is not recorded.
+        """
+        if name not in self.run.names:
+            raise KeyError(f"`name` must be one of {', '.join(self.run.names)}, but is {name!r}")
+        return self.run[name]
+
+    @property
+    def time(self) -> Array:
+        """Communication points [s], shape (n,)."""
+        return self.run.time
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Recorded signals, ``instance.variable``."""
+        return self.run.names
+
+    @property
+    def units(self) -> Mapping[str, str | None]:
+        """Unit of each signal; None where its FMU declares none."""
+        return self.run.units
+
+    @property
+    def steps(self) -> int:
+        """Communication steps."""
+        return len(self.time) - 1
+
+    def write_csv(self, path: Path | str) -> None:
+        """Write times and signals as CSV.
+
+        Args:
+            path: the file.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        write_columns(Path(path), {"time": self.time} | {name: self[name] for name in self.names})
+
+    def plot(self, path: Path | str) -> None:
+        """Draw the signals against time, those of one unit in one panel.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+        """
+        units = {name: self.units.get(name) or "" for name in self.names}
+        draw_signals(Path(path), self.time, {name: self[name] for name in self.names}, units)
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the table of the signals."""
+        return [table(f"{self.title}: {self.steps} steps", HEAD, self._rows())]
+
+    def _rows(self) -> list[list[str]]:
+        rows = []
+        for name in self.names:
+            values = self[name]
+            numbers = (values[0], values[-1], values.min(), values.max())
+            rows.append([name, self.units.get(name) or "", *(f"{v:.6g}" for v in numbers)])
+        return rows
+
+    def results(self, place: Path | None = None) -> SignalsFound:
+        """Return what the JSON file says of the run."""
+        signals = [SignalFound(*row) for row in self._rows()]
+        return SignalsFound(signals=signals, steps=self.steps, isolation=dict(self.isolation))
+
+    def write_files(self, folder: Path) -> None:
+        """Write the signals as CSV; of ``simulate`` also the figure."""
+        self.write_csv(folder / f"{self.command}.csv")
+        if self.command == "simulate":
+            self.plot(folder / "simulate.png")
+
+
+def simulate(
+    scenario: Scenario | Path | str,
+    *,
+    stop: float | None = None,
+    step: float | None = None,
+    inputs: Mapping[str, float] | None = None,
+    jacobi: bool = False,
+    safety: Safety | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> SimulationResult:
+    """Run a scenario once. FMUs that are not ours run in a process of their own, behind walls.
+
+    Args:
+        scenario: a TOML scenario file, an SSP file (``.ssp``) of FMI 2.0 co-simulation FMUs, or a ``Scenario``.
+        stop: end [s] (default: the scenario's own).
+        step: communication step of an SSP file [s] (default: the file's own).
+        inputs: constant values of an SSP file's outer inputs, by name.
+        jacobi: run all FMUs of an SSP file side by side, as most SSP tools do.
+        safety: how far FMUs are trusted, and limits of time and memory (default: not at all).
+        tell: called with a line when FMUs that are not ours run on a system without walls.
+
+    Returns:
+        Times and recorded signals with their units.
+
+    Raises:
+        InputError: the file, an FMU or an argument is wrong; the text names the file and every problem in it.
+        SimulationError: the run went wrong.
+
+    Example:
+        >>> result = oc.simulate("loop.toml", stop=2.0)
+        >>> result["plant.theta_l"].shape
+        (2001,)
+    """
+    if isinstance(scenario, Scenario):
+        return _run(scenario, scenario.name, "simulate", stop, safety, tell, {})
+    path = Path(scenario)
+    if path.suffix.lower() == ".ssp":
+        return run_ssp(path, stop=stop, step=step, inputs=inputs or {}, jacobi=jacobi, safety=safety, tell=tell)
+    for name, given in (("step", step is not None), ("inputs", bool(inputs)), ("jacobi", jacobi)):
+        if given:
+            raise ScenarioError(f"`{name}` must be left out with a TOML scenario, which says it itself", name)
+    return _run(load_scenario(path), path.name, "simulate", stop, safety, tell, {"scenario": str(path)})
+
+
+def _run(
+    scenario: Scenario,
+    title: str,
+    command: str,
+    stop: float | None,
+    safety: Safety | None,
+    tell: Callable[[str], None] | None,
+    given: Mapping[str, Any],
+) -> SimulationResult:
+    safety = safety or Safety()
+    walls = described(scenario.system, safety)
+    if walls["not_enforced"] and tell is not None:
+        tell(f"FMUs that are not ours run with limits, but {walls['not_enforced']}")
+    result = scenarios.simulate(scenario if stop is None else replace(scenario, stop=stop), safety)
+    return SimulationResult(result, title, walls, command, given)
+
+
+def run_ssp(
+    path: Path,
+    *,
+    stop: float | None = None,
+    step: float | None = None,
+    inputs: Mapping[str, float],
+    jacobi: bool = False,
+    safety: Safety | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> SimulationResult:
+    """Run an SSP file, whatever its name; see ``simulate``.
+
+    Args:
+        path: the file.
+        stop: end [s].
+        step: communication step [s].
+        inputs: constant values of outer inputs, by name.
+        jacobi: run all FMUs side by side.
+        safety: how far FMUs are trusted.
+        tell: as in ``simulate``.
+
+    Returns:
+        Times and recorded signals.
+
+    Raises:
+        ScenarioError: the file or an argument is wrong.
+        SimulationError: the run went wrong.
+    """
+    if step is not None and not 0.0 < step < float("inf"):
+        raise ScenarioError(f"`step` must be finite and positive, but is {step!r}", "step")
+    constants = {name: Constant(float(value)) for name, value in inputs.items()}
+    given = {"action": "run", "file": str(path), "step": step, "stop": stop, "jacobi": jacobi}
+    with opened_ssp(path, constants, step, jacobi) as scenario:
+        return _run(scenario, path.name, "ssp", stop, safety, tell, given)

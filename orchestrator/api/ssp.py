@@ -1,0 +1,78 @@
+"""Systems as SSP 1.0 files."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from orchestrator.building.build import ensure_built
+from orchestrator.paired.cosimulation import FMUS
+from orchestrator.paired.experiment import Experiment
+from orchestrator.paired.scenario import paired_scenario
+from orchestrator.scenarios.scenario import Scenario, load_scenario
+from orchestrator.scenarios.ssp.write import write_ssp
+
+
+@dataclass(frozen=True)
+class ExportedSsp:
+    """An SSP file that was written.
+
+    Attributes:
+        path: the file.
+        scenario: what is in it.
+    """
+
+    path: Path
+    scenario: Scenario
+
+    def results(self) -> Mapping[str, Any]:
+        """Collect what ``ssp.json`` says of the file.
+
+        Returns:
+            File name, components, number of connections, stop time and step [s].
+        """
+        return {
+            "file": self.path.name,
+            "components": [i.name for i in self.scenario.system.instances],
+            "connections": len(self.scenario.system.connections),
+            "stop": self.scenario.stop,
+            "step": self.scenario.algorithm.step,
+        }
+
+    def __str__(self) -> str:
+        system = self.scenario.system
+        return f"{self.path}: {len(system.instances)} FMUs, {len(system.connections)} connections"
+
+
+def export_ssp(
+    path: Path | str,
+    scenario: Scenario | Path | str | None = None,
+    *,
+    alpha: float = 0.02,
+    reference: float = 0.5,
+) -> ExportedSsp:
+    """Write a system of FMUs as an SSP 1.0 file.
+
+    Args:
+        path: the file to write.
+        scenario: a ``Scenario`` or a TOML scenario file (default: the paired loops).
+        alpha: half-gap of the paired loops [rad].
+        reference: load angle to which the paired loops are led [rad].
+
+    Returns:
+        The path, and what is in the file.
+
+    Raises:
+        ScenarioError: the scenario has what SSP cannot express, or a number is out of its range.
+        OutputError: the file cannot be written.
+
+    Example:
+        >>> print(oc.export_ssp("paired.ssp", alpha=0.02))
+        paired.ssp: 6 FMUs, 20 connections
+    """
+    if scenario is None:
+        chosen = paired_scenario(Experiment(), ensure_built(FMUS), alpha, reference)
+    else:
+        chosen = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
+    write_ssp(Path(path), chosen)
+    return ExportedSsp(Path(path), chosen)

@@ -1,0 +1,263 @@
+"""Sweeps: many sizes, noise levels and seeds of the paired loops."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.api.arguments import chosen_experiment, chosen_settings
+from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, varied
+from orchestrator.api.shown import Block, table
+from orchestrator.building.fastest import PYTHON, ensure_fastest
+from orchestrator.engine import (
+    DesignCases,
+    Row,
+    Status,
+    Sweep,
+)
+from orchestrator.engine.work import file_hash
+from orchestrator.errors import ScenarioError
+from orchestrator.paired.calibration import Calibration
+from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system
+from orchestrator.paired.experiment import Experiment
+from orchestrator.paired.figures import draw_errors, draw_estimates, draw_pair
+from orchestrator.paired.metric import ErrorStatistics, trust_of_sweep
+from orchestrator.paired.pair import run_pair, with_settings
+from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.sweep import OWN_PARAMETERS, SweepArrays, SweepPlan, gather, sweep_work
+from orchestrator.scenarios.sweep import check_parameters
+from orchestrator.shared.play import Play
+from orchestrator.shared.results import CalibrationFound, ErrorsFound, SweepFound
+from orchestrator.shared.settings import as_tables
+from orchestrator.shared.trust import Trust
+
+
+@dataclass(frozen=True, repr=False)
+class SweepResult(AnySweepResult):
+    """A sweep of the paired loops.
+
+    Attributes:
+        plan: what was varied.
+        cases: the cases, indexable.
+        sweep: the finished cases.
+        fmus: paths of the three FMUs.
+        calibrations: by noise level [rad].
+        parquet: whether ``save`` writes Parquet too.
+        arguments: what was asked for.
+        fmu_kind: which builds of the FMUs ran: "native" or "Python".
+    """
+
+    plan: SweepPlan
+    cases: DesignCases
+    sweep: Sweep
+    fmus: Mapping[str, Path]
+    calibrations: Mapping[float, Calibration]
+    parquet: bool = False
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    fmu_kind: str = PYTHON
+
+    @property
+    def seed(self) -> int:
+        """Seed of random sizes and of all noise."""
+        return self.plan.seed
+
+    @cached_property
+    def arrays(self) -> SweepArrays:
+        """Finished cases as columns [rad], each of shape (done,): actual, noise, estimate, lower, upper."""
+        return gather(self.rows())
+
+    @cached_property
+    def statistics(self) -> dict[float, ErrorStatistics]:
+        """Errors of the estimates by noise level [rad]."""
+        return self.arrays.statistics()
+
+    @property
+    def trust(self) -> Trust:
+        """Whether the intervals hold the sizes that were run."""
+        level = min(c.level for c in self.calibrations.values())
+        return trust_of_sweep(self.statistics.values(), level, self.failed)
+
+    def plot(self, path: Path | str) -> None:
+        """Draw estimated against actual half-gaps, with their intervals.
+
+        Args:
+            path: a PNG, SVG or PDF file.
+        """
+        a = self.arrays
+        title = f"Estimated half-gap with 95 % intervals ({self.plan.experiment.name} experiment)"
+        draw_estimates(Path(path), a.actual, a.estimate, a.lower, a.upper, a.noise, title)
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the table of the first cases and that of the errors."""
+        shown: list[list[str]] = []
+        for row in self.rows():
+            if len(shown) == MOST_ROWS_SHOWN:
+                break
+            shown.append(_cells(row, self.cases.names))
+        title = f"Sweep of {len(self.cases)} cases"
+        if len(self.cases) > len(shown):
+            title += f", the first {len(shown)}; all of them are in sweep.csv"
+        extra = [name for name in self.cases.names if name not in OWN_PARAMETERS]
+        found = ("S [rad]", "estimate [rad]", "interval [rad]", "error [rad]", "error [%]")
+        rows = [
+            [
+                f"{level:g}",
+                str(s.count),
+                f"{s.mean_percent:.4f}",
+                f"{s.worst_percent:.4f}",
+                f"{s.mse:.3e}",
+                f"{100.0 * s.coverage:.1f}",
+            ]
+            for level, s in self.statistics.items()
+        ]
+        total = len(self.cases)
+        errors = f"Errors by noise level ({total - self.failed} of {total} cases done, {self.failed} failed)"
+        head = (
+            "noise [rad]",
+            "cases",
+            "mean error [%]",
+            "worst [%]",
+            "MSE [rad^2]",
+            "intervals that hold the size [%]",
+        )
+        tables = [table(title, ("actual [rad]", "noise [rad]", *extra, *found), shown), table(errors, head, rows)]
+        sizes = [f"{word.capitalize()} size: {play}" for word, play in self._plays().items()]
+        return [*tables, *sizes, f"FMUs: {self.fmu_kind}", f"Trust: {self.trust}"]
+
+    def _plays(self) -> dict[str, Play]:
+        """Return the smallest and the largest size of the finished cases."""
+        sizes, ratio = self.arrays.actual, self.plan.experiment.values.i
+        if not len(sizes):
+            return {}
+        return {"smallest": Play(float(sizes.min()), ratio), "largest": Play(float(sizes.max()), ratio)}
+
+    def results(self, place: Path | None = None) -> SweepFound:
+        """Return what ``sweep.json`` says."""
+        return SweepFound(
+            cases=len(self.cases),
+            failed=self.failed,
+            columns=self.columns(),
+            play={word: play.as_json() for word, play in self._plays().items()},
+            statistics=[ErrorsFound(noise=level, **asdict(s)) for level, s in self.statistics.items()],
+            trust=self.trust.as_json(),
+            experiment=asdict(self.plan.experiment),
+            calibrations={f"{level:g}": _provenance(c) for level, c in self.calibrations.items()},
+            fmus={name: file_hash(path) for name, path in self.fmus.items()},
+            fmu_kind=self.fmu_kind,
+        )
+
+    def write_files(self, folder: Path) -> None:
+        """Write the table and the figures."""
+        self.write_tables(folder)
+        a, plan = self.arrays, self.plan
+        if not len(a.actual):
+            return
+        name = plan.experiment.name
+        self.plot(folder / "estimates.png")
+        draw_errors(folder / "errors.png", a.actual, a.estimate, a.noise, f"Error against size ({name} experiment)")
+        middle = float(np.sort(a.actual)[len(a.actual) // 2])
+        pair = run_pair(with_settings(plan.experiment, noise=plan.noise[-1]), self.fmus, middle, plan.seed)
+        title = f"Paired loops, half-gap {middle:.4g} rad"
+        draw_pair(folder / "loops.png", pair.machine, pair.twin, plan.experiment.reference()[0], title)
+
+
+def sweep(
+    sizes: str | Sequence[float] = "random:20",
+    noise: float | Sequence[float] = (0.0, 1e-4),
+    *,
+    seeds: int = 1,
+    seed: int = 0,
+    vary: Varied = (),
+    samples: int | None = None,
+    experiment: str | Experiment = "default",
+    backlash_model: str | None = None,
+    settings: CalibrationSettings | Path | str | None = None,
+    options: RunOptions | None = None,
+    tell: Callable[[str], None] | None = None,
+    **more: Any,
+) -> SweepResult:
+    """Co-simulate many half-gaps, noise levels and seeds, and estimate each half-gap.
+
+    Args:
+        sizes: half-gaps [rad], or a text: "range:LOW:HIGH:N", "logrange:LOW:HIGH:N", "random:N".
+        noise: standard deviations of the encoder noise [rad].
+        seeds: runs of each size and noise level, each with noise of its own.
+        seed: of random sizes and of all noise.
+        vary: further parameters, as ``{"plant.J_l": [5.3, 5.6]}``, ``{"plant.J_l": "range:5.3:5.9:5"}`` or
+            ``["plant.J_l=range:5.3:5.9:5"]``.
+        samples: draws of what ``vary`` makes random or sobol (default: 16).
+        experiment: "default", "thesis" or an ``Experiment``.
+        backlash_model: of the loop with a gap (default: the experiment's).
+        settings: of the calibration, or the path of a TOML file with those that differ from the default.
+        options: where and how cases run.
+        tell: called with a line on what takes time before the first case.
+        **more: fields of ``RunOptions``, such as ``workers=2``, instead of ``options``.
+
+    Returns:
+        The table of cases and the statistics of the errors.
+
+    Raises:
+        ScenarioError: an argument is wrong.
+        CalibrationError: a size outside what the experiment claims.
+        SimulationError: the place where cases run is gone. A case that fails is a row, not an error.
+
+    Example:
+        >>> result = oc.sweep(sizes=[0.01, 0.02], noise=0.0)
+        >>> len(result), result.failed
+        (2, 0)
+    """
+    options = options or RunOptions(**more)
+    levels = _levels(noise)
+    words = varied(vary)
+    calibrated = chosen_settings(settings, CalibrationSettings)
+    text = sizes if isinstance(sizes, str) else ",".join(repr(float(size)) for size in sizes)
+    count = draws_of(samples, words, text)
+    chosen = chosen_experiment(experiment, backlash_model)
+    plan = SweepPlan(chosen, text, levels, seeds, seed, words, count)
+    cases = plan.cases()
+    if tell is not None:
+        tell("preparing FMUs, compiled loop and calibration (the first time takes half a minute)")
+    builds = ensure_fastest(FMUS)
+    fmus = builds.paths
+    check_parameters(loop_system(plan.experiment, fmus, (MACHINE,)), cases, OWN_PARAMETERS)
+    calibrations = plan.calibrations(tell, calibrated)
+    done = options.run(cases, sweep_work(plan, fmus, calibrations))
+    given: dict[str, Any] = {"experiment": chosen.name, "backlash_model": chosen.backlash_model, "sizes": text}
+    given |= {"noise": ",".join(f"{level:g}" for level in levels), "seeds": seeds, "vary": list(words)}
+    return SweepResult(plan, cases, done, fmus, calibrations, options.parquet, given, builds.kind)
+
+
+def _levels(noise: float | Sequence[float]) -> tuple[float, ...]:
+    levels = tuple(float(level) for level in (noise if isinstance(noise, Sequence) else (noise,)))
+    if len(set(levels)) != len(levels):
+        listed = ",".join(f"{level:g}" for level in levels)
+        raise ScenarioError(f"`noise` must name each level once, but is {listed!r}", "noise")
+    return levels
+
+
+def _provenance(calibration: Calibration) -> CalibrationFound:
+    return CalibrationFound(
+        calibration.digest,
+        calibration.runs,
+        calibration.seed_branch,
+        calibration.smallest,
+        calibration.largest,
+        calibration.level,
+        calibration.width,
+        calibration.version,
+        as_tables(calibration.settings),
+    )
+
+
+def _cells(row: Row, names: tuple[str, ...]) -> list[str]:
+    p = row.case.parameters
+    extra = [str(p[name]) for name in names if name not in OWN_PARAMETERS]
+    start = [f"{p['alpha']:.6g}", f"{p['noise']:g}", *extra]
+    if row.outcome.status is not Status.DONE:
+        return [*start, row.outcome.status.value, row.outcome.message, "", "", ""]
+    total, estimate, lower, upper, error, percent = (float(v or 0.0) for v in row.outcome.values)
+    interval = f"{lower:.8g} .. {upper:.8g}"
+    return [*start, f"{total:.6g}", f"{estimate:.8g}", interval, f"{error:.2e}", f"{percent:.4f}"]

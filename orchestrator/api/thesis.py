@@ -1,0 +1,139 @@
+"""Every published number of the thesis beside the recomputed one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from orchestrator.api.shown import Block, Result, table
+from orchestrator.paired.calibration import estimate_gap, load_or_calibrate
+from orchestrator.paired.compiled_loop import compiled_loop
+from orchestrator.paired.experiment import thesis_experiment
+from orchestrator.paired.metric import difference_sum
+from orchestrator.paired.thesis import published
+from orchestrator.paired.thesis.errata import Erratum, errata
+from orchestrator.paired.thesis.recompute import Comparison, TableComparison, gain_comparisons, table_comparison
+
+TABLE_HEAD = (
+    "alpha [rad]",
+    "S",
+    "estimate",
+    "by the quadratic",
+    "error [%]",
+    "recomputed [%]",
+    "our estimate",
+    "our error [%]",
+)
+
+
+@dataclass(frozen=True, repr=False)
+class ThesisResult(Result):
+    """The thesis's numbers and ours.
+
+    Attributes:
+        gains: model and gains, published and recomputed.
+        table: Table 4.1, recomputed with the thesis's own map.
+        estimates: our estimates of the table's sizes [rad].
+        errata: what the thesis prints and should.
+        arguments: none.
+    """
+
+    command: ClassVar[str] = "thesis"
+    gains: tuple[Comparison, ...]
+    table: TableComparison
+    estimates: tuple[float, ...]
+    errata: tuple[Erratum, ...]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+    def blocks(self) -> Sequence[Block]:
+        """Return the tables of gains, sizes, errata and of others' results."""
+        t = self.table
+        note = (
+            f"Quadratic map through the table: largest deviation {t.largest_deviation:.4f} rad. "
+            f"Mean error {t.mean_error_percent:.2f} %, MSE {t.mse:.3e} (printed {published.MSE_TABLE:.3e}).\n"
+            f"The thesis's 100 random tests: mean error {published.MEAN_ERROR_100_TESTS} %, "
+            f"MSE {published.MSE_100_TESTS:.5e}; its simulations cannot be repeated, for its filter is told the size "
+            '(erratum 6). A sweep of the experiment "thesis" runs our own on the same sizes.\n'
+        )
+        errors = [(str(e.number), e.where, e.printed, e.right, e.shown_by) for e in self.errata]
+        others = [(o.who, o.method, o.figure) for o in published.OTHERS]
+        return [
+            self._gains(),
+            self._sizes(),
+            note,
+            table("Errata", ("", "where", "printed", "right", "shown by"), errors),
+            table(
+                "Results of others that the thesis compares itself with (as it quotes them)",
+                ("who", "method", "figure"),
+                others,
+            ),
+        ]
+
+    def _gains(self) -> Block:
+        rows = [
+            (
+                f"{c.what} ({c.where})",
+                _numbers(c.published),
+                _numbers(c.recomputed),
+                f"{c.deviation:.1e}",
+                "agrees" if c.agrees else c.note,
+            )
+            for c in self.gains
+        ]
+        head = ("what", "published", "recomputed", "largest deviation", "")
+        return table("Model and gains, recomputed with the A that the thesis used", head, rows)
+
+    def _sizes(self) -> Block:
+        columns = (published.TABLE_4_1, self.table.estimates, self.table.errors_percent, self.estimates)
+        rows = [
+            (
+                f"{row.alpha:.4f}",
+                f"{row.S:.3e}",
+                f"{row.estimate:.3f}",
+                f"{again:.3f}",
+                f"{row.error_percent:.2f}",
+                f"{error:.2f}",
+                f"{own:.4f}",
+                f"{100.0 * abs(own - row.alpha) / row.alpha:.4f}",
+            )
+            for row, again, error, own in zip(*columns, strict=True)
+        ]
+        return table("Table 4.1", TABLE_HEAD, rows)
+
+    def results(self, place: Path | None = None) -> dict[str, Any]:
+        """Return what ``thesis.json`` says."""
+        rows = [asdict(r) for r in published.TABLE_4_1]
+        return {
+            "gains": [asdict(c) for c in self.gains],
+            "table": asdict(self.table) | {"rows": rows, "our_estimates": list(self.estimates)},
+            "errata": [asdict(e) for e in self.errata],
+            "others": [asdict(o) for o in published.OTHERS],
+        }
+
+
+def thesis() -> ThesisResult:
+    """Recompute every published number of the thesis.
+
+    Returns:
+        Gains, Table 4.1 and errata, each published value beside the recomputed one.
+
+    Example:
+        >>> ours = oc.thesis()
+        >>> len(ours.estimates)
+        8
+    """
+    return ThesisResult(tuple(gain_comparisons()), table_comparison(), _our_estimates(), tuple(errata()))
+
+
+def _our_estimates() -> tuple[float, ...]:
+    experiment = thesis_experiment()
+    calibration = load_or_calibrate(experiment)
+    loop = compiled_loop(experiment)
+    errors = experiment.encoder_errors(0)
+    twin = loop.run(0.0, errors)[:, 2]
+    sums = [difference_sum(loop.run(row.alpha, errors)[:, 2], twin) for row in published.TABLE_4_1]
+    return tuple(estimate_gap(calibration, total).alpha for total in sums)
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return " ".join(f"{v:.5g}" for v in values)

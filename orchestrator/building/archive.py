@@ -1,0 +1,66 @@
+"""Canonical zip archives: the same members always give the same bytes."""
+
+import os
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from orchestrator.errors import FmuError
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+
+
+def write_archive(path: Path, members: Mapping[str, bytes]) -> None:
+    """Write ``members`` (name in the archive to content) sorted, with fixed dates and permissions, all or nothing.
+
+    Args:
+        path: the archive.
+        members: content by name.
+
+    Raises:
+        FmuError: the file cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=".part", dir=path.parent)
+    except OSError as error:
+        raise FmuError(f"cannot write {path}: {error.strerror}") from None
+    try:
+        with os.fdopen(handle, "wb") as stream, zipfile.ZipFile(stream, "w") as archive:
+            for name in sorted(members):
+                archive.writestr(_entry(name), members[name], zipfile.ZIP_DEFLATED, 9)
+        os.chmod(part, 0o644)
+        os.replace(part, path)
+    except OSError as error:
+        raise FmuError(f"cannot write {path}: {error.strerror}") from None
+    finally:
+        Path(part).unlink(missing_ok=True)
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(name, EPOCH)
+    entry.create_system = 3
+    entry.external_attr = (0o100755 if name.endswith((".so", ".dll", ".dylib")) else 0o100644) << 16
+    return entry
+
+
+def read_archive(path: Path) -> dict[str, bytes]:
+    """Return the members of an archive, without its folders.
+
+    Args:
+        path: the archive.
+
+    Returns:
+        Content by name.
+
+    Raises:
+        FmuError: the file is missing or no zip archive.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}
+    except FileNotFoundError:
+        raise FmuError(f"`fmu` must exist, but {path} does not") from None
+    except (OSError, zipfile.BadZipFile) as error:
+        raise FmuError(f"`fmu` must be a zip archive, but {path} is not: {error}") from None

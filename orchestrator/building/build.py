@@ -1,0 +1,193 @@
+"""Builds our FMUs: reproducible to the byte, rebuilt when stale, published whole or not at all.
+
+An FMU is stale when its fingerprint (sources, builder, versions, compiler there or not) is not the one that a build
+would have now. The fingerprint is in the FMU, so nothing beside the file itself is needed to tell.
+"""
+
+import importlib
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import orchestrator
+from orchestrator.building.launcher import find_toolchain
+from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of
+from orchestrator.errors import FmuError
+from orchestrator.fmi.ours import is_ours, record
+from pyfmu_sources.fmu_variables import with_starts
+
+ROOT = Path(orchestrator.__file__).resolve().parents[1]
+IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
+_STAMP = re.compile(rb'<Build fingerprint="([0-9a-f]{64})"')
+
+
+def default_directory() -> Path:
+    """Return where FMUs live: ``fmus/`` of the repository; of an installed package, ``fmus/`` in the current folder.
+
+    Returns:
+        The folder, which may not exist yet.
+    """
+    return ROOT / "fmus" if (ROOT / "pyproject.toml").exists() else Path("fmus")
+
+
+def ensure_built(
+    names: Sequence[str] | None = None, directory: Path | None = None, force: bool = False
+) -> dict[str, Path]:
+    """Return the path of each FMU in ``names`` (default: all), after building what is missing or stale.
+
+    Args:
+        names: which FMUs.
+        directory: where they are (default: :func:`default_directory`).
+        force: build also what is up to date.
+
+    Returns:
+        Path by name.
+
+    Raises:
+        FmuError: a name is unknown, a build fails or ``directory`` cannot be written.
+    """
+    recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
+    folder = default_directory() if directory is None else directory
+    return {recipe.name: _ensure(recipe, folder, force) for recipe in recipes}
+
+
+def build_variant(
+    name: str,
+    base: str = "Drivetrain",
+    start_values: Mapping[str, float | str] | None = None,
+    directory: Path | None = None,
+) -> Path:
+    """Build (unless it is there already) an FMU called ``name`` that is ``base`` with other start values.
+
+    Args:
+        name: model name and model identifier, a C identifier.
+        base: the FMU that it varies.
+        start_values: value by parameter name; an enumeration is given by the name of its item or its number.
+        directory: where it goes (default: where the others are).
+
+    Returns:
+        The FMU's path.
+
+    Raises:
+        FmuError: the name is no identifier, a parameter is unknown or out of range, or the build fails.
+    """
+    if not IDENTIFIER.fullmatch(name) or name in catalogue():
+        raise FmuError(f"`name` must be a new C identifier of at most 100 characters, but is {name!r}")
+    starts = _start_numbers(start_values or {})
+    recipe = replace(recipe_of(base), name=name, starts=starts)
+    slave = getattr(importlib.import_module(f"pyfmu_sources.{recipe.module}"), recipe.class_name)
+    try:
+        with_starts(slave.table, starts)
+    except ValueError as error:
+        raise FmuError(str(error)) from None
+    return _ensure(recipe, default_directory() if directory is None else directory)
+
+
+def is_stale(name: str, directory: Path | None = None) -> bool:
+    """Tell whether the FMU ``name`` is missing or older than what it is made from.
+
+    Args:
+        name: of the FMU.
+        directory: where it is (default: :func:`default_directory`).
+
+    Returns:
+        True when it has to be built.
+    """
+    folder = default_directory() if directory is None else directory
+    return stamp_of(folder / f"{name}.fmu") != fingerprint(recipe_of(name), find_toolchain().identity)
+
+
+def _start_numbers(values: Mapping[str, float | str]) -> dict[str, float]:
+    """Return start values as numbers, an enumeration's item as its own.
+
+    Raises:
+        FmuError: a value is neither.
+    """
+    return {parameter: _number(value) for parameter, value in values.items()}
+
+
+def _number(value: float | str) -> float:
+    if not isinstance(value, str):
+        return float(value)
+    from pyfmu_sources.model_xml import ENUMERATIONS
+
+    for items in ENUMERATIONS.values():
+        names = [item for item, _ in items]
+        if value in names:
+            return float(names.index(value) + 1)
+    raise FmuError(f"a start value must be a number or the name of an enumeration's item, but is {value!r}")
+
+
+def _ensure(recipe: Recipe, directory: Path, force: bool = False) -> Path:
+    path = directory / f"{recipe.name}.fmu"
+    current = fingerprint(recipe, find_toolchain().identity)
+    if force or stamp_of(path) != current or not trusted(path):
+        _build(recipe, path, current)
+    return path
+
+
+def trusted(path: Path) -> bool:
+    """Tell whether the file is what we built; a stamp alone can be forged, save beside sources as open.
+
+    Args:
+        path: of an FMU.
+
+    Returns:
+        True when it may run in this process.
+    """
+    if is_ours(path):
+        return True
+    if path.parent.resolve() in (ROOT / "fmus", ROOT / "fmus" / "native") and (ROOT / "pyproject.toml").exists():
+        record(path)
+        return True
+    return False
+
+
+def stamp_of(path: Path) -> str | None:
+    """Return the fingerprint inside the FMU at ``path``; ``None`` where there is none.
+
+    Args:
+        path: of an FMU.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            found = _STAMP.search(archive.read("modelDescription.xml"))
+    except (OSError, KeyError, zipfile.BadZipFile):
+        return None
+    return found[1].decode() if found else None
+
+
+def _build(recipe: Recipe, path: Path, current: str) -> None:
+    """Run the worker; it writes beside ``path`` and renames, so that two builds at a time do no harm."""
+    request = {
+        "name": recipe.name,
+        "module": recipe.module,
+        "class_name": recipe.class_name,
+        "starts": dict(recipe.starts),
+        "target": str(path.absolute()),
+        "fingerprint": current,
+    }
+    inherited = os.environ.get("PYTHONPATH")
+    paths = [str(ROOT), *([inherited] if inherited else [])]
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "PYTHONDONTWRITEBYTECODE": "1"}
+    run = subprocess.run(
+        [sys.executable, "-m", "orchestrator.building.worker"],
+        input=json.dumps(request),
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if run.returncode != 0:
+        lines = run.stderr.strip().splitlines() or ["no message"]
+        raise FmuError(f"cannot build {recipe.name}: {lines[-1]}")
+    record(path)

@@ -1,0 +1,222 @@
+"""C compilers for native FMUs: zig for every platform where it is installed, else the local one for this platform."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import platform
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from orchestrator.errors import FmuError
+from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.machine_code import local_compiler
+
+# No contraction of a product and a sum: it would round once where Python rounds twice.
+FLAGS = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall", "-Wextra", "-Wpedantic")
+
+# zig is clang with checks switched on; its vectors of two numbers stall where structures are read right after.
+ZIG_FLAGS = ("-O2", "-fno-sanitize=undefined", "-fno-slp-vectorize")
+# On Windows half a library is the compiler's own C library: what is translated is kept small there.
+ZIG_WINDOWS_FLAGS = ("-Os", *ZIG_FLAGS[1:])
+# A module without a main function, for a browser.
+WEB_FLAGS = ("-std=gnu99", *ZIG_FLAGS, "-target", "wasm32-wasi", "-mexec-model=reactor", "-s")
+
+
+@dataclass(frozen=True)
+class Target:
+    """One platform: folder in ``binaries/``, suffix of its libraries, zig's names of the machines that it runs on."""
+
+    folder: str
+    suffix: str
+    zig: tuple[str, ...]
+    system: str
+    machines: tuple[str, ...]
+
+
+TARGETS = (
+    # An old glibc, so that the library loads on every Linux of the last ten years.
+    Target("linux64", ".so", ("x86_64-linux-gnu.2.17",), "linux", ("x86_64", "amd64")),
+    # FMI 2.0 has no name for this platform; the folder is named as in FMI 3.0.
+    Target("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",), "linux", ("aarch64", "arm64")),
+    Target("win64", ".dll", ("x86_64-windows-gnu",), "win32", ("x86_64", "amd64")),
+    # One folder for both machines in FMI 2.0: a universal library.
+    Target("darwin64", ".dylib", ("x86_64-macos", "aarch64-macos"), "darwin", ("x86_64", "arm64", "aarch64")),
+)
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A compiler and the platforms for which it makes libraries."""
+
+    command: tuple[str, ...]
+    identity: str
+    targets: tuple[Target, ...]
+
+    @property
+    def is_zig(self) -> bool:
+        """Whether it compiles for other platforms."""
+        return self.identity.startswith("zig")
+
+
+@cache
+def find_compiler(here: bool = False) -> Compiler | None:
+    """Return zig if it is installed, else the local C compiler, else ``None``.
+
+    Args:
+        here: for this platform alone; the local compiler, which is quicker, comes first then.
+
+    Returns:
+        The compiler and the platforms that it compiles for.
+    """
+    local = [t for t in TARGETS if t.system == sys.platform and platform.machine().lower() in t.machines]
+    zig = _zig(tuple(local) if here else TARGETS)
+    cc = _local(tuple(local))
+    return (cc or zig) if here else (zig or cc)
+
+
+def _zig(targets: tuple[Target, ...]) -> Compiler | None:
+    if importlib.util.find_spec("ziglang") is None or not targets:
+        return None
+    try:
+        number = version("ziglang")
+    except PackageNotFoundError:
+        number = "unknown"
+    return Compiler((sys.executable, "-m", "ziglang", "cc"), f"zig {number}", targets)
+
+
+def _local(targets: tuple[Target, ...]) -> Compiler | None:
+    path = local_compiler()
+    return Compiler((path,), f"cc {_first_line(path)}", targets) if path is not None and targets else None
+
+
+def _first_line(path: str) -> str:
+    run = subprocess.run([path, "--version"], capture_output=True, text=True, check=False)
+    return (run.stdout.splitlines() or ["unknown"])[0]
+
+
+def compile_library(compiler: Compiler, target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:
+    """Return the shared library of an FMU for one platform, the same bytes for the same sources and compiler.
+
+    Args:
+        compiler: from :func:`find_compiler`.
+        target: one of its platforms.
+        name: model identifier; ``NAME.c`` is compiled.
+        sources: content by file name.
+
+    Returns:
+        The library.
+
+    Raises:
+        FmuError: the compiler fails or warns.
+    """
+    machines = target.zig if compiler.is_zig else ("",)
+    with tempfile.TemporaryDirectory() as folder:
+        for file, content in sources.items():
+            (Path(folder) / file).write_bytes(content)
+        parts = [_compiled(compiler, target, machine, name, Path(folder)) for machine in machines]
+    return parts[0] if len(parts) == 1 else universal(parts)
+
+
+def _compiled(compiler: Compiler, target: Target, machine: str, name: str, folder: Path) -> bytes:
+    library = f"{name}{target.suffix}"
+    zig = ZIG_WINDOWS_FLAGS if target.system == "win32" else ZIG_FLAGS
+    speed = zig if compiler.is_zig else ("-O3",)
+    command = [
+        *compiler.command,
+        *FLAGS,
+        *speed,
+        *_options(target, machine, library),
+        "-shared",
+        "-o",
+        library,
+        f"{name}.c",
+    ]
+    if target.system == "linux":
+        command.append("-lm")
+    _run(compiler, command, folder, f"{name}.c for {target.folder}")
+    return (folder / library).read_bytes()
+
+
+def compile_web_module(compiler: Compiler, sources: Mapping[str, bytes]) -> bytes:
+    """Return a WebAssembly module.
+
+    Args:
+        compiler: zig.
+        sources: content by file name; ``live.c`` and what ends in ``_part.c`` is compiled, the rest is included.
+
+    Returns:
+        Its bytes.
+
+    Raises:
+        FmuError: the compiler fails or warns.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, content in sources.items():
+            (folder / file).write_bytes(content)
+        parts = [file for file in sources if file.endswith("_part.c")]
+        command = [*compiler.command, *FLAGS, *WEB_FLAGS, "-o", "live.wasm", "live.c", *parts]
+        _run(compiler, command, folder, "live.c for a page")
+        return (folder / "live.wasm").read_bytes()
+
+
+def _run(compiler: Compiler, command: Sequence[str], folder: Path, what: str) -> None:
+    """Run the compiler.
+
+    Raises:
+        FmuError: it fails or warns.
+    """
+    cache = str(cache_directory("zig"))
+    environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
+    try:
+        run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env=environment)
+    except OSError as error:
+        raise FmuError(f"the C compiler {compiler.identity} cannot be run: {error.strerror}") from None
+    lines = run.stderr.splitlines()
+    if run.returncode != 0:
+        reason = next((line for line in lines if "error" in line), "no message")
+        raise FmuError(f"the C compiler {compiler.identity} failed on {what}: {reason}")
+    warning = next((line for line in lines if "warning:" in line), None)
+    if warning is not None:
+        raise FmuError(f"{what} must compile without warnings, but {compiler.identity} says: {warning}")
+
+
+def _options(target: Target, machine: str, library: str) -> list[str]:
+    options = ["-target", machine] if machine else []
+    if target.system == "linux":
+        return [*options, "-fPIC", "-s", "-Wl,--build-id=none", f"-Wl,-soname,{library}"]
+    if target.system == "darwin":
+        return [*options, "-fPIC", f"-Wl,-install_name,@rpath/{library}", "-Wl,-x"]
+    return [*options, "-s"]
+
+
+def universal(parts: Sequence[bytes]) -> bytes:
+    """Return one Mach-O library for several machines: a table of contents, then each at a page of its own.
+
+    Args:
+        parts: one library per machine.
+
+    Returns:
+        The library.
+    """
+    alignment = 14
+    offsets, end = [], 1 << alignment
+    for part in parts:
+        offsets.append(end)
+        end = (end + len(part) + (1 << alignment) - 1) >> alignment << alignment
+    head = struct.pack(">II", 0xCAFEBABE, len(parts))
+    for part, offset in zip(parts, offsets, strict=True):
+        cpu, subtype = struct.unpack("<ii", part[4:12])
+        head += struct.pack(">iiIII", cpu, subtype, offset, len(part), alignment)
+    content = head
+    for part, offset in zip(parts, offsets, strict=True):
+        content = content.ljust(offset, b"\0") + part
+    return content

@@ -1,0 +1,132 @@
+"""The documentation, icon and licence that an FMU carries."""
+
+import csv
+import html
+import io
+from collections.abc import Sequence
+from xml.etree.ElementTree import Element
+
+from orchestrator.building.reference_files import DATA, PARAMETERS
+from orchestrator.building.sources import Recipe
+
+STYLE = """body { font: 15px/1.5 sans-serif; max-width: 60em; margin: 2em auto; padding: 0 1em; color: #222; }
+table { border-collapse: collapse; margin: 1em 0; }
+td, th { border: 1px solid #bbb; padding: .2em .6em; text-align: left; }
+td.number { text-align: right; font-variant-numeric: tabular-nums; } .equation { margin-left: 2em; }
+svg { max-width: 100%; } svg text { font: 12px sans-serif; }"""
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head><meta charset="utf-8"><title>{name}</title><style>
+{style}
+</style></head>
+<body>
+<h1>{name}</h1>
+<p>{title}. FMI 2.0 for {interfaces}.</p>
+{equations}
+{plot}
+{tables}
+<h2>Running it</h2>
+<p>{running}</p>
+<p>Refused calls change nothing: values out of range and steps that cannot be taken return fmi2Discard, calls that the
+standard forbids return fmi2Error, both with a message.</p>
+<h2>Licence</h2>
+<p>MIT; see <a href="licenses/license.txt">licenses/license.txt</a>.{license}</p>
+</body>
+</html>
+"""
+RUNNING_PYTHON = """The FMU needs a Python 3.9 or later with nothing but its standard library. In a Python host it uses
+the host's. In any other host on Linux it opens the libpython that it was built with, else the system's libpython3; the
+environment variable FMU_LIBPYTHON names another one. On Windows a python3.dll must be on the path."""
+RUNNING_NATIVE = """The FMU needs nothing but the C library. Its sources are in <code>sources/</code>, translated from
+the Python of the project; binaries: {platforms}."""
+PYTHONFMU_LICENSE = """ PythonFMU, which connects Python and C, has its own in
+<a href="licenses/PythonFMU.txt">licenses/PythonFMU.txt</a>."""
+PLOTTED = {
+    "Drivetrain": ("theta_m", "theta_l", "T_shaft"),
+    "LqrController": ("reference", "theta_l_hat", "u"),
+    "KalmanEstimator": ("theta_l", "theta_l_hat", "omega_m_hat"),
+}
+COLOURS = ("#1b6ca8", "#c8553d", "#4b8b3b")
+
+
+def documentation(recipe: Recipe, description: Element, platforms: Sequence[str] = ()) -> dict[str, bytes]:
+    """Return members of the archive: a page, the licence and the icon.
+
+    Args:
+        recipe: of the FMU.
+        description: its model description.
+        platforms: of a native FMU, for which it has binaries; none for an FMU that runs Python.
+
+    Returns:
+        Content by name in the archive.
+    """
+    fragments = [f"{recipe.class_name}.html"]
+    if any(v.attrib["name"] == "sample_time" for v in description.iter("ScalarVariable")):
+        fragments.append("sampled.html")
+    paths = [DATA / name for name in fragments]
+    page = PAGE.format(
+        name=html.escape(description.attrib["modelName"]),
+        title=html.escape(description.attrib["description"]),
+        style=STYLE,
+        interfaces="co-simulation" if description.find("ModelExchange") is None else "co-simulation and model exchange",
+        equations="\n".join(path.read_text(encoding="utf-8").strip() for path in paths if path.exists()),
+        plot=_plot(recipe.class_name),
+        running=RUNNING_NATIVE.format(platforms=", ".join(platforms)) if platforms else RUNNING_PYTHON,
+        license="" if platforms else PYTHONFMU_LICENSE,
+        tables="\n".join(_table(description, *section) for section in _SECTIONS),
+    )
+    files = {"documentation/index.html": page.encode(), "model.png": (DATA / "model.png").read_bytes()}
+    return files | {"documentation/licenses/license.txt": (DATA / "license.txt").read_bytes()}
+
+
+_SECTIONS = (("Inputs", "input"), ("Outputs", "output"), ("Parameters", "parameter"))
+
+
+def _table(description: Element, heading: str, causality: str) -> str:
+    rows = [_row(v) for v in description.iter("ScalarVariable") if v.attrib["causality"] == causality]
+    if not rows:
+        return ""
+    head = "<tr><th>name</th><th>unit</th><th>start</th><th>minimum</th><th>maximum</th><th>meaning</th></tr>"
+    return "\n".join([f"<h2>{heading}</h2>", "<table>", head, *rows, "</table>"])
+
+
+def _row(variable: Element) -> str:
+    kind = variable[0].attrib
+    texts = (f"{float(kind[key]):.6g}" if key in kind else "" for key in ("start", "min", "max"))
+    numbers = "".join(f'<td class="number">{text}</td>' for text in texts)
+    name, text = html.escape(variable.attrib["name"]), html.escape(variable.attrib["description"])
+    return f"<tr><td><code>{name}</code></td><td>{kind.get('unit', '')}</td>{numbers}<td>{text}</td></tr>"
+
+
+def _plot(class_name: str) -> str:
+    """Return the reference experiment as a drawing; nothing where there is none."""
+    path = DATA / f"{class_name}_reference.csv"
+    if class_name not in PLOTTED or not path.exists():
+        return ""
+    rows = list(csv.DictReader(io.StringIO(path.read_text(encoding="ascii"))))
+    with_values = ", ".join(f"{name} = {value:g}" for name, value in PARAMETERS[class_name].items())
+    caption = (
+        f"The reference experiment inside the FMU{f' ({with_values})' if with_values else ''}, each signal scaled."
+    )
+    times = [float(row["time"]) for row in rows]
+    lines = [_line(times, [float(row[n]) for row in rows], k, n) for k, n in enumerate(PLOTTED[class_name])]
+    return f'<svg viewBox="0 0 640 270" role="img">{_axis(times[-1])}{"".join(lines)}</svg>\n<p>{caption}</p>'
+
+
+def _axis(end: float) -> str:
+    marks = "".join(
+        f'<text x="{10 + 115 * n}" y="262" fill="#666">{end * n / 4:g}{" s" if n == 4 else ""}</text>' for n in range(5)
+    )
+    return f'<path stroke="#bbb" d="M10 130H470M10 245H470"/>{marks}'
+
+
+def _line(times: list[float], values: list[float], k: int, name: str) -> str:
+    width, height, left, top = 460.0, 220.0, 10.0, 20.0
+    reach = max(map(abs, values)) or 1.0
+    span = times[-1] - times[0]
+    points = " ".join(
+        f"{left + width * (t - times[0]) / span:.1f},{top + height * (0.5 - 0.5 * v / reach):.1f}"
+        for t, v in zip(times, values, strict=True)
+    )
+    label = f'<text x="480" y="{40 + 20 * k}" fill="{COLOURS[k]}">{name} (largest {reach:.3g})</text>'
+    return f'<polyline fill="none" stroke="{COLOURS[k]}" stroke-width="1.5" points="{points}"/>{label}'

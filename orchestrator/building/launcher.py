@@ -1,0 +1,103 @@
+"""The launcher library (native/launcher.c), by which our FMUs load in hosts that have no Python of their own."""
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from orchestrator.errors import FmuError
+from orchestrator.shared.machine_code import local_compiler
+
+NATIVE = Path(__file__).parent / "native"
+SOURCE = "launcher.c"
+
+
+@dataclass(frozen=True)
+class Toolchain:
+    """How the launcher is made here: compiler and libpython (``None`` where there is none), Python program."""
+
+    compiler: str | None
+    libpython: Path | None
+    program: str
+
+    @property
+    def identity(self) -> str:
+        """What a build depends on, as one line."""
+        return f"{'launcher' if self.compiler else 'none'} {self.libpython} {self.program}"
+
+    @property
+    def remark(self) -> str | None:
+        """One line on what the FMUs built here cannot do, or ``None``."""
+        if self.compiler is None:
+            preload = self.libpython or "libpython3.X.so.1.0"
+            return (
+                "no C compiler (cc) for Linux was found: the FMUs load in Python hosts only, unless the host is "
+                f"started with LD_PRELOAD={preload}"
+            )
+        if self.libpython is None:
+            return (
+                f"{sys.executable} has no shared libpython: hosts without Python use the system's libpython3, or "
+                "the one that the environment variable FMU_LIBPYTHON names"
+            )
+        return None
+
+
+def find_toolchain() -> Toolchain:
+    """Return what this machine offers.
+
+    Returns:
+        Compiler, libpython and interpreter, as far as there are any.
+    """
+    linux = sys.platform == "linux" and platform.machine() == "x86_64"
+    compiler = local_compiler() if linux else None
+    folder = sysconfig.get_config_var("LIBDIR") or ""
+    name = sysconfig.get_config_var("INSTSONAME") or ""
+    libpython = Path(folder) / name
+    shared = ".so" in name and libpython.exists()
+    program = getattr(sys, "_base_executable", sys.executable)
+    return Toolchain(compiler, libpython if shared else None, os.path.realpath(program))
+
+
+def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
+    """Return the shared library, the same bytes wherever it is compiled.
+
+    Args:
+        toolchain: what to compile with.
+        wrapper: file name of PythonFMU's library, which the launcher opens.
+
+    Returns:
+        The library.
+
+    Raises:
+        FmuError: the compiler fails.
+    """
+    assert toolchain.compiler is not None
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(NATIVE, folder, dirs_exist_ok=True)
+        library = str(toolchain.libpython) if toolchain.libpython else ""
+        command = [
+            toolchain.compiler,
+            *("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden", "-Wl,--build-id=none"),
+            f'-DWRAPPER="{wrapper}"',
+            f"-DPYTHON_LIBRARY={_quoted(library)}",
+            f"-DPYTHON_PROGRAM=L{_quoted(toolchain.program if library else '')}",
+            *("-o", "launcher.so", SOURCE, "-ldl", "-lpthread"),
+        ]
+        try:
+            run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        except OSError as error:
+            raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
+        if run.returncode != 0:
+            reason = next((line for line in run.stderr.splitlines() if "error" in line), "no message")
+            raise FmuError(f"the C compiler {toolchain.compiler} failed on {SOURCE}: {reason}")
+        return (Path(folder) / "launcher.so").read_bytes()
+
+
+def _quoted(text: str) -> str:
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'

@@ -1,0 +1,139 @@
+"""The C sources of a native FMU: one file made from the slave's Python, and the runtime around it."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import textwrap
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from orchestrator.building.sources import Recipe, closure
+from orchestrator.building.starts import default_starts
+from orchestrator.building.translation.slave import translate_slave
+from orchestrator.errors import FmuError
+from pyfmu_sources.fmu_variables import Variable
+
+RUNTIME = Path(__file__).parent / "native_fmu"
+_HEADERS = ("translated.h", "fmi2_types.h", "fmi2_slave.h", "fmi2_model_exchange.h", "fmi2_states.h", "pairs.h")
+_FILE = """/* {name}: {title}
+ *
+ * Made by backlash-cosim from {files}:
+ * the physics below is those Python files, function by function. Compile this one file; it needs the C library only.
+ * Without contraction of products and sums (-ffp-contract=off) it computes the same bits as Python does. */
+
+#include "translated.h"
+
+{types}
+
+{constants}
+
+{prototypes}
+
+{definitions}
+
+/* {line} */
+/* What the runtime has to know of this slave. */
+
+#include "fmi2_types.h"
+
+{tables}
+
+#define GUID "{guid}"
+
+#include "fmi2_slave.h"
+"""
+
+
+def slave_class(recipe: Recipe) -> Any:
+    """Return the adapter of a recipe with the recipe's name and start values, as a class of its own.
+
+    Args:
+        recipe: of the FMU.
+
+    Returns:
+        The class.
+
+    Raises:
+        FmuError: a start value is unknown or out of range.
+    """
+    base = getattr(importlib.import_module(f"pyfmu_sources.{recipe.module}"), recipe.class_name)
+    cls: Any = type(base.__name__, (base,), {"__module__": base.__module__, "__doc__": base.__doc__})
+    try:
+        cls.customise(recipe.name, "native", default_starts(recipe.class_name) | dict(recipe.starts))
+    except ValueError as error:
+        raise FmuError(str(error)) from None
+    cls.table = (*cls.table, *_state_variables(cls))
+    cls._index()
+    return cls
+
+
+def _state_variables(cls: Any) -> Iterator[Variable]:
+    """Yield the variables by which model exchange names states and derivatives."""
+    states = getattr(cls, "continuous_states", ())
+    for name, unit, nominal, text in states:
+        yield Variable(name, "local", unit, None, text, nominal=nominal)
+    for name, unit, _, text in states:
+        rate = {"rad": "rad/s", "rad/s": "rad/s2", "N.m": "N.m/s", "1": "1/s"}.get(unit, f"{unit}/s")
+        yield Variable(f"der({name})", "local", rate, None, f"Rate of: {text}", derivative_of=name)
+
+
+def c_sources(recipe: Recipe, cls: Any, guid: str) -> dict[str, bytes]:
+    """Return the members of ``sources/``: file name to content.
+
+    Args:
+        recipe: of the FMU.
+        cls: from :func:`slave_class`.
+        guid: of the FMU.
+
+    Returns:
+        Content by file name.
+
+    Raises:
+        FmuError: the slave is outside the subset that can be translated; the message names file and line.
+    """
+    translated = translate_slave(cls, _runtime_names())
+    files = ", ".join(path.name for path in closure(recipe.module) if path.stem not in _PYTHON_ONLY)
+    text = _FILE.format(
+        name=recipe.name,
+        title=cls.title,
+        files="\n * ".join(textwrap.wrap(files, 110)),
+        line="-" * 110,
+        guid=guid,
+        types=translated.types,
+        constants=translated.constants,
+        prototypes=translated.prototypes,
+        definitions=translated.definitions,
+        tables=translated.tables,
+    )
+    needed = [name for name in _HEADERS if name != "pairs.h" or '"pairs.h"' in translated.types]
+    headers = {name: (RUNTIME / name).read_bytes() for name in needed}
+    return {f"{recipe.name}.c": text.encode("utf-8"), **headers}
+
+
+def indicator_count(source: bytes) -> int:
+    """Return how many event indicators the C of a slave defines.
+
+    Args:
+        source: C of a slave.
+
+    Returns:
+        The number.
+    """
+    found = re.search(rb"#define INDICATORS (\d+)", source)
+    return int(found[1]) if found else 0
+
+
+_PYTHON_ONLY = ("slave_base", "sampled_slave", "fmu_variables", "hidden_state", "model_xml")
+
+
+@cache
+def _runtime_names() -> frozenset[str]:
+    """Return every identifier in the runtime's code, so that translated names keep clear of them."""
+    names: set[str] = set()
+    for file in _HEADERS:
+        text = re.sub(r"/\*.*?\*/|\"[^\"\n]*\"", " ", (RUNTIME / file).read_text(encoding="utf-8"), flags=re.DOTALL)
+        names |= set(re.findall(r"[A-Za-z_]\w*", text))
+    return frozenset(names)

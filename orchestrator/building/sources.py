@@ -1,0 +1,153 @@
+"""Which source files an FMU is made of, and the fingerprints by which a stale FMU is recognised."""
+
+import ast
+import hashlib
+import json
+import platform
+import sysconfig
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import pyfmu_sources
+from orchestrator.errors import FmuError
+from orchestrator.shared.version import __version__
+
+SOURCES = Path(pyfmu_sources.__file__).parent
+HERE = Path(__file__).parent
+SUFFIX = "_slave"
+# Not themselves slaves, although their names end so.
+BASES = ("sampled_slave",)
+DATA_FILES = tuple(sorted(path for path in (HERE / "data").glob("*") if path.is_file()))
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What one FMU is made from: model name, adapter module and class, and start values that differ."""
+
+    name: str
+    module: str
+    class_name: str
+    starts: Mapping[str, float] = field(default_factory=dict)
+
+
+@cache
+def catalogue() -> dict[str, Recipe]:
+    """Return the recipe of every adapter ``pyfmu_sources/*_slave.py``, by the name of its class.
+
+    Returns:
+        Recipes by name.
+    """
+    recipes = {}
+    for path in sorted(SOURCES.glob(f"*{SUFFIX}.py")):
+        if path.stem in BASES:
+            continue
+        classes = [node.name for node in ast.parse(path.read_bytes()).body if isinstance(node, ast.ClassDef)]
+        recipes[classes[-1]] = Recipe(classes[-1], path.stem, classes[-1])
+    return recipes
+
+
+def recipe_of(name: str) -> Recipe:
+    """Return the recipe called ``name``.
+
+    Args:
+        name: of one of our FMUs.
+
+    Returns:
+        The recipe.
+
+    Raises:
+        FmuError: there is none.
+    """
+    try:
+        return catalogue()[name]
+    except KeyError:
+        raise FmuError(f"`name` must be one of {', '.join(catalogue())}, but is {name!r}") from None
+
+
+@cache
+def closure(module: str) -> tuple[Path, ...]:
+    """Return the files of ``pyfmu_sources`` that ``module`` imports, directly or not, and its own, sorted.
+
+    Args:
+        module: its name without the package.
+
+    Returns:
+        Paths.
+    """
+    found: dict[str, Path] = {}
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        path = SOURCES / f"{name}.py"
+        if name in found or not path.exists():
+            continue
+        found[name] = path
+        waiting += _imported(path)
+    return tuple(found[name] for name in sorted(found))
+
+
+def _imported(path: Path) -> list[str]:
+    names: list[str] = []
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        if isinstance(node, ast.ImportFrom) and node.level == 1:
+            names += [node.module.split(".")[0]] if node.module else [alias.name for alias in node.names]
+    return names
+
+
+def digest(parts: Iterable[bytes]) -> str:
+    """Return a SHA-256 of ``parts``, hexadecimal, in which their borders count.
+
+    Args:
+        parts: in an order that counts.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    total = hashlib.sha256()
+    for part in parts:
+        total.update(len(part).to_bytes(8, "little") + part)
+    return total.hexdigest()
+
+
+def fingerprint(recipe: Recipe, launcher: str) -> str:
+    """Return what changes whenever a build of ``recipe`` would: sources, builder, versions, ``launcher``.
+
+    Args:
+        recipe: of the FMU.
+        launcher: identity of the compiler and interpreter.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    files = [*closure(recipe.module), *_builder_files()]
+    options = {
+        "name": recipe.name,
+        "class": recipe.class_name,
+        "starts": {name: float(value).hex() for name, value in sorted(recipe.starts.items())},
+        "versions": [__version__, version("pythonfmu"), platform.python_version()],
+        "platform": sysconfig.get_platform(),
+        "launcher": launcher,
+    }
+    named = [part for path in files for part in (path.name.encode(), path.read_bytes())]
+    return digest([json.dumps(options, sort_keys=True).encode(), *named])
+
+
+@cache
+def _builder_files() -> tuple[Path, ...]:
+    names = (
+        "archive",
+        "documentation",
+        "launcher",
+        "reference_files",
+        "reference_runs",
+        "sources",
+        "stamping",
+        "starts",
+        "worker",
+    )
+    files = [HERE / f"{name}.py" for name in names]
+    files += sorted(path for path in (*HERE.glob("native/*.[ch]"), *HERE.glob("data/*")) if path.is_file())
+    return tuple(path for path in (*files, HERE.parent / "plants" / "design.py") if path.exists())

@@ -1,0 +1,53 @@
+"""What every model description gets at the end of a build: the fingerprint, the GUID and its final text."""
+
+import uuid
+from collections.abc import Mapping
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from orchestrator.building.sources import digest
+
+
+def stamp(description: Element, fingerprint: str) -> None:
+    """Put in the fingerprint, by which a stale FMU is recognised.
+
+    Args:
+        description: root of the model description.
+        fingerprint: 64 hexadecimal digits.
+    """
+    annotations = Element("VendorAnnotations")
+    tool = ElementTree.SubElement(annotations, "Tool", {"name": "backlash-cosim"})
+    ElementTree.SubElement(tool, "Build", {"fingerprint": fingerprint})
+    before = [child.tag for child in description].index("ModelVariables")
+    description.insert(before, annotations)
+
+
+def content_guid(description: Element, members: Mapping[str, bytes]) -> str:
+    """Return the GUID that follows from the content.
+
+    Args:
+        description: root of the model description.
+        members: content by name in the archive.
+
+    Returns:
+        The GUID, in braces.
+    """
+    content = [part for name in sorted(members) for part in (name.encode(), members[name])]
+    return "{" + str(uuid.UUID(digest([ElementTree.tostring(description), *content])[:32])) + "}"
+
+
+def final_text(description: Element, guid: str) -> bytes:
+    """Return ``modelDescription.xml``.
+
+    Args:
+        description: root of the model description.
+        guid: in braces.
+
+    Returns:
+        The file's content.
+    """
+    description.set("guid", guid)
+    for element in description.iter():
+        element.text = element.tail = None
+    ElementTree.indent(description)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(description) + b"\n"

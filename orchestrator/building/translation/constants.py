@@ -1,0 +1,61 @@
+"""What is known of an expression before it runs: global names, and between which whole numbers it lies."""
+
+from __future__ import annotations
+
+import ast
+from types import ModuleType
+from typing import Any
+
+from orchestrator.building.translation.scope import Bounds, Scope
+
+
+def known(scope: Scope, node: ast.expr) -> Any:
+    """Return the value of a global name or of an attribute of a module; ``None`` where it is neither.
+
+    Args:
+        scope: the function under translation.
+        node: of the Python source.
+
+    Returns:
+        The value.
+    """
+    if isinstance(node, ast.Name) and node.id not in scope.kinds and scope.source.has(node.id):
+        return scope.source.value(node.id)
+    if isinstance(node, ast.Attribute):
+        base = known(scope, node.value)
+        if isinstance(base, ModuleType):
+            return getattr(base, node.attr, None)
+    return None
+
+
+def interval(scope: Scope, node: ast.expr) -> Bounds | None:
+    """Return between which whole numbers a value lies, as far as constants and loops tell.
+
+    Args:
+        scope: the function under translation.
+        node: of the Python source.
+
+    Returns:
+        Least and largest number; None where that is not known.
+    """
+    if isinstance(node, ast.Constant) and type(node.value) is int:
+        return (node.value, node.value)
+    if isinstance(node, ast.Name) and node.id in scope.ranges:
+        return scope.ranges[node.id]
+    value = known(scope, node)
+    if type(value) is int:
+        return (value, value)
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        inner = interval(scope, node.operand)
+        return None if inner is None else (-inner[1], -inner[0])
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub | ast.Mult):
+        a, b = interval(scope, node.left), interval(scope, node.right)
+        if a is None or b is None:
+            return None
+        if isinstance(node.op, ast.Add):
+            return (a[0] + b[0], a[1] + b[1])
+        if isinstance(node.op, ast.Sub):
+            return (a[0] - b[1], a[1] - b[0])
+        corners = [x * y for x in a for y in b]
+        return (min(corners), max(corners))
+    return None

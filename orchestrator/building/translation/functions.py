@@ -1,0 +1,197 @@
+"""One function of the sources as a C function."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+from orchestrator.building.translation.definitions import Function, Owner
+from orchestrator.building.translation.expressions import expression
+from orchestrator.building.translation.kinds import NOTHING, REAL, TRUTH, WHOLE, Items, Kind, Tuple, Values, size_of
+from orchestrator.building.translation.program import Program
+from orchestrator.building.translation.scope import Scope
+from orchestrator.building.translation.source import ModuleSource, docstring
+from orchestrator.building.translation.statements import block
+
+MOST_PASSES = 8
+# Tuples of more numbers are handed on by address to functions that can change nothing.
+LARGEST_BY_VALUE = 12
+
+
+def translate(
+    program: Program, source: ModuleSource, node: ast.FunctionDef, c_name: str, owner: Owner | None = None
+) -> Function:
+    """Return the function in C; what it calls is translated before.
+
+    Args:
+        program: what is translated so far.
+        source: the function's module.
+        node: its definition.
+        c_name: its name in C.
+        owner: the slave, for a method.
+
+    Returns:
+        The function.
+    """
+    function = _signature(source, node, c_name, owner)
+    mutated: set[str] = set()
+    function.by_address = _by_address(function, node)
+    kinds: dict[str, Kind] = {}
+    for _ in range(MOST_PASSES):
+        scope = Scope(program, source, expression, owner, function.returns)
+        scope.kinds = kinds | dict(function.parameters)
+        scope.pointers = {name for name, kind in function.parameters if isinstance(kind, Items)} | function.by_address
+        scope.fixed = function.by_address
+        scope.mutated = set(mutated)
+        _survey(scope, node, [name for name, _ in function.parameters])
+        body = block(scope, _without_docstring(node))
+        mutated = scope.mutated
+        parameters = {name for name, _ in function.parameters}
+        kinds = {name: kind for name, kind in scope.kinds.items() if name not in parameters}
+        if not scope.changed:
+            break
+    _check_end(source, node, function.returns)
+    function.mutated = {name for name, kind in function.parameters if isinstance(kind, Items) and name in mutated}
+    function.faults = scope.faults > 0
+    late = [name for name in scope.homes if name in scope.kinds and scope.homes[name] is node]
+    unused = [name for name, _ in function.parameters if name not in scope.read]
+    voids = [f"(void){program.local_name(name)};" for name in unused]
+    function.body = [*voids, *_late_declarations(scope, late), *body]
+    function.head = _head(program, function)
+    return function
+
+
+def _signature(source: ModuleSource, node: ast.FunctionDef, c_name: str, owner: Owner | None) -> Function:
+    arguments = node.args
+    if arguments.vararg or arguments.kwarg or arguments.posonlyargs or arguments.kwonlyargs or node.decorator_list:
+        source.refuse(node, f"`{node.name}` must have plain parameters and no decorator")
+    names = arguments.args[1:] if owner is not None else arguments.args
+    parameters = [(argument.arg, source.annotation(argument.annotation, argument)) for argument in names]
+    defaults = dict(
+        zip([a.arg for a in names][len(names) - len(arguments.defaults) :], arguments.defaults, strict=True)
+    )
+    returns = source.annotation(node.returns, node)
+    if isinstance(returns, Values):
+        source.refuse(node, f"`{node.name}` must return a tuple of fixed length")
+    return Function(
+        node.name,
+        c_name,
+        source.name,
+        node.lineno,
+        parameters,
+        returns,
+        defaults,
+        owner is not None,
+        comment=docstring(node),
+    )
+
+
+def _by_address(function: Function, node: ast.FunctionDef) -> set[str]:
+    """Return the parameters that are large tuples, never assigned, of a function without lists and ``self``."""
+    if function.owned or any(isinstance(kind, Items) for _, kind in function.parameters):
+        return set()
+    stored = {n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    return {n for n, kind in function.parameters if size_of(kind) > LARGEST_BY_VALUE and n not in stored}
+
+
+def _head(program: Program, function: Function) -> str:
+    parameters = [f"{program.owner_name} *self"] if function.owned else []
+    for name, kind in function.parameters:
+        local = program.local_name(name)
+        if isinstance(kind, Items) or name in function.by_address:
+            constant = "" if name in function.mutated else "const "
+            parameters.append(f"{constant}{program.names.c(kind)} *{local}")
+        else:
+            c = program.names.c(kind)
+            parameters.append(f"{c}{local}" if c.endswith("*") else f"{c} {local}")
+    if function.faults:
+        parameters.append("Fault *fault")
+    often = "RARELY " if program.paired else ""
+    return f"{often}static {program.names.c(function.returns)} {function.c}({', '.join(parameters) or 'void'})"
+
+
+def _without_docstring(node: ast.FunctionDef) -> list[ast.stmt]:
+    return node.body[1:] if ast.get_docstring(node) is not None else node.body
+
+
+def _late_declarations(scope: Scope, names: list[str]) -> list[str]:
+    """Declare at the top what is first assigned inside a branch or a loop and read outside."""
+    lines = []
+    for name in names:
+        kind = scope.kinds[name]
+        if name in scope.pointers or name in scope.ranges or name not in scope.read:
+            continue
+        paired = scope.program.paired and kind == REAL
+        empty = "{0}" if paired or isinstance(kind, Tuple | Items) else {REAL: "0.0", WHOLE: "0", TRUTH: "false"}[kind]  # type: ignore[index]
+        lines.append(f"{scope.program.names.c(kind)} {scope.local(name)} = {empty};")
+    return lines
+
+
+# Where variables begin ----------------------------------------------------------------------------------------
+
+
+def _survey(scope: Scope, node: ast.FunctionDef, parameters: list[str]) -> None:
+    """Find for each local where it begins, whether it is assigned once, and whether it is read."""
+    places: dict[str, list[tuple[tuple[int, ...], ast.stmt, bool]]] = {}
+    counters = {
+        name.id
+        for loop in ast.walk(node)
+        if isinstance(loop, ast.For | ast.comprehension)
+        for name in ast.walk(loop.target)
+        if isinstance(name, ast.Name)
+    }
+    for path, statement in _statements(node.body, ()):
+        for own in _own_names(statement):
+            places.setdefault(own.id, []).append((path, statement, isinstance(own.ctx, ast.Store)))
+    for name, found in places.items():
+        stores = [place for place in found if place[2]]
+        if any(not store for *_, store in found) or any(isinstance(s, ast.AugAssign) for _, s, _ in found):
+            scope.read.add(name)
+        if not stores or name in parameters or name in counters:
+            continue
+        if len(stores) == 1 and not isinstance(stores[0][1], ast.AugAssign):
+            scope.once.add(name)
+        scope.homes[name] = _home(node, found, stores[0][1])
+
+
+def _home(node: ast.FunctionDef, found: list[tuple[tuple[int, ...], ast.stmt, bool]], first: ast.stmt) -> ast.AST:
+    """Return the statement that declares a variable, or the function itself."""
+    inside = min((path for path, *_ in found), key=len)
+    block_of = next(path for path, statement, _ in found if statement is first)
+    direct = isinstance(first, ast.Assign | ast.AnnAssign) and found[0][1] is first
+    value = first.value if isinstance(first, ast.Assign | ast.AnnAssign) else None
+    reads_itself = value is not None and any(not store and s is first for _, s, store in found)
+    covers = all(path[: len(block_of)] == block_of for path, *_ in found)
+    return first if direct and covers and not reads_itself and len(block_of) <= len(inside) else node
+
+
+def _statements(body: list[ast.stmt], path: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], ast.stmt]]:
+    """Yield every statement with the path of its block."""
+    for statement in body:
+        yield path, statement
+        for n, inner in enumerate((getattr(statement, "body", []), getattr(statement, "orelse", []))):
+            yield from _statements(inner, (*path, statement.lineno * 2 + n))
+
+
+def _own_names(statement: ast.stmt) -> list[ast.Name]:
+    """Return the names in a statement without the statements inside it, loads before stores."""
+    found: list[ast.Name] = []
+    waiting: list[ast.AST] = [child for child in ast.iter_child_nodes(statement) if not isinstance(child, ast.stmt)]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Name):
+            found.append(node)
+        waiting += [child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.stmt)]
+    return sorted(found, key=lambda name: isinstance(name.ctx, ast.Store))
+
+
+def _check_end(source: ModuleSource, node: ast.FunctionDef, returns: Kind) -> None:
+    if returns != NOTHING and not _leaves(node.body):
+        source.refuse(node, f"`{node.name}` must end with `return` on every path")
+
+
+def _leaves(body: list[ast.stmt]) -> bool:
+    last = body[-1]
+    if isinstance(last, ast.Return | ast.Raise):
+        return True
+    return isinstance(last, ast.If) and bool(last.orelse) and _leaves(last.body) and _leaves(last.orelse)

@@ -1,0 +1,255 @@
+"""The kinds of value in the translated subset: numbers, fixed tuples, lists of declared capacity."""
+
+from __future__ import annotations
+
+import types
+import typing
+from dataclasses import dataclass
+from typing import Annotated, Any, get_args, get_origin
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number, a truth value or nothing, with its name in C."""
+
+    c: str
+    word: str
+
+
+REAL = Scalar("double", "float")
+WHOLE = Scalar("int64_t", "int")
+TRUTH = Scalar("bool", "bool")
+NOTHING = Scalar("void", "None")
+
+
+@dataclass(frozen=True)
+class Tuple:
+    """A tuple of fixed length; ``names`` are the fields of a NamedTuple."""
+
+    items: tuple[Kind, ...]
+    names: tuple[str, ...] = ()
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all items are of one kind, so that an array holds them."""
+        return not self.names and all(item == self.items[0] for item in self.items)
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list of at most ``capacity`` items of one kind."""
+
+    item: Kind
+    capacity: int
+
+
+@dataclass(frozen=True)
+class Values:
+    """``tuple[float, ...]``: a flat tuple of floats that is only read, of a length that the caller knows."""
+
+
+@dataclass(frozen=True)
+class Store:
+    """``self.real`` or ``self.integer`` of a slave: values by value reference."""
+
+    attribute: str
+    length: int
+
+
+Kind = Scalar | Tuple | Items | Values | Store
+_SCALARS: dict[Any, Scalar] = {float: REAL, int: WHOLE, bool: TRUTH, None: NOTHING, type(None): NOTHING}
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth")
+
+
+class KindError(ValueError):
+    """An annotation is outside the subset."""
+
+
+def kind_of(annotation: Any) -> Kind:
+    """Return the kind that an annotation (evaluated) stands for.
+
+    Args:
+        annotation: such as ``float`` or ``tuple[float, float]``.
+
+    Returns:
+        The kind.
+
+    Raises:
+        KindError: it is outside the subset.
+    """
+    if isinstance(annotation, type | None) and annotation in _SCALARS:
+        return _SCALARS[annotation]
+    if isinstance(annotation, type) and issubclass(annotation, tuple) and hasattr(annotation, "_fields"):
+        hints = typing.get_type_hints(annotation)
+        return Tuple(tuple(kind_of(hints[name]) for name in annotation._fields), tuple(annotation._fields))
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return _with_capacity(arguments[0], arguments[1])
+    if origin is tuple and arguments and arguments[-1] is Ellipsis:
+        if arguments[0] is float:
+            return Values()
+        raise KindError("a tuple of any length must be of floats")
+    if origin is tuple and arguments:
+        return Tuple(tuple(kind_of(argument) for argument in arguments))
+    if origin is list or annotation is list:
+        raise KindError("a list must have a capacity: Annotated[list[T], N]")
+    name = annotation.__name__ if isinstance(annotation, type) else str(annotation)
+    raise KindError(f"a type must be float, int, bool, a fixed tuple or a list of declared capacity, but is {name}")
+
+
+def _with_capacity(base: Any, capacity: Any) -> Kind:
+    if not isinstance(capacity, int) or capacity < 1:
+        raise KindError(f"a capacity must be a positive integer, but is {capacity!r}")
+    if get_origin(base) is list:
+        return Items(kind_of(get_args(base)[0]), capacity)
+    if get_origin(base) is tuple and get_args(base) == (float, Ellipsis):
+        return Tuple((REAL,) * capacity)
+    raise KindError("only a list or tuple[float, ...] has a capacity")
+
+
+def is_type(value: Any) -> bool:
+    """Tell whether a module's global is an alias of a tuple or list, or a NamedTuple.
+
+    Args:
+        value: of the global.
+
+    Returns:
+        True when it is.
+    """
+    if isinstance(value, types.GenericAlias) or get_origin(value) is Annotated:
+        return True
+    return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields")
+
+
+def describe(kind: Kind) -> str:
+    """Return the kind in words, for messages.
+
+    Args:
+        kind: of a value.
+
+    Returns:
+        Words, as Python would write the type.
+    """
+    match kind:
+        case Scalar():
+            return kind.word
+        case Tuple():
+            return f"tuple[{', '.join(describe(item) for item in kind.items)}]"
+        case Items():
+            return f"list[{describe(kind.item)}] of at most {kind.capacity}"
+        case Values():
+            return "tuple[float, ...]"
+        case Store():
+            return f"self.{kind.attribute}"
+
+
+def size_of(kind: Kind) -> int:
+    """Return how many numbers a value holds.
+
+    Args:
+        kind: of a value.
+
+    Returns:
+        The number; 1 for what is no tuple.
+    """
+    if isinstance(kind, Tuple):
+        return sum(size_of(item) for item in kind.items)
+    return 1
+
+
+PAIR = "Pair"  # a value and its derivative, in C
+
+
+class KindNames:
+    """The names of tuples and lists in C: those of the source's aliases, else made from the items.
+
+    Args:
+        taken: names that are others'.
+        paired: floats are pairs of a value and its derivative.
+    """
+
+    def __init__(self, taken: frozenset[str] = frozenset(), paired: bool = False) -> None:
+        self._taken = taken
+        self._paired = paired
+        self._names: dict[Kind, str] = {}
+        self._order: list[Kind] = []
+
+    def suggest(self, kind: Kind, name: str) -> None:
+        """Let ``kind`` be called ``name`` unless it has a name or the name is taken.
+
+        Args:
+            kind: of a value.
+            name: in C.
+        """
+        name = self._own(name)
+        free = name not in self._names.values() and name not in self._taken
+        if isinstance(kind, Tuple | Items) and kind not in self._names and free:
+            self._names[kind] = name
+
+    def c(self, kind: Kind) -> str:
+        """Return the C type of a value of this kind, and remember that it has to be defined.
+
+        Args:
+            kind: of a value.
+
+        Returns:
+            The type.
+        """
+        match kind:
+            case Scalar():
+                return PAIR if self._paired and kind == REAL else kind.c
+            case Values():
+                return "const double *"  # of parameters, which have no derivative
+            case Store():
+                return "double *" if kind.attribute == "real" else "int *"
+        if kind not in self._order:
+            for item in kind.items if isinstance(kind, Tuple) else (kind.item,):
+                self.c(item)
+            self._order.append(kind)
+        if kind not in self._names:
+            self._names[kind] = self._own(self._made(kind))
+        return self._names[kind]
+
+    def _own(self, name: str) -> str:
+        return f"{name}{PAIR}" if self._paired and PAIR not in name else name
+
+    def _made(self, kind: Tuple | Items) -> str:
+        if isinstance(kind, Items):
+            return f"List_of_{kind.capacity}_{self.c(kind.item)}"
+        names = [self.c(item) for item in kind.items]
+        if kind.uniform:
+            return f"{names[0]}_x{len(names)}"
+        return "_and_".join(names)
+
+    def definitions(self) -> list[str]:
+        """Return the typedefs of all that was asked for, items first.
+
+        Returns:
+            A typedef each.
+        """
+        return [self._definition(kind) for kind in self._order]
+
+    def _definition(self, kind: Kind) -> str:
+        name = self._names[kind]
+        if isinstance(kind, Items):
+            return f"typedef struct {{\n    int64_t n;\n    {self.c(kind.item)} v[{kind.capacity}];\n}} {name};"
+        assert isinstance(kind, Tuple)
+        if kind.uniform:
+            return f"typedef struct {{\n    {self.c(kind.items[0])} v[{len(kind.items)}];\n}} {name};"
+        fields = "\n".join(f"    {self.c(item)} {field_name(kind, n)};" for n, item in enumerate(kind.items))
+        return f"typedef struct {{\n{fields}\n}} {name};"
+
+
+def field_name(kind: Tuple, n: int) -> str:
+    """Return the name of the field ``n`` of a tuple that is not uniform.
+
+    Args:
+        kind: of a value.
+        n: its place, from 0.
+
+    Returns:
+        The name.
+    """
+    if kind.names:
+        return kind.names[n]
+    return ORDINALS[n] if n < len(ORDINALS) else f"item{n + 1}"

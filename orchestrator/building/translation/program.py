@@ -1,0 +1,287 @@
+"""A whole program in C: the functions that are asked for and all that they call, with their types and constants."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from typing import Any
+
+from orchestrator.building.translation.definitions import Function, Owner, comment_of
+from orchestrator.building.translation.kinds import KindNames
+from orchestrator.building.translation.source import ModuleSource, docstring, read_source
+from orchestrator.errors import FmuError
+
+_KEYWORDS = (
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true "
+    "false self fault"
+)
+# Names that the headers of the C library take at file scope.
+_TAKEN = (
+    "abs acos asin atan atan2 ceil copysign cos cosh div erf erfc exit exp fabs floor fmax fmin fmod free frexp gamma "
+    "hypot isfinite isinf isnan j0 j1 jn labs ldexp lgamma log log10 main malloc modf nan pow powf printf qsort rand "
+    "remainder remove rename rint round sin sinh sqrt system tan tanh tgamma time trunc y0 y1 yn clock signal index "
+    "EOF NULL NAN INFINITY DOMAIN SING OVERFLOW UNDERFLOW PLOSS TLOSS HUGE"
+)
+RESERVED = frozenset(_KEYWORDS.split())
+TAKEN = RESERVED | frozenset(_TAKEN.split())
+
+Translator = Callable[["Program", ModuleSource, ast.FunctionDef, str, Owner | None], Function]
+
+
+class Program:
+    """What is translated so far.
+
+    Args:
+        translate: the translator of one function: program, module, definition, name in C and owner.
+        owner: the slave whose methods are translated, or ``None`` for functions alone.
+        taken: names at file scope that the C around it uses.
+        beside: the program of plain numbers in the same file; this one is of pairs then, each number with its
+            derivative, and shares the constants.
+    """
+
+    def __init__(
+        self,
+        translate: Translator,
+        owner: Owner | None = None,
+        taken: frozenset[str] = frozenset(),
+        beside: Program | None = None,
+    ) -> None:
+        self._translate = translate
+        self._taken = TAKEN | taken
+        self.paired = beside is not None
+        self.names = KindNames(self._taken, self.paired)
+        self.owner = owner
+        self.owner_name = owner.cls.__name__ if owner is not None else ""
+        self.uses_math = False
+        self._functions: dict[tuple[str, str], Function] = {}
+        self._underway: list[tuple[str, str]] = []
+        self._constants: dict[str, float | int] = {} if beside is None else dict(beside._constants)
+        self._shared = frozenset(self._constants)
+        self._modules: list[str] = []
+        self._sources: dict[str, ModuleSource] = {}
+        self._largest_index = -1
+
+    # Names --------------------------------------------------------------------------------------------------
+
+    @staticmethod
+    def local_name(name: str) -> str:
+        """Return the C name of a local variable.
+
+        Args:
+            name: in Python.
+
+        Returns:
+            The name.
+        """
+        return f"{name}_" if name in RESERVED else name
+
+    @staticmethod
+    def attribute_name(name: str) -> str:
+        """Return the C name of a slave's attribute.
+
+        Args:
+            name: in Python.
+
+        Returns:
+            The name.
+        """
+        plain = name.lstrip("_")
+        return f"{plain}_" if plain in RESERVED else plain
+
+    def _global_name(self, name: str, module: str) -> str:
+        taken = {function.c for function in self._functions.values()} | set(self._constants) | self._taken
+        plain = f"{name.lstrip('_')}{'_pair' if self.paired else ''}"
+        return plain if plain not in taken else f"{module}_{plain}"
+
+    def constant(self, source: ModuleSource, name: str, value: float | int) -> str:
+        """Return the name of a constant, which is defined once.
+
+        Args:
+            source: the module that defines it.
+            name: of the constant there.
+            value: of the constant.
+
+        Returns:
+            Its C name.
+
+        Raises:
+            FmuError: two modules use the name for different values.
+        """
+        plain = name.lstrip("_")
+        for candidate in (plain, f"{source.name}_{plain}"):
+            known = self._constants.get(candidate)
+            if known is None and candidate not in self._taken:
+                self._constants[candidate] = value
+                return candidate
+            if known is not None and known == value and isinstance(known, type(value)):
+                return candidate
+        raise FmuError(f"{source.path}: the constant `{name}` must have a name of its own, but two modules use it")
+
+    # Functions ----------------------------------------------------------------------------------------------
+
+    def function(self, user: ModuleSource | None, node: ast.AST | None, target: Callable[..., Any]) -> Function:
+        """Return the translation of a function of the sources.
+
+        Args:
+            user: the module that calls it, or None.
+            node: the call, for messages.
+            target: the function.
+
+        Returns:
+            The translated function.
+
+        Raises:
+            FmuError: it is not a function of a module that is translated.
+        """
+        source = self._source(target.__module__)
+        name = target.__name__
+        definition = source.functions.get(name)
+        if definition is None:
+            raise FmuError(f"{source.path}: `{name}` must be a function of this module, but is not")
+        return self._translated(user, node, (target.__module__, name), source, definition, None)
+
+    def method(self, user: ModuleSource | None, node: ast.AST | None, name: str) -> Function:
+        """Return the translation of a method of the slave.
+
+        Args:
+            user: the module that calls it, or None.
+            node: the call, for messages.
+            name: of the method.
+
+        Returns:
+            The translated method.
+
+        Raises:
+            FmuError: the slave has no such method.
+        """
+        assert self.owner is not None
+        for cls in self.owner.cls.__mro__:
+            if name in vars(cls) and cls.__module__ not in BASE_MODULES:
+                source = self._source(cls.__module__)
+                body = next(n for n in source.tree.body if isinstance(n, ast.ClassDef) and n.name == cls.__name__)
+                definition = next(n for n in body.body if isinstance(n, ast.FunctionDef) and n.name == name)
+                return self._translated(user, node, (cls.__qualname__, name), source, definition, self.owner)
+        message = f"`{self.owner_name}` must have a method `{name}` of its own, but has none"
+        if user is not None and node is not None:
+            user.refuse(node, message)
+        raise FmuError(message)
+
+    def _translated(
+        self,
+        user: ModuleSource | None,
+        node: ast.AST | None,
+        key: tuple[str, str],
+        source: ModuleSource,
+        definition: ast.FunctionDef,
+        owner: Owner | None,
+    ) -> Function:
+        if key in self._underway:
+            (user or source).refuse(node or definition, f"`{key[1]}` must not call itself")
+        if key not in self._functions:
+            self._underway.append(key)
+            name = f"{self.owner_name}_{key[1].lstrip('_')}" if owner is not None else key[1]
+            function = self._translate(self, source, definition, self._global_name(name, source.name), owner)
+            self._underway.pop()
+            self._functions[key] = function
+        return self._functions[key]
+
+    def _source(self, module: str) -> ModuleSource:
+        source = read_source(module)
+        if source.name not in self._sources:
+            self._sources[source.name] = source
+            for imported in source.imported():
+                self._source(imported)
+            for name, kind in source.aliases():
+                self.names.suggest(kind, name)
+        return source
+
+    # Lengths of `tuple[float, ...]` -----------------------------------------------------------------------------
+
+    def note_index(self, index: int) -> None:
+        """Note that an item of a flat tuple of unknown length is read.
+
+        Args:
+            index: from 0.
+        """
+        self._largest_index = max(self._largest_index, index)
+
+    def note_values(self, length: int) -> None:
+        """Note that a tuple of this length is handed on as one of unknown length.
+
+        Args:
+            length: of the tuple.
+        """
+        self._shortest = min(getattr(self, "_shortest", length), length)
+
+    def check_lengths(self) -> None:
+        """Refuse a program that could read beyond a flat tuple.
+
+        Raises:
+            FmuError: the program could.
+        """
+        if self._largest_index >= getattr(self, "_shortest", self._largest_index + 1):
+            raise FmuError(f"item {self._largest_index} of a tuple of {self._shortest} floats must not be read, but is")
+
+    # Text -----------------------------------------------------------------------------------------------------
+
+    def types(self) -> str:
+        """Return the typedefs.
+
+        Returns:
+            C text.
+        """
+        return "\n\n".join(self.names.definitions())
+
+    def constants(self) -> str:
+        """Return the definitions of the constants in use.
+
+        Returns:
+            C text.
+        """
+        own = {n: v for n, v in self._constants.items() if n not in self._shared}
+        wholes = {n: v for n, v in own.items() if isinstance(v, int) and abs(v) < 2**31}
+        lines = [f"enum {{ {name} = {value} }};" for name, value in sorted(wholes.items(), key=_by_value)]
+        others = {n: v for n, v in own.items() if n not in wholes}
+        lines += [f"static const {_c_type(value)} {name} = {value!r};" for name, value in sorted(others.items())]
+        return "\n".join(lines)
+
+    def prototypes(self) -> str:
+        """Return a declaration of every function.
+
+        Returns:
+            C text.
+        """
+        return "\n".join(f"{function.head};" for function in self._in_order())
+
+    def definitions(self) -> str:
+        """Return every function, module by module.
+
+        Returns:
+            C text.
+        """
+        parts: list[str] = []
+        module = ""
+        for function in self._in_order():
+            if function.module != module:
+                module = function.module
+                first = docstring(self._sources[module].tree).split("\n\n")[0]
+                title = f"{module}.py: {first}"
+                parts.append(f"/* {'-' * 110} */\n{comment_of(title)}".rstrip())
+            parts.append(function.text)
+        return "\n\n".join(parts)
+
+    def _in_order(self) -> list[Function]:
+        modules = list(dict.fromkeys(function.module for function in self._functions.values()))
+        return sorted(self._functions.values(), key=lambda f: (modules.index(f.module), f.line))
+
+
+def _by_value(item: tuple[str, float | int]) -> tuple[str, float | int]:
+    return item
+
+
+def _c_type(value: float | int) -> str:
+    return "int64_t" if isinstance(value, int) else "double"
+
+
+BASE_MODULES = ("pyfmu_sources.slave_base", "pyfmu_sources.sampled_slave")

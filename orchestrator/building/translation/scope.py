@@ -1,0 +1,417 @@
+"""What the translator knows while it is inside one function."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NoReturn
+
+from orchestrator.building.translation.definitions import Owner
+from orchestrator.building.translation.kinds import (
+    NOTHING,
+    REAL,
+    TRUTH,
+    WHOLE,
+    Items,
+    Kind,
+    Tuple,
+    Values,
+    describe,
+    field_name,
+)
+from orchestrator.building.translation.program import Program
+from orchestrator.building.translation.source import ModuleSource
+
+# Precedence in C, the higher the tighter.
+TERNARY, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, PRIMARY = range(9)
+NUMBERS = (REAL, WHOLE)
+Bounds = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Code:
+    """An expression in C.
+
+    ``place`` says that it names something whose address can be taken; ``address`` is the address of what is chosen
+    between two such. ``plain`` is the number in a pair whose derivative is zero.
+    """
+
+    text: str
+    kind: Kind
+    level: int = PRIMARY
+    place: bool = False
+    address: str = ""
+    plain: str = ""
+
+    def within(self, level: int) -> str:
+        """Return the text, in parentheses where the operator around it binds tighter.
+
+        Args:
+            level: of the operator around it.
+
+        Returns:
+            C text.
+        """
+        return self.text if self.level >= level else f"({self.text})"
+
+
+@dataclass
+class Scope:
+    """One function under translation.
+
+    ``expressions`` is the translator of expressions: those of statements, calls and lists reach it by
+    :meth:`expression`, because an expression may hold any of them again.
+    """
+
+    program: Program
+    source: ModuleSource
+    expressions: Callable[[Scope, ast.expr, Kind | None], Code]
+    owner: Owner | None = None
+    returns: Kind = NOTHING
+    kinds: dict[str, Kind] = field(default_factory=dict)
+    pointers: set[str] = field(default_factory=set)
+    mutated: set[str] = field(default_factory=set)
+    ranges: dict[str, Bounds] = field(default_factory=dict)
+    before: list[str] = field(default_factory=list)
+    conditional: int = 0
+    faults: int = 0
+    temporaries: int = 0
+    changed: bool = False
+    fixed: set[str] = field(default_factory=set)
+    aliases: dict[str, str] = field(default_factory=dict)
+    homes: dict[str, ast.AST] = field(default_factory=dict)
+    once: set[str] = field(default_factory=set)
+    read: set[str] = field(default_factory=set)
+    begun: set[str] = field(default_factory=set)
+
+    def refuse(self, node: ast.AST, message: str) -> NoReturn:
+        """Raise for what is outside the subset.
+
+        Args:
+            node: of the Python source.
+            message: what it must be, and is.
+
+        Returns:
+            Never.
+        """
+        self.source.refuse(node, message)
+
+    def expression(self, node: ast.expr, wanted: Kind | None = None) -> Code:
+        """Translate an expression; ``wanted`` is the kind to which it is converted, if that is known.
+
+        Args:
+            node: of the Python source.
+            wanted: kind to which the value is converted, if that is known.
+
+        Returns:
+            The expression in C.
+        """
+        return self.expressions(self, node, wanted)
+
+    def condition(self, node: ast.expr) -> Code:
+        """Translate a condition.
+
+        Args:
+            node: of the Python source.
+
+        Returns:
+            The condition in C.
+        """
+        return truth(value_of(self, self.expression(node)))
+
+    def fault(self) -> str:
+        """Return the argument by which a call can raise, and remember that it can.
+
+        Returns:
+            C text.
+        """
+        self.faults += 1
+        return "fault"
+
+    def raised(self, before: int) -> bool:
+        """Tell whether a slave's method can have raised since there were ``before`` faults; functions go on.
+
+        Args:
+            before: value of ``faults`` at that time.
+
+        Returns:
+            True when it can.
+        """
+        return self.owner is not None and self.faults > before
+
+    def checked(self, before: int) -> list[str]:
+        """Return the statement that leaves a method if it can have raised since there were ``before`` faults.
+
+        Args:
+            before: value of ``faults`` at that time.
+
+        Returns:
+            One statement or none.
+        """
+        return [self.fault_check()] if self.raised(before) else []
+
+    def fault_check(self) -> str:
+        """Return the statement that leaves a function once something was raised.
+
+        Returns:
+            C text.
+        """
+        return f"if (fault->kind) return{self.nothing()};"
+
+    def nothing(self) -> str:
+        """Return what a function gives back when it raises, which nobody looks at.
+
+        Returns:
+            C text, with the blank before it.
+        """
+        if self.returns == NOTHING:
+            return ""
+        if isinstance(self.returns, Tuple | Items):
+            return f" ({self.program.names.c(self.returns)}){{0}}"
+        return " pair_of(0.0)" if self.program.paired and self.returns == REAL else " 0"
+
+    def local(self, name: str) -> str:
+        """Return the C name of a local variable.
+
+        Args:
+            name: in Python.
+
+        Returns:
+            The name.
+        """
+        return self.program.local_name(name)
+
+    def note_mutation(self, node: ast.expr) -> None:
+        """Note that the list to which ``node`` leads is changed.
+
+        Args:
+            node: of the Python source.
+        """
+        while isinstance(node, ast.Subscript | ast.Attribute):
+            node = node.value
+        if isinstance(node, ast.Name):
+            name = node.id
+            while name not in self.mutated:
+                self.mutated.add(name)
+                self.changed = True
+                name = self.aliases.get(name, name)
+
+    def temporary(self, stem: str) -> str:
+        """Return a new name for something that has none in the source.
+
+        Args:
+            stem: what the name begins with.
+
+        Returns:
+            The name.
+        """
+        while True:
+            self.temporaries += 1
+            name = f"{stem}_{self.temporaries}"
+            if name not in self.kinds:
+                return name
+
+    def hoist(self, node: ast.AST, code: Code, stem: str) -> Code:
+        """Give a value a name before the statement in which it stands.
+
+        Args:
+            node: of the Python source.
+            code: an expression in C.
+            stem: what the name begins with.
+
+        Returns:
+            The name as an expression.
+        """
+        if self.conditional:
+            self.refuse(node, "this value must be given a name first, because it is needed under a condition")
+        name = self.temporary(stem)
+        self.before.append(f"const {self.program.names.c(code.kind)} {name} = {code.text};")
+        return Code(name, code.kind, place=True)
+
+    def assign_kind(self, node: ast.AST, name: str, kind: Kind) -> None:
+        """Note that a local variable takes a value of ``kind``; whole numbers widen to reals.
+
+        Args:
+            node: of the Python source.
+            name: of the variable.
+            kind: type of the value.
+        """
+        known = self.kinds.get(name)
+        if known is None:
+            self.kinds[name] = kind
+            self.changed = True
+        elif known != kind:
+            if {known, kind} != {REAL, WHOLE}:
+                self.refuse(node, f"`{name}` must keep its type {describe(known)}, but is assigned {describe(kind)}")
+            if known == WHOLE:
+                self.kinds[name] = REAL
+                self.changed = True
+
+
+def converted(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
+    """Return ``code`` as a value of ``kind``, or refuse.
+
+    Args:
+        scope: the function under translation.
+        node: of the Python source.
+        code: an expression in C.
+        kind: type of the value.
+
+    Returns:
+        The value in C.
+    """
+    if code.kind == kind:
+        return code
+    if kind == REAL and code.kind == WHOLE:
+        return as_real(scope, code)
+    if kind == Values() and isinstance(code.kind, Tuple) and code.kind.uniform and code.kind.items[0] == REAL:
+        scope.program.note_values(len(code.kind.items))
+        if not code.place:
+            code = scope.hoist(node, code, "values")
+        return Code(f"{member(code)}v", kind)
+    if isinstance(kind, Tuple) and isinstance(code.kind, Tuple) and code.kind.items == kind.items:
+        return code if code.kind.uniform == kind.uniform else _renamed(scope, node, code, kind)
+    return scope.refuse(node, f"a value must be {describe(kind)}, but is {describe(code.kind)}")
+
+
+def as_real(scope: Scope, code: Code) -> Code:
+    """Return a number as a float; in C plain ones convert by themselves.
+
+    Args:
+        scope: the function under translation.
+        code: a number.
+
+    Returns:
+        The float.
+    """
+    if not scope.program.paired:
+        return Code(code.text, REAL, code.level) if code.kind == WHOLE else code
+    return code if code.kind == REAL else constant_pair(f"(double){code.within(UNARY)}")
+
+
+def constant_pair(plain: str) -> Code:
+    """Return a number that does not depend on what is differentiated by.
+
+    Args:
+        plain: the number in C.
+
+    Returns:
+        Its pair.
+    """
+    return Code(f"pair_of({plain})", REAL, plain=plain)
+
+
+def value_of(scope: Scope, code: Code) -> Code:
+    """Return a number without its derivative, as conditions and messages take it.
+
+    Args:
+        scope: the function under translation.
+        code: a number.
+
+    Returns:
+        Its value.
+    """
+    if not scope.program.paired or code.kind != REAL:
+        return code
+    return Code(f"({code.plain})" if code.plain else f"{member(code)}v", REAL)
+
+
+def _renamed(scope: Scope, node: ast.AST, code: Code, kind: Tuple) -> Code:
+    assert isinstance(code.kind, Tuple)
+    if not code.place:
+        code = scope.hoist(node, code, "pair")
+    parts = ", ".join(item_of(code, n).text for n in range(len(kind.items)))
+    return compound(scope, kind, parts)
+
+
+def compound(scope: Scope, kind: Kind, parts: str) -> Code:
+    """Return a tuple made of ``parts``.
+
+    Args:
+        scope: the function under translation.
+        kind: type of the value.
+        parts: the items in C, separated by commas.
+
+    Returns:
+        The tuple in C.
+    """
+    assert isinstance(kind, Tuple)
+    braces = f"{{{{{parts}}}}}" if kind.uniform else f"{{{parts}}}"
+    return Code(f"({scope.program.names.c(kind)}){braces}", kind)
+
+
+def item_of(code: Code, n: int) -> Code:
+    """Return the item ``n`` of a tuple that has a name.
+
+    Args:
+        code: an expression in C.
+        n: its place, from 0.
+
+    Returns:
+        The item in C.
+    """
+    assert isinstance(code.kind, Tuple)
+    field = f"v[{n}]" if code.kind.uniform else field_name(code.kind, n)
+    return Code(member(code) + field, code.kind.items[n], place=True)
+
+
+def member(base: Code) -> str:
+    """Return ``base.`` or, for what is behind a pointer, ``base->``.
+
+    Args:
+        base: a structure in C.
+
+    Returns:
+        C text, to which the name of a field is added.
+    """
+    return f"{base.text[1:]}->" if base.text.startswith("*") else f"{base.within(PRIMARY)}."
+
+
+def address_of(code: Code) -> str:
+    """Return the address of a place.
+
+    Args:
+        code: an expression in C.
+
+    Returns:
+        C text.
+    """
+    if code.address:
+        return code.address
+    return code.text[1:] if code.text.startswith("*") else f"&{code.within(PRIMARY)}"
+
+
+def joined(scope: Scope, node: ast.AST, one: Kind, other: Kind) -> Kind:
+    """Return the kind of a value that is of either kind.
+
+    Args:
+        scope: the function under translation.
+        node: of the Python source.
+        one: kind of the one value.
+        other: kind of the other.
+
+    Returns:
+        The kind.
+    """
+    if one == other:
+        return one
+    if {one, other} == {REAL, WHOLE}:
+        return REAL
+    return scope.refuse(node, f"both values must be of one type, but are {describe(one)} and {describe(other)}")
+
+
+def truth(code: Code) -> Code:
+    """Return a value as a condition, as Python takes it.
+
+    Args:
+        code: an expression in C.
+
+    Returns:
+        The condition in C.
+    """
+    if code.kind == TRUTH:
+        return code
+    if isinstance(code.kind, Items):
+        return Code(f"{code.within(PRIMARY)}.n > 0", TRUTH, RELATION)
+    return Code(f"{code.within(EQUALITY + 1)} != 0", TRUTH, EQUALITY)

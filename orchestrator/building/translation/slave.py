@@ -1,0 +1,214 @@
+"""A slave's adapter in C: its values and hidden state as a struct, its methods as functions, its tables."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass
+from typing import Any
+
+from orchestrator.building.translation.definitions import Function, Owner, comment_of
+from orchestrator.building.translation.directional import directional
+from orchestrator.building.translation.functions import translate
+from orchestrator.building.translation.kinds import NOTHING, REAL, Items, Kind, Tuple
+from orchestrator.building.translation.program import BASE_MODULES, Program
+from orchestrator.building.translation.source import read_source
+from orchestrator.errors import FmuError
+
+# Hooks that the runtime calls, with their parameters; a slave may lack those marked False.
+_PLAIN = {"initialise": ("", True), "advance": (", double time, double step", True), "refresh": ("", False)}
+_SAMPLED = {
+    "take_parameters": ("", True),
+    "begin": ("", True),
+    "predict": ("", False),
+    "correct": ("", True),
+}
+# Hooks of a slave with continuous states; those with a kind return it.
+_CONTINUOUS = {"derivatives": "", "indicators": "", "update": ", double time", "_write": ""}
+_ARGUMENTS = {"advance": "time, step", "update": "time"}
+_CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER", "local": "LOCAL"}
+
+
+@dataclass(frozen=True)
+class TranslatedSlave:
+    """The C of one slave: ``definitions`` come first in the file, ``tables`` before the runtime."""
+
+    types: str
+    constants: str
+    prototypes: str
+    definitions: str
+    tables: str
+
+
+def translate_slave(cls: Any, taken: frozenset[str] = frozenset()) -> TranslatedSlave:
+    """Translate an adapter (a subclass of ``SlaveBase``) and all that it calls.
+
+    Args:
+        cls: the class; its table holds the start values of this FMU.
+        taken: names that the C runtime uses.
+
+    Returns:
+        The slave in C, in parts.
+
+    Raises:
+        FmuError: something is outside the subset; the message names file and line.
+    """
+    owner = Owner(cls, attributes_of(cls), len(cls.table))
+    program = Program(translate, owner, taken | {cls.__name__})
+    sampled = any(base.__name__ == "SampledSlave" for base in cls.__mro__)
+    hooks = [_hook(program, name, *hook) for name, hook in (_SAMPLED if sampled else _PLAIN).items()]
+    if has_states(cls):
+        hooks.append(_continuous(program, cls))
+    program.check_lengths()
+    pairs = directional(program, owner) if hasattr(cls, "response") else None
+    struct = _struct(program, owner)
+    tables = "\n\n".join((_variables(cls), _lists(program, owner), _settings(cls, owner, sampled, program), *hooks))
+    if pairs is None:
+        return TranslatedSlave(
+            f"{program.types()}\n\n{struct}",
+            program.constants(),
+            program.prototypes(),
+            program.definitions(),
+            tables,
+        )
+    both = (program, pairs.program)
+    return TranslatedSlave(
+        "\n\n".join((program.types(), '#include "pairs.h"', pairs.program.types(), struct)),
+        "\n".join(filter(None, (each.constants() for each in both))),
+        "\n".join(each.prototypes() for each in both),
+        "\n\n".join(each.definitions() for each in both),
+        f"{tables}\n\n{pairs.hook}",
+    )
+
+
+def attributes_of(cls: Any) -> dict[str, Kind]:
+    """Return the hidden state of a slave: the attributes that its class declares, with their kinds.
+
+    Returns:
+        Kinds by attribute.
+    """
+    found: dict[str, Kind] = {}
+    for base in reversed(cls.__mro__):
+        if base.__module__ in BASE_MODULES or not base.__module__.startswith("pyfmu_sources."):
+            continue
+        source = read_source(base.__module__)
+        body = next((n for n in source.tree.body if isinstance(n, ast.ClassDef) and n.name == base.__name__), None)
+        for node in body.body if body is not None else ():
+            if not isinstance(node, ast.AnnAssign) or not isinstance(node.target, ast.Name):
+                continue
+            if not ast.unparse(node.annotation).startswith("ClassVar"):
+                found[node.target.id] = source.annotation(node.annotation, node)
+    return found
+
+
+def has_states(cls: Any) -> bool:
+    """Tell whether a slave has continuous states, so that it can do model exchange.
+
+    Returns:
+        True when it has.
+    """
+    return bool(getattr(cls, "continuous_states", ()))
+
+
+def _continuous(program: Program, cls: Any) -> str:
+    """Return the hooks of model exchange, and where the states are."""
+    count = len(cls.continuous_states)
+    owner = program.owner
+    assert owner is not None
+    if owner.attributes.get(cls.state_attribute) != Tuple((REAL,) * count):
+        raise FmuError(f"`{program.owner_name}.{cls.state_attribute}` must be a tuple of {count} floats")
+    made = {name: program.method(None, None, name) for name in _CONTINUOUS}
+    returned = made["indicators"].returns
+    if made["derivatives"].returns != Tuple((REAL,) * count) or not isinstance(returned, Tuple):
+        raise FmuError(f"`{program.owner_name}` must return {count} derivatives, and indicators as a tuple of floats")
+    nominals = ", ".join(repr(float(nominal)) for _, _, nominal, _ in cls.continuous_states)
+    first = next(n for n, variable in enumerate(cls.table) if variable.name == cls.continuous_states[0][0])
+    lines = [
+        f"#define CONTINUOUS_STATES {count}",
+        f"#define INDICATORS {len(returned.items)}",
+        f"#define FIRST_STATE {first}",
+        f"#define STATES(slave) ((slave)->{program.attribute_name(cls.state_attribute)}.v)",
+        f"static const double nominals[] = {{{nominals}}};",
+    ]
+    return "\n\n".join(["\n".join(lines), *(_state_hook(program, name, function) for name, function in made.items())])
+
+
+def _state_hook(program: Program, name: str, function: Function) -> str:
+    plain = name.lstrip("_")
+    arguments = [a for a in ("self", _ARGUMENTS.get(name), "fault" if function.faults else None) if a]
+    call = f"{function.c}({', '.join(arguments)})"
+    unused = "" if function.faults else "    (void)fault;\n"
+    if function.returns == NOTHING:
+        head = f"static void slave_{plain}({program.owner_name} *self{_CONTINUOUS[name]}, Fault *fault)"
+        return f"{head}\n{{\n{unused}    {call};\n}}"
+    c = program.names.c(function.returns)
+    head = f"static void slave_{plain}({program.owner_name} *self, double values[], Fault *fault)"
+    return f"{head}\n{{\n{unused}    const {c} found = {call};\n    memcpy(values, found.v, sizeof found.v);\n}}"
+
+
+def _hook(program: Program, name: str, parameters: str, needed: bool) -> str:
+    """Return the function by which the runtime calls a hook, whether it can raise or not."""
+    head = f"static void slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
+    if not needed and not _defined(program, name):
+        return f"{head}\n{{\n    (void)self;\n    (void)fault;\n}}"
+    function = program.method(None, None, name)
+    _check(program, function, parameters)
+    arguments = [a for a in ("self", _ARGUMENTS.get(name), "fault" if function.faults else None) if a]
+    unused = "" if function.faults else "    (void)fault;\n"
+    return f"{head}\n{{\n{unused}    {function.c}({', '.join(arguments)});\n}}"
+
+
+def _defined(program: Program, name: str) -> bool:
+    assert program.owner is not None
+    return any(name in vars(base) for base in program.owner.cls.__mro__ if base.__module__ not in BASE_MODULES)
+
+
+def _check(program: Program, function: Function, parameters: str) -> None:
+    if function.returns != NOTHING or len(function.parameters) != parameters.count(","):
+        raise FmuError(
+            f"`{program.owner_name}.{function.name}` must have the parameters of `SlaveBase` and return None"
+        )
+
+
+def _struct(program: Program, owner: Owner) -> str:
+    """Return the type of a slave; lists stand last, because of them only what is in use is saved."""
+    fixed = {n: k for n, k in owner.attributes.items() if not isinstance(k, Items)}
+    lists = {n: k for n, k in owner.attributes.items() if isinstance(k, Items)}
+    fields = [f"    double real[{owner.variables}];", f"    int integer[{owner.variables}];"]
+    fields += [f"    {program.names.c(k)} {program.attribute_name(n)};" for n, k in (fixed | lists).items()]
+    assert owner.cls.__doc__
+    comment = comment_of(owner.cls.__doc__.splitlines()[0])
+    name = program.owner_name
+    return f"{comment}typedef struct {{\n" + "\n".join(fields) + f"\n}} {name};"
+
+
+def _variables(cls: Any) -> str:
+    rows = []
+    for variable in cls.table:
+        low, high = variable.bounds
+        kind = "REAL_VALUE" if variable.type == "Real" else "WHOLE_VALUE"
+        numbers = ", ".join(repr(float(number)) for number in (variable.start or 0.0, low, high))
+        rows.append(f'    {{"`{variable.name}`", {kind}, {_CAUSALITIES[variable.causality]}, {numbers}}},')
+    return "static const Variable variables[] = {\n" + "\n".join(rows) + "\n};"
+
+
+def _lists(program: Program, owner: Owner) -> str:
+    rows = []
+    for name, kind in owner.attributes.items():
+        if isinstance(kind, Items):
+            place = f"{program.owner_name}, {program.attribute_name(name)}"
+            sizes = f"sizeof({program.names.c(kind.item)}), {kind.capacity}"
+            rows.append(f"    {{offsetof({place}.n), offsetof({place}.v), {sizes}}},")
+    return "static const List lists[] = {\n" + "\n".join([*rows, "    {0, 0, 0, 0},"]) + "\n};"
+
+
+def _settings(cls: Any, owner: Owner, sampled: bool, program: Program) -> str:
+    first = next((n for n, k in owner.attributes.items() if isinstance(k, Items)), None)
+    name = program.owner_name
+    fixed = f"sizeof({name})" if first is None else f"offsetof({name}, {program.attribute_name(first)})"
+    lines = [
+        f"#define SLAVE {name}",
+        f"#define VARIABLES {owner.variables}",
+        f"#define FIXED_BYTES {fixed}",
+        f"#define FEEDTHROUGH {int(cls.feedthrough)}",
+    ]
+    return "\n".join(lines + ([f"#define SAMPLE_TIME {cls.sample_time_reference}"] if sampled else []))

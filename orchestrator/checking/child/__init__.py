@@ -1,1 +1,0 @@
-"""The process that runs a stranger's FMU. Standard library only; the parent sets the limits and watches it."""

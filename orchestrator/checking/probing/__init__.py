@@ -1,0 +1,1 @@
+"""Probes: what is asked of a running FMU, and what its answers must be. They run here; the FMU runs in a child."""

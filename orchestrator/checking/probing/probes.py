@@ -1,0 +1,261 @@
+"""Probes of one running slave: life cycle, inputs, reference result, memory.
+
+A probe returns whether the ones after it make sense.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from orchestrator.checking.probing.binding import Library, ProbedSlave, StatusError, TerminatedError, finite
+from orchestrator.checking.probing.trajectory import Bench, Difference, ProbedVariable, compare, excitation
+
+_LEAK_PER_INSTANCE = 256 * 1024
+_LEAK_PER_STEP = 8 * 1024
+_LEAK_AT_LEAST = 512 * 1024
+_FEWEST_STEPS = 10
+_SMALL = 1e-3
+
+
+@dataclass
+class Context:
+    """What the probes share.
+
+    Attributes:
+        report: called with rule, message and path.
+        trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
+            cannot be repeated, so that nothing can be compared with it.
+        single: whether a second instance is known not to work.
+    """
+
+    bench: Bench
+    report: Callable[..., None]
+    trace: list[list[Any]] | None = None
+    single: bool = False
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the recorded variables."""
+        return [v.name for v in self.bench.job.outputs()]
+
+    def compare(self, expected: list[list[Any]], found: list[list[Any]]) -> Difference | None:
+        """Hold a run against another; None when they are equal bit for bit.
+
+        Args:
+            expected: the one run, [step][output].
+            found: the other.
+
+        Returns:
+            The first difference.
+        """
+        return compare(expected, found, self.names)
+
+    def report_difference(self, rule: str, wanted: str, difference: Difference) -> None:
+        """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only.
+
+        Args:
+            rule: for a difference that matters.
+            wanted: what the standard asks for, in words.
+            difference: what was found.
+        """
+        if difference.relative > _SMALL:
+            self.report(rule, f"{wanted}, but {difference}")
+        else:
+            self.report("run.inexact", f"{wanted} bit for bit, but {difference}")
+
+
+Probe = Callable[[Context], bool]
+
+
+def load(library: Library, report: Callable[..., None]) -> None:
+    """Version and platform of the library.
+
+    Args:
+        library: of the FMU.
+        report: called with rule, message and path.
+    """
+    version = library.text("fmi2GetVersion")
+    if version != "2.0":
+        report("load.version", f"fmi2GetVersion must return 2.0, but returns {version!r}")
+    platform = library.text("fmi2GetTypesPlatform")
+    if platform != "default":
+        report("load.platform", f"fmi2GetTypesPlatform must return default, but returns {platform!r}")
+
+
+def life_cycle(context: Context) -> bool:
+    """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        False when nothing else can be probed.
+    """
+    bench, job = context.bench, context.bench.job
+    outputs = job.outputs()
+    with bench.instance(initialised=False) as slave:
+        slave.setup(job.start, job.stop, job.tolerance)
+        slave.call("fmi2EnterInitializationMode")
+        _start_values(context, slave)
+        slave.call("fmi2ExitInitializationMode")
+        complaints: set[str] = set()
+        _look(context, outputs, bench.read(slave, outputs, "after initialisation"), "after initialisation", complaints)
+        clock = time.monotonic()
+        for n in range(job.steps):
+            t = job.start + n * job.step
+            try:
+                slave.step(t, job.step, f"at t = {t:g} (step {n + 1})")
+            except TerminatedError:
+                bench.job = replace(job, steps=max(n, 1))
+                break
+            when = f"at t = {t + job.step:g}"
+            _look(context, outputs, bench.read(slave, outputs, when), when, complaints)
+            if time.monotonic() - clock > job.budget and n + 1 >= _FEWEST_STEPS:
+                bench.job = replace(job, steps=n + 1)
+                break
+        slave.call("fmi2Terminate")
+    return True
+
+
+def _start_values(context: Context, slave: ProbedSlave) -> None:
+    fixed = [
+        v
+        for v in context.bench.job.variables
+        if v.start is not None and (v.causality in ("parameter", "input") or v.initial == "exact")
+    ]
+    for v, read in zip(fixed, context.bench.read(slave, fixed, "in initialisation mode"), strict=True):
+        _string(context, v, read)
+        value = read.decode("utf-8", "replace") if isinstance(read, bytes) else read
+        if value is not None and not _close(value, v.start):
+            message = f"`{v.name}` must start at {v.start!r} as the XML says, but starts at {value!r}"
+            context.report("value.start", message, v.name)
+
+
+def _close(a: Any, b: Any) -> bool:
+    if isinstance(a, float):
+        return abs(a - b) <= 1e-12 * max(abs(a), abs(b))
+    return bool(a == b)
+
+
+def _string(context: Context, v: ProbedVariable, value: Any) -> None:
+    if v.base == "String" and value is None:
+        context.report("value.string", f"the string `{v.name}` must not be null, but is", v.name)
+
+
+def _look(context: Context, outputs: list[ProbedVariable], values: list[Any], when: str, complaints: set[str]) -> None:
+    """Complain once about each output that is not finite or not in its range."""
+    for v, value in zip(outputs, values, strict=True):
+        if v.name in complaints:
+            continue
+        if not finite(value):
+            complaints.add(v.name)
+            context.report("value.not-finite", f"`{v.name}` must be finite, but is {value} {when}", v.name)
+        elif v.base in ("Real", "Integer"):
+            slack = 1e-9 * max(abs(value), 1.0)
+            low = v.minimum is not None and value < v.minimum - slack
+            if low or (v.maximum is not None and value > v.maximum + slack):
+                complaints.add(v.name)
+                message = f"`{v.name}` must lie in [{v.minimum}, {v.maximum}], but is {value} {when}"
+                context.report("value.out-of-range", message, v.name)
+        _string(context, v, value)
+
+
+def inputs(context: Context) -> bool:
+    """Run with moving inputs; what is recorded is what the later probes compare with.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        False when nothing else can be probed.
+    """
+    bench = context.bench
+    refused = None
+    with bench.instance() as slave:
+        for v in bench.job.inputs():
+            try:
+                slave.set("Real", [v.reference], [excitation(v, 0.0, bench.duration)])
+            except StatusError as error:
+                refused = f"{error} for `{v.name}`, which was set within its bounds"
+                break
+    if refused is not None:
+        context.report("run.input-refused", refused)
+        bench.excited = False
+    with bench.instance() as slave:
+        context.trace = bench.run(slave)
+    return True
+
+
+def setting(context: Context) -> bool:
+    """Set everything that can be set to its start value before initialisation: accepted, and without effect.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        True: the other probes go on.
+    """
+    bench, job = context.bench, context.bench.job
+    settable = [v for v in job.variables if _settable(v)]
+    with bench.instance(initialised=False) as slave:
+        for v in settable:
+            value = v.start.encode() if v.base == "String" else v.start
+            try:
+                slave.set(v.base, [v.reference], [value], f"for `{v.name}`, set to its start value,")
+            except StatusError as error:
+                rule = "value.set" if v.causality in ("input", "parameter") else "value.set-initial"
+                context.report(rule, str(error), v.name)
+                return True
+        if context.trace is None:
+            return True
+        bench.initialise(slave)
+        difference = context.compare(context.trace, bench.run(slave))
+    if difference is not None:
+        context.report_difference("value.set", "a run must not change when start values are set", difference)
+    return True
+
+
+def _settable(v: ProbedVariable) -> bool:
+    """Whether the standard allows to set the variable before initialisation."""
+    return v.start is not None and v.variability != "constant" and (v.initial == "exact" or v.causality == "input")
+
+
+def memory(context: Context) -> bool:
+    """Resident memory over instances and over steps.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        True: the other probes go on.
+    """
+    bench, job = context.bench, context.bench.job
+    resident = bench.library.resident
+    if not resident():
+        return True
+    clock = time.monotonic()
+    cycles, before = 0, None
+    for n in range(30):
+        with bench.instance():
+            pass
+        if n == 9:
+            before = resident()
+        cycles += before is not None
+        if time.monotonic() - clock > job.budget:
+            break
+    growth = (resident() - (before or 0)) / max(cycles - 1, 1)
+    if before is not None and cycles > 5 and growth > _LEAK_PER_INSTANCE:
+        context.report(
+            "resources.instance-leak", f"an instance must leave no memory behind, but leaves {growth / 1024:.0f} KiB"
+        )
+    with bench.instance() as slave:
+        quarter = max(job.steps // 4, 1)
+        bench.run(slave, 0, quarter, excited=False)
+        before = resident()
+        bench.run(slave, quarter, excited=False)
+        growth = resident() - before
+    if growth > _LEAK_AT_LEAST and growth / max(job.steps - quarter, 1) > _LEAK_PER_STEP:
+        per_step = growth / max(job.steps - quarter, 1) / 1024
+        context.report("resources.step-leak", f"memory must not grow with steps, but grows by {per_step:.0f} KiB each")
+    return True

@@ -1,0 +1,206 @@
+"""Probes that compare two runs: determinism, instances, reset, state, communication step."""
+
+from typing import Any
+
+from orchestrator.checking.probing.binding import ProbedSlave, StatusError
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.trajectory import ProbedVariable
+
+_STEP_TOLERANCE = 0.1
+_FEWEST_PAIRS = 10
+
+
+def determinism(context: Context) -> bool:
+    """A second fresh instance must give the same run.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        True: the other probes go on.
+    """
+    with context.bench.instance() as slave:
+        difference = context.compare(context.trace or [], context.bench.run(slave))
+    if difference is not None:
+        context.report("run.determinism", f"two equal runs must give the same, but {difference}")
+        context.report("run.skipped", "instances, reset and state are not checked, because runs cannot be compared")
+        context.trace = None
+    return True
+
+
+def instances(context: Context) -> bool:
+    """Two instances at once: the one under test must not notice the other.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        True: the other probes go on.
+    """
+    bench, job = context.bench, context.bench.job
+    if context.trace is None or context.single:
+        return True
+    with bench.instance(name="first") as one:
+        try:
+            with bench.instance(name="second") as other:
+                rows = []
+                outputs = job.outputs()
+                for n in range(job.steps):
+                    t = job.start + n * job.step
+                    bench.excite(one, t)
+                    bench.excite(other, t, phase=2.0)
+                    one.step(t, job.step, f"at t = {t:g} with a second instance")
+                    other.step(t, job.step, f"at t = {t:g} in the second instance")
+                    rows.append(bench.read(one, outputs))
+        except StatusError as error:
+            context.single = True
+            context.report("instances.second", str(error))
+            return True
+    difference = context.compare(context.trace, rows)
+    if difference is not None:
+        context.report_difference(
+            "instances.interference", "a run beside a second instance must be the same", difference
+        )
+    return True
+
+
+def reset(context: Context) -> bool:
+    """A reset instance must run as a fresh one does, from mid-run and from the end.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        True: the other probes go on.
+    """
+    bench = context.bench
+    if context.trace is None:
+        return True
+    with bench.instance() as slave:
+        bench.run(slave, 0, max(bench.job.steps // 2, 1))
+        try:
+            for moment in ("in mid-run", "at the end"):
+                slave.call("fmi2Reset")
+                bench.initialise(slave)
+                difference = context.compare(context.trace, bench.run(slave))
+                if difference is not None:
+                    wanted = f"an instance that is reset {moment} must run as a fresh one"
+                    context.report_difference("run.reset", wanted, difference)
+                    break
+                slave.call("fmi2Terminate")
+        except StatusError as error:
+            context.report("run.reset", str(error))
+    return True
+
+
+def state(context: Context) -> bool:
+    """Save in mid-run, go on, restore, go on: the rest of the run must be the same.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        True: the other probes go on.
+    """
+    bench, job = context.bench, context.bench.job
+    if context.trace is None or "canGetAndSetFMUstate" not in job.flags:
+        return True
+    half = max(job.steps // 2, 1) if job.steps > 1 else 0
+    with bench.instance() as slave:
+        bench.run(slave, 0, half)
+        try:
+            saved = slave.get_state()
+            try:
+                _restore(context, slave, saved, half)
+            finally:
+                nulled = slave.free_state(saved)
+            if not nulled:
+                context.report("state.free", "fmi2FreeFMUstate must set the state to null, but does not")
+        except StatusError as error:
+            context.report("state.status", str(error))
+    return True
+
+
+def _restore(context: Context, slave: ProbedSlave, saved: Any, half: int) -> None:
+    """Three times, for a state that is kept by reference is right the first time only; then through bytes."""
+    bench = context.bench
+    for _ in range(3):
+        bench.run(slave, half)
+        slave.set_state(saved)
+        if not _continues(context, slave, half, "state.restore", "a restored state must continue as before"):
+            return
+        slave.set_state(saved)
+    if "canSerializeFMUstate" not in bench.job.flags:
+        return
+    data = slave.serialise(saved)
+    if context.single:
+        _deserialise(context, slave, data, half)
+        return
+    with bench.instance(name="restored") as other:
+        _deserialise(context, other, data, half)
+
+
+def _deserialise(context: Context, slave: ProbedSlave, data: bytes, half: int) -> None:
+    copy = slave.deserialise(data)
+    try:
+        slave.set_state(copy)
+        _continues(context, slave, half, "state.serialise", "a serialised state must continue as before")
+    finally:
+        slave.free_state(copy)
+
+
+def _continues(context: Context, slave: ProbedSlave, half: int, rule: str, wanted: str) -> bool:
+    """Whether the rest of the run is as it was; a difference is reported."""
+    difference = context.compare((context.trace or [])[half:], context.bench.run(slave, half))
+    if difference is not None:
+        context.report_difference(rule, wanted, difference)
+    return difference is None
+
+
+def variable_steps(context: Context) -> bool:
+    """Uneven communication steps must hardly change what comes out at common times.
+
+    The inputs stay at their start values, for what a slave does between two values of an input is its own.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        True: the other probes go on.
+    """
+    job = context.bench.job
+    if "canHandleVariableCommunicationStepSize" not in job.flags or job.steps < _FEWEST_PAIRS * 2:
+        return True
+    outputs = [v for v in job.outputs() if v.base == "Real"]
+    pairs = job.steps // 2
+    even = _run_in_pairs(context, outputs, (1.0, 1.0))
+    try:
+        uneven = _run_in_pairs(context, outputs, (0.4, 1.0, 0.6))
+    except StatusError as error:
+        context.report("steps.variable", str(error))
+        return True
+    for i, v in enumerate(outputs):
+        a, b = [r[i] for r in even], [r[i] for r in uneven]
+        # A signal that hardly moves is held to its size, where a solver's tolerance is.
+        size = max(max(a) - min(a), 0.01 * max(map(abs, a)), 1e-6 * (v.nominal or 1.0))
+        far = sum(abs(x - y) > _STEP_TOLERANCE * size for x, y in zip(a, b, strict=True))
+        if far > pairs / 2:
+            off = f"is off by more than {_STEP_TOLERANCE:.0%} of its range at {far} of {pairs} points with uneven steps"
+            message = f"`{v.name}` must hardly depend on the communication step, but {off}"
+            context.report("steps.variable", message, v.name)
+    return True
+
+
+def _run_in_pairs(context: Context, outputs: list[ProbedVariable], sizes: tuple[float, ...]) -> list[list[Any]]:
+    """Outputs after every two communication steps, which are done in steps of ``sizes`` times the usual one."""
+    bench, job = context.bench, context.bench.job
+    rows = []
+    with bench.instance() as slave:
+        for n in range(job.steps // 2):
+            t, end = (job.start + m * job.step for m in (2 * n, 2 * n + 2))
+            for i, size in enumerate(sizes, 1):
+                goal = end if i == len(sizes) else t + size * job.step
+                slave.step(t, goal - t, f"with {size:g} times the usual step at t = {t:g}")
+                t = goal
+            rows.append(bench.read(slave, outputs))
+    return rows

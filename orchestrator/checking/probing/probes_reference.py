@@ -1,0 +1,117 @@
+"""The probe that reproduces the reference result which an FMU carries."""
+
+import time
+from itertools import pairwise
+from typing import Any
+
+from orchestrator.checking.probing.binding import ProbedSlave, TerminatedError
+from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.trajectory import ProbedVariable
+
+_RELATIVE = 0.02
+_OUTSIDE = 0.02
+_PATIENCE = 20.0
+
+Row = list[float]
+Columns = list[tuple[int, ProbedVariable]]
+
+
+class Tube:
+    """A band around the reference result, and what has left it.
+
+    The band is 2 % of the range of each signal to either side, and at least a millionth of its size.
+    """
+
+    def __init__(self, columns: Columns, rows: list[Row]) -> None:
+        self.columns = columns
+        self.half_widths = [_half_width([r[i] for r in rows], v) for i, v in columns]
+        self.outside = 0
+        self.worst: tuple[float, str] = (1.0, "")
+
+    def compare(self, values: list[Any], row: Row) -> None:
+        """Look at the values of one row.
+
+        Args:
+            values: of the FMU's variables, in the order of the columns.
+            row: time [s] and the reference's values.
+        """
+        off = [abs(float(x) - row[i]) / w for x, (i, _), w in zip(values, self.columns, self.half_widths, strict=True)]
+        largest = max(off, default=0.0)
+        self.outside += largest > 1.0
+        if largest > self.worst[0]:
+            at = off.index(largest)
+            i, v = self.columns[at]
+            found = f"`{v.name}` is {float(values[at]):.6g} instead of {row[i]:.6g} at t = {row[0]:g}"
+            self.worst = (largest, found)
+
+
+def reference(context: Context) -> bool:
+    """Simulate what the reference result shows and compare.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Returns:
+        True: the other probes go on.
+    """
+    job = context.bench.job
+    if job.reference is None:
+        return True
+    names, rows, path = job.reference["names"], job.reference["rows"], job.reference["path"]
+    by_name = {v.name: v for v in job.variables}
+    columns = [(i, by_name[n]) for i, n in enumerate(names, 1) if by_name[n].base != "String"]
+    inputs = [c for c in columns if c[1].causality == "input"]
+    parameters = [c for c in columns if c[1].causality == "parameter"]
+    rest = [c for c in columns if c[1].causality not in ("input", "parameter", "independent")]
+    tube = Tube(rest, rows)
+    if not _simulate(context, rows, parameters, inputs, tube):
+        context.report("reference.not-run", "the reference result takes too long to be reproduced", path)
+    elif tube.outside > _OUTSIDE * len(rows):
+        where = f"{tube.outside} of {len(rows)} points are outside the tube: {tube.worst[1]}"
+        context.report("reference.result", f"the reference result must be reproduced, but {where}", path)
+    return True
+
+
+def _simulate(context: Context, rows: list[Row], parameters: Columns, inputs: Columns, tube: Tube) -> bool:
+    """Run over the times of ``rows``; False when it takes too long."""
+    bench, job = context.bench, context.bench.job
+    variables = [v for _, v in tube.columns]
+    deadline = time.monotonic() + _PATIENCE * job.budget
+    with bench.instance(initialised=False) as slave:
+        _set(slave, parameters + inputs, rows[0])
+        slave.setup(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]), job.tolerance)
+        slave.call("fmi2EnterInitializationMode")
+        slave.call("fmi2ExitInitializationMode")
+        tube.compare(bench.read(slave, variables, "after initialisation"), rows[0])
+        for row, following in pairwise(rows):
+            _set(slave, inputs, row)
+            try:
+                _advance(slave, row[0], following[0], job.step)
+            except TerminatedError:
+                break
+            tube.compare(bench.read(slave, variables, f"at t = {following[0]:g}"), following)
+            if time.monotonic() > deadline:
+                return False
+    return True
+
+
+def _advance(slave: ProbedSlave, t: float, end: float, step: float) -> None:
+    """Go from ``t`` to ``end`` (not at all when they are equal) in steps of the default experiment when they fit."""
+    if end <= t:
+        return
+    n = max(1, round((end - t) / step))
+    if abs(n * step - (end - t)) > 1e-6 * step:
+        n = 1
+    points = [*(t + i * (end - t) / n for i in range(n)), end]
+    for a, b in pairwise(points):
+        slave.step(a, b - a, f"at t = {a:g}")
+
+
+def _set(slave: ProbedSlave, columns: Columns, row: Row) -> None:
+    for i, v in columns:
+        slave.set(v.base, [v.reference], [row[i] if v.base == "Real" else int(row[i])], f"at t = {row[0]:g}")
+
+
+def _half_width(column: list[float], v: ProbedVariable) -> float:
+    spread = max(column) - min(column)
+    return max(_RELATIVE * spread, 1e-6 * max(map(abs, column)), 1e-9 * (v.nominal or 1.0))

@@ -1,0 +1,72 @@
+"""The options with which every command reads measured records."""
+
+import argparse
+from collections.abc import Iterable
+from typing import Any
+
+from orchestrator.api.records import Record
+from orchestrator.errors import ScenarioError
+from orchestrator.records.timing import RESAMPLING
+
+FORMATS = "CSV of any dialect, Parquet, MDF, MAT or NumPy"
+RATES = (1.0, 1e6)  # Hz
+
+
+def add_reading_arguments(parser: argparse.ArgumentParser, rate_too: str = "") -> None:
+    """Add the options; ``rate_too`` is what else ``--rate`` means to the command.
+
+    Args:
+        parser: of the command.
+        rate_too: words for the help, or nothing.
+    """
+    group = parser.add_argument_group("reading of records")
+    group.add_argument("--part", metavar="START:END", help="keep this part of each record [s], from its first row on")
+    group.add_argument(
+        "--resample",
+        choices=RESAMPLING,
+        help="times that are not uniform: trust the rows and not their stamps, or interpolate (default: refuse them)",
+    )
+    text = "samples per second to come down to, through an anti-alias filter (default: all samples)"
+    group.add_argument("--rate", type=float, metavar="HZ", help=f"{text}{rate_too}")
+
+
+def reading_of(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the options by the names that ``read_record`` has for them.
+
+    Args:
+        args: of the command line.
+
+    Returns:
+        Arguments by name.
+
+    Raises:
+        ScenarioError: an option is out of its range.
+    """
+    if args.rate is not None and not RATES[0] <= args.rate <= RATES[1]:
+        raise ScenarioError(f"`rate` must be between {RATES[0]:g} and {RATES[1]:g}, but is {args.rate:g}", "rate")
+    return {"part": _part(args.part), "resample": args.resample, "rate": args.rate}
+
+
+def what_was_read(records: Iterable[Record]) -> list[str]:
+    """Return one line for each record that says what was detected and assumed.
+
+    Args:
+        records: that were read.
+
+    Returns:
+        The lines.
+    """
+    return [f"{record.source}: {'; '.join(record.notes)}" for record in records if record.notes]
+
+
+def _part(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    first, colon, last = text.partition(":")
+    try:
+        start, end = float(first or "0"), float(last or "inf")
+    except ValueError:
+        start, end = 1.0, 0.0
+    if not colon or not 0.0 <= start < end:
+        raise ScenarioError(f"`part` must be START:END in seconds, such as 2:30, but is {text!r}", "part")
+    return start, end

@@ -1,0 +1,86 @@
+"""Stages of a long piece of work on a terminal: what is done now, how far it is, and the time that is left."""
+
+import sys
+import time
+from types import TracebackType
+from typing import IO
+
+from rich.console import Console, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+
+DIAGNOSIS_START, DIAGNOSIS_PER_ROW, DIAGNOSED_ROWS = 5.0, 0.01, 9000  # s, s for each row, of so many at most
+
+
+def diagnosis_seconds(rows: int) -> float:
+    """Return about how long a diagnosis takes, before its first fit tells.
+
+    Args:
+        rows: of the record.
+
+    Returns:
+        Seconds.
+    """
+    return DIAGNOSIS_START + DIAGNOSIS_PER_ROW * min(rows, DIAGNOSED_ROWS)
+
+
+class Stages:
+    """A line on standard error with the stage, a bar and the time left; nothing where that is no terminal.
+
+    Use as a context manager. The time left starts as what ``begin`` expects, follows the shares that ``at`` reports,
+    and is drawn anew several times a second between them.
+    """
+
+    def __init__(self, stream: IO[str] | None = None) -> None:
+        chosen = stream or sys.stderr
+        self._stage, self._expected, self._begun = "", 0.0, time.monotonic()
+        live = Live(get_renderable=self._line, console=Console(file=chosen), transient=True, refresh_per_second=4)
+        self._live = live if chosen.isatty() else None
+
+    def __enter__(self) -> "Stages":
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def begin(self, stage: str, seconds: float) -> None:
+        """Start a piece of work that is expected to take so many seconds.
+
+        Args:
+            stage: what is done, in a few words.
+            seconds: that it will take.
+        """
+        self._stage, self._expected, self._begun = stage, seconds, time.monotonic()
+
+    def at(self, stage: str, share: float) -> None:
+        """Say what is done now, and which share of the piece of work is behind.
+
+        Args:
+            stage: what is done, in a few words.
+            share: 0 to 1.
+        """
+        self._stage = stage
+        if share > 0.0:
+            self._expected = (time.monotonic() - self._begun) / min(share, 1.0)
+
+    def left(self) -> float:
+        """Return the time that is left of the piece of work.
+
+        Returns:
+            Seconds.
+        """
+        return max(self._expected - (time.monotonic() - self._begun), 0.0)
+
+    def _line(self) -> RenderableType:
+        left = self.left()
+        done = 1.0 - left / self._expected if self._expected > 0.0 else 0.0
+        minutes, seconds = divmod(round(left), 60)
+        line = Table.grid(padding=(0, 1))
+        line.add_row(self._stage, ProgressBar(1.0, done, width=30), f"about {minutes}:{seconds:02d} left")
+        return line

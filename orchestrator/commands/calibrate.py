@@ -1,0 +1,39 @@
+"""``calibrate``: the parameters of any FMU from a measured record, with intervals."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from orchestrator.api.any_fmu import calibrate
+from orchestrator.commands._console import print_blocks, say
+from orchestrator.commands._safety import note_missing_walls
+from orchestrator.shared.output import staged
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command.
+
+    Args:
+        parser: of the command.
+    """
+    parser.add_argument("record", type=Path, metavar="DATA.csv", help="measured record")
+    parser.add_argument("--fmu", type=Path, required=True, metavar="ANY.fmu", help="any FMI 2.0 co-simulation FMU")
+    parser.add_argument("--map", type=Path, required=True, metavar="MAP.toml", help="columns and uncertain parameters")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fit, print the parameters, write JSON and report.
+
+    Args:
+        args: of the command line.
+
+    Returns:
+        The exit code.
+    """
+    note_missing_walls()
+    with staged(args.out) as folder:
+        found = calibrate(args.record, args.fmu, args.map, progress=say)
+        found.write(folder, args.out)
+        print_blocks(found.blocks())
+    sys.stdout.write(f"Written to {args.out}: report.html, calibrate.json\n")
+    return 0

@@ -1,0 +1,217 @@
+"""What may be attached around an FMU: one row each, with where a fit starts from."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pyfmu_sources import port_laws as laws
+
+Array = NDArray[np.float64]
+INPUT, OUTPUT, PORT = "input", "output", "port"
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Typical sizes of what happens where an effect would act; starting values depend on them.
+
+    Attributes:
+        h: sample time [s].
+        size: rms of the signal (at a port: of the effort that drives it).
+        peak: its largest magnitude.
+        signal: its samples.
+        noise: standard deviation of the measurement, for outputs.
+        position: rms of the position about zero; span: from the smallest to the largest.
+        speed: rms of the speed.
+        angular: the position is an angle.
+    """
+
+    h: float
+    size: float
+    peak: float
+    signal: Array
+    noise: float = 0.0
+    position: float = 1.0
+    span: float = 1.0
+    speed: float = 1.0
+    acceleration: float = 1.0
+    angular: bool = False
+    cycles: tuple[float, ...] = ()
+
+
+Values = tuple[float, ...]
+REMEMBERS = ("input_delay", "input_lag", "input_rate_limit")
+"""Effects in series with an input for which it matters what the signal was before the record."""
+STARTS_OFF = 1e-3
+"""Share of its rms by which a signal starts away from zero, so that this makes a difference."""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One row of the bank.
+
+    Attributes:
+        name: of the effect.
+        where: in series at an ``input`` or an ``output``, or as feedback at a ``port``.
+        parameters: their names, in the order of the values.
+        units: of each: "effort", "flow" and "s" stand for the units at the place where it acts.
+        scales: scene -> what counts as a small change of each.
+        starts: scene -> values to try.
+        linear: the response is proportional to all values (found from one small change of each).
+        law: number of the law, for feedback.
+        lower: smallest value of each.
+        nuisances: how many of the parameters, the last ones, are not its size.
+        needs: the simpler effect that it contains.
+        plausible: values -> False where the fit has left what the effect means.
+        angular: only for angles.
+        shrinks: the response to a small value is proportional to it: what is smaller than the least start is found.
+    """
+
+    name: str
+    where: str
+    parameters: tuple[str, ...]
+    units: tuple[str, ...]
+    scales: Callable[[Scene], Values]
+    starts: Callable[[Scene], tuple[Values, ...]]
+    linear: bool = False
+    law: int = 0
+    lower: Values = ()
+    nuisances: int = 0
+    needs: str = ""
+    plausible: Callable[[Values, Scene], bool] = lambda values, scene: True
+    angular: bool = False
+    shrinks: bool = False
+
+
+def _delays(s: Scene) -> tuple[Values, ...]:
+    return tuple((f * s.h,) for f in (0.15, 0.5, 1.0, 1.7, 2.5, 4.0, 6.0, 9.0, 14.0))
+
+
+def _lags(s: Scene) -> tuple[Values, ...]:
+    return tuple((f * s.h,) for f in (0.3, 1.0, 3.0, 8.0, 20.0))
+
+
+def _limits(s: Scene) -> tuple[Values, ...]:
+    return tuple((f * s.peak,) for f in (0.3, 0.5, 0.65, 0.75, 0.83, 0.89, 0.93, 0.96, 0.985, 0.996))
+
+
+def _widths(s: Scene) -> tuple[Values, ...]:
+    return tuple((f * s.peak,) for f in (0.01, 0.03, 0.08, 0.16, 0.3))
+
+
+def _rates(s: Scene) -> tuple[Values, ...]:
+    steps = np.abs(np.diff(s.signal))
+    top = float(steps.max()) / s.h if len(steps) else 1.0
+    return tuple((f * top,) for f in (0.02, 0.05, 0.12, 0.25, 0.5, 0.8))
+
+
+def _quanta(s: Scene) -> tuple[Values, ...]:
+    return tuple((f * s.peak,) for f in (0.05, 0.1, 0.2, 0.4))
+
+
+def _friction(s: Scene) -> tuple[Values, ...]:
+    walk = s.speed * s.h
+    return tuple((0.05 * s.size, f * walk) for f in (0.1, 0.6, 3.0, 12.0, 60.0))
+
+
+def _small(share: float) -> Callable[[Scene], Values]:
+    return lambda s: (share * s.size,)
+
+
+ONCE = 0.03
+"""How far from 1 a ripple's wavenumber over an angle is at least: gravity is what comes once a turn."""
+
+
+def _once_a_turn(values: Values, scene: Scene) -> bool:
+    return scene.angular and abs(values[2] - 1.0) < ONCE
+
+
+def _positive(values: Values, scene: Scene) -> bool:
+    del scene
+    return values[0] > 0.0
+
+
+_SERIES = (
+    Kind("input_gain", INPUT, ("gain",), ("1",), lambda s: (0.01,), lambda s: ((0.01,),), True),
+    Kind("input_offset", INPUT, ("offset",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True),
+    Kind("input_delay", INPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),
+    Kind("input_lag", INPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,), shrinks=True),
+    Kind("input_saturation", INPUT, ("limit",), ("effort",), lambda s: (0.003 * s.peak,), _limits, lower=(0.0,)),
+    Kind("input_dead_zone", INPUT, ("width",), ("effort",), lambda s: (0.003 * s.peak,), _widths, lower=(0.0,)),
+    Kind("input_rate_limit", INPUT, ("rate",), ("effort/s",), lambda s: (0.01 * _rates(s)[2][0],), _rates,
+         lower=(1e-30,)),
+    Kind("input_quantisation", INPUT, ("step",), ("effort",), lambda s: (0.01 * s.peak,), _quanta, lower=(0.0,)),
+    Kind("output_gain", OUTPUT, ("gain",), ("1",), lambda s: (0.003,), lambda s: ((0.01,),), True),
+    Kind("output_offset", OUTPUT, ("offset",), ("flow",), lambda s: (s.noise,), lambda s: ((s.noise,),), True),
+    Kind("output_delay", OUTPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),
+    Kind("output_lag", OUTPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,), shrinks=True),
+    Kind("output_quantisation", OUTPUT, ("step",), ("flow",), lambda s: (s.noise,),
+         lambda s: tuple((f * s.noise,) for f in (6.0, 15.0, 40.0, 100.0)), lower=(0.0,)),
+)  # fmt: skip
+
+_FEEDBACK = (
+    Kind("coulomb_friction", PORT, ("level", "distance"), ("effort", "flow"),
+         lambda s: (0.01 * s.size, 0.2 * s.speed * s.h), _friction, law=laws.COULOMB, lower=(0.0, 1e-300), nuisances=1,
+         plausible=lambda v, s: 0.0 < v[0] < 3.0 * s.peak and v[1] < 0.5 * s.span),
+    Kind("stribeck_friction", PORT, ("sliding", "breakaway", "speed", "distance"),
+         ("effort", "effort", "flow/s", "flow"),
+         lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 * s.speed, 0.2 * s.speed * s.h), lambda s: (),
+         law=laws.STRIBECK, lower=(0.0, 0.0, 1e-300, 1e-300), nuisances=1, needs="coulomb_friction",
+         plausible=lambda v, s: v[1] > 1.03 * v[0] > 0.0),
+    Kind("quadratic_drag", PORT, ("coefficient",), ("effort.s2/flow2",), lambda s: (0.01 * s.size / s.speed**2,),
+         lambda s: ((0.01 * s.size / s.speed**2,),), True, laws.QUADRATIC, plausible=_positive),
+    Kind("viscous_drag", PORT, ("coefficient",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
+         lambda s: ((0.01 * s.size / s.speed,),), True, laws.VISCOUS, plausible=_positive),
+    Kind("spring", PORT, ("stiffness",), ("effort/flow",), lambda s: (0.01 * s.size / s.position,),
+         lambda s: ((0.01 * s.size / s.position,),), True, laws.SPRING, plausible=_positive),
+    Kind("hardening_spring", PORT, ("cubic",), ("effort/flow3",), lambda s: (0.01 * s.size / s.position**3,),
+         lambda s: ((0.01 * s.size / s.position**3,),), True, laws.HARDENING),
+    Kind("gravity", PORT, ("sine", "cosine"), ("effort", "effort"), lambda s: (0.01 * s.size, 0.01 * s.size),
+         lambda s: ((0.01 * s.size, 0.01 * s.size),), True, laws.GRAVITY, angular=True),
+    Kind("ripple", PORT, ("sine", "cosine", "wavenumber"), ("effort", "effort", "1/flow"),
+         lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 / s.span),
+         lambda s: tuple((0.01 * s.size, 0.01 * s.size, n) for n in s.cycles), law=laws.RIPPLE,
+         plausible=lambda v, s: not _once_a_turn(v, s)),
+    Kind("load", PORT, ("effort",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True, laws.LOAD),
+    Kind("directional_friction", PORT, ("difference",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
+         lambda s: ((0.01 * s.size / s.speed,),), True, laws.DIRECTIONAL),
+    Kind("added_inertia", PORT, ("inertia",), ("effort.s2/flow",), lambda s: (0.003 * s.size / s.acceleration,),
+         lambda s: ((0.003 * s.size / s.acceleration,),), True, laws.INERTIA),
+)  # fmt: skip
+
+BANK: Mapping[str, Kind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK)}
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect of the bank at a place: the name of an input, an output or a port of the map.
+
+    ``at_rest``: a signal with memory was zero before the record, and not what it was at first.
+    """
+
+    kind: Kind
+    place: str
+    scene: Scene = field(compare=False, repr=False)
+    at_rest: bool = False
+
+    @property
+    def label(self) -> str:
+        """Return name and place."""
+        return f"{self.kind.name}@{self.place}"
+
+    @property
+    def scales(self) -> Values:
+        """Return what counts as a small change of each value."""
+        return self.kind.scales(self.scene)
+
+    def bounded(self, values: Array) -> Array:
+        """Return values no smaller than what the law allows.
+
+        Args:
+            values: of the effect's parameters.
+
+        Returns:
+            As many values.
+        """
+        return np.maximum(values, self.kind.lower) if self.kind.lower else values

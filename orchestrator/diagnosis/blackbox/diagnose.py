@@ -1,0 +1,321 @@
+"""Diagnosis of any FMU: probe, fit, search, proof on held-out data, verdict."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.estimates import Estimate, Found, Misfit, estimates_of, misfits
+from orchestrator.diagnosis.blackbox.fitting import Fit, Fitter, Ladder, Parts, interleaved, parts_of
+from orchestrator.diagnosis.blackbox.mapping import Map
+from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
+from orchestrator.diagnosis.blackbox.problem import Data, Model, Problem, effects_of
+from orchestrator.diagnosis.blackbox.search import Search
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
+from orchestrator.diagnosis.blackbox.verdict import (
+    Rest,
+    beginning_of,
+    family_of,
+    predicted,
+    recovered,
+    rest_of,
+)
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a record says of an FMU.
+
+    Attributes:
+        verdict: "none", "parameters", "effects" or "unknown".
+        effects: what is missing, in the order found; with "unknown": empty.
+        suspects: with "unknown": what came nearest.
+        parameters: re-fitted values.
+        misfit: of each output.
+        model: the corrected model.
+        rest: what it leaves.
+        probe: what the FMU was found to be.
+        where: sentences: output, interval of time and how far what is left exceeds noise.
+        warnings: sentences.
+        problem: ready to simulate further models; closed by ``close``.
+        refitted: the model without effects, its parameters re-fitted.
+        stages: runs of the nominal, re-fitted and corrected model, (n, outputs) each.
+    """
+
+    verdict: str
+    effects: tuple[Found, ...]
+    suspects: tuple[str, ...]
+    parameters: tuple[Estimate, ...]
+    misfit: tuple[Misfit, ...]
+    model: Model
+    rest: Rest
+    probe: Probe
+    where: tuple[str, ...]
+    warnings: tuple[str, ...]
+    refitted: Model
+    problem: Problem = field(repr=False)
+    stages: tuple[Array, Array, Array] = field(repr=False)
+    search: Search | None = field(repr=False, default=None)
+    seconds: float = 0.0
+    runs: int = 0
+
+
+Progress = Callable[[str], None]
+
+
+def prepared(
+    path: Path,
+    given: Map,
+    data: Data,
+    units: dict[str, str],
+    workers: int | None = None,
+    progress: Progress = lambda what: None,
+) -> tuple[Problem, Probe]:
+    """Return a probed problem without what does nothing, its noise known.
+
+    Args:
+        path: of the FMU.
+        given: the map.
+        data: the record.
+        units: of the FMU's variables, by name.
+        workers: child processes.
+
+    Returns:
+        The problem, whose children the caller ends, and what the FMU was found to be.
+
+    Raises:
+        FmuError: the FMU cannot be used.
+    """
+    problem, probe = opened(path, given, data, workers, progress)
+    problem.units = units
+    problem.map = reduced(given, probe)
+    problem.sign = probe.sign
+    y = problem.must_simulate(problem.nominal)
+    rough = [noise_of(given, data.outputs, r) for r in (data.outputs, data.outputs - y)]
+    problem.noise = np.sqrt(np.minimum(*rough) ** 2 + probe.solver_error**2)
+    return problem, probe
+
+
+def fitters(problem: Problem, parts: Parts, spread: float = DEFAULT.start.spread) -> list[Fitter]:
+    """Return fitters that take the FMU's start as exact, and as somewhat off.
+
+    Args:
+        problem: the FMU and the record.
+        parts: of the record: fitted, deciding, held out.
+        spread: how far the state that the FMU starts from may be off, as seen at the outputs, in units of their noise.
+
+    Returns:
+        Two fitters.
+    """
+    surrogate, drive = problem.impulses(problem.nominal, max(problem.n // 2, 16))
+    return [Fitter(problem, Ladder(surrogate, drive, problem.n, off), parts) for off in (0.0, spread)]
+
+
+def diagnose(
+    path: Path,
+    given: Map,
+    data: Data,
+    units: dict[str, str],
+    settings: BoxSettings = DEFAULT,
+    progress: Progress = lambda what: None,
+    workers: int | None = None,
+) -> Outcome:
+    """Return what ``data`` says of the FMU at ``path``.
+
+    Args:
+        path: of the FMU.
+        given: the map.
+        data: the record.
+        units: of the FMU's variables, by name.
+        settings: thresholds.
+        progress: called with what is being done.
+        workers: child processes.
+
+    Returns:
+        The verdict, with all that it rests on.
+
+    Raises:
+        FmuError: the FMU cannot be used.
+        SlaveError: it fails again and again.
+    """
+    begun = time.monotonic()
+    progress("probing")
+    problem, probe = prepared(path, given, data, units, workers, progress)
+    try:
+        with np.errstate(all="ignore"):
+            return _diagnosed(problem, probe, settings, progress, begun)
+    except BaseException:
+        problem.runner.close()
+        raise
+
+
+def _diagnosed(problem: Problem, probe: Probe, settings: BoxSettings, progress: Progress, begun: float) -> Outcome:
+    parts = parts_of(problem.n)
+    nominal_reads = problem.must_read(problem.nominal)
+    effects = effects_of(problem, nominal_reads)
+    tried: list[tuple[Search, Fit, Fit]] = []
+    for n, fitter in enumerate(fitters(problem, parts, settings.start.spread)):
+        search = Search(fitter, effects, settings.search, progress, until=begun + problem.map.options.budget)
+        base = search.base()
+        if base is None:
+            raise problem.does_not_run()
+        tried.append((search, base, base))
+        if n == 0 and search.explained(base):
+            break
+    chosen = tried[0]
+    if len(tried) > 1 and tried[1][1].total > tried[0][1].total + settings.start.pays:
+        chosen = tried[1]
+    search, base, _ = chosen
+    best = search.run(base)
+    if len(tried) > 1 and not search.explained(best):
+        # The other view of the start, from the model found: a wrong model hides what the start was.
+        other = next(t[0] for t in tried if t[0] is not search)
+        again = other.fitter.fit(best.model, best.level)
+        if again is not None:
+            again = other.fitter.settled(again)
+            pays = settings.start.pays if other.fitter.ladder.spread > 0.0 else -settings.start.pays
+            if again.total > best.total + pays:
+                other.steps = search.steps
+                rebased = other.fitter.fit(base.model, base.level)
+                search, best, base = other, other.run(again), rebased or base
+    search, base, best = _interleaved(search, base, best)
+    # What a start that is off explains by itself needs no effect.
+    if len(tried) == 1 and best.model.effects:
+        offset = fitters(problem, parts, settings.start.spread)[1]
+        plain = Search(offset, effects, settings.search, progress)
+        found = plain.base()
+        if found is not None:
+            tried.append((plain, found, found))
+    for other, found, _ in tried[1:]:
+        if other is not search and best.model.effects and search.score(best) < found.total + settings.start.pays:
+            search, base, best = other, found, found
+    return _judged(problem, probe, search, base, best, begun, settings.rest)
+
+
+def _interleaved(search: Search, base: Fit, best: Fit) -> tuple[Search, Fit, Fit]:
+    """Return a search whose parts take turns, where that explains what the one before does not.
+
+    An effect that acts in one half of the record only (a limit that is seldom reached) is not found in the other.
+    """
+    if search.explained(best) or search.late:
+        return search, base, best
+    fitter = search.fitter
+    turns = Search(
+        Fitter(fitter.problem, fitter.ladder, interleaved(fitter.problem.n)),
+        search.effects, search.settings, search.progress, until=search.until,
+    )  # fmt: skip
+    plain = turns.fitter.fit(base.model, base.level)
+    start = turns.fitter.fit(best.model, best.level) if best.model.effects else plain
+    if plain is None or start is None:
+        return search, base, best
+    found = turns.run(start, plain)
+    explains = bool(found.model.effects) and turns.explained(found)
+    return (turns, plain, found) if explains else (search, base, best)
+
+
+def _judged(
+    problem: Problem, probe: Probe, search: Search, base: Fit, best: Fit, begun: float, settings: RestSettings
+) -> Outcome:
+    fitter, parts = search.fitter, search.fitter.parts
+    seen = slice(0, parts.seen)
+    last = fitter.fit(best.model, best.level, None, seen, iterations=4) or best
+    whole = problem.simulate([problem.nominal, base.model, last.model])
+    if whole[0] is None:
+        raise problem.does_not_run()
+    if any(y is None for y in whole):
+        whole = [whole[0] if y is None else y for y in whole]
+    stages = (np.asarray(whole[0]), np.asarray(whole[1]), np.asarray(whole[2]))
+    J = fitter.jacobian(last.model, stages[2])
+    last = replace(last, y=stages[2], J=last.J if J is None else J)
+    rest = rest_of(fitter, last, slice(0, problem.n), settings)
+    if rest.disturbed:
+        rest = _doubted(fitter, last, rest, bool(best.model.effects), settings)
+    fine = rest.explained or rest.disturbed
+    share = recovered(base, best, len(problem.outputs), parts.seen)
+    nominal = Fit(problem.nominal, last.level, stages[0], 0.0, 0.0, 0.0, last.J)
+    if best.model.effects:
+        verdict = "effects" if fine else "unknown"
+    else:
+        as_given = rest_of(fitter, nominal, slice(0, problem.n), settings).explained
+        verdict = ("none" if as_given else "parameters") if fine else "unknown"
+    covariance = fitter.covariance(last, seen)
+    parameters, values = estimates_of(problem, last.model, covariance)
+    named: tuple[Found, ...] = ()
+    if verdict == "effects":
+        family = family_of(search, best)
+        n = len(best.model.effects)
+        named = tuple(
+            Found(e, values[k], best.total - base.total, family if k == n - 1 else ())
+            for k, e in enumerate(last.model.effects)
+        )
+    suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
+    if suspects:
+        suspects += family_of(search, best)
+    model = last.model if verdict != "unknown" else base.model
+    return Outcome(
+        verdict, named, suspects, parameters, misfits(problem, stages, parts.held_out), model, rest, probe,
+        _where_of(problem, rest) if verdict == "unknown" else (), _warned(probe, search, rest, verdict, best, share),
+        base.model, problem, stages, search,
+        time.monotonic() - begun, problem.runner.runs,
+    )  # fmt: skip
+
+
+def _warned(probe: Probe, search: Search, rest: Rest, verdict: str, best: Fit, share: float) -> tuple[str, ...]:
+    """Return sentences for the user; ``share``: of what is missing, how much the effects explain."""
+    problem = search.fitter.problem
+    warnings = list(probe.notes)
+    if search.late:
+        warnings.append(
+            f"the search was cut short after {problem.map.options.budget:g} s (`budget` of the map): a run takes about "
+            f"{probe.step_cost * problem.n * problem.m:.2g} s; shorten the record or lower `substeps`"
+        )
+    if rest.disturbed:
+        warnings.append(
+            f"a disturbance of about {100.0 * rest.share:.2g} % of the drive acts at the ports beside the noise"
+        )
+    if verdict == "unknown" and best.model.effects:
+        warnings.append(
+            f"the nearest effects explain {100.0 * share:.0f} % of what is missing, and more than noise is left"
+        )
+    if search.fitter.ladder.spread > 0.0:
+        warnings.append(
+            "the state that the FMU starts from is not the record's: the start is left out of the comparison"
+        )
+    return tuple(warnings)
+
+
+def _doubted(fitter: Fitter, fit: Fit, rest: Rest, named: bool, settings: RestSettings) -> Rest:
+    """Return what is left, no disturbance where it begins at some time or is large beside effects that are named."""
+    if named and rest.share > settings.most_with_effects:
+        return replace(
+            rest, disturbed=False, reasons=(f"{100.0 * rest.share:.2g} % of the drive is left at the ports",)
+        )
+    if predicted(fitter, fit, settings.driven_lags) > settings.driven:
+        return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
+    gain, name, time = beginning_of(fitter, fit, settings.beginnings)
+    if gain > settings.begins:
+        return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))
+    return rest
+
+
+def _where_of(problem: Problem, rest: Rest) -> tuple[str, ...]:
+    """Return where and when what is left exceeds noise, worst first."""
+    found = []
+    bounds = np.linspace(0, problem.n - 1, len(rest.blocks) + 1).astype(int)
+    for b, block in enumerate(rest.blocks):
+        for k, power in enumerate(block):
+            if power > 1.3:
+                a, z = problem.data.time[bounds[b]], problem.data.time[bounds[b + 1]]
+                found.append(
+                    (
+                        float(power),
+                        f"{problem.outputs[k]} from {a:.4g} to {z:.4g} s: {power:.2g} times the expected power",
+                    )
+                )
+    found.sort(reverse=True)
+    return tuple(text for _, text in found[:5]) or tuple(rest.reasons[:3])

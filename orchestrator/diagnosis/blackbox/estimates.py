@@ -1,0 +1,151 @@
+"""What is found, in numbers: values with intervals and units, misfits, and those on a second record."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.bank import PORT, Effect
+from orchestrator.diagnosis.blackbox.problem import Data, Model, Problem
+from orchestrator.errors import FmuError
+from orchestrator.shared.inference.normal import interval_95
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its standard error and 95 % interval."""
+
+    name: str
+    value: float
+    standard_error: float
+    interval: tuple[float, float]
+    unit: str
+    nominal: float | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that is missing: name, where it is attached, its values, and what cannot be told from it."""
+
+    effect: Effect
+    estimates: tuple[Estimate, ...]
+    gain: float
+    family: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect, as in the bank."""
+        return self.effect.kind.name
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Rms of simulated minus measured on held-out data, over the noise, of one output."""
+
+    output: str
+    noise: float
+    nominal: float
+    refitted: float
+    corrected: float
+    unit: str
+
+
+def misfits(problem: Problem, stages: Sequence[Array], rows: slice) -> tuple[Misfit, ...]:
+    """Return rms over noise of nominal, re-fitted and corrected model over ``rows`` that no fit has seen.
+
+    Args:
+        problem: the FMU and the record.
+        stages: (n, outputs) free run of the nominal, the re-fitted and the corrected model.
+        rows: the held-out samples.
+
+    Returns:
+        A misfit per output.
+    """
+    rms = [np.sqrt(np.mean(problem.residual(y)[rows] ** 2, axis=0)) for y in stages]
+    return tuple(
+        Misfit(
+            name,
+            float(problem.noise[k]),
+            float(rms[0][k]),
+            float(rms[1][k]),
+            float(rms[2][k]),
+            problem.units.get(name, ""),
+        )
+        for k, name in enumerate(problem.outputs)
+    )
+
+
+def estimates_of(
+    problem: Problem, model: Model, covariance: Array
+) -> tuple[tuple[Estimate, ...], list[tuple[Estimate, ...]]]:
+    """Return estimates of the parameters, and of the values of each effect.
+
+    Args:
+        problem: the FMU and the record.
+        model: the final one.
+        covariance: (values, values) of all that was fitted.
+
+    Returns:
+        Both, with 95 % intervals.
+    """
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+
+    def one(name: str, value: float, error: float, unit: str, nominal: float | None = None) -> Estimate:
+        return Estimate(name, value, error, interval_95(value, error), unit, nominal)
+
+    parameters = tuple(
+        one(u.name, float(model.p[k]), float(errors[k]), u.unit, u.value) for k, u in enumerate(problem.map.uncertain)
+    )
+    values, at = [], len(model.p)
+    for effect, found in zip(model.effects, model.values, strict=True):
+        units = _units_at(problem, effect)
+        values.append(
+            tuple(
+                one(name, float(v), float(errors[at + k]), units[k])
+                for k, (name, v) in enumerate(zip(effect.kind.parameters, found, strict=True))
+            )
+        )
+        at += len(found)
+    return parameters, values
+
+
+def _units_at(problem: Problem, effect: Effect) -> tuple[str, ...]:
+    """Return the units of an effect's values, at the place where it acts."""
+    if effect.kind.where == PORT:
+        port = problem.map.ports[effect.place]
+        names = {"effort": problem.units.get(port.input, ""), "flow": problem.units.get(port.position, "")}
+    else:
+        unit = problem.units.get(effect.place, "")
+        names = {"effort": unit, "flow": unit}
+    found = []
+    for unit in effect.kind.units:
+        shown = unit
+        for key, name in names.items():
+            shown = shown.replace(key, name or "1")
+        found.append(shown)
+    return tuple(found)
+
+
+def validated(problem: Problem, models: Sequence[Model], data: Data) -> tuple[Misfit, ...]:
+    """Return the misfit of nominal, re-fitted and corrected model on a second record of the same columns.
+
+    Args:
+        problem: of the first record.
+        models: the three, in this order.
+        data: the second record; nothing is fitted to it.
+
+    Returns:
+        A misfit per output.
+
+    Raises:
+        FmuError: the FMU does not run over it.
+    """
+    second = replace(problem, data=data)
+    runs = second.simulate(models)
+    found = [y for y in runs if y is not None]
+    if len(found) < len(runs):
+        raise FmuError(f"{problem.runner.path}: must run over {data.source}, but {problem.runner.reason}")
+    return misfits(second, found, slice(0, second.n))

@@ -1,0 +1,258 @@
+"""The map between a record and an FMU: which column is which variable, what is uncertain, where effects may act.
+
+A map is TOML::
+
+    [inputs]
+    M_A = { column = "u", hold = "zero" }     # hold "linear": straight lines between samples, for sensed inputs
+    [outputs]
+    phiA = { column = "phi", noise = 2e-4 }   # noise: standard deviation; absent: estimated
+    [parameters]
+    "inertia.J" = { uncertainty = "5 %" }     # or a number in the parameter's unit
+    [start]
+    "inertia.phi" = { uncertainty = 0.02 }
+    [ports.shaft]
+    input = "M_B"                             # what effects at the port add to
+    position = "phiA"                         # any readable variable
+    velocity = "wA"                           # absent: differentiated
+    [options]
+    tolerance = 1e-8                          # of the FMU's own solver
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from orchestrator.errors import ScenarioError
+from orchestrator.fmi.model_description import FmuDescription
+from orchestrator.master.protocol import Variable
+
+MAXIMUM_BYTES = 1 << 24
+
+
+class InputEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An input that a column drives."""
+
+    column: str = ""
+    hold: str = "zero"
+    factor: float = 1.0
+
+
+class OutputEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An output that a column measures."""
+
+    column: str = ""
+    noise: float | None = None
+    factor: float = 1.0
+
+
+class ParameterEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A parameter, or a start value: where the record's own value differs, and how far it may be off."""
+
+    value: float | None = None
+    uncertainty: str | float = 0.0
+
+
+class PortEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A conjugate pair: an effort that is added to an input, and the motion that it acts on."""
+
+    input: str
+    position: str
+    velocity: str | None = None
+
+
+class Options(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What else can be said."""
+
+    tolerance: float | None = None
+    time: str = "time"
+    substeps: int = 4
+    """Communication steps in a sample."""
+    budget: float = 600.0
+    """Seconds that a diagnosis may take."""
+
+
+class MapFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A map, as it is written."""
+
+    inputs: dict[str, InputEntry] = {}
+    outputs: dict[str, OutputEntry] = {}
+    parameters: dict[str, ParameterEntry] = {}
+    start: dict[str, ParameterEntry] = {}
+    ports: dict[str, PortEntry] = {}
+    options: Options = Options()
+
+
+class Uncertain(msgspec.Struct, frozen=True):
+    """A parameter that is re-fitted: its nominal value and the largest error that the user grants it."""
+
+    name: str
+    value: float
+    uncertainty: float
+    unit: str
+    minimum: float
+    maximum: float
+
+    @property
+    def standard_deviation(self) -> float:
+        """Return that of the uniform distribution over the granted interval."""
+        return self.uncertainty / math.sqrt(3.0)
+
+
+class Map(msgspec.Struct, frozen=True):
+    """A map that has been checked against its FMU.
+
+    Attributes:
+        inputs, outputs, ports, options: as written, with columns filled in.
+        uncertain: what is re-fitted.
+        fixed: values by name of what is set and not re-fitted.
+        source: file name, for messages.
+    """
+
+    inputs: dict[str, InputEntry]
+    outputs: dict[str, OutputEntry]
+    ports: dict[str, PortEntry]
+    uncertain: tuple[Uncertain, ...]
+    fixed: dict[str, float]
+    options: Options
+    source: str
+
+
+def read_map(path: Path, description: FmuDescription) -> Map:
+    """Read and check a map.
+
+    Args:
+        path: a TOML file.
+        description: of the FMU.
+
+    Returns:
+        The map.
+
+    Raises:
+        ScenarioError: the file cannot be read, or breaks a rule; the message names the entry.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ScenarioError(f"`map` must be a readable file, but {path} is not: {error.strerror}") from None
+    if len(data) > MAXIMUM_BYTES:
+        raise ScenarioError(f"`map` must be at most {MAXIMUM_BYTES >> 20} MB, but {path} is larger")
+    try:
+        written = msgspec.toml.decode(data, type=MapFile)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: {error}") from None
+    return checked(written, description, str(path))
+
+
+def checked(written: MapFile, description: FmuDescription, source: str) -> Map:
+    """Check a map against an FMU.
+
+    Args:
+        written: what the file says.
+        description: of the FMU.
+        source: the file's name, for messages.
+
+    Returns:
+        The map.
+
+    Raises:
+        ScenarioError: see ``read_map``.
+    """
+    look = _Look(description.model.variables, source)
+    if not written.inputs:
+        raise ScenarioError(f"{source}: $.inputs must name at least one input with a column, but names none")
+    if not written.outputs:
+        raise ScenarioError(f"{source}: $.outputs must name at least one output with a column, but names none")
+    for name, given in written.inputs.items():
+        look.up(f"$.inputs.{name}", name, ("input",))
+        if given.hold not in ("zero", "linear"):
+            raise ScenarioError(f'{source}: $.inputs.{name}.hold must be "zero" or "linear", but is {given.hold!r}')
+        look.factor(f"$.inputs.{name}.factor", given.factor)
+    for name, measured in written.outputs.items():
+        look.up(f"$.outputs.{name}", name, ("output", "local", "input"))
+        look.factor(f"$.outputs.{name}.factor", measured.factor)
+        if measured.noise is not None and not 0.0 < measured.noise < math.inf:
+            raise ScenarioError(f"{source}: $.outputs.{name}.noise must be positive, but is {measured.noise!r}")
+    for name, port in written.ports.items():
+        look.up(f"$.ports.{name}.input", port.input, ("input",))
+        look.up(f"$.ports.{name}.position", port.position, ("output", "local"))
+        if port.velocity is not None:
+            look.up(f"$.ports.{name}.velocity", port.velocity, ("output", "local"))
+    if not 1 <= written.options.substeps <= 1000:
+        raise ScenarioError(f"{source}: $.options.substeps must be 1 to 1000, but is {written.options.substeps}")
+    uncertain, fixed = [], {}
+    for table, entries in (("parameters", written.parameters), ("start", written.start)):
+        for name, entry in entries.items():
+            found = look.uncertain(f"$.{table}.{name}", name, entry)
+            if found.uncertainty > 0.0:
+                uncertain.append(found)
+            else:
+                fixed[name] = found.value
+    return Map(
+        {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.inputs.items()},
+        {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.outputs.items()},
+        written.ports,
+        tuple(uncertain),
+        fixed,
+        written.options,
+        source,
+    )
+
+
+class _Look:
+    """Looks names up, and says where one is wrong."""
+
+    def __init__(self, variables: Any, source: str) -> None:
+        self._variables, self._source = variables, source
+
+    def up(self, where: str, name: str, causalities: tuple[str, ...]) -> Variable:
+        """Return a variable of type Real."""
+        import difflib
+
+        if name not in self._variables:
+            near = difflib.get_close_matches(name, self._variables, 1)
+            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            raise ScenarioError(f"{self._source}: {where} must be a variable of the FMU, but {name!r} is not{hint}")
+        variable: Variable = self._variables[name]
+        if variable.type != "Real":
+            raise ScenarioError(f"{self._source}: {where} must be of type Real, but is {variable.type}")
+        if variable.causality not in causalities:
+            wanted = " or ".join(causalities)
+            raise ScenarioError(f"{self._source}: {where} must be of causality {wanted}, but is {variable.causality}")
+        return variable
+
+    def factor(self, where: str, factor: float) -> None:
+        """Refuse a factor that cannot be one."""
+        if not (math.isfinite(factor) and factor != 0.0):
+            raise ScenarioError(f"{self._source}: {where} must be finite and not 0, but is {factor!r}")
+
+    def uncertain(self, where: str, name: str, entry: ParameterEntry) -> Uncertain:
+        """Return a parameter with its uncertainty as a number."""
+        variable = self.up(where, name, ("parameter", "local", "output", "input"))
+        value = entry.value if entry.value is not None else variable.start
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            raise ScenarioError(f"{self._source}: {where}.value must be given: the FMU states no start value")
+        spread = _spread(f"{self._source}: {where}.uncertainty", entry.uncertainty, float(value))
+        low = -math.inf if variable.minimum is None else float(variable.minimum)
+        high = math.inf if variable.maximum is None else float(variable.maximum)
+        if not low <= value <= high:
+            raise ScenarioError(f"{self._source}: {where}.value must be {low:g} to {high:g}, but is {value:g}")
+        return Uncertain(name, float(value), spread, variable.unit or "", low, high)
+
+
+def _spread(where: str, given: str | float, value: float) -> float:
+    if isinstance(given, str):
+        text = given.strip()
+        try:
+            share = float(text.removesuffix("%")) / 100.0
+        except ValueError:
+            share = -1.0
+        if not text.endswith("%") or not 0.0 <= share < math.inf:
+            raise ScenarioError(f'{where} must be a number or a share such as "5 %", but is {given!r}')
+        if share > 0.0 and value == 0.0:
+            raise ScenarioError(f"{where} must be a number where the value is 0, but is {given!r}")
+        return share * abs(value)
+    if not 0.0 <= given < math.inf:
+        raise ScenarioError(f"{where} must be finite and not negative, but is {given!r}")
+    return float(given)

@@ -1,0 +1,253 @@
+"""Probes of a foreign FMU before it is believed: what it does when run twice, reset, pushed, and stepped finely."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.mapping import Map
+from orchestrator.diagnosis.blackbox.problem import IMPULSE, Data, Model, Problem, series_of
+from orchestrator.diagnosis.blackbox.runner import Plan, Runner
+from orchestrator.errors import FmuError
+
+Array = NDArray[np.float64]
+Progress = Callable[[str], None]
+
+STUCK = 0.15
+"""Share of communication steps in which nothing moves, from which an FMU is taken to have a coarser grid of its own."""
+REPEATS = 1e-3
+"""Largest difference between two runs of one model, as a share of the noise."""
+FEWEST, FEWEST_EACH = 20, 6
+"""Runs that the probes and the first fit take, and for each uncertain value."""
+SLOW = 0.5
+"""Seconds of a run from which the user is told."""
+TRIMMED = 0.7767
+"""Mean magnitude of Gaussian noise of variance 1 without the largest hundredth."""
+MOVES = 1e-9
+"""Share of a variable's size by which a parameter must change something."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """What was found out.
+
+    Attributes:
+        fresh: the FMU does not come back by a reset: it is made anew for every run.
+        sign: of each port, the direction in which its input pushes.
+        dead: parameters that change nothing.
+        blind: ports whose input moves nothing.
+        solver_error: (outputs,) usual difference between runs at the step chosen and at half of it.
+        step_cost: seconds of one step.
+        notes: sentences for the user.
+    """
+
+    fresh: bool
+    sign: dict[str, float]
+    dead: tuple[str, ...]
+    blind: tuple[str, ...]
+    solver_error: Array
+    step_cost: float
+    notes: tuple[str, ...]
+
+
+def _names_of(given: Map) -> tuple[list[str], list[str]]:
+    """Return the inputs that are set and the variables that are read, those of the record first."""
+    inputs = list(dict.fromkeys([*given.inputs, *(p.input for p in given.ports.values())]))
+    ports = [name for p in given.ports.values() for name in (p.position, p.velocity) if name is not None]
+    return inputs, list(dict.fromkeys([*given.outputs, *ports]))
+
+
+def opened(
+    path: Path, given: Map, data: Data, workers: int | None = None, progress: Progress = lambda what: None
+) -> tuple[Problem, Probe]:
+    """Return a problem ready to be fitted, and what its FMU was found to be.
+
+    Args:
+        path: of the FMU.
+        given: the map.
+        data: the record.
+        workers: child processes.
+
+    Returns:
+        The problem, whose children the caller ends, and what the FMU was found to be.
+
+    Raises:
+        FmuError: the FMU cannot be used: it does not load, run or repeat.
+    """
+    inputs, reads = _names_of(given)
+    runner = Runner(path, inputs, reads, given.options.tolerance, workers=workers)
+    try:
+        rough = noise_of(given, data.outputs, data.outputs)
+        problem = Problem(data, given, runner, _affordable(runner, given, data, progress), rough)
+        fresh = _repeats(problem)
+        if fresh:
+            runner.close()
+            runner = Runner(path, inputs, reads, given.options.tolerance, fresh=True, workers=workers)
+            problem.runner = runner
+            if _repeats(problem):
+                raise FmuError(f"{path}: must give the same outputs for the same inputs, but does not")
+        return problem, _pushed(problem, fresh)
+    except BaseException:
+        runner.close()
+        raise
+
+
+def noise_of(given: Map, outputs: Array, residual: Array) -> Array:
+    """Return the noise of each output: as given, else from third differences of what no model should follow.
+
+    Args:
+        given: the map.
+        outputs: (n, outputs) measured.
+        residual: (n, outputs) measured minus simulated.
+
+    Returns:
+        Shape (outputs,), in the units of the outputs.
+    """
+    found = []
+    for k, entry in enumerate(given.outputs.values()):
+        if entry.noise is not None:
+            found.append(entry.noise * abs(entry.factor))
+            continue
+        # Its mean without the largest hundredth: a median is no measure of what comes in whole counts.
+        rough = np.sort(np.abs(np.diff(residual[:, k], 3)))[: int(0.99 * (len(residual) - 3))]
+        estimate = float(np.mean(rough)) / TRIMMED / np.sqrt(20.0)
+        found.append(max(estimate, 1e-9 * float(np.max(np.abs(outputs[:, k]))), 1e-300))
+    return np.array(found)
+
+
+def _affordable(runner: Runner, given: Map, data: Data, progress: Progress) -> int:
+    """Return how many communication steps a sample has, fewer where the FMU is too slow for as many.
+
+    Raises:
+        FmuError: it does not run, or even the fewest runs take longer than the budget of the map.
+    """
+    m, budget = _steps_in_a_sample(runner, given, data), given.options.budget
+    short = Problem(data, given, runner, m, np.ones(len(given.outputs)))
+    plan = Plan(short.starts(short.nominal), series_of(short, min(len(data.time), 100)))
+    for _ in range(3):  # the first answer of a child is not timed
+        if runner.step_cost == 0.0:
+            runner.run([plan], float(data.time[0]), data.step / m, m)
+    runs = FEWEST + FEWEST_EACH * len(given.uncertain)
+    while m > 1 and runner.step_cost * len(data.time) * m * runs > budget:
+        m //= 2
+    one = runner.step_cost * len(data.time) * m
+    if one * runs > budget:
+        raise FmuError(
+            f"{runner.path}: must run {runs} times within the {budget:g} s of `budget`, but a run takes about "
+            f"{one:.2g} s: shorten the record or raise `budget`"
+        )
+    if one > SLOW:
+        progress(f"a run takes about {one:.2g} s, the search up to {budget:g} s")
+    return m
+
+
+def _steps_in_a_sample(runner: Runner, given: Map, data: Data) -> int:
+    """Return how many communication steps a sample has: as the map says, but none in which the FMU stands still.
+
+    An FMU with a fixed step of its own that is longer stands still in some, and takes two at once in others.
+
+    Raises:
+        SlaveError: it does not run.
+    """
+    rows = min(len(data.time), 200)
+    m = given.options.substeps
+    while m > 1:
+        problem = Problem(data, given, runner, m, np.ones(len(given.outputs)))
+        plan = Plan(problem.starts(problem.nominal), series_of(problem, rows))
+        y = runner.run([plan], float(data.time[0]), data.step / m, 1)[0]
+        if y is None:
+            raise problem.does_not_run()
+        moves = np.any(np.diff(y, axis=0) != 0.0, axis=1)
+        samples = moves[: len(moves) // m * m].reshape(-1, m)
+        moving = samples[np.any(samples, axis=1)]
+        if not len(moving) or float(np.mean(~moving)) < STUCK:
+            break
+        m = m // 2
+    return m
+
+
+def _repeats(problem: Problem) -> bool:
+    """Tell whether a run after a reset differs from the first, with another run in between."""
+    other = problem.nominal.p + np.array([0.5 * u.standard_deviation for u in problem.map.uncertain])
+    plain = series_of(problem, problem.n)
+    mine = Plan(problem.starts(problem.nominal), plain)
+    between = Plan(problem.starts(Model(other)), plain * 1.1)
+    start, step = float(problem.data.time[0]), problem.h / problem.m
+    first, _, again = problem.runner.run([mine, between, mine], start, step, problem.m, together=True)
+    if first is None or again is None:
+        raise problem.does_not_run()
+    count = len(problem.outputs)
+    return bool(np.max(np.abs(again - first)[:, :count] / problem.noise) > REPEATS)
+
+
+def _pushed(problem: Problem, fresh: bool) -> Probe:
+    """Return what ports and parameters do."""
+    base = problem.must_read(problem.nominal)
+    size = np.maximum(np.max(np.abs(base), axis=0), 1e-300)
+    notes = ["reset is not followed: a new instance is made for every run"] if fresh else []
+    if problem.m < problem.map.options.substeps:
+        notes.append(
+            f"the FMU has a fixed step of its own, or is slow: {problem.m} communication steps in a sample instead of "
+            f"{problem.map.options.substeps}"
+        )
+    sign, blind = {}, []
+    plain = series_of(problem, problem.n)
+    start, step = float(problem.data.time[0]), problem.h / problem.m
+    for name, port in problem.map.ports.items():
+        place = problem.runner.inputs.index(port.input)
+        pushed = plain.copy()
+        pushed[: 4 * problem.m, place] += IMPULSE * problem.drive([place])[0]
+        y = problem.runner.run([Plan(problem.starts(problem.nominal), pushed)], start, step, problem.m)[0]
+        at = problem.runner.reads.index(port.position)
+        moved = None if y is None else (y - base)[:, at]
+        if moved is None or np.max(np.abs(moved)) < MOVES * size[at]:
+            blind.append(name)
+            notes.append(f"port {name}: `{port.input}` does not move `{port.position}`: left out")
+            continue
+        first = int(np.argmax(np.abs(moved) > 1e-6 * np.max(np.abs(moved))))
+        early = moved[first : first + 4]
+        sign[name] = 1.0 if early[np.argmax(np.abs(early))] > 0.0 else -1.0
+        if sign[name] < 0.0:
+            notes.append(f"port {name}: `{port.input}` pushes against `{port.position}`: turned round")
+    dead = _dead(problem, base, size)
+    notes += [f"parameter `{name}` changes nothing: left out" for name in dead]
+    problem.sign = sign
+    coarse = problem.m
+    problem.m = 2 * coarse
+    fine = problem.must_read(problem.nominal)
+    problem.m = coarse
+    # The median of the first quarter: where motion is chaotic, two solutions part for no fault of a solver.
+    early = np.abs(fine - base)[: max(len(base) // 4, 8), : len(problem.outputs)]
+    error = 1.4826 * np.median(early, axis=0)
+    return Probe(fresh, sign, tuple(dead), tuple(blind), error, problem.runner.step_cost, tuple(notes))
+
+
+def _dead(problem: Problem, base: Array, size: Array) -> list[str]:
+    models = []
+    for k, u in enumerate(problem.map.uncertain):
+        p = problem.nominal.p.copy()
+        p[k] += u.standard_deviation if p[k] + u.standard_deviation <= u.maximum else -u.standard_deviation
+        models.append(Model(p))
+    runs = problem.read(models)
+    return [
+        u.name
+        for u, y in zip(problem.map.uncertain, runs, strict=True)
+        if y is not None and np.max(np.abs(y - base) / size) < MOVES
+    ]
+
+
+def reduced(given: Map, probe: Probe) -> Map:
+    """Return the map without what does nothing.
+
+    Args:
+        given: the map.
+        probe: what the FMU was found to be.
+
+    Returns:
+        The map.
+    """
+    uncertain = tuple(u for u in given.uncertain if u.name not in probe.dead)
+    ports = {name: port for name, port in given.ports.items() if name not in probe.blind}
+    return Map(given.inputs, given.outputs, ports, uncertain, given.fixed, given.options, given.source)

@@ -1,0 +1,469 @@
+"""A record, an FMU and a map, ready to be fitted: models are simulated, residuals come in units of the noise."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox import series
+from orchestrator.diagnosis.blackbox.bank import BANK, INPUT, OUTPUT, PORT, REMEMBERS, STARTS_OFF, Effect, Scene
+from orchestrator.diagnosis.blackbox.mapping import Map
+from orchestrator.diagnosis.blackbox.runner import Plan, Runner
+from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
+from orchestrator.diagnosis.blackbox.wire import Feedback
+from orchestrator.errors import SlaveError
+
+Array = NDArray[np.float64]
+
+ANGLES = ("rad", "deg", "")
+GROWS = 2.5
+"""How much larger than at the start a response within the record may be: beyond, its motion is not stable."""
+IMPULSE = 0.5
+"""Size of the pulse that measures a response, as a share of the drive."""
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """The columns of a record that a map names.
+
+    Attributes:
+        time: (n,) s, uniform.
+        inputs: (n, inputs) in the order of the map.
+        outputs: (n, outputs).
+        source: file name, for messages.
+    """
+
+    time: Array
+    inputs: Array
+    outputs: Array
+    source: str
+
+    @property
+    def step(self) -> float:
+        """Return the sample time [s]."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A model: values of the uncertain parameters, effects, and their values."""
+
+    p: Array
+    effects: tuple[Effect, ...] = ()
+    values: tuple[Array, ...] = ()
+
+    @property
+    def vector(self) -> Array:
+        """Return all values in one row."""
+        return np.concatenate([self.p, *self.values])
+
+    def moved(self, vector: Array) -> "Model":
+        """Return the same structure with other values, kept within what the laws allow.
+
+        Args:
+            vector: (values,) parameters first.
+
+        Returns:
+            The model.
+        """
+        values, at = [], len(self.p)
+        for effect, old in zip(self.effects, self.values, strict=True):
+            values.append(effect.bounded(vector[at : at + len(old)]))
+            at += len(old)
+        return Model(vector[: len(self.p)], self.effects, tuple(values))
+
+    def extended(self, effect: Effect, values: Array) -> "Model":
+        """Return this model with one more effect.
+
+        Args:
+            effect: that is added.
+            values: of its parameters.
+
+        Returns:
+            The model.
+        """
+        return Model(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))
+
+    def without(self, label: str) -> "Model":
+        """Return this model with one effect less.
+
+        Args:
+            label: of the effect that goes.
+
+        Returns:
+            The model.
+        """
+        kept = [k for k, effect in enumerate(self.effects) if effect.label != label]
+        return Model(self.p, tuple(self.effects[k] for k in kept), tuple(self.values[k] for k in kept))
+
+
+@dataclass
+class Problem:
+    """Simulates models of one record.
+
+    Attributes:
+        data: the record.
+        map: what is what.
+        runner: the FMU.
+        m: communication steps in a sample.
+        noise: (outputs,) standard deviations.
+    """
+
+    data: Data
+    map: Map
+    runner: Runner
+    m: int
+    noise: Array
+    sign: dict[str, float] = field(default_factory=dict)
+    nominal_rows: Array | None = None
+
+    @property
+    def n(self) -> int:
+        """Return the number of samples."""
+        return len(self.data.time)
+
+    @property
+    def h(self) -> float:
+        """Return the sample time [s]."""
+        return self.data.step
+
+    @property
+    def nominal(self) -> Model:
+        """Return the model as the user gave it."""
+        return Model(np.array([u.value for u in self.map.uncertain]))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Return the names of the recorded inputs."""
+        return tuple(self.map.inputs)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Return the names of the measured outputs."""
+        return tuple(self.map.outputs)
+
+    def simulate(self, models: Sequence[Model], rows: int | None = None) -> list[Array | None]:
+        """Return outputs (rows, outputs) of each model; None where the FMU failed.
+
+        Args:
+            models: parameters, effects and their values, each.
+            rows: samples to simulate (default: all).
+
+        Returns:
+            The outputs, in their own units.
+        """
+        found = self.read(models, rows)
+        return [None if y is None else self._measured(y, model) for y, model in zip(found, models, strict=True)]
+
+    def read(self, models: Sequence[Model], rows: int | None = None) -> list[Array | None]:
+        """Return all that is read (rows, reads) of each model, before effects at outputs.
+
+        Args:
+            models: parameters, effects and their values, each.
+            rows: samples to simulate (default: all).
+
+        Returns:
+            The values, in their own units.
+        """
+        rows = self.n if rows is None else rows
+        plain = series_of(self, rows)
+        plans = [Plan(self.starts(model), self._table(model, plain, rows), self._feedback(model)) for model in models]
+        return self.runner.run(plans, float(self.data.time[0]), self.h / self.m, self.m)
+
+    def must_simulate(self, model: Model) -> Array:
+        """Return outputs (rows, outputs) of a model.
+
+        Args:
+            model: parameters, effects and their values.
+
+        Returns:
+            The outputs, in their own units.
+
+        Raises:
+            SlaveError: the FMU does not run over the record.
+        """
+        return self._measured(self.must_read(model), model)
+
+    def must_read(self, model: Model) -> Array:
+        """Return all that is read (rows, reads) of a model, before effects at outputs.
+
+        Args:
+            model: parameters, effects and their values.
+
+        Returns:
+            The values, in their own units.
+
+        Raises:
+            SlaveError: the FMU does not run over the record.
+        """
+        y = self.read([model])[0]
+        if y is None:
+            raise self.does_not_run()
+        return y
+
+    def does_not_run(self) -> SlaveError:
+        """Return the error that says why the last run failed.
+
+        Returns:
+            The error.
+        """
+        return SlaveError(f"{self.runner.path}: must run over the record, but {self.runner.reason}")
+
+    def residual(self, y: Array) -> Array:
+        """Return measured minus simulated, in units of the noise.
+
+        Args:
+            y: (rows, outputs) simulated.
+
+        Returns:
+            Shape (rows, outputs).
+        """
+        return np.asarray((self.data.outputs[: len(y)] - y) / self.noise)
+
+    def pushed(self, model: Model, pushes: Sequence[tuple[int, int, float]]) -> list[Array | None]:
+        """Return outputs where an effort (input, first sample, size) is added until the end, one after the other.
+
+        Args:
+            model: parameters, effects and their values.
+            pushes: the efforts.
+
+        Returns:
+            The outputs, (n, outputs) each.
+        """
+        plain = self._table(model, series_of(self, self.n), self.n)
+        plans = []
+        for place, first, size in pushes:
+            table = plain.copy()
+            table[first * self.m :, place] += size
+            plans.append(Plan(self.starts(model), table, self._feedback(model)))
+        found = self.runner.run(plans, float(self.data.time[0]), self.h / self.m, self.m)
+        return [None if y is None else self._measured(y, model) for y in found]
+
+    def starts(self, model: Model) -> dict[str, float]:
+        """Return what is set before a run, by name.
+
+        Args:
+            model: parameters, effects and their values.
+
+        Returns:
+            Value by name.
+        """
+        values = dict(self.map.fixed)
+        values |= {u.name: float(v) for u, v in zip(self.map.uncertain, model.p, strict=True)}
+        return values
+
+    def _table(self, model: Model, plain: Array, rows: int) -> Array:
+        table = plain
+        step = self.h / self.m
+        for effect, values in zip(model.effects, model.values, strict=True):
+            if effect.kind.where != INPUT:
+                continue
+            if table is plain:
+                table = plain.copy()
+            column = self.runner.inputs.index(effect.place)
+            table[:, column] = at_input(effect, table[:, column], step, float(values[0]))
+        return table
+
+    def _feedback(self, model: Model) -> tuple[Feedback, ...]:
+        found = []
+        for effect, values in zip(model.effects, model.values, strict=True):
+            if effect.kind.where != PORT:
+                continue
+            port = self.map.ports[effect.place]
+            reads = self.runner.reads
+            velocity = -1 if port.velocity is None else reads.index(port.velocity)
+            q = [float(v) for v in values] + [0.0] * (4 - len(values))
+            place = self.runner.inputs.index(port.input)
+            sign = self.sign.get(effect.place, 1.0)
+            found.append(Feedback(place, effect.kind.law, reads.index(port.position), velocity, sign, q))
+        return tuple(found)
+
+    def _measured(self, rows: Array, model: Model) -> Array:
+        y = rows[:, : len(self.outputs)]
+        for effect, values in zip(model.effects, model.values, strict=True):
+            if effect.kind.where != OUTPUT:
+                continue
+            if y.base is not None:
+                y = y.copy()
+            column = self.outputs.index(effect.place)
+            y[:, column] = _at_output(effect.kind.name, y[:, column], self.h, float(values[0]))
+        return y
+
+    def impulses(self, model: Model, length: int) -> tuple[Surrogate, Array]:
+        """Return the surrogate at the ports, and the size (ports,) that a share of noise stands for.
+
+        Responses are measured within the record, where the FMU works, unless they grow there.
+
+        Args:
+            model: parameters, effects and their values.
+            length: of the responses, in samples.
+
+        Returns:
+            The surrogate, and the sizes in the units of the ports.
+
+        Raises:
+            SlaveError: the FMU does not run over the record.
+        """
+        later = min(self.n // 4, self.n - length)
+        within = self._responses(model, later, length)
+        first = self._responses(model, 0, length)
+        chosen = within if float(np.max(np.abs(within))) < GROWS * float(np.max(np.abs(first))) else first
+        return realised(chosen), np.ones(len(self.noise_places))
+
+    def _responses(self, model: Model, at: int, length: int) -> Array:
+        """Return responses (length - 1, outputs, ports) to pulses in sample ``at``, in units of noise and drive."""
+        plain = series_of(self, at + length)
+        places = self.noise_places
+        tables = [plain]
+        for place, size in zip(places, self.drive(places), strict=True):
+            pulsed = plain.copy()
+            pulsed[at * self.m : (at + 1) * self.m, place] += IMPULSE * size
+            tables.append(pulsed)
+        plans = [Plan(self.starts(model), t, self._feedback(model)) for t in tables]
+        found = self.runner.run(plans, float(self.data.time[0]), self.h / self.m, self.m)
+        rows = [None if y is None else self._measured(y, model) for y in found]
+        base = rows[0]
+        if base is None or any(y is None for y in rows):
+            raise self.does_not_run()
+        responses = [(y - base)[at + 1 :] / self.noise / IMPULSE for y in rows[1:] if y is not None]
+        return np.stack(responses, axis=2)
+
+    @property
+    def noise_places(self) -> list[int]:
+        """Return the inputs at which unmodelled efforts may act: those of the ports, else all that are recorded."""
+        names = list(dict.fromkeys(port.input for port in self.map.ports.values())) or list(self.inputs)
+        return [self.runner.inputs.index(name) for name in names]
+
+    def drive(self, places: Sequence[int]) -> Array:
+        """Return the size of the effort at each place: of its own column, else of the columns of the same unit.
+
+        Args:
+            places: of inputs.
+
+        Returns:
+            Shape (places,).
+        """
+        sizes = np.sqrt(np.mean(self.data.inputs**2, axis=0))
+        largest = float(sizes.max()) or 1.0
+        found = []
+        for place in places:
+            own = float(sizes[place]) if place < len(sizes) else 0.0
+            found.append(own or self._like(place, sizes) or largest)
+        return np.array(found)
+
+    def _like(self, place: int, sizes: Array) -> float:
+        same = [float(s) for name, s in zip(self.inputs, sizes, strict=True)
+                if self.units.get(name) == self.units.get(self.runner.inputs[place])]  # fmt: skip
+        return max(same, default=0.0)
+
+    units: dict[str, str] = field(default_factory=dict)
+
+
+def series_of(problem: Problem, rows: int) -> Array:
+    """Return the recorded inputs over every communication step up to ``rows`` samples; other inputs are 0.
+
+    Args:
+        problem: the FMU and the record.
+        rows: samples.
+
+    Returns:
+        Shape (steps, inputs).
+    """
+    table = np.zeros(((rows - 1) * problem.m, len(problem.runner.inputs)))
+    for k, entry in enumerate(problem.map.inputs.values()):
+        order = 1 if entry.hold == "linear" else 0
+        table[:, k] = series.finely(problem.data.inputs[:rows, k], problem.m, order)
+    return table
+
+
+def at_input(effect: Effect, fine: Array, step: float, value: float) -> Array:
+    """Return an input behind an effect in series with it; before the record it had its first value, or was zero.
+
+    Args:
+        effect: at an input.
+        fine: (steps,) recorded input.
+        step: communication step [s].
+        value: of the effect's parameter.
+
+    Returns:
+        Shape (steps,).
+    """
+    name, first = effect.kind.name, 0.0 if effect.at_rest else float(fine[0])
+    if name == "input_gain":
+        return np.asarray(fine * (1.0 + value))
+    if name == "input_offset":
+        return np.asarray(fine + value)
+    if name == "input_delay":
+        return series.delayed(fine, step, value, first)
+    if name == "input_lag":
+        return np.asarray(series.lagged(fine, step, value, first))
+    if name == "input_saturation":
+        return series.saturated(fine, value)
+    if name == "input_dead_zone":
+        return series.dead_zone(fine, value)
+    if name == "input_rate_limit":
+        return np.asarray(series.rate_limited(fine, step, value, first))
+    return series.quantised(fine, value)
+
+
+def _at_output(name: str, rows: Array, h: float, value: float) -> Array:
+    """Return an output behind an effect in series with it."""
+    if name == "output_gain":
+        return np.asarray(rows * (1.0 + value))
+    if name == "output_offset":
+        return np.asarray(rows + value)
+    if name == "output_delay":
+        return series.later(rows, h, value)
+    if name == "output_lag":
+        return np.asarray(series.smoothed(rows, h, value))
+    return series.quantised(rows, value)
+
+
+def effects_of(problem: Problem, nominal: Array) -> list[Effect]:
+    """Return every effect that could act, given all that is read of the nominal run (n, reads).
+
+    Args:
+        problem: the FMU and the record.
+        nominal: the nominal run.
+
+    Returns:
+        The effects, each at a place.
+    """
+    found = []
+    h, runner = problem.h, problem.runner
+    for k, name in enumerate(problem.inputs):
+        u = problem.data.inputs[:, k]
+        if float(np.ptp(u)) == 0.0:
+            continue
+        scene = Scene(h, _rms(u), float(np.max(np.abs(u))), u)
+        found += [Effect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
+        if abs(u[0]) > STARTS_OFF * scene.size:
+            found += [Effect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
+    for k, name in enumerate(problem.outputs):
+        y = problem.data.outputs[:, k]
+        scene = Scene(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
+        found += [Effect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
+    for name, port in problem.map.ports.items():
+        x = nominal[:, runner.reads.index(port.position)]
+        v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]
+        effort = float(problem.drive([runner.inputs.index(port.input)])[0])
+        angular = problem.units.get(port.position, "") in ANGLES
+        a = _rms(np.gradient(v, h))
+        span = float(np.ptp(x)) or 1.0
+        top = 0.5 * np.pi / max(float(np.quantile(np.abs(v), 0.8)) * h, 1e-300)
+        low = 1.5 * 2.0 * np.pi / span
+        cycles = (
+            tuple(float(c) for c in np.geomspace(low, max(min(top, 40.0 * low), 2.0 * low), 24)) if top > low else ()
+        )
+        if angular:
+            whole = tuple(float(c) for c in range(2, 13) if low < c < top)
+            cycles = tuple(sorted({*cycles, *whole}))
+        scene = Scene(h, effort, effort, x, 0.0, _rms(x) or 1.0, span, _rms(v) or 1.0, a or 1.0, angular, cycles)
+        kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
+        found += [Effect(kind, name, scene) for kind in kinds]
+    return found
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,284 @@
+"""Runs of a foreign FMU in jails: batches, deadlines, and a new jail where one was lost."""
+
+import threading
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Job, Load
+from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
+from orchestrator.shared.cores import usable_cores
+from orchestrator.shared.isolation.archives import unpack
+from orchestrator.shared.isolation.jail import Jail
+from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
+from orchestrator.shared.isolation.scratch import Scratch
+
+Array = NDArray[np.float64]
+
+LOADING = 60.0
+"""Seconds that loading an FMU may take: some unpack a whole tool."""
+PATIENCE = 20.0
+"""Seconds that a batch may take beyond what it is expected to."""
+SLOWER = 20.0
+"""How many times as long as expected a batch may take."""
+MOST_LOST = 5
+"""Processes that an FMU may cost."""
+CHUNK = 3
+"""Runs that are sent to a child at a time."""
+TOTAL = 86_400.0
+"""Seconds that a child may live."""
+MEMORY = 4096 * MEBIBYTE
+SLACK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One run that is wanted.
+
+    Attributes:
+        starts: value by name of parameters and start values.
+        table: (steps, inputs) input values, each held over a step.
+        effects: in the loop around the FMU.
+    """
+
+    starts: dict[str, float]
+    table: Array
+    effects: tuple[Feedback, ...] = ()
+
+
+Grid = tuple[float, float, int, float]
+
+
+class Runner:
+    """An FMU in child processes behind walls.
+
+    Args:
+        path: of the FMU.
+        inputs, reads: what is set before and read after every step.
+        tolerance: of the FMU's own solver; None: its own.
+        fresh: make a new instance for every run instead of a reset.
+        workers: children (default: one a core, two at most).
+
+    Raises:
+        FmuError: the FMU cannot be loaded.
+        SlaveError: it crashes or hangs when it is.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        inputs: Sequence[str],
+        reads: Sequence[str],
+        tolerance: float | None = None,
+        fresh: bool = False,
+        workers: int | None = None,
+    ) -> None:
+        self.path = path
+        self.inputs, self.reads = tuple(inputs), tuple(reads)
+        self.fresh, self.tolerance = fresh, tolerance
+        self.step_cost = 0.0  # s, of one step, measured
+        self.runs = 0
+        self.lost = 0
+        self.reason = ""  # why the last run that failed did
+        self._jails: dict[int, Jail] = {}
+        self._warm: set[int] = set()
+        self._lock = threading.Lock()
+        self._scratch = Scratch("box")
+        self._folder = self._scratch.path / "fmu"
+        # A jail dies with the thread that made it: the threads live as long as this.
+        self._pool = ThreadPoolExecutor(min(2, usable_cores()) if workers is None else workers)
+        try:
+            _compile_loop()
+            unpack(path, self._folder)
+            self._pool.submit(self._jail).result()
+        except ChildError as error:
+            self.close()
+            raise SlaveError(f"{path}: must load and instantiate, but {_worded(error, LOADING)}") from None
+        except OrchestratorError as error:
+            self.close()
+            raise FmuError(str(error).replace(str(self._folder), str(path))) from None
+        except BaseException:
+            self.close()
+            raise
+
+    def run(
+        self,
+        plans: Sequence[Plan],
+        start: float,
+        step: float,
+        per_row: int,
+        lead: float = 0.5,
+        together: bool = False,
+    ) -> list[Array | None]:
+        """Return what each run gave, (rows, reads); None where it failed (``reason`` says why).
+
+        Args:
+            plans: the runs.
+            start: time at which they start [s].
+            step: communication step [s].
+            per_row: steps for each row that is returned.
+            lead: steps by which fed-back signals are extrapolated.
+            together: one after the other in one process.
+
+        Returns:
+            A run per plan.
+
+        Raises:
+            SlaveError: the FMU has cost too many processes.
+        """
+        results: list[Array | None] = [None] * len(plans)
+        if not plans:
+            return results
+        self.runs += len(plans)
+        size = CHUNK if len(plans) >= 2 * CHUNK else 1
+        if together or len(plans) * self.step_cost * len(plans[0].table) < SMALL:
+            size = len(plans)  # the latter: not worth a second child
+        chunks = [list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size)]
+        grid = (start, step, per_row, lead)
+        futures: list[Future[None]] = [self._pool.submit(self._chunk, c, plans, grid, results) for c in chunks]
+        try:
+            for future in futures:
+                future.result()
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            for jail in list(self._jails.values()):
+                jail.interrupt()
+            raise
+        return results
+
+    def close(self) -> None:
+        """End the children and remove their files."""
+        for jail in list(self._jails.values()):
+            jail.interrupt()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+        for jail in self._jails.values():
+            jail.close()
+        self._jails = {}
+        self._scratch.close()
+
+    def __enter__(self) -> "Runner":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _jail(self) -> Jail:
+        """Return this thread's jail, its FMU loaded."""
+        mine = threading.get_ident()
+        if mine not in self._jails:
+            request = Load(str(self._folder), list(self.inputs), list(self.reads), self.tolerance, self.fresh)
+            limits = Limits(time=LOADING, memory=MEMORY, total=TOTAL)
+            jail = Jail("orchestrator.diagnosis.blackbox.inside:opened", request, read=[self._folder], limits=limits)
+            try:
+                jail.start(LOADING)
+            except BaseException:
+                jail.close()
+                raise
+            self._jails[mine] = jail
+        return self._jails[mine]
+
+    def _chunk(self, chunk: list[int], plans: Sequence[Plan], grid: Grid, results: list[Array | None]) -> None:
+        """Run some of the plans in this thread's jail; where that is lost, each of them alone in a new one."""
+        steps = sum(len(plans[k].table) for k in chunk)
+        allowed = PATIENCE + SLOWER * steps * self.step_cost + (LOADING if self.step_cost == 0.0 else 0.0)
+        count = (len(plans[chunk[0]].table) // grid[2] + 1) * len(self.reads)
+        try:
+            jail = self._jail()
+            answer = jail.call(_batch(chunk, plans, grid), time=allowed, most=8 * count * len(chunk) + SLACK)
+        except ChildError as error:
+            self._lose(_worded(error, allowed))
+            if len(chunk) > 1:  # one of them was the culprit
+                for k in chunk:
+                    self._chunk([k], plans, grid, results)
+            return
+        except OrchestratorError as error:
+            raise SlaveError(str(error).replace(str(self._folder), str(self.path))) from None
+        self._take(answer, chunk, plans, grid, results, steps)
+
+    def _take(
+        self, answer: Any, chunk: list[int], plans: Sequence[Plan], grid: Grid, results: list[Array | None], steps: int
+    ) -> None:
+        """Look at what the child claims, and keep it."""
+        match answer:
+            case [list() as found, list() as reasons, float() as seconds] if len(found) == len(reasons) == len(chunk):
+                pass
+            case _:
+                raise SlaveError(f"{self.path}: its process must return {len(chunk)} runs, but does not")
+        for k, rows, reason in zip(chunk, found, reasons, strict=True):
+            shape = (len(plans[k].table) // grid[2] + 1, len(self.reads))
+            if isinstance(rows, np.ndarray) and rows.shape == shape and rows.dtype == np.float64:
+                results[k] = rows
+            elif isinstance(reason, str) and reason:
+                self.reason = reason.replace(str(self._folder), str(self.path))
+        mine = threading.get_ident()
+        if mine in self._warm:  # the first answer of a child includes what it loads
+            self.step_cost = max(0.5 * self.step_cost, seconds / max(steps, 1))
+        self._warm.add(mine)
+
+    def _lose(self, reason: str) -> None:
+        """Close this thread's jail.
+
+        Raises:
+            SlaveError: too many have been lost.
+        """
+        jail = self._jails.pop(threading.get_ident(), None)
+        self._warm.discard(threading.get_ident())
+        if jail is not None:
+            jail.close()
+        with self._lock:
+            self.reason = reason
+            self.lost += 1
+            if self.lost > MOST_LOST:
+                raise SlaveError(f"{self.path}: must run, but {reason}; given up after {self.lost} processes")
+
+
+SMALL = 0.01
+"""Seconds of work below which a second child is not asked."""
+
+
+def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid) -> Batch:
+    tables: list[Array] = []
+    places: dict[int, int] = {}
+    jobs = []
+    for k in chunk:
+        plan = plans[k]
+        if id(plan.table) not in places:
+            places[id(plan.table)] = len(tables)
+            tables.append(np.ascontiguousarray(plan.table))
+        starts = {name: float(value) for name, value in plan.starts.items()}
+        jobs.append(Job(starts, places[id(plan.table)], list(plan.effects)))
+    start, step, per_row, lead = grid
+    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead))
+
+
+def _worded(error: ChildError, allowed: float) -> str:
+    if error.reason == "time":
+        return f"hangs: no answer within {allowed:.0f} s"
+    if error.reason == "signal":
+        return f"crashes: {error}"
+    return str(error)
+
+
+_compiled: list[bool] = []
+
+
+def _compile_loop() -> None:
+    """Compile the loop, once per machine, here: children cannot keep machine code."""
+    if _compiled:
+        return
+    import numba
+
+    from orchestrator.diagnosis.blackbox.loop import run_loop
+
+    whole, real = numba.int64, numba.float64
+    run_loop.compile(
+        (whole[::1], whole[::1], whole[::1], real[::1], real[::1], real[:, ::1], real[::1], whole[:, ::1], real[::1],
+         real[:, ::1], real, real[:, ::1])
+    )  # fmt: skip
+    _compiled.append(True)

@@ -1,0 +1,201 @@
+"""What a search means: explained or not, by what, how surely, and where the rest is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.fitting import Fit, Fitter
+from orchestrator.diagnosis.blackbox.search import Search, labels
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What a model leaves.
+
+    Attributes:
+        explained: nothing but measurement noise.
+        disturbed: small stationary noise at the ports beside it.
+        share: that noise, as a share of the drive.
+        reasons: what speaks against noise.
+        blocks: (blocks, outputs) mean square of the innovations over equal parts of the record; noise: 1.
+    """
+
+    explained: bool
+    disturbed: bool
+    share: float
+    reasons: tuple[str, ...]
+    blocks: Array
+
+
+def rest_of(fitter: Fitter, fit: Fit, rows: slice, settings: RestSettings = DEFAULT.rest) -> Rest:
+    """Return what a model leaves over ``rows``; ``fit.y`` must reach so far.
+
+    Args:
+        fitter: gives the filters and the record.
+        fit: of a model.
+        rows: samples to look at.
+        settings: the thresholds.
+
+    Returns:
+        The shares, and why it counts as unexplained.
+    """
+    ladder = fitter.ladder
+    e = fitter.whitened(fit.y, fit.level)[rows]
+    free = fitter.whitened(fit.y, 0)[rows]
+    count = e.size
+    square = float(np.sum(free * free))
+    explained = square < count + settings.deviations * np.sqrt(2.0 * count)
+    explained = bool(explained) and not _reasons(free, settings)
+    share = ladder.share(fit.level)
+    reasons = _reasons(e, settings)
+    blocks = np.array([np.mean(part * part, axis=0) for part in np.array_split(e, settings.blocks)])
+    disturbed = not explained and share <= settings.most_port_noise and not reasons
+    return Rest(explained, disturbed, share, tuple(reasons), blocks)
+
+
+def _reasons(e: Array, s: RestSettings) -> list[str]:
+    """Return what distinguishes innovations (n, outputs) from white noise of variance 1 (less: it was overstated)."""
+    found = []
+    n = len(e)
+    for k in range(e.shape[1]):
+        x = e[:, k]
+        mean_square = float(np.mean(x * x))
+        if mean_square - 1.0 > s.deviations * np.sqrt(2.0 / n):
+            found.append(f"output {k + 1}: {mean_square:.2f} times the expected power")
+        x = (x - x.mean()) / max(float(x.std()), 1e-300)
+        lags = [float(np.mean(x[lag:] * x[:-lag])) for lag in range(1, s.lags + 1)]
+        if float(np.sum(np.square(lags))) * n > s.lags + s.most_correlated * np.sqrt(2.0 * s.lags):
+            found.append(f"output {k + 1}: correlated from sample to sample")
+        if float(np.mean(x**4)) - 3.0 > s.most_kurtosis:
+            found.append(f"output {k + 1}: comes in bursts")
+        parts = np.array([np.mean(p * p) for p in np.array_split(e[:, k], s.blocks)])
+        if float(parts.max()) / mean_square - 1.0 > s.deviations * np.sqrt(2.0 * s.blocks / n):
+            found.append(f"output {k + 1}: changes with time")
+    return found
+
+
+def beginning_of(fitter: Fitter, fit: Fit, count: int = DEFAULT.rest.beginnings) -> tuple[float, str, float]:
+    """Return the gain, the input and the time of the effort that begins there and explains most of what is left.
+
+    A disturbance that is noise begins nowhere. Each effort's response is measured on the FMU.
+
+    Args:
+        fitter: gives the filters and the record.
+        fit: of a model.
+        count: of moments at which an effort may begin.
+
+    Returns:
+        Gain in log-likelihood, name of the input, time [s]; 0.0 and nothing where none explains any.
+    """
+    problem, n = fitter.problem, fitter.problem.n
+    starts = [int(s) for s in np.linspace(0, n, count + 2)[1:-1]]
+    places = problem.noise_places
+    sizes = 0.02 * problem.drive(places)
+    runs = problem.pushed(fit.model, [(p, s, size) for p, size in zip(places, sizes, strict=True) for s in starts])
+    base = problem.simulate([fit.model])[0]
+    if base is None or len(fit.J) < n:
+        return 0.0, "", 0.0
+    columns = [(run - base) / problem.noise if run is not None else np.zeros_like(base) for run in runs]
+    block = np.concatenate([problem.residual(base)[:, :, None], fit.J, np.stack(columns, axis=2)], axis=2)
+    white = fitter.ladder[fit.level].whiten(block).reshape(-1, block.shape[2])
+    known = 1 + fit.J.shape[2]
+    J = white[:, 1:known]
+    Q, _ = np.linalg.qr(J / np.maximum(np.sqrt(np.sum(J * J, axis=0)), 1e-300))
+    e = white[:, 0] - Q @ (Q.T @ white[:, 0])
+    D = white[:, known:] - Q @ (Q.T @ white[:, known:])
+    power = np.sum(D * D, axis=0)
+    gains = np.where(power > 0.0, 0.5 * (D.T @ e) ** 2 / np.maximum(power, 1e-300), 0.0)
+    best = int(np.argmax(gains))
+    name = problem.runner.inputs[places[best // len(starts)]]
+    return float(gains[best]), name, float(problem.data.time[starts[best % len(starts)]])
+
+
+PLACES = 12
+"""Stretches of an output's range in each of which what is left may act in a way of its own."""
+
+
+def predicted(fitter: Fitter, fit: Fit, lags: int = DEFAULT.rest.driven_lags) -> float:
+    """Return by how many standard deviations of chance what is left can be predicted from what went before.
+
+    By all signals together, or by one alone.
+
+    A disturbance is none of the drive's doing: innovations do not depend on earlier inputs, nor on how the FMU moved
+    under them. What the model lacks does.
+
+    Args:
+        fitter: gives the filters and the record.
+        fit: of a model.
+        lags: samples that are looked back.
+
+    Returns:
+        The number of standard deviations.
+    """
+    problem, n = fitter.problem, fitter.problem.n
+    e = fitter.whitened(fit.y, fit.level)[lags:]
+    columns = [problem.data.inputs[lags - k : n - k] for k in range(1, lags + 1)]
+    for y in fit.y.T:
+        v = np.gradient(y)
+        size = max(float(v.std()), 1e-300)
+        for shape in (np.tanh(10.0 * v / size), np.abs(v), v * np.abs(v), y - y.mean(), (y - y.mean()) ** 3):
+            columns += [shape[lags - k : n - k, None] for k in (1, 2)]
+        place = np.searchsorted(np.quantile(y, np.linspace(0.0, 1.0, PLACES + 1)[1:-1]), y)
+        here = place[:, None] == np.arange(PLACES)
+        columns += [(here * shape[:, None])[lags - 1 : n - 1] for shape in (v, np.ones(n))]
+    block = np.hstack([np.ones((n - lags, 1)), *columns])
+    block = block / np.maximum(np.sqrt(np.mean(block * block, axis=0)), 1e-300)
+    U, s, _ = np.linalg.svd(block, full_matrices=False)
+    U = U[:, s > 1e-9 * s[0]]
+    size = np.sqrt(np.mean(e * e, axis=0))
+    power = np.sum((U.T @ e) ** 2, axis=0) / size**2
+    count = U.shape[1] * e.shape[1]
+    together = float((np.sum(power) - count) / np.sqrt(2.0 * count))
+    alone = np.abs(block.T @ e) / size / np.sqrt(len(e))
+    return max(together, float(np.max(alone)))
+
+
+def family_of(search: Search, best: Fit) -> tuple[str, ...]:
+    """Return labels of effects that the record does not tell from the last one of the best model.
+
+    Args:
+        search: that found it.
+        best: fit of the best model.
+
+    Returns:
+        The labels.
+    """
+    if not best.model.effects:
+        return ()
+    last = best.model.effects[-1]
+    others: list[str] = []
+    kept = labels(best) - {last.label}
+    for step in search.steps:
+        for fit in step.tried:
+            if fit is best or len(fit.model.effects) != len(best.model.effects):
+                continue
+            mine = labels(fit)
+            near = best.total - fit.total < search.settings.family
+            contains = fit.model.effects[-1].kind.needs == last.kind.name  # what contains it is no other
+            if mine != labels(best) and kept <= mine and near and not contains:
+                others += sorted(mine - labels(best))
+    return tuple(dict.fromkeys(others))
+
+
+def recovered(base: Fit, best: Fit, outputs: int, rows: int) -> float:
+    """Return the share of what the re-fitted model lacks of pure noise that the effects bring.
+
+    Args:
+        base: fit of the re-fitted model.
+        best: fit of the model with effects.
+        outputs: their number.
+        rows: samples that were looked at.
+
+    Returns:
+        The share, 1.0 for all.
+    """
+    noise = -0.5 * outputs * rows
+    lacks = noise - (base.fitted + base.decided)
+    return 1.0 if lacks <= 0.0 else (best.fitted + best.decided - base.fitted - base.decided) / lacks

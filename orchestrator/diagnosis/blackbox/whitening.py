@@ -1,0 +1,278 @@
+"""Whitening of residuals: a small linear surrogate of the FMU, measured at its ports, as a Kalman filter.
+
+The surrogate whitens and does nothing else: the fit runs the FMU. Impulse responses from the ports to the outputs are
+realised to a low order (eigensystem realisation, Juang and Pappa 1985). Noise at the ports then gives a filter that is
+applied to the residual of a free run and to every column of its Jacobian. For a linear FMU that equals the innovations
+of the optimal predictor.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.shared.numba_cache import kept
+
+Array = NDArray[np.float64]
+
+SHARES = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1.8e-3, 3e-3, 5.5e-3, 1e-2, 1.4e-2, 2e-2, 2.8e-2, 4e-2, 0.1, 0.3, 1.0)
+"""Port noise, as a share of the drive, that is held over a sample."""
+COLOURS = (0.0, 0.7, 0.9)
+MOST_ORDER = 6
+LEAST_SINGULAR = 1e-4
+"""Share of the largest singular value below which an order is not kept."""
+BLOCKS = 40
+"""About how many rows and columns of blocks the Hankel matrix has."""
+
+
+@dataclass(frozen=True)
+class Surrogate:
+    """``x+ = A x + B w``, ``y = C x``, outputs in units of their noise; ``order`` 0: none could be found."""
+
+    A: Array
+    B: Array
+    C: Array
+
+    @property
+    def order(self) -> int:
+        """Return the number of states."""
+        return len(self.A)
+
+
+def realised(impulses: Array) -> Surrogate:
+    """Return a surrogate of impulse responses.
+
+    Args:
+        impulses: (length, outputs, ports) response to a pulse one sample long, from the sample after it begins.
+
+    Returns:
+        The surrogate.
+    """
+    length, outputs, ports = impulses.shape
+    peak = float(np.max(np.abs(impulses), initial=0.0))
+    if length < 8 or not np.isfinite(peak) or peak == 0.0:
+        return Surrogate(np.zeros((0, 0)), np.zeros((0, ports)), np.zeros((outputs, 0)))
+    # Dense where fast modes live, then wider and wider: slow ones hardly change from sample to sample.
+    half = (length - 2) // 2
+    spaced = np.geomspace(1.0, half, BLOCKS).astype(int)
+    places = np.unique(np.concatenate([np.arange(min(BLOCKS // 2, half)), spaced]))
+    hankel = np.block([[impulses[i + j] for j in places] for i in places])
+    shifted = np.block([[impulses[i + j + 1] for j in places] for i in places])
+    U, s, Vt = np.linalg.svd(hankel, full_matrices=False)
+    order = int(np.sum(s[:MOST_ORDER] > LEAST_SINGULAR * s[0]))
+    root = np.sqrt(s[:order])
+    A = (U[:, :order] / root).T @ shifted @ (Vt[:order].T / root)
+    B = (root[:, None] * Vt[:order])[:, :ports]
+    C = (U[:, :order] * root)[:outputs]
+    values, vectors = np.linalg.eig(A)
+    size = np.abs(values)
+    values = np.where(size > 1.0, values / np.maximum(size, 1e-300), values)
+    A = np.real(vectors @ np.diag(values) @ np.linalg.inv(vectors)) if np.any(size > 1.0) else A
+    return Surrogate(A, B, C)
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of noise at the ports, ready to whiten: gains and inverse roots of every sample.
+
+    Attributes:
+        q: standard deviation of the noise, as a share of the drive; 0.0: measurement noise alone.
+        colour: correlation from sample to sample.
+        K: (n, states, outputs) gains of the predictor form.
+        R: (n, outputs, outputs) inverse Cholesky roots of the innovations' covariance.
+        half_log: (n,) half of the logarithm of its determinant.
+    """
+
+    q: float
+    colour: float
+    A: Array
+    C: Array
+    K: Array
+    R: Array
+    half_log: Array
+
+    def whiten(self, columns: Array) -> Array:
+        """Return columns (n, outputs, c), in units of the noise, whitened.
+
+        Args:
+            columns: residual and columns of its Jacobian.
+
+        Returns:
+            Shape (n, outputs, c).
+        """
+        return np.asarray(_filtered(self.A, self.C, self.K, self.R, np.ascontiguousarray(columns)))
+
+
+def level(surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, spread: float = 0.0) -> Level:
+    """Return the filter for port noise over ``n`` samples.
+
+    Args:
+        surrogate: of the FMU.
+        q, drive: the noise is ``q`` times ``drive`` (ports,).
+        colour: its correlation from sample to sample.
+        n: samples.
+        spread: how far the state that the FMU starts from may be off, as seen at the outputs, in units of their noise.
+
+    Returns:
+        The filter.
+    """
+    outputs = surrogate.C.shape[0]
+    if (q == 0.0 and spread == 0.0) or surrogate.order == 0:
+        R = np.repeat(np.eye(outputs)[None], n, axis=0)
+        return Level(0.0, 0.0, np.zeros((0, 0)), np.zeros((outputs, 0)), np.zeros((n, 0, outputs)), R, np.zeros(n))
+    order, ports = surrogate.B.shape
+    sd = q * drive
+    if colour == 0.0:
+        A, C = surrogate.A, surrogate.C
+        Q = (surrogate.B * sd**2) @ surrogate.B.T
+        start = _start(surrogate, spread)
+    else:
+        A = np.block([[surrogate.A, surrogate.B], [np.zeros((ports, order)), colour * np.eye(ports)]])
+        C = np.hstack([surrogate.C, np.zeros((outputs, ports))])
+        Q = np.zeros_like(A)
+        Q[order:, order:] = np.diag((1.0 - colour**2) * sd**2)
+        start = np.zeros_like(A)
+        start[:order, :order] = _start(surrogate, spread)
+        start[order:, order:] = np.diag(sd**2)
+    A, C, Q, start = (np.ascontiguousarray(a) for a in (A, C, Q, start))
+    K, R, half_log = _gains(A, C, Q, start, n)
+    return Level(q, colour, A, C, K, R, half_log)
+
+
+REACH = 400
+"""Samples over which efforts at the ports may have led to the state that the record starts from."""
+
+
+def _start(surrogate: Surrogate, spread: float) -> Array:
+    """Return the covariance of the initial state: what port noise before the record would have led to."""
+    total = np.zeros_like(surrogate.A)
+    if spread == 0.0:
+        return total
+    step = surrogate.B.copy()
+    for _ in range(REACH):
+        total += step @ step.T
+        step = surrogate.A @ step
+    seen = float(np.max(np.diag(surrogate.C @ total @ surrogate.C.T), initial=0.0))
+    return np.asarray(total * (spread**2 / seen)) if seen > 0.0 else total
+
+
+@dataclass
+class Ladder:
+    """Filters for every level of port noise, made when first needed."""
+
+    surrogate: Surrogate
+    drive: Array
+    n: int
+    spread: float = 0.0
+    made: dict[int, Level] = field(default_factory=dict)
+
+    @property
+    def size(self) -> int:
+        """Return the number of levels."""
+        return 1 if self.surrogate.order == 0 else 1 + (len(SHARES) - 1) * len(COLOURS)
+
+    def share(self, k: int) -> float:
+        """Return the port noise of level ``k`` as a share of the drive.
+
+        Args:
+            k: level of port noise, from 0.
+
+        Returns:
+            The share.
+        """
+        return SHARES[0 if k == 0 else 1 + (k - 1) % (len(SHARES) - 1)]
+
+    def colour(self, k: int) -> float:
+        """Return the correlation from sample to sample at level ``k``.
+
+        Args:
+            k: level of port noise, from 0.
+
+        Returns:
+            The correlation.
+        """
+        return COLOURS[0 if k == 0 else (k - 1) // (len(SHARES) - 1)]
+
+    def near(self, k: int) -> list[int]:
+        """Return the levels around ``k``, of both colours, and that of no noise.
+
+        Args:
+            k: level of port noise, from 0.
+
+        Returns:
+            The levels.
+        """
+        if self.size == 1:
+            return [0]
+        count = len(SHARES) - 1
+        place = 0 if k == 0 else (k - 1) % count
+        around = [j for j in range(place - 3, place + 4) if 0 <= j < count]
+        return [0, *(1 + j + c * count for c in range(len(COLOURS)) for j in around)]
+
+    def __getitem__(self, k: int) -> Level:
+        if k not in self.made:
+            self.made[k] = level(self.surrogate, self.share(k), self.colour(k), self.drive, self.n, self.spread)
+        return self.made[k]
+
+
+@kept()
+def _gains(A, C, Q, P, n):  # type: ignore[no-untyped-def]
+    """Return predictor gains, inverse roots, half log determinants of every sample; each output's noise is 1."""
+    states, outputs = A.shape[0], C.shape[0]
+    K = np.zeros((n, states, outputs))
+    R = np.zeros((n, outputs, outputs))
+    half_log = np.zeros(n)
+    eye = np.eye(outputs)
+    AT, CT = np.ascontiguousarray(A.T), np.ascontiguousarray(C.T)
+    still = 0
+    for k in range(n):
+        if still > 3:  # the recursion has settled
+            K[k], R[k], half_log[k] = K[k - 1], R[k - 1], half_log[k - 1]
+            continue
+        S = C @ P @ CT + eye
+        L = np.linalg.cholesky(S)
+        inverse = np.linalg.inv(L)
+        IT = np.ascontiguousarray(inverse.T)
+        gain = A @ (P @ (CT @ (IT @ inverse)))
+        K[k], R[k] = gain, inverse
+        half_log[k] = np.sum(np.log(np.diag(L)))
+        after = A @ P @ AT - gain @ S @ np.ascontiguousarray(gain.T) + Q
+        P = 0.5 * (after + after.T)
+        if k > 0 and abs(half_log[k] - half_log[k - 1]) < 1e-12 * (1.0 + abs(half_log[k])):
+            still += 1
+        else:
+            still = 0
+    return K, R, half_log
+
+
+@kept()
+def _filtered(A, C, K, R, columns):  # type: ignore[no-untyped-def]
+    n, outputs, count = columns.shape
+    states = A.shape[0]
+    out = np.empty_like(columns)
+    x = np.zeros((states, count))
+    fresh = np.zeros((states, count))
+    e = np.zeros((outputs, count))
+    for k in range(n):
+        for j in range(outputs):
+            for c in range(count):
+                value = columns[k, j, c]
+                for s in range(states):
+                    value -= C[j, s] * x[s, c]
+                e[j, c] = value
+        for j in range(outputs):
+            for c in range(count):
+                value = 0.0
+                for i in range(j + 1):
+                    value += R[k, j, i] * e[i, c]
+                out[k, j, c] = value
+        for s in range(states):
+            for c in range(count):
+                value = 0.0
+                for i in range(states):
+                    value += A[s, i] * x[i, c]
+                for j in range(outputs):
+                    value += K[k, s, j] * e[j, c]
+                fresh[s, c] = value
+        x, fresh = fresh, x
+    return out

@@ -1,0 +1,1 @@
+"""Fits of a model to a record: likelihood of innovations, damped fit, standard errors from blocks."""

@@ -1,0 +1,325 @@
+"""Prediction-error fit of a set of parameters: Levenberg-Marquardt on whitened innovations with Gaussian priors."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.shared.inference.colour import ORDERS, WHITE, Colour, colour_of
+from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
+from orchestrator.shared.inference.normal import NORMAL_95
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter that a fit may change: its place in ``p``, scale, bounds and prior (mean, standard deviation)."""
+
+    place: int
+    scale: float
+    minimum: float
+    maximum: float
+    prior: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The outcome of a fit: parameters, process noise, innovations and the covariance of the free parameters."""
+
+    p: Array
+    q: float
+    z: Array
+    free: tuple[Free, ...]
+    covariance: Array
+    fitted: float  # log-likelihood of the part that was fitted, prior included
+    validated: float  # log-likelihood of the part after it
+    colour: Colour = WHITE  # of the innovations of the part that was fitted
+
+    def standard_error(self, place: int) -> float:
+        """Return the standard error of one free parameter.
+
+        Args:
+            place: of the parameter in the predictor's tuple.
+
+        Returns:
+            The error, in the parameter's unit.
+        """
+        row = next(n for n, entry in enumerate(self.free) if entry.place == place)
+        return float(np.sqrt(max(self.covariance[row, row], 0.0)))
+
+    def interval(self, place: int) -> tuple[float, float]:
+        """Return the 95 % interval of one free parameter, cut off at its bounds.
+
+        Args:
+            place: of the parameter in the predictor's tuple.
+
+        Returns:
+            Lower and upper end, in the parameter's unit.
+        """
+        entry = next(entry for entry in self.free if entry.place == place)
+        reach = NORMAL_95 * self.standard_error(place)
+        low, high = float(self.p[place]) - reach, float(self.p[place]) + reach
+        return (max(low, entry.minimum), min(high, entry.maximum))
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The samples that are fitted, those that decide, and those that nothing has touched."""
+
+    fitted: slice
+    validated: slice
+    held_out: slice
+
+    @property
+    def seen(self) -> slice:
+        """Return the samples that may be looked at: the fitted and the deciding ones, which are neighbours."""
+        both = (self.fitted, self.validated)
+        return slice(min(part.start for part in both), max(part.stop for part in both))
+
+
+def split(sizes: Sequence[int], settings: DiagnosisSettings) -> tuple[Parts, list[tuple[int, int]]]:
+    """Return the parts of records of ``sizes`` samples: fitted, deciding, held out, one after the other.
+
+    Args:
+        sizes: samples of each record.
+        settings: of the diagnosis.
+
+    Returns:
+        the parts of the series of all records, and of each record where its deciding and its held-out part begin.
+    """
+    own, total, found = settings.fit, sum(sizes), []
+    for size in sizes:
+        most = int(own.most_fitted * size / total)
+        a = min(int(size * own.fitted), most)
+        found.append((a, min(int(size * own.looked_at), a + most // 2)))
+    a, b = (sum(edges) for edges in zip(*found, strict=True))
+    return Parts(slice(settings.likelihood.head, a), slice(a, b), slice(b, total)), found
+
+
+def log_prior(p: Array, free: Sequence[Free]) -> float:
+    """Return the logarithm of the prior density of the free parameters, up to a constant.
+
+    Args:
+        p: (parameters,) of the predictor.
+        free: parameters to fit.
+
+    Returns:
+        The logarithm.
+    """
+    return -0.5 * sum(((p[f.place] - f.prior[0]) / f.prior[1]) ** 2 for f in free if f.prior is not None)
+
+
+def jacobian(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Free], z: Array, part: slice) -> Array:
+    """Return the derivative (samples, channels, parameters) of whitened innovations by the scaled parameters.
+
+    Args:
+        likelihood: of the record.
+        p: (parameters,) of the predictor.
+        q: process noise, as a share of the drive's rms torque.
+        free: parameters to fit.
+        z: (samples, channels) whitened innovations at ``p``.
+        part: the samples.
+
+    Returns:
+        The derivative.
+    """
+    columns = np.empty((*z[part].shape, len(free)))
+    for n, entry in enumerate(free):
+        moved = p.copy()
+        step = likelihood.settings.fit.difference * entry.scale
+        if moved[entry.place] + step > entry.maximum:
+            step = -step
+        moved[entry.place] += step
+        columns[:, :, n] = (likelihood.whitened(moved, q)[part] - z[part]) / (step / entry.scale)
+    return columns
+
+
+@np.errstate(over="ignore", invalid="ignore")  # a step into instability is seen by its cost
+def fit(
+    likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts,
+    iterations: int | None = None, most: int = ORDERS[-1],
+) -> Fit:  # fmt: skip
+    """Maximise the likelihood of ``parts.fitted`` over the ``free`` parameters at process noise ``q``.
+
+    Covariance and colour of the innovations are re-estimated at every iteration, so that the determinant of what an
+    autoregression leaves of them is minimised.
+
+    Args:
+        likelihood: of the record.
+        start: all parameters; those that are not free stay.
+        q: process noise.
+        free: parameters to fit.
+        parts: parts of the record.
+        iterations: most Levenberg-Marquardt steps; None: as in the settings.
+        most: largest order of the autoregression; 0: innovations count as white.
+
+    Returns:
+        The fit.
+    """
+    return _descent(likelihood, start, q, free, parts, iterations, most)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def settled(likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts) -> Fit:
+    """Return the better of two fits: from ``start``, and from where innovations counted as white lead from there.
+
+    A model that is far off leaves slow innovations, whose autoregression hides what is slow in the signals, its
+    own errors among it: such a fit stays where it is.
+
+    Args:
+        likelihood: of the record.
+        start: (parameters,) to start from.
+        q: process noise, as a share of the drive's rms torque.
+        free: parameters to fit.
+        parts: of the record: fitted, deciding, held out.
+
+    Returns:
+        The fit.
+    """
+    direct = fit(likelihood, start, q, free, parts)
+    white = _descent(likelihood, start, q, free, parts, None, 0)
+    other = fit(likelihood, white.p, q, free, parts) if np.all(np.isfinite(white.z)) else direct
+    return other if other.fitted > direct.fitted else direct
+
+
+Point = tuple[Array, Array]  # parameters, innovations
+
+
+def _descent(
+    likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, iterations: int | None,
+    most: int,
+) -> Fit:  # fmt: skip
+    """Return the best point of a descent whose innovations are whitened by an autoregression of order ``most``."""
+    settings, part = likelihood.settings.fit, parts.fitted
+    scales = np.array([f.scale for f in free])
+    seen: list[Fit] = []  # at every point of the descent
+
+    def linearise(point: Point) -> Linearised[Point] | None:
+        p, z = point
+        colour = colour_of(z, part, most)
+        seen.append(_fit_at(likelihood, p, q, z, free, parts, colour))
+        if not free or not colour.usable:
+            return None
+        residual = colour.white(z, part).ravel()
+        wide, inner = reaching_back(part, colour.order)
+        J = colour.white(jacobian(likelihood, p, q, free, z, wide), inner).reshape(residual.size, len(free))
+        if not np.all(np.isfinite(J)):
+            return None
+        pull = np.array([(p[f.place] - f.prior[0]) / f.prior[1] if f.prior else 0.0 for f in free])
+        weight = np.array([f.scale / f.prior[1] if f.prior else 0.0 for f in free])
+        hessian = J.T @ J + np.diag(weight**2)
+        seen[-1] = replace(seen[-1], covariance=np.asarray(np.linalg.pinv(hessian) * np.outer(scales, scales)))
+
+        def moved(step: Array) -> tuple[Point, float]:
+            there = _moved(p, step * scales, free)
+            z_there = likelihood.whitened(there, q)
+            new = colour.white(z_there, part).ravel()
+            return (there, z_there), float(0.5 * new @ new - log_prior(there, free))
+
+        cost = 0.5 * residual @ residual - log_prior(p, free)
+        return Linearised(hessian, J.T @ residual + weight * pull, float(cost), moved)
+
+    damping = Damping(settings.damping, settings.damping, lambda hessian: settings.ridge, settings.patience)
+    first = np.array(start, dtype=float)
+    (p, z), _ = damped_fit(
+        (first, likelihood.whitened(first, q)), linearise, damping,
+        settings.iterations if iterations is None else iterations, lambda gain, cost: gain < settings.enough,
+    )  # fmt: skip
+    last = _fit_at(likelihood, p, q, z, free, parts, colour_of(z, part, most))
+    seen.append(replace(last, covariance=seen[-1].covariance) if seen else last)
+    return max(seen, key=lambda found: found.fitted)
+
+
+def _fit_at(
+    likelihood: RecordLikelihood, p: Array, q: float, z: Array, free: Sequence[Free], parts: Parts, colour: Colour
+) -> Fit:  # fmt: skip
+    nothing: Array = np.zeros((len(free), len(free)))
+    if not colour.usable:
+        return Fit(p, q, z, tuple(free), nothing, -np.inf, -np.inf, colour)
+    fitted = likelihood.log_likelihood(z, q, parts.fitted, colour, p) - colour.cost + log_prior(p, free)
+    validated = likelihood.log_likelihood(z, q, parts.validated, colour, p)
+    return Fit(p, q, z, tuple(free), nothing, fitted, validated, colour)
+
+
+def reaching_back(part: slice, order: int) -> tuple[slice, slice]:
+    """Return a part with the samples that an autoregression needs before it, and where the part lies in that.
+
+    Args:
+        part: the samples.
+        order: of the autoregression.
+
+    Returns:
+        Both.
+    """
+    begin = max(part.start - order, 0)
+    return slice(begin, part.stop), slice(part.start - begin, part.stop - begin)
+
+
+def anneal(
+    likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, levels: Sequence[float],
+    most: int = ORDERS[-1],
+) -> Fit:  # fmt: skip
+    """Fit at ``q``, then at other levels of process noise, in long strides and then in short ones.
+
+    Long strides down go on where the likelihood of the fitted part falls: a colour that was estimated at a high level
+    holds part of what a right model explains at a low one.
+
+    Args:
+        likelihood, start, free, parts: as in :func:`fit`.
+        q: level to start from, one of ``levels``.
+        levels: the ladder of process noise, falling.
+        most: largest order of the autoregression of innovations; 0: they count as white.
+
+    Returns:
+        The fit.
+    """
+    first = settled(likelihood, start, q, free, parts) if most else fit(likelihood, start, q, free, parts, most=0)
+    at, best = list(levels).index(q), first
+    settings = likelihood.settings.fit
+    for stride in settings.strides:
+        for direction in (1, -1):
+            patience = settings.passed_over if direction > 0 and stride == settings.strides[0] else 0
+            place, misses = at, 0
+            while misses <= patience and 0 <= place + direction * stride < len(levels):
+                place += direction * stride
+                tried = fit(likelihood, best.p, levels[place], free, parts, most=most)
+                if tried.fitted > best.fitted:
+                    best, at, misses = tried, place, 0
+                else:
+                    misses += 1
+    return replace(best, validated=decided(likelihood, best, parts, levels)) if most else best
+
+
+def decided(likelihood: RecordLikelihood, best: Fit, parts: Parts, levels: Sequence[float]) -> float:
+    """Return the log-likelihood of the deciding part, its process noise raised as long as that helps.
+
+    A model that is nearly right may deserve more process noise on a part that it was not fitted to.
+
+    Args:
+        likelihood: of the record.
+        best: fit to the fitted part.
+        parts: of the record: fitted, deciding, held out.
+        levels: of process noise, falling.
+
+    Returns:
+        The log-likelihood.
+    """
+    value = best.validated
+    for level in reversed(levels[: list(levels).index(best.q)]):
+        z = likelihood.whitened(best.p, level)
+        raised = likelihood.log_likelihood(z, level, parts.validated, colour_of(z, parts.fitted), best.p)
+        if not raised > value:
+            break
+        value = raised
+    return value
+
+
+def _moved(p: Array, step: Array, free: Sequence[Free]) -> Array:
+    moved = p.copy()
+    for change, entry in zip(step, free, strict=True):
+        moved[entry.place] = min(max(p[entry.place] + change, entry.minimum), entry.maximum)
+    return moved

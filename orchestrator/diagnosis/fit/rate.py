@@ -1,0 +1,182 @@
+"""The rate at which a record is analysed: from its content, not from how often it was sampled.
+
+A record that was interpolated goes back to the rows that were measured. One that was sampled far faster than anything
+in it moves is brought down behind one linear-phase filter for torque and angles alike, the torque then averaged over
+the new samples, which keeps its impulse. What is left out is noise; a diagnosis then says the same at any rate.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.record_likelihood import noise_level
+from orchestrator.diagnosis.settings import DiagnosisSettings, RateSettings
+from orchestrator.plants.description import Plant
+from orchestrator.records.record import Record
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The record as it is analysed.
+
+    Attributes:
+        record: the record.
+        factor: rows of the file for one that is analysed.
+        interpolated: rows of the file for one that was measured; 1: none was interpolated.
+    """
+
+    record: Record
+    factor: int
+    interpolated: int
+
+    @property
+    def rate(self) -> float:
+        """Return the rate [Hz]."""
+        return 1.0 / self.record.step
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the rate [Hz], the rows, the file's rows for each, and the notes.
+
+        Returns:
+            Plain data.
+        """
+        own = {"rate": self.rate, "rows": self.record.size, "rows_of_the_file": self.factor}
+        return own | {"notes": list(self.notes)}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return what a reader should know of it."""
+        if self.factor == 1:
+            return ()
+        why = f"rows were interpolated {self.interpolated} times" if self.interpolated > 1 else "nothing faster shows"
+        return (f"analysed at {self.rate:.4g} Hz, one row for {self.factor}: {why}",)
+
+
+def analysed(
+    record: Record, plant: Plant, nominal: Array, settings: DiagnosisSettings, most: int | None = None
+) -> Analysis:
+    """Return a record at the rate that its content asks for.
+
+    Args:
+        record: as it was read.
+        plant: the plant.
+        nominal: its nominal parameters; their oscillations are kept.
+        settings: of the diagnosis.
+        most: rows of the file for one that is analysed, at most; None: as many as its content asks for.
+
+    Returns:
+        The record and how it was thinned.
+    """
+    own = settings.rate
+    native = _interpolated_by(record, own)
+    measured = _thinned(record, native)
+    fastest = float(np.max(np.abs(np.linalg.eigvals(plant.jacobian(nominal)).imag))) / (2.0 * math.pi)
+    reach = band(measured, own, settings.likelihood.noise_window)
+    needed = max(own.least_rate, own.per_band * reach, own.per_mode * fastest)
+    rows = max(1, measured.size // own.least_rows)
+    factor = max(1, min(math.floor(1.0 / measured.step / needed * (1.0 + own.rounding)), rows))
+    factor = factor if most is None else max(1, min(factor, most // native))
+    return Analysis(decimated(measured, factor, own), factor * native, native)
+
+
+def _interpolated_by(record: Record, settings: RateSettings) -> int:
+    """Return how many rows there are for one that was measured, from rows that lie on a line between others."""
+    second = np.abs(np.diff(record.theta_m, 2))
+    moving = second[second > 0.0]
+    if moving.size < 50:
+        return 1
+    limit = settings.on_line * float(np.median(moving))
+    for factor in range(settings.most_interpolated, 1, -1):
+        phases = [second[(n % factor) :: factor] for n in range(factor)]
+        bent = [float(np.mean(phase > limit)) for phase in phases]
+        corner = int(np.argmax(bent))
+        if bent[corner] > 0.5 and all(b < 1.0 - settings.all_but for n, b in enumerate(bent) if n != corner):
+            return factor
+    return 1
+
+
+def _thinned(record: Record, factor: int) -> Record:
+    """Return every ``factor``-th row, those at which an interpolated record bends."""
+    if factor == 1:
+        return record
+    second = np.abs(np.diff(record.theta_m, 2))
+    bends = [float(np.mean(second[n::factor])) for n in range(factor)]
+    first = (int(np.argmax(bends)) + 1) % factor
+    rows = slice(first, None, factor)
+    load = None if record.theta_l is None else record.theta_l[rows]
+    return replace(record, time=record.time[rows], u=record.u[rows], theta_m=record.theta_m[rows], theta_l=load,
+                   further={})  # fmt: skip
+
+
+def band(record: Record, settings: RateSettings, window: int) -> float:
+    """Return the frequency [Hz] below which nearly all of a squared speed lies that shows above measurement noise.
+
+    Args:
+        record: as it was read.
+        settings: the thresholds.
+        window: samples of the sliding cubic whose residual is the noise.
+
+    Returns:
+        The frequency; 0.0 where nothing moves.
+    """
+    from scipy.signal import welch
+
+    highest = 0.0
+    for angle in (record.theta_m, record.theta_l):
+        if angle is None:
+            continue
+        rate = 1.0 / record.step
+        frequency, power = welch(np.diff(angle), rate, nperseg=min(settings.pane, angle.size // 4))
+        slope = np.abs(1.0 - np.exp(-2j * np.pi * frequency / rate)) ** 2
+        power = power[1:] / slope[1:]
+        floor = max(2.0 * noise_level(angle, window) ** 2 / rate, float(np.median(power[-len(power) // 8 :])))
+        speed = np.where(power > settings.shows * floor, power - floor, 0.0) * frequency[1:] ** 2
+        share = np.cumsum(speed) / max(float(np.sum(speed)), 1e-300)
+        beyond = np.maximum.accumulate(power[::-1])[::-1]  # largest power at a frequency or above it
+        twice = beyond[np.minimum(2 * np.arange(power.size) + 1, power.size - 1)]
+        drowned = np.flatnonzero(
+            power[: power.size // 2] < twice[: power.size // 2]
+        )  # noise is no smaller an octave above
+        last = int(drowned[0]) if drowned.size else power.size - 1
+        highest = max(highest, float(frequency[1:][min(int(np.searchsorted(share, 1.0 - settings.most_above)), last)]))
+    return highest
+
+
+def decimated(record: Record, factor: int, settings: RateSettings) -> Record:
+    """Return a record at a rate lower by a whole ``factor``.
+
+    Args:
+        record: as it was read.
+        factor: rows for one that is kept.
+        settings: the thresholds.
+
+    Returns:
+        The record.
+    """
+    if factor <= 1:
+        return record
+    from scipy.signal import fftconvolve, firwin
+
+    half = 4 * factor
+    kernel = firwin(2 * half + 1, settings.cut_off / factor)
+    size = (record.size - 1) // factor
+
+    def smooth(values: Array) -> Array:
+        mirrored = np.concatenate(
+            [2 * values[0] - values[half:0:-1], values, 2 * values[-1] - values[-2 : -half - 2 : -1]]
+        )
+        return np.asarray(fftconvolve(mirrored, kernel, "valid"))[: size * factor]
+
+    def angle(values: Array | None) -> Array | None:
+        return None if values is None else smooth(values)[::factor]
+
+    torque = smooth(record.u).reshape(size, factor).mean(axis=1)
+    motor = angle(record.theta_m)
+    assert motor is not None
+    return replace(record, time=record.time[: size * factor : factor], u=torque, theta_m=motor,
+                   theta_l=angle(record.theta_l), further={})  # fmt: skip

@@ -1,0 +1,472 @@
+"""Innovations of a record under one set of parameters and one level of process noise, and their likelihood.
+
+Gains come from the Riccati recursion of the plant with every effect off, at the nominal parameters, for white
+torques of standard deviation ``q`` on motor and load; they depend on the sample (they start large, since the initial
+state is not known) and not on the candidate, so one set of gains serves all candidates at one ``q``.
+
+With one encoder and a gap before what is not measured, models with a gap share another set: that of a filter linearised
+along the motion of one of them, the ``reference``.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from threading import Event
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.riccati import riccati
+from orchestrator.diagnosis.fit.runs import Run, stretches
+from orchestrator.diagnosis.settings import DiagnosisSettings, LikelihoodSettings
+from orchestrator.plants.description import STATES, Plant
+from orchestrator.plants.measurement import LEAD, SHIFT
+from orchestrator.plants.predictor import follower_of, predictor_of
+from orchestrator.records.record import Record, quantisation_step
+from orchestrator.shared.inference.colour import Colour, colour_of
+from orchestrator.shared.inference.noise import residual_noise
+
+Array = NDArray[np.float64]
+
+SMOOTHED = 9  # samples of the cubic that gives the motion within a sample
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The signals of a record as the predictor takes them.
+
+    Attributes:
+        y: (n, 2) measured angles; the second column is zero with one encoder.
+        u: (n,) requested torque.
+        h: sample time [s].
+        channels: number of encoders, 1 or 2.
+        noise: (channels,) standard deviation of the measurement noise, rounding included.
+        torque: rms of the drive's torque, the unit in which process noise is counted.
+        runs: the records, where there are several.
+    """
+
+    y: Array
+    u: Array
+    h: float
+    channels: int
+    noise: Array
+    torque: float
+    runs: tuple[Run, ...] = ()
+
+    def stretches(self, part: slice) -> list[slice]:
+        """Return the stretches of a part within which time goes on.
+
+        Args:
+            part: of the samples.
+
+        Returns:
+            Slices, in order.
+        """
+        return [rows for _, rows in stretches(self.runs, part, self.size)]
+
+    @property
+    def size(self) -> int:
+        """Return the number of samples."""
+        return int(self.u.size)
+
+    def aligned(self, plant: Plant, p: Array) -> "Signals":
+        """Return the signals as they were, from how the log has them: what is early put later, what is late earlier.
+
+        Args:
+            plant: the plant.
+            p: its parameters, those of the log among them.
+
+        Returns:
+            A copy, or these signals.
+        """
+        lead, late = (plant.value(p, name) if name in plant.names else 0.0 for name in (LEAD.name, SHIFT.name))
+        if lead == 0.0 and late == 0.0:
+            return self
+        u = self._each(self.u, lambda asked: _earlier(asked, lead / self.h))
+        return replace(self, u=u, y=self._earlier_load(late / self.h))
+
+    def _each(self, values: Array, function: Callable[[Array], Array]) -> Array:
+        """Return ``function`` of the values (n,) of each record in time, in their places."""
+        if not self.runs:
+            return function(values)
+        out = np.empty_like(values)
+        for run in self.runs:
+            out[run.rows] = function(values[run.rows])
+        return out
+
+    @cached_property
+    def _motion(self) -> tuple[Array, Array]:
+        """Return change (n,) and curvature (n,) of the load's angle per sample, by a sliding cubic."""
+        from scipy.signal import savgol_filter
+
+        def derived(angle: Array, order: int) -> Array:
+            window = min(SMOOTHED, (angle.size - 1) // 2 * 2 + 1)
+            return np.asarray(savgol_filter(angle, window, 3, deriv=order, mode="interp"))
+
+        return self._each(self.y[:, 1], lambda y: derived(y, 1)), self._each(self.y[:, 1], lambda y: derived(y, 2))
+
+    def _earlier_load(self, samples: float) -> Array:
+        """Return the angles (n, 2), the load's read ``samples`` later.
+
+        Whole samples are moved; the rest follows a smoothed motion, so that the noise of a sample stays as it is.
+        """
+        if samples == 0.0:
+            return self.y
+        whole = round(samples)
+        rest, (one, two) = samples - whole, self._motion
+        load = self.y[:, 1] + rest * one + 0.5 * rest**2 * two
+        load = self._each(load, lambda y: y[np.clip(np.arange(y.size) + whole, 0, y.size - 1)])
+        return np.ascontiguousarray(np.column_stack([self.y[:, 0], load]))
+
+
+def _earlier(u: Array, samples: float) -> Array:
+    """Return requests (n,), each held for a sample, that act ``samples`` earlier: their means over each sample."""
+    whole = math.floor(samples)
+    at = np.arange(u.size) + whole
+    first, second = (u[np.clip(at + n, 0, u.size - 1)] for n in (0, 1))
+    return np.asarray(first + (samples - whole) * (second - first))
+
+
+def signals_of(record: Record, tau: float, settings: LikelihoodSettings) -> Signals:
+    """Return the signals of a record for a plant whose torque lags by ``tau`` [s].
+
+    Args:
+        record: the record.
+        tau: lag of the drive [s].
+        settings: of the likelihood.
+
+    Returns:
+        Torque, angles, their noise and sizes.
+    """
+    one = record.theta_l is None
+    load = np.zeros(record.size) if record.theta_l is None else record.theta_l
+    y = np.ascontiguousarray(np.column_stack([record.theta_m, load]))
+    channels = 1 if one else 2
+    noise = np.array([noise_level(y[:, n], settings.noise_window) for n in range(channels)])
+    return Signals(
+        y, np.ascontiguousarray(record.u), record.step, channels, noise, lagged_rms(record.u, record.step, tau)
+    )
+
+
+def noise_level(values: Array, window: int) -> float:
+    """Return the standard deviation of an encoder's noise, at least the rounding error of its count.
+
+    Args:
+        values: (n,) angles.
+        window: samples of the sliding cubic whose residual is the noise.
+
+    Returns:
+        The standard deviation, in the unit of ``values``.
+    """
+    return residual_noise(values, quantisation_step(values), window)
+
+
+def lagged_rms(u: Array, h: float, tau: float) -> float:
+    """Return the rms [N.m] of ``u`` behind a lag of ``tau`` [s].
+
+    Args:
+        u: (n,) requested torque [N.m].
+        h: sample time [s].
+        tau: [s].
+
+    Returns:
+        The rms, positive.
+    """
+    from scipy.signal import lfilter
+
+    pole = math.exp(-h / tau) if tau > 0.0 else 0.0
+    torque = lfilter([1.0 - pole], [1.0, -pole], u)
+    return max(float(np.sqrt(np.mean(torque**2))), 1e-12)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Filter gains (n, 8, 2) in the predictor's places and the whitening factors (n, channels, channels)."""
+
+    gains: Array
+    roots: Array
+
+
+@dataclass
+class RecordLikelihood:
+    """Runs the predictor over one record; keeps the gains of each process-noise level."""
+
+    plant: Plant
+    signals: Signals
+    nominal: Array
+    stop: int
+    settings: DiagnosisSettings
+    reference: Array | None = None  # parameters of a model with a gap, along whose motion gains are taken; None: none
+    _gains: dict[tuple[float, bytes], Gains] = field(default_factory=dict)
+    _halted: Event = field(default_factory=Event)
+
+    def __post_init__(self) -> None:
+        self._predict = predictor_of(self.plant)
+        self._delay, self._limit = (self.plant.index(name) for name in (self.plant.drive.delay, self.plant.drive.limit))
+        self._offsets = [self.plant.index(name) for name in self.plant.offsets]
+        self._substeps = self.plant.substeps(self.nominal, self.signals.h)
+        self._start = self._initial_state()
+
+    def over(self, stop: int) -> "RecordLikelihood":
+        """Return the likelihood over the samples before ``stop``; gains are shared.
+
+        Args:
+            stop: sample to stop before.
+
+        Returns:
+            The likelihood.
+        """
+        return replace(self, stop=stop)
+
+    def about(self, reference: Array) -> "RecordLikelihood":
+        """Return the likelihood whose gains for models with a gap are those along the motion of ``reference``.
+
+        It is the same one where every body has its encoder, or the reference has no gap.
+
+        Args:
+            reference: (parameters,) of a model.
+
+        Returns:
+            The likelihood.
+        """
+        return replace(self, reference=reference) if self.is_hidden(reference) else self
+
+    def is_hidden(self, p: Array) -> bool:
+        """Tell whether a model ``p`` has a gap before a body that is not measured.
+
+        Args:
+            p: (parameters,) of the predictor.
+
+        Returns:
+            True when it has.
+        """
+        shaft = self.plant.shaft
+        if shaft is None or not shaft.gap or self.signals.channels >= len(self.plant.bodies):
+            return False
+        return self.plant.value(p, shaft.gap) > 0.0
+
+    def gains(self, q: float, p: Array | None = None) -> Gains:
+        """Return the gains for white torques of standard deviation ``q`` times the drive's rms torque.
+
+        Args:
+            q: process noise.
+            p: parameters of the model; None: one without a gap.
+
+        Returns:
+            Gains and roots of every sample.
+        """
+        reference = self.reference if self.reference is not None and p is not None and self.is_hidden(p) else None
+        key = (q, b"" if reference is None else reference.tobytes())
+        if key not in self._gains:
+            self._gains[key] = self._solve(q, reference)
+        return self._gains[key]
+
+    def halt(self) -> None:
+        """Let every run of the predictor from now on, in whatever thread, raise ``CancelledError``."""
+        self._halted.set()
+
+    def innovations(self, p: Array, q: float) -> tuple[Array, Array]:
+        """Return raw innovations (stop, 2) and corrected states (stop, 8).
+
+        Args:
+            p: parameters of the predictor, in its order.
+            q: process noise of the filter, relative to the plant's.
+
+        Returns:
+            Innovations (stop, 2) and states (stop, 8) after each correction.
+
+        Raises:
+            CancelledError: the fits have been stopped by an interrupt.
+        """
+        if self._halted.is_set():
+            raise CancelledError
+        n, gains = self.stop, self.gains(q, p).gains
+        raw, states = np.empty((n, 2)), np.empty((n, STATES))
+        signals = self.signals.aligned(self.plant, p)
+        offsets = [p[place] for place in self._offsets] + [0.0, 0.0]
+        for rows, u, start in self._records(signals, n):
+            errors, corrected = np.empty((len(u), 2)), np.empty((len(u), STATES))
+            self._predict(
+                signals.y[rows], *self.delivered(p, u), tuple(p.tolist()), signals.h, self.substeps(p), gains[rows],
+                (offsets[0], offsets[1]), start, errors, corrected,
+            )  # fmt: skip
+            raw[rows], states[rows] = errors, corrected
+        for run in signals.runs[1:]:
+            raw[run.rows[run.rows < n][: self.settings.likelihood.settled]] = 0.0  # they only settle the state
+        return raw, states
+
+    def whitened(self, p: Array, q: float) -> Array:
+        """Return innovations (stop, channels), each sample scaled by the filter's own covariance.
+
+        Args:
+            p: (parameters,) of the predictor.
+            q: process noise, as a share of the drive's rms torque.
+
+        Returns:
+            The innovations.
+        """
+        raw, _ = self.innovations(p, q)
+        roots = self.gains(q, p).roots[: self.stop]
+        m = self.signals.channels
+        with np.errstate(over="ignore", invalid="ignore"):  # of an unstable predictor; the caller sees that
+            return np.asarray((roots @ raw[:, :m, None])[:, :, 0])
+
+    def _records(self, signals: Signals, stop: int) -> Iterator[tuple[Any, Array, tuple[float, ...]]]:
+        """Yield of each record its rows before ``stop``, its requests there and its initial state."""
+        if not signals.runs:
+            yield slice(0, stop), signals.u[:stop], self._start
+        for run in signals.runs:
+            rows = run.rows[run.rows < stop]
+            yield rows, signals.u[rows], self._initial_state(int(run.rows[0]))
+
+    def delivered(self, p: Array, u: Array) -> tuple[Array, Array, float]:
+        """Return what of the requests ``u`` (n,) reaches the drive in each sample: limited, then late.
+
+        Args:
+            p: (parameters,) of the predictor.
+            u: [N.m].
+
+        Returns:
+            torque (n,) in the first part of each sample, torque (n,) in the rest, length of the first part [s].
+        """
+        h, stop = self.signals.h, len(u)
+        limit, delay = p[self._limit], float(p[self._delay])
+        if limit < self.settings.likelihood.unlimited:
+            u = np.clip(u, -limit, limit)
+        u, _ = self.plant.followed(p, u, h)
+        if delay <= 0.0:
+            return u, u, 0.0
+        whole = math.floor(delay / h)
+        late = u[np.maximum(np.arange(stop) - whole, 0)]
+        early = u[np.maximum(np.arange(stop) - whole - 1, 0)]
+        return early, late, delay - whole * h
+
+    def substeps(self, p: Array) -> tuple[int, int]:
+        """Return Runge-Kutta steps of a sample, and of one in which dry friction may turn round.
+
+        An extra resonance may need more than the plant alone.
+
+        Args:
+            p: (parameters,) of the predictor.
+
+        Returns:
+            Both numbers.
+        """
+        needed, settings, added = 1, self.settings.likelihood, self.plant.resonance
+        if added is not None and p[self.plant.index(added.inertia)] > 0.0:
+            turned = p[self.plant.index(added.frequency)] * self.signals.h
+            needed = math.ceil(turned * settings.resonance_margin / settings.resonance_step)
+        return max(self._substeps, needed), max(settings.finer * self._substeps, needed)
+
+    def log_likelihood(
+        self, z: Array, q: float, part: slice, colour: Colour | None = None, p: Array | None = None
+    ) -> float:  # fmt: skip
+        """Return the log-likelihood of a part, the covariance of what ``colour`` leaves taken from that part.
+
+        Without a colour, innovations count as independent from sample to sample; ``p`` are the model's parameters
+        (None: it has no gap).
+
+        Args:
+            z: (n, channels) whitened innovations.
+            q: process noise, as a share of the drive's rms torque.
+            part: the samples.
+            colour: autoregression that is taken out first.
+            p: (parameters,) of the predictor.
+
+        Returns:
+            The log-likelihood; minus infinity for an unstable predictor.
+        """
+        colour = colour_of(z, part, 0) if colour is None else colour
+        if not colour.usable:
+            return -math.inf
+        e = colour.white(z, part)
+        if not np.all(np.isfinite(e)):
+            return -math.inf  # an unstable predictor explains nothing
+        covariance = e.T @ e / len(e)
+        roots = self.gains(q, p).roots[part]
+        logdet = np.linalg.slogdet(covariance)[1] - 2.0 * np.linalg.slogdet(colour.root)[1]
+        scale = np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2)))
+        return float(-0.5 * len(e) * logdet + scale)
+
+    def _initial_state(self, first: int = 0) -> tuple[float, ...]:
+        y = self.signals.y[first:]
+        start = [0.0] * STATES
+        for channel, body in enumerate(self.plant.bodies):
+            if channel < self.signals.channels:
+                start[body.angle] = float(y[0, channel])
+            else:
+                start[body.angle] = float(y[0, 0] / self.plant.ratio(self.nominal))
+        for place, followed in self.plant.followers:
+            start[place] = start[followed]
+        return tuple(start)
+
+    def _solve(self, q: float, reference: Array | None) -> Gains:
+        plant = self.plant
+        signals = self.signals if reference is None else self.signals.aligned(plant, reference)
+        m, n = signals.channels, signals.size
+        at = {place: row for row, place in enumerate(plant.states)}
+        size, p = len(plant.states), self.nominal
+        A = plant.transition(p, signals.h)
+        C = measurement_matrix(plant, m)
+        Q, P = np.zeros((size, size)), np.zeros((size, size))
+        ratio = plant.ratio(p)
+        speed = _largest_speed(signals, self.settings.likelihood.speed_span)
+        for body in plant.bodies:
+            torque = q * signals.torque * (ratio if body.geared else 1.0)
+            row = at[body.speed]
+            Q[row, row] = (torque / p[plant.index(body.inertia)]) ** 2 * signals.h
+            P[row, row] = speed**2 / (ratio**2 if body.geared else 1.0)
+        for channel, body in enumerate(plant.bodies):
+            noise = signals.noise[min(channel, m - 1)]
+            P[at[body.angle], at[body.angle]] = (self.settings.likelihood.start_angle * noise) ** 2
+        drive = at[plant.drive.torque]
+        P[drive, drive] = signals.torque**2 if plant.value(p, plant.drive.lag) > 0.0 else 0.0
+        gains, roots = np.zeros((n, size, m)), np.zeros((n, m, m))
+        noises = [run.noise for run in signals.runs] or [signals.noise]
+        for (rows, u, start), noise in zip(self._records(signals, n), noises, strict=True):
+            own, factors, R = np.zeros((len(u), size, m)), np.zeros((len(u), m, m)), np.diag(noise**2)
+            if reference is None:
+                riccati(A, C, Q, R, P, own, factors)
+            else:
+                offsets = [reference[place] for place in self._offsets] + [0.0, 0.0]
+                follower_of(plant)(
+                    signals.y[rows], *self.delivered(reference, u), tuple(reference.tolist()), signals.h,
+                    self.substeps(reference), (offsets[0], offsets[1]), start, np.array(plant.states),
+                    np.array([at[body.angle] for body in plant.bodies[:m]]), P, Q, R, own, factors,
+                )  # fmt: skip
+            gains[rows], roots[rows] = own, factors
+        full = np.zeros((n, STATES, 2))
+        for place, row in at.items():
+            full[:, place, :m] = gains[:, row]
+        for place, followed in plant.followers:
+            full[:, place] = full[:, followed]
+        return Gains(full, roots)
+
+
+def measurement_matrix(plant: Plant, channels: int) -> Array:
+    """Return (channels, states): which state of the plant with every effect off each encoder measures.
+
+    Args:
+        plant: that the record is of.
+        channels: number of encoders.
+
+    Returns:
+        Ones and zeros.
+    """
+    C = np.zeros((channels, len(plant.states)))
+    for channel, body in enumerate(plant.bodies[:channels]):
+        C[channel, plant.states.index(body.angle)] = 1.0
+    return C
+
+
+def _largest_speed(signals: Signals, span: float) -> float:
+    """Return a bound for the motor's speed from the record [rad/s], taken over ``span`` [s]."""
+    reach, largest = max(1, round(span / signals.h)), 0.0
+    for y in [signals.y[run.rows, 0] for run in signals.runs] or [signals.y[:, 0]]:
+        if reach >= y.size:
+            return float(np.ptp(y)) + 1e-9
+        largest = max(largest, float(np.max(np.abs(y[reach:] - y[:-reach])) / (reach * signals.h)))
+    return largest + 1e-9

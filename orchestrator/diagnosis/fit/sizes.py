@@ -1,0 +1,97 @@
+"""Sizes that hold where a law is not exact: the fit in white innovations beside the efficient one.
+
+The autoregression that whitens innovations makes a fit efficient as long as what is left is a noise of its own. Where
+it is the error of a law, whitening weighs the rare moments at which the law is worst, and gives away what it says of
+the rest. A fit in white innovations, weighed like white torques, is less efficient and needs neither: its standard
+errors hold whatever the colour (Newey and West). Where the two disagree by more than chance the first one's assumption
+is refuted (Hausman, Econometrica 46(6), 1978): sizes are then those of white innovations, and intervals hold both.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal, fit, jacobian
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.spread import widened
+from orchestrator.plants.effects import Effect
+from orchestrator.shared.inference.colour import colour_of
+from orchestrator.shared.inference.long_run import long_run_covariance
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sized:
+    """A fit whose sizes and intervals are fit to be reported, and names of the parameters on which fits disagree."""
+
+    fit: Fit
+    disputed: tuple[str, ...] = ()
+
+
+def sized(
+    likelihood: RecordLikelihood, found: Fit, parts: Parts, effects: Sequence[Effect], levels: Sequence[float]
+) -> Sized:
+    """Return the fit of a model as it is reported: widened, and in white innovations where the colour misleads.
+
+    Args:
+        likelihood: of the record.
+        found: the efficient fit to ``parts.fitted``.
+        parts: parts of the record.
+        effects: of the model.
+        levels: of process noise that the model may have, falling.
+
+    Returns:
+        The fit, and what the two weightings dispute.
+    """
+    efficient = widened(likelihood, found, parts.fitted, effects)
+    if found.colour.order == 0 or not found.free:
+        return Sized(efficient)
+    white = anneal(likelihood, found.p, found.q, found.free, parts, levels, most=0)
+    if not np.all(np.isfinite(white.z)):
+        return Sized(efficient)
+    robust = widened(likelihood, _with_robust_errors(likelihood, white, parts.fitted), parts.fitted, effects, _refitted)
+    places = [entry.place for entry in found.free]
+    change = robust.p[places] - efficient.p[places]
+    chance = np.sqrt(np.diag(robust.covariance) + np.diag(efficient.covariance))
+    far = np.abs(change) > likelihood.settings.fit.disputed * chance
+    disputed = tuple(
+        likelihood.plant.names[place]
+        for place, bad in zip(places, far, strict=True)
+        if bad and place < len(likelihood.plant.table)
+    )
+    if not disputed:
+        return Sized(efficient)
+    covariance = robust.covariance + np.diag((0.5 * change) ** 2)
+    colour = colour_of(robust.z, parts.fitted)
+    return Sized(replace(robust, covariance=covariance, colour=colour), disputed)
+
+
+def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -> Fit:
+    """Return a fit in white innovations with a covariance that holds whatever their colour.
+
+    Args:
+        likelihood: of the record.
+        white: fitted with innovations that count as white.
+        part: the samples that were fitted.
+    """
+    colour = colour_of(white.z, part, 0)
+    if not white.free or not colour.usable:
+        return white
+    scales = np.array([entry.scale for entry in white.free])
+    J = colour.white(jacobian(likelihood, white.p, white.q, white.free, white.z, part), slice(0, len(white.z[part])))
+    if not np.all(np.isfinite(J)):
+        return white
+    scores = np.einsum("nck,nc->nk", J, colour.white(white.z, part))
+    prior = np.diag([(entry.scale / entry.prior[1]) ** 2 if entry.prior else 0.0 for entry in white.free])
+    bread = np.linalg.pinv(np.einsum("nck,ncj->kj", J, J) + prior)
+    meat = long_run_covariance(scores) + prior
+    return replace(white, covariance=np.asarray(bread @ meat @ bread * np.outer(scales, scales)))
+
+
+def _refitted(
+    likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, iterations: int
+) -> Fit:  # fmt: skip
+    return _with_robust_errors(likelihood, fit(likelihood, start, q, free, parts, iterations, 0), parts.fitted)

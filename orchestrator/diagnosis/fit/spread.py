@@ -1,0 +1,76 @@
+"""Standard errors that hold although no law of friction or contact is exact: the fit repeated on blocks of the record.
+
+The covariance of a fit takes the model for true. Where it is not quite, each stretch of the record pulls the
+parameters its own way, by more than its noise explains: the fit is repeated on each block, and what the blocks differ
+by beyond their own standard errors widens those of the whole (overdispersion, as in quasi-likelihood; McCullagh and
+Nelder, Generalized Linear Models, 1989, ch. 9).
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.plants.effects import Effect
+
+Array = NDArray[np.float64]
+Refit = Callable[[RecordLikelihood, Array, float, Sequence[Free], Parts, int], Fit]
+
+
+def widened(
+    likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect], refit: Refit = fit
+) -> Fit:
+    """Return a fit whose covariance allows for laws that are not exact.
+
+    Args:
+        likelihood: of the record.
+        found: the fit to all of ``part``.
+        part: the samples that were fitted.
+        effects: those that the fit has; each says how far its law leaves the parameters undefined.
+        refit: how ``found`` was fitted, and its covariance found.
+
+    Returns:
+        The fit.
+    """
+    if not found.free:
+        return found
+    stretch = np.sqrt(np.maximum(_block_ratios(likelihood, found, part, refit), 1.0))
+    names = likelihood.plant.names
+    covariance = found.covariance * np.outer(stretch, stretch)
+    for effect in effects:
+        for row, entry in enumerate(found.free):
+            share = effect.tolerance.get(names[entry.place], 0.0)
+            covariance[row, row] += (share * found.p[entry.place]) ** 2
+    return replace(found, covariance=covariance)
+
+
+def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Refit = fit) -> Array:
+    """Return, for each free parameter, the mean square of how far blocks lie from the whole, in standard errors.
+
+    About one when the model is right.
+
+    Args:
+        likelihood: of the record.
+        whole: the fit to all of ``part``.
+        part: the samples that were fitted.
+        refit: how ``whole`` was fitted.
+    """
+    settings = likelihood.settings.fit
+    blocks = settings.blocks
+    edges = np.linspace(part.start, part.stop, blocks + 1).astype(int).tolist()
+    free = tuple(
+        replace(entry, prior=(entry.prior[0], entry.prior[1] * blocks**0.5)) if entry.prior else entry
+        for entry in whole.free
+    )
+    places = [entry.place for entry in free]
+    squares = []
+    for start, stop in itertools.pairwise(edges):
+        block = slice(start, stop)
+        own = refit(likelihood, whole.p, whole.q, free, Parts(block, block, block), settings.block_iterations)
+        variance = np.maximum(np.diag(own.covariance), 1e-300)
+        squares.append((own.p[places] - whole.p[places]) ** 2 / variance)
+    return np.asarray(np.mean(squares, axis=0) * blocks / (blocks - 1))

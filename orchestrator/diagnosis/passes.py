@@ -1,0 +1,254 @@
+"""Passes of the search over a record: parts in their usual roles, then in others where something is left."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit, Parts
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals
+from orchestrator.diagnosis.fit.sizes import Sized, sized
+from orchestrator.diagnosis.proof.horizons import horizons
+from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder
+from orchestrator.diagnosis.search.scene import scene_of
+from orchestrator.diagnosis.search.search import Search
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
+from orchestrator.diagnosis.verdict.gain import far_off
+from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown
+from orchestrator.diagnosis.verdict.remainder import Remainder, noise_floor, remainder, tails
+from orchestrator.plants.effects import Effect
+from orchestrator.records.model_file import Model
+from orchestrator.shared.inference.colour import colour_of
+
+Array = NDArray[np.float64]
+
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One pass of the search, with its fits to all that may be looked at.
+
+    ``plain`` re-fits parameters alone; ``base`` is the same with its sizes as they are reported, ``final`` has effects.
+    """
+
+    likelihood: RecordLikelihood
+    parts: Parts
+    search: Search
+    best: Candidate
+    plain: Fit
+    base: Fit
+    final: Fit
+    left: Remainder
+    floor_off: bool
+    unknown: bool
+    proof: Proof
+    withdrawn: tuple[str, ...]
+
+
+def passes(
+    model: Model, signals: Signals, parts: Parts, nominal: Array, settings: DiagnosisSettings, progress: Progress
+) -> Pass:
+    """Run the search; where nothing is found but a misfit, search again with the parts of the record in other roles.
+
+    Args:
+        model: the model.
+        signals: of the record, or records.
+        parts: of them.
+        nominal: parameters of the model, the predictor's own included.
+        settings: of the diagnosis.
+        progress: called as candidates are fitted.
+
+    Returns:
+        The pass that decides.
+    """
+    size, head = signals.size, settings.likelihood.head
+    again = settings.search.most_in_a_repeat
+    limit = settings.search.time_limit
+    deadline = time.monotonic() + limit if limit else math.inf
+    likelihood = RecordLikelihood(model.plant, signals, nominal, parts.validated.stop, settings)
+    found = _search(model, likelihood, parts, parts, settings.search.most_effects, progress, deadline)
+    first = int(size * (1.0 - settings.fit.looked_at))  # as many samples as are held out
+    if found.unknown and time.monotonic() < deadline:
+        # What shows on the deciding part alone (a limit that is reached once) must be fitted to be found.
+        exchanged = Parts(slice(first, parts.validated.stop), slice(head, first), parts.held_out)
+        other = _search(model, likelihood, parts, exchanged, again, progress, deadline)
+        found = found if other.unknown else other
+    if found.unknown and found.left.growth > settings.verdict.grown and time.monotonic() < deadline:
+        # What shows on the held-out part alone must be looked at: the first part is held out in its place.
+        held_out = slice(head, first)
+        turned = Parts(slice(first, parts.held_out.start), parts.held_out, held_out)
+        exchanged = Parts(slice(parts.fitted.stop, size), slice(first, parts.fitted.stop), held_out)
+        other = _search(model, likelihood.over(size), turned, exchanged, again, progress, deadline)
+        found = found if other.unknown else other
+    return found
+
+
+def _search(
+    model: Model, likelihood: RecordLikelihood, parts: Parts, used: Parts, most: int, progress: Progress,
+    deadline: float,
+) -> Pass:  # fmt: skip
+    """Search for at most ``most`` effects with the parts ``used``; judge what is left on ``parts``."""
+    settings = likelihood.settings
+    search = Search(likelihood, model, used, most, progress, deadline)
+    base, best = search.run()
+    likelihood = search.likelihood  # its gains may be those of a gap now
+    whole = Parts(parts.seen, parts.validated, parts.held_out)
+    plain = annealed(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, ())
+    proven = _proven(search, whole, base, plain, best)
+    best, final, withdrawn = proven.best, proven.final.fit, proven.notes
+    lowest = ladder(settings.levels, best.effects, proven.efficient.q)[-1]
+    logged = _of_the_log(search, whole, plain, best)
+    left = _left(likelihood, logged, proven.efficient, best.fit, parts, lowest)
+    growth = _growth(likelihood, final, whole)
+    left = replace(left, growth=growth if best.effects else max(growth, left.growth))
+    floor = _over_floor(likelihood, proven.efficient, parts, lowest)
+    verdict = settings.verdict
+    floor_off = floor > verdict.least_missing * (parts.seen.stop - parts.seen.start)
+    far = far_off(model, final.p, verdict)
+    named = any(not effect.measurement for effect in best.effects)
+    proof = proven.proof
+    if logged is not plain:  # what putting the log right explains is no proof of an effect
+        proof = Proof(horizons(likelihood, logged.p, plain.q, whole.held_out), proof.final)
+    unknown = search.stopped or is_unknown(left, floor_off, proof, named, bool(far), verdict)
+    if search.stopped:
+        withdrawn = (f"the search was stopped after {settings.search.time_limit:g} s: no name is sure", *withdrawn)
+    if proven.final.disputed and not unknown:
+        withdrawn = (*withdrawn, _dispute(proven.final.disputed))
+    return Pass(
+        likelihood,
+        parts,
+        search,
+        best,
+        plain,
+        proven.base.fit,
+        final,
+        left,
+        floor_off,
+        unknown,
+        proven.proof,
+        withdrawn,
+    )
+
+
+def _of_the_log(search: Search, whole: Parts, plain: Fit, best: Candidate) -> Fit:
+    """Return the model of re-fitted parameters and the log's nuisances alone; ``plain``: the log has none."""
+    log = tuple(effect for effect in best.effects if effect.measurement)
+    if not log:
+        return plain
+    p = best.fit.p
+    for effect in best.effects:
+        if not effect.measurement:
+            p = search.without(p, effect)
+    free = search.free(log, scene_of(search.likelihood, plain))
+    return annealed(search.likelihood, p, best.fit.q, free, whole, log)
+
+
+@dataclass(frozen=True)
+class _Proven:
+    """The best model that stands: its fits, efficient and as they are reported, and why effects were withdrawn."""
+
+    best: Candidate
+    efficient: Fit
+    base: Sized
+    final: Sized
+    proof: Proof
+    notes: tuple[str, ...]
+
+
+def _proven(search: Search, whole: Parts, base: Candidate, plain: Fit, best: Candidate) -> _Proven:
+    """Return the best model all of whose effects stand on all that may be looked at, and do no harm on the rest.
+
+    An effect is withdrawn when its size is not far from zero, or when with it the model predicts worse, at any horizon
+    and by more than chance, than without it or than re-fitted parameters alone.
+    """
+    likelihood = search.likelihood
+    levels = likelihood.settings.levels
+    sized_base = sized(likelihood, plain, whole, (), ladder(levels, (), plain.q))
+    before = horizons(likelihood, sized_base.fit.p, plain.q, whole.held_out)
+    notes: list[str] = []
+    while best.effects:
+        efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
+        final = sized(likelihood, efficient, whole, best.effects, ladder(levels, best.effects, efficient.q))
+        after = horizons(likelihood, final.fit.p, plain.q, whole.held_out)
+        weak = next((effect for effect in reversed(best.effects) if _is_weak(likelihood, effect, final.fit)), None)
+        noise = torque_noise(likelihood, final.fit, whole.fitted, sized_base.fit.p)
+        out, harm = weak or best.effects[-1], after.harm_over(before, noise)
+        fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
+        if weak is None and not harm and fewer.effects:
+            harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
+        if weak is None and not harm:
+            return _Proven(best, efficient, sized_base, final, Proof(before, after), tuple(notes))
+        why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
+        notes.append(f"{out.name} ({out.site}) was withdrawn: {why}")
+        best = fewer
+    return _Proven(base, plain, sized_base, sized_base, Proof(before, before), tuple(notes))
+
+
+def _dispute(names: tuple[str, ...]) -> str:
+    """Return what it means that fits disagree, in words."""
+    listed = ", ".join(f"`{name}`" for name in names)
+    return (
+        f"{listed}: what is left is no noise of its own, and how it is weighed changes the value: "
+        "it is that of the smallest torque error, its interval holds both"
+    )
+
+
+def _harm_over_fewer(
+    likelihood: RecordLikelihood, final: Fit, fewer: Candidate, whole: Parts, noise: TorqueNoise
+) -> tuple[str, ...]:
+    """Return the horizons at which the final model predicts worse than one without its last effect.
+
+    That one is taken as the search fitted it, and fitted again to all that may be looked at: a small effect must not
+    pass because its model is fitted to more of the record. All start from the filter of the final model.
+    """
+    after = horizons(likelihood, final.p, final.q, whole.held_out)
+
+    def harm(p: Array) -> tuple[str, ...]:
+        return after.harm_over(horizons(likelihood, p, final.q, whole.held_out), replace(noise, before=p))
+
+    found = harm(fewer.fit.p)
+    if found:
+        return found
+    again = annealed(likelihood, fewer.fit.p, fewer.fit.q, fewer.fit.free, whole, fewer.effects)
+    levels = ladder(likelihood.settings.levels, fewer.effects, again.q)
+    return harm(sized(likelihood, again, whole, fewer.effects, levels).fit.p)
+
+
+def _is_weak(likelihood: RecordLikelihood, effect: Effect, final: Fit) -> bool:
+    """Tell whether the size of an effect lies within a few standard errors of zero."""
+    place = effect.places(likelihood.plant)[effect.size]
+    return abs(float(final.p[place])) < likelihood.settings.search.least_errors * final.standard_error(place)
+
+
+def _over_floor(likelihood: RecordLikelihood, final: Fit, parts: Parts, lowest: float) -> float:
+    """Return the log-likelihood that innovations lack which count as white: slow ones are no measurement noise."""
+    white = colour_of(final.z, parts.seen, 0)
+    return noise_floor(likelihood, parts, lowest, final.p) - likelihood.log_likelihood(
+        final.z, final.q, parts.seen, white, final.p
+    )
+
+
+def _growth(likelihood: RecordLikelihood, final: Fit, whole: Parts) -> float:
+    """Return how much larger innovations are on the held-out part than where the final model was fitted."""
+    z = likelihood.over(likelihood.signals.size).whitened(final.p, final.q)
+    return float(np.max(np.std(z[whole.held_out], axis=0) / np.maximum(np.std(z[whole.fitted], axis=0), 1e-300)))
+
+
+def _left(
+    likelihood: RecordLikelihood, base: Fit, final: Fit, fitted: Fit, parts: Parts, lowest: float
+) -> Remainder:  # fmt: skip
+    """Return the remainder of the final fit; growth and predictability are those of the fit to the first part.
+
+    ``lowest`` is the level of process noise that the final model could have reached at best.
+    """
+    seen = remainder(likelihood, base, fitted, parts, lowest)
+    floor = seen.missing + fitted.fitted + fitted.validated
+    had, left = floor - base.fitted, floor - final.fitted
+    explained = 1.0 - left / had if had > 0.0 else 0.0
+    return replace(seen, missing=left, explained=explained, tails=tails(likelihood, final, parts.seen))

@@ -1,0 +1,210 @@
+"""Free-run simulation of the exact, event-located plant over a part of a record, and the misfit that it leaves.
+
+The initial state of the simulation is not measured. It starts from the predictor's estimate at the first sample
+(which has seen earlier samples only) and is then chosen so that the simulation lies closest to the measurement:
+five numbers against thousands of samples, for the nominal and the corrected model alike. Parameters stay as they are.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.record_likelihood import Signals
+from orchestrator.diagnosis.fit.runs import in_time
+from orchestrator.diagnosis.settings import FreeRunSettings
+from orchestrator.plants.description import Plant
+from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
+from pyfmu_sources.effects import UNASKED
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FreeRun:
+    """A simulated part of a record.
+
+    Attributes:
+        outputs: (n, channels) simulated encoder angles.
+        start: (8,) the initial state.
+        rms: (channels,) rms of simulated minus measured.
+    """
+
+    outputs: Array
+    start: Array
+    rms: Array
+
+
+def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice, history: bool = True) -> Array:
+    """Return the simulated encoder angles (n, 2) of a part of a record.
+
+    Args:
+        plant: the plant.
+        p: its parameters.
+        start: (8,) state at the part's first sample.
+        signals: of the record; requests before the part matter when there is a dead time.
+        part: samples to simulate.
+        history: requests before the part are still under way in a dead time; False: there were none, as in an FMU
+            that starts with the part.
+
+    Returns:
+        The angles [rad].
+    """
+    begin, end, _ = part.indices(signals.size)
+    rows, place = in_time(signals.runs, begin, signals.size)
+    limit = p[plant.index(plant.drive.limit)]
+    delay = plant.value(p, plant.drive.delay)
+    u = np.clip(signals.aligned(plant, p).u[rows], -limit, limit)
+    whole = int(np.floor(delay / signals.h + 1e-9))
+    first = delay - whole * signals.h
+    at = np.arange(place, place + end - begin)
+    late, early = (_requests(u, at - back, 0 if history else place) for back in (whole, whole + 1))
+    out = np.empty((end - begin, 2))
+    flat = tuple(float(v) for v in plant.own(p))
+    asked = float(plant.followed(p, u, signals.h)[1][max(place - whole, 0)])
+    memory = (float(start[7]), asked) if history else (0.0, UNASKED)
+    plant.runner()((*start[:7].tolist(), *memory), flat, early, late, max(first, 0.0), signals.h, out)
+    for channel, name in enumerate(plant.offsets):
+        out[:, channel] += p[plant.index(name)]
+    return out
+
+
+def _requests(u: Array, at: NDArray[np.int64], first: int) -> Array:
+    """Return the requests at samples ``at``; there were none before ``first``."""
+    return np.where(at >= first, u[np.maximum(at, 0)], u[0] if first == 0 else 0.0)
+
+
+def free_run(
+    plant: Plant, p: Array, guess: Array, signals: Signals, part: slice, settings: FreeRunSettings, history: bool = True
+) -> FreeRun:
+    """Return the free run whose initial state lies closest to the measurement.
+
+    Where impacts make the end of a run depend on its start in no simple way, a run that has not come close is sought
+    again over growing parts of its length.
+
+    Args:
+        plant: the plant.
+        p: its parameters.
+        guess: (8,) first guess of the state at the part's first sample.
+        signals: of the record.
+        part: samples to simulate.
+        settings: of the search for the initial state.
+        history: as in :func:`simulate`.
+
+    Returns:
+        Initial state and angles.
+    """
+    first = _closest(plant, p, guess, signals, part, settings, history)
+    if float(np.max(first.rms / signals.noise)) < settings.close:
+        return first
+    begin, end, _ = part.indices(signals.size)
+    start, run = guess, first
+    for share in settings.growing:
+        length = max(round(share * (end - begin)), settings.least_samples)
+        run = _closest(plant, p, start, signals, slice(begin, begin + length), settings, history)
+        start = run.start
+    cost, other = (float(np.sum((r.rms / signals.noise) ** 2)) for r in (first, run))
+    return run if other < cost else first
+
+
+def _closest(
+    plant: Plant, p: Array, guess: Array, signals: Signals, part: slice, settings: FreeRunSettings, history: bool
+) -> FreeRun:
+    """Return the free run at which a descent from the ``guess`` of its initial state ends (damped Gauss-Newton)."""
+    m = signals.channels
+    measured, scale = signals.aligned(plant, p).y[part, :m], signals.noise
+    free = _free_places(plant, p)
+
+    def outputs(start: Array) -> Array:
+        return simulate(plant, p, start, signals, part, history)[:, :m]
+
+    def cost(out: Array) -> float:
+        return float(np.sum(((out - measured) / scale) ** 2))
+
+    first = _followed(plant, np.array(guess, dtype=float))
+    steps = _steps(plant, first, signals, free, settings)
+
+    def linearise(point: tuple[Array, Array]) -> Linearised[tuple[Array, Array]] | None:
+        start, out = point
+        J = _answers(outputs, start, out, free, steps, plant) / np.tile(scale, len(out))[:, None]
+        if not np.all(np.isfinite(J)):
+            return None
+
+        def moved(change: Array) -> tuple[tuple[Array, Array], float]:
+            there = start.copy()
+            there[list(free)] += change
+            there = _followed(plant, there)
+            new = outputs(there)
+            return (there, new), cost(new)
+
+        return Linearised(J.T @ J, J.T @ ((out - measured) / scale).ravel(), cost(out), moved)
+
+    damping = Damping(settings.damping, 0.0, lambda H: settings.fade * float(np.trace(H)), settings.tries)
+    (start, out), _ = damped_fit(
+        (first, outputs(first)), linearise, damping, settings.iterations,
+        lambda gain, after: gain == 0.0 or gain < settings.enough * after,
+    )  # fmt: skip
+    return FreeRun(out, start, np.sqrt(np.mean((out - measured) ** 2, axis=0)))
+
+
+def start_answers(
+    plant: Plant, p: Array, run: FreeRun, signals: Signals, part: slice, settings: FreeRunSettings
+) -> Array:
+    """Return (n * channels, free places): how a free run's outputs answer to its initial state.
+
+    Args:
+        plant: the plant.
+        p: its parameters.
+        run: the free run.
+        signals: of the record.
+        part: the samples that it covers.
+        settings: of free runs.
+
+    Returns:
+        The derivatives, per unit of each place.
+    """
+    free, m = _free_places(plant, p), signals.channels
+    steps = _steps(plant, run.start, signals, free, settings)
+    return _answers(
+        lambda start: simulate(plant, p, start, signals, part)[:, :m], run.start, run.outputs, free, steps, plant
+    )
+
+
+def _answers(
+    outputs: Callable[[Array], Array], start: Array, out: Array, free: tuple[int, ...], steps: Sequence[float],
+    plant: Plant,
+) -> Array:  # fmt: skip
+    moved = [outputs(_followed(plant, _nudged(start, place, step))) for place, step in zip(free, steps, strict=True)]
+    return np.column_stack([((new - out) / step).ravel() for new, step in zip(moved, steps, strict=True)])
+
+
+def _nudged(start: Array, place: int, step: float) -> Array:
+    moved = start.copy()
+    moved[place] += step
+    return moved
+
+
+def _followed(plant: Plant, start: Array) -> Array:
+    """Return the state with the extra inertia at rest relative to what carries it."""
+    moved = start.copy()
+    for place, followed in plant.followers:
+        moved[place] = moved[followed]
+    return moved
+
+
+def _free_places(plant: Plant, p: Array) -> tuple[int, ...]:
+    lagged = plant.value(p, plant.drive.lag) > 0.0
+    return tuple(place for place in plant.states if place != plant.drive.torque or lagged)
+
+
+def _steps(
+    plant: Plant, start: Array, signals: Signals, free: tuple[int, ...], settings: FreeRunSettings
+) -> list[float]:  # fmt: skip
+    """Return the steps of the derivatives by the free places of the state."""
+    share = settings.relative_size
+    sizes = {plant.drive.torque: share * signals.torque}
+    for channel, body in enumerate(plant.bodies):
+        sizes[body.angle] = float(signals.noise[min(channel, signals.channels - 1)])
+        sizes[body.speed] = share * abs(start[body.speed]) + settings.least_speed
+    return [settings.nudge * float(sizes[place]) for place in free]

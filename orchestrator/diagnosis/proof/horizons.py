@@ -1,0 +1,221 @@
+"""How far ahead a model predicts: errors on data that no fit has seen, at several horizons.
+
+A prediction starts from the predictor's estimate of the state, which has seen earlier samples only, and runs freely
+over its horizon with the exact, event-located plant. Over two seconds, and over the whole part, the initial state is
+the one that lies closest. All models of a diagnosis are started by the same filter: they differ in physics alone.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.proof.free_run import FreeRun, free_run, simulate
+from orchestrator.diagnosis.proof.misfit import segments
+from orchestrator.diagnosis.settings import HorizonSettings
+from orchestrator.shared.inference.long_run import long_run_covariance
+
+Array = NDArray[np.float64]
+Runs = Sequence[tuple[FreeRun, slice]]  # with the samples that they cover
+Chance = Callable[[Runs, Runs], Array]
+
+
+@dataclass(frozen=True)
+class Horizons:
+    """Prediction errors of one model.
+
+    Attributes:
+        labels: of the horizons, the whole part last.
+        errors: (horizons, channels) rms.
+        plain: (horizons, channels) rms of a motion on at the speed that it starts with; NaN for the whole part.
+        r_squared: (channels,) coefficient of determination of the run over the whole part.
+        noise: (channels,) standard deviation of the measurement noise.
+        squares: (starts, channels) squared errors of each horizon of many starts.
+        runs: free runs of each longer horizon, and where they go.
+        settings: when predictions get worse.
+    """
+
+    labels: tuple[str, ...]
+    errors: Array
+    plain: Array
+    r_squared: Array
+    noise: Array
+    squares: tuple[Array, ...]
+    runs: tuple[tuple[tuple[FreeRun, slice], ...], ...]
+    settings: HorizonSettings
+
+    def harm_over(self, other: "Horizons", chance: Chance | None = None) -> tuple[str, ...]:
+        """Return the horizons at which this model predicts worse than another, beyond chance.
+
+        Args:
+            other: of the other model, over the same part.
+            chance: (runs of this model, of the other) -> (channels,) largest increase of the mean squared error that
+                torque noise explains where this model is true; None: measurement noise is all there is.
+
+        Returns:
+            Their labels.
+        """
+        settings = self.settings
+        most = other.errors * (1.0 + settings.larger) + settings.of_noise * self.noise
+        worse = np.any(~(self.errors <= most), axis=1)
+        for row, (own, before) in enumerate(zip(self.squares, other.squares, strict=True)):
+            change = np.sum((own - before) / self.noise**2, axis=1)
+            spread = np.sqrt(long_run_covariance((change - np.mean(change))[:, None])[0, 0]) / change.size
+            worse[row] &= not np.mean(change) <= settings.sure * spread
+        if chance is not None:
+            for row, (mine, theirs) in enumerate(zip(self.runs, other.runs, strict=True), start=len(self.squares)):
+                if worse[row]:
+                    allowed = other.errors[row] ** 2 + chance(mine, theirs)
+                    worse[row] = bool(np.any(~(self.errors[row] ** 2 <= np.maximum(most[row] ** 2, allowed))))
+        return tuple(label for label, bad in zip(self.labels, worse, strict=True) if bad)
+
+    @property
+    def long(self) -> int:
+        """Return the first horizon that noise does not rule."""
+        return 1 + sum(span < self.settings.ruled_by_noise for span in self.settings.spans)
+
+    def least_skill_over(self, other: "Horizons") -> float:
+        """Return the smallest share of the other model's squared error removed, at half a second and at the whole.
+
+        Args:
+            other: prediction errors of another model on the same samples.
+
+        Returns:
+            The share; negative where this model is worse.
+        """
+        return self._least_skill(other, self.long)
+
+    def even_skill_over(self, other: "Horizons") -> float:
+        """Return the smallest share of the other model's squared error removed, at every horizon but one sample.
+
+        Args:
+            other: prediction errors of another model on the same samples.
+
+        Returns:
+            The share; negative where this model is worse.
+        """
+        return self._least_skill(other, 1)
+
+    def _least_skill(self, other: "Horizons", first: int) -> float:
+        own, before = (np.mean((h.errors[first:] / self.noise) ** 2, axis=1) for h in (self, other))
+        return float(np.min(1.0 - own / before))
+
+    def skill_over(self, other: "Horizons") -> float:
+        """Return the largest share of the other's squared error that this one removes, at horizons beyond noise.
+
+        Args:
+            other: prediction errors of another model on the same samples.
+
+        Returns:
+            The share; minus infinity where there is no such horizon.
+        """
+        own, before = (np.mean((h.errors[self.long :] / self.noise) ** 2, axis=1) - 1.0 for h in (self, other))
+        return float(np.max(1.0 - np.maximum(own, 0.0) / np.maximum(before, 1e-9), initial=-np.inf))
+
+    def is_hopeless(self, share: float) -> bool:
+        """Tell whether the model predicts hardly better than a motion at constant speed, and not the whole part.
+
+        Args:
+            share: of the plain error, and of the variance, that a model must beat.
+
+        Returns:
+            True when it is.
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            better = np.any(self.errors < share * self.plain)
+        return not bool(better) and not bool(np.any(self.r_squared > share))
+
+
+def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> Horizons:
+    """Return the prediction errors of a model on a part of a record.
+
+    Args:
+        likelihood: of the record.
+        p: parameters of the model.
+        q: process noise of the filter that estimates the states.
+        part: the samples.
+
+    Returns:
+        The errors.
+    """
+    plant, signals, proof = likelihood.plant, likelihood.signals, likelihood.settings.proof
+    settings, m, h = proof.horizons, signals.channels, signals.h
+    _, states = likelihood.over(signals.size).innovations(p, q)
+    stretches = signals.stretches(part)
+    labels, errors, plain, squares = [], [], [], []
+    for span in (0.0, *settings.spans):
+        reach = max(1, min(round(span / h), min(rows.stop - rows.start for rows in stretches) // 3))
+        starts = _starts(stretches, reach, settings.starts)
+        ran, moved = _predicted(likelihood, p, states, starts, reach)
+        labels.append(f"{1e3 * span:g} ms" if span else "one sample")
+        errors.append(np.sqrt(np.mean(ran, axis=0)))
+        plain.append(np.sqrt(np.mean(moved, axis=0)))
+        squares.append(ran)
+    none = np.full(m, np.nan)
+    pieces = segments(part, signals, proof)
+    runs: list[tuple[tuple[FreeRun, slice], ...]] = []
+    if len(pieces) > 1:
+        runs.append(tuple((free_run(plant, p, states[piece.start], signals, piece, proof.free_run), piece)
+                          for piece in pieces[: settings.most_segments]))  # fmt: skip
+        labels.append(f"{proof.segment:g} s")
+        errors.append(np.sqrt(np.mean(np.square([run.rms[:m] for run, _ in runs[0]]), axis=0)))
+        plain.append(none)
+    runs.append(tuple((free_run(plant, p, states[rows.start], signals, rows, proof.free_run), rows)
+                      for rows in stretches))  # fmt: skip
+    rows_of = [rows.stop - rows.start for _, rows in runs[-1]]
+    whole = np.sqrt(np.average([run.rms[:m] ** 2 for run, _ in runs[-1]], axis=0, weights=rows_of))
+    spreads = [np.var(signals.y[rows, :m], axis=0) for _, rows in runs[-1]]
+    r_squared = np.asarray(1.0 - whole**2 / np.maximum(np.average(spreads, axis=0, weights=rows_of), 1e-300))
+    return Horizons(
+        (*labels, "whole part"), np.array([*errors, whole]), np.array([*plain, none]), r_squared, signals.noise,
+        tuple(squares), tuple(runs), settings,
+    )  # fmt: skip
+
+
+def _starts(stretches: Sequence[slice], reach: int, count: int) -> list[int]:
+    """Return samples from which a prediction over ``reach`` samples stays in its stretch, spread over all of them."""
+    each = max(2, count // len(stretches))
+    found = [np.linspace(rows.start, rows.stop - reach - 1, each).astype(int) for rows in stretches]
+    return np.unique(np.concatenate(found)).tolist()
+
+
+def _predicted(
+    likelihood: RecordLikelihood, p: Array, states: Array, starts: Sequence[int], reach: int
+) -> tuple[Array, Array]:
+    """Return squared errors (starts, channels) of runs over ``reach`` samples, and of a motion on at constant speed."""
+    plant, signals = likelihood.plant, likelihood.signals
+    bodies = plant.bodies[: signals.channels]
+    y = signals.aligned(plant, p).y
+    angles, speeds = [body.angle for body in bodies], [body.speed for body in bodies]
+    ran, moved = [], []
+    for start in starts:
+        truth = y[start + reach, : signals.channels]
+        run = simulate(plant, p, states[start], signals, slice(start, start + reach + 1))
+        ran.append(run[-1, : signals.channels] - truth)
+        moved.append(states[start][angles] + reach * signals.h * states[start][speeds] - truth)
+    return np.square(np.array(ran)), np.square(np.array(moved))
+
+
+def table(names: Sequence[str], found: Sequence[Horizons]) -> list[dict[str, object]]:
+    """Return one row a horizon for the result: its label and each model's error of each signal.
+
+    Args:
+        names: of the models.
+        found: errors of each model.
+
+    Returns:
+        The rows.
+    """
+    signals = ("theta_m", "theta_l")
+    return [
+        {
+            "horizon": label,
+            "errors": [
+                {"model": name, **{s: float(e) for s, e in zip(signals, one.errors[row], strict=False)}}
+                for name, one in zip(names, found, strict=True)
+            ],
+        }
+        for row, label in enumerate(found[0].labels)
+    ]

@@ -1,0 +1,38 @@
+"""The corrected model as a model file, which a validation without a search takes."""
+
+from orchestrator.diagnosis.outcome import Diagnosis
+from orchestrator.records.model_file import Model
+
+
+def corrected_model(model: Model, diagnosis: Diagnosis) -> str:
+    """Return the TOML text of a model with the values of a diagnosis.
+
+    Every value that differs from the FMU's default is stated. Those that were fitted carry the half-width of their
+    95 % interval as uncertainty, so that another record may move them.
+
+    Args:
+        model: the model that the record was compared with; its columns and encoders are kept.
+        diagnosis: of the record.
+
+    Returns:
+        The text.
+    """
+    w = diagnosis.workings
+    plant, final = w.plant, w.final
+    fitted = {entry.place for entry in final.free}
+    lines = [f'fmu = "{model.fmu}"']
+    for place, entry in enumerate(plant.table):
+        value = float(final.p[place])
+        if value == entry.default and place not in fitted:
+            continue
+        lines += ["", f'[parameters."{entry.name}"]', f"value = {value!r}"]
+        if place in fitted:
+            low, high = final.interval(place)
+            lines.append(f"uncertainty = {0.5 * (high - low)!r}")
+    for name, encoder in model.encoders.items():
+        lines += ["", f"[encoders.{name}]"]
+        lines += [f"{key} = {v!r}" for key in ("resolution", "noise") if (v := getattr(encoder, key)) is not None]
+    for name, column in model.columns.items():
+        lines += ["", f"[columns.{name}]", f'name = "{column.name}"']
+        lines += [f'unit = "{column.unit}"'] if column.unit else []
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,1 @@
+"""The search: candidates screened, fitted, accepted and taken out again."""

@@ -1,0 +1,142 @@
+"""Candidates of the search: a model with its effects, what it gains over another, and whether that pays."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.settings import SearchSettings
+from orchestrator.plants.effects import Effect
+
+Array = NDArray[np.float64]
+
+
+def ladder(levels: Sequence[float], effects: Sequence[Effect], before: float) -> list[float]:
+    """Return the levels of process noise, falling, that a model with ``effects`` may have.
+
+    Args:
+        levels: every level, falling.
+        effects: of the model.
+        before: the level of the model that it comes from, which is always among them.
+
+    Returns:
+        The levels.
+    """
+    least = max((effect.least_noise for effect in effects), default=0.0)
+    return [level for level in levels if level >= min(least, before)]
+
+
+def annealed(
+    likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, effects: Sequence[Effect]
+) -> Fit:  # fmt: skip
+    """Fit a model with ``effects`` down the ladder of process noise, no lower than their laws are exact.
+
+    Args:
+        likelihood: of the record.
+        start: (parameters,) to start from.
+        q: level of process noise to start from.
+        free: parameters to fit.
+        parts: of the record: fitted, deciding, held out.
+        effects: of the model.
+
+    Returns:
+        The fit.
+    """
+    return anneal(likelihood, start, q, free, parts, ladder(likelihood.settings.levels, effects, q))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A fitted model: the effects it has, its fit, and what an effect must gain."""
+
+    effects: tuple[Effect, ...]
+    fit: Fit
+    settings: SearchSettings
+
+    @property
+    def score(self) -> float:
+        """Return the penalised log-likelihood of both parts of the record that were looked at."""
+        return self.fit.fitted + self.fit.validated - self.settings.penalty * parameter_count(self)
+
+    def gain_over(self, other: "Candidate") -> float:
+        """Return the penalised gain over another model.
+
+        Args:
+            other: the model before.
+
+        Returns:
+            The gain in log-likelihood.
+        """
+        return self.score - other.score
+
+    def pays_over(self, other: "Candidate", base: "Candidate") -> bool:
+        """Tell whether this model, which has more effects than ``other``, earns them on both parts.
+
+        The gain must also be more than what the laws of the effects before may leave of what those have gained over
+        ``base``: no law of friction or contact is exact, and what is left of a large effect must not pass for a small
+        one.
+
+        Args:
+            other: the model before.
+            base: the model without effects.
+
+        Returns:
+            True when it does.
+        """
+        more = self.settings.penalty * max(parameter_count(self) - parameter_count(other), 1)
+        fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
+        left = max((effect.leaves for effect in other.effects), default=0.0)
+        settings = self.settings
+        pays = settings.pays if self.fit.q <= settings.noise_alone else settings.pays_above_noise
+        least = max(pays, left * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
+        return self.gain_over(other) > least and fitted > more and decided > settings.least_decided
+
+    def nearly_pays_over(self, other: "Candidate") -> bool:
+        """Tell whether this model earns its parameters on either part, so that predictions may decide.
+
+        Args:
+            other: the model before.
+
+        Returns:
+            True when it does.
+        """
+        fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
+        more, settings = max(parameter_count(self) - parameter_count(other), 1), self.settings
+        earned = fitted > settings.least_fitted * more and decided > 0.0
+        return earned and self.gain_over(other) > settings.nearly_pays
+
+    def holds_over(self, other: "Candidate") -> bool:
+        """Tell whether what the last effect gains where it was fitted, it also gains where it was not.
+
+        Args:
+            other: the model before.
+
+        Returns:
+            True when it does.
+        """
+        fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
+        return decided > self.settings.least_decided_share * fitted
+
+
+def parameter_count(candidate: Candidate) -> int:
+    """Return the number of parameters of a candidate's effects.
+
+    Args:
+        candidate: with its effects.
+
+    Returns:
+        The number.
+    """
+    return sum(len(effect.parameters) for effect in candidate.effects)
+
+
+@dataclass(frozen=True)
+class ForwardStep:
+    """One forward step: every candidate that was fitted, best first, with its gain over the model before."""
+
+    before: Candidate
+    candidates: tuple[Candidate, ...]
+    accepted: bool

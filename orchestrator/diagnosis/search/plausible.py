@@ -1,0 +1,44 @@
+"""Sizes that no machine has: such candidates are refused, and said in a warning with what they hint at."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.settings import SearchSettings
+from orchestrator.plants.description import Plant
+from orchestrator.plants.effects import Effect, Scene
+
+Array = NDArray[np.float64]
+
+
+def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: SearchSettings) -> str:
+    """Return why the size of an effect cannot be true, in words; empty: it can.
+
+    Args:
+        plant: the plant.
+        effect: the effect.
+        p: parameters of the model that has it.
+        scene: sizes of the record's signals.
+        settings: of the search.
+
+    Returns:
+        The words.
+    """
+    largest = float(np.max(np.abs(scene.u))) * (1.0 if effect.site == "motor" else scene.ratio)
+    travel = 2.0 * np.pi * scene.turns / (1.0 if effect.site == "motor" else scene.ratio)
+    for short, place in effect.places(plant).items():
+        if place >= len(plant.table):
+            continue
+        value, unit = abs(float(p[place])), plant.table[place].unit
+        what = f"{effect.name} ({effect.site}) of {value:.3g} {unit}"
+        if short == "limit":
+            if value < settings.least_limit * float(np.max(np.abs(scene.u))):
+                return f"{what} would leave no torque: `u` may not be what drives the machine"
+        elif unit == "N.m":
+            dry = "friction" in effect.name
+            if value > (settings.most_friction if dry else settings.most_torque) * largest:
+                return f"{what} is more than the drive's largest torque, {largest:.3g}: wrong units, or another machine"
+        elif unit == "rad" and short in ("offset", "alpha", "amplitude") and value > travel:
+            return f"{what} is more than the whole travel, {travel:.3g} rad"
+        elif short == "delay" and value > min(settings.most_delay, settings.delay_share * scene.h * scene.u.size):
+            return f"{what} is too long for a dead time: `u` and the angles may not belong together"
+    return ""

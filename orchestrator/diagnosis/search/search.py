@@ -1,0 +1,571 @@
+"""The search: forward steps through the bank until nothing pays, with backward steps after each.
+
+Every candidate is fitted together with the uncertain linear parameters, with its own level of process noise. What a
+step gains is counted on the part of the record that decides (and on the part that was fitted); naming an effect
+must pay on both. Candidates are fitted in threads, one per core; the predictor runs outside the interpreter's lock.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import partial
+from threading import Lock
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.proof.horizons import horizons
+from orchestrator.diagnosis.search.candidate import (
+    Candidate,
+    ForwardStep,
+    annealed,
+)
+from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
+from orchestrator.diagnosis.search.periodic import with_cycles
+from orchestrator.diagnosis.search.plausible import implausible
+from orchestrator.diagnosis.search.scene import scene_of
+from orchestrator.diagnosis.search.screening import Guess, Screen
+from orchestrator.diagnosis.settings import SearchSettings
+from orchestrator.plants.description import Plant
+from orchestrator.plants.effects import Effect, Scene
+from orchestrator.records.model_file import Model
+from orchestrator.shared.cores import usable_cores
+from orchestrator.shared.inference.colour import Colour, colour_of
+
+Array = NDArray[np.float64]
+Guesses = tuple[Guess, ...]  # best first, at least one
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class TimeUpError(Exception):
+    """The search may take no longer."""
+
+
+@dataclass
+class Search:
+    """The state of a search; :meth:`run` carries it out.
+
+    Attributes:
+        likelihood, model, parts: what is searched.
+        most: effects that are named at most.
+        progress: called with (done, expected, what) as candidates are fitted.
+        deadline: by the monotonic clock [s]; no fit of a candidate begins after it.
+        stopped: the deadline has cut the search short.
+        hidden: the model with a gap before a body that is not measured; None: there is none to look for.
+    """
+
+    likelihood: RecordLikelihood
+    model: Model
+    parts: Parts
+    most: int
+    progress: Callable[[int, int, str], None] = lambda done, expected, what: None
+    deadline: float = math.inf
+    stopped: bool = False
+    hidden: Candidate | None = None
+    steps: list[ForwardStep] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+    done: int = 0
+    _counting: Lock = field(default_factory=Lock)
+
+    @property
+    def plant(self) -> Plant:
+        """Return the plant that is searched."""
+        return self.likelihood.plant
+
+    @property
+    def settings(self) -> SearchSettings:
+        """Return the settings of the search."""
+        return self.likelihood.settings.search
+
+    def run(self) -> tuple[Candidate, Candidate]:
+        """Return the model with re-fitted parameters only, and the best model found.
+
+        Returns:
+            Both.
+        """
+        base = self.base()
+        current = base
+        try:
+            self.hidden = self.hidden_gap(base)
+            while len(current.effects) < self.most:
+                step = self.step(current, base)
+                self.steps.append(step)
+                if not step.accepted:
+                    break
+                current = step.candidates[0]
+                current = self.prune(current, base)
+        except TimeUpError:
+            self.stopped = True
+        return base, current
+
+    def hidden_gap(self, base: Candidate) -> Candidate | None:
+        """Return the model with a gap that one encoder alone shows, and take gains along its motion from now on.
+
+        Nothing is looked for where every body has its encoder, or nothing is left to explain.
+
+        Args:
+            base: the model without effects.
+
+        Returns:
+            The model; None where nothing is found.
+        """
+        shaft, likelihood = self.plant.shaft, self.likelihood
+        gap = next(
+            (effect for effect in self.eligible(base) if shaft and shaft.gap in effect.parameters.values()), None
+        )
+        one_sided = likelihood.signals.channels < len(self.plant.bodies)
+        if gap is None or self.most == 0 or not one_sided or at_the_floor(likelihood, base.fit, self.parts.fitted):
+            return None
+        p = gap_of_the_estimator(likelihood, self.model, self.parts.fitted, self.deadline)
+        self._tick(f"{gap.label}, estimated")
+        if p is None:
+            return None
+        free = self.free((gap,), scene_of(likelihood, base.fit))
+        first = max(level for level in likelihood.settings.levels if level <= self.settings.first_hidden)
+        for _ in range(self.settings.linearised):
+            self.likelihood = likelihood.about(p)
+            fitted = annealed(self.likelihood, p, first, free, self.parts, (gap,))
+            p, first = fitted.p, fitted.q
+            self._tick(gap.label)
+        return self.candidate((gap,), fitted)
+
+    def base(self) -> Candidate:
+        """Return the model without effects, its uncertain parameters re-fitted.
+
+        Returns:
+            The model.
+        """
+        start = self.plant.extended(self.model.values)
+        first = self.likelihood.settings.levels[self.settings.first_level]
+        fitted = annealed(self.likelihood, start, first, self.linear(), self.parts, ())
+        self._tick("parameters")
+        return self.candidate((), fitted)
+
+    def step(self, current: Candidate, base: Candidate) -> ForwardStep:
+        """Fit the shortlist of effects on top of ``current``.
+
+        Args:
+            current: the model to build on.
+            base: the model without effects.
+
+        Returns:
+            What was tried and what was accepted.
+        """
+        scene, guesses = self.screen(current)
+        found = self._each(lambda pair: self.extend(current, *pair, scene), guesses)
+        found += self.refined(found, current, base, scene)
+        found = self._each(lambda candidate: self.rescued(candidate, current, base), found)
+        found = self.possible(found, scene)
+        found.sort(key=lambda candidate: candidate.score, reverse=True)
+        accepted = bool(found) and found[0].pays_over(current, base) and found[0].holds_over(current)
+        if not accepted:
+            shown = next((c for c in found if c.nearly_pays_over(current) and self.predicts(c, current)), None)
+            if shown is not None:
+                found.remove(shown)
+                return ForwardStep(current, (shown, *found), True)
+        return ForwardStep(current, tuple(found), accepted)
+
+    def possible(self, found: Sequence[Candidate], scene: Scene) -> list[Candidate]:
+        """Return the candidates whose last effect has a size that a machine may have; note the others.
+
+        Args:
+            found: fitted candidates.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The candidates.
+        """
+        kept = []
+        for candidate in found:
+            why = implausible(self.plant, candidate.effects[-1], candidate.fit.p, scene, self.settings)
+            if not why:
+                kept.append(candidate)
+            elif candidate.effects[-1].label not in self.refused:
+                self.refused[candidate.effects[-1].label] = why
+        return kept
+
+    def predicts(self, candidate: Candidate, current: Candidate) -> bool:
+        """Tell whether a candidate predicts the deciding part far better than the model before it, at long horizons.
+
+        Args:
+            candidate: a fitted model.
+            current: the model to build on.
+
+        Returns:
+            True when it does.
+        """
+        before, after = (horizons(self.likelihood, c.fit.p, current.fit.q, self.parts.validated)
+                         for c in (current, candidate))  # fmt: skip
+        return not after.harm_over(before) and after.least_skill_over(before) > self.settings.shown
+
+    def screen(self, current: Candidate) -> tuple[Scene, list[tuple[Effect, Guesses]]]:
+        """Return the scene and the effects worth a fit on top of ``current``, with their starting values.
+
+        Args:
+            current: the model to build on.
+
+        Returns:
+            Both.
+        """
+        scene = scene_of(self.likelihood, current.fit)
+        scene = with_cycles(scene, self.likelihood, current.fit, self.parts)
+        return scene, self.shortlist(*(self.guessed(current, scene, colour) for colour in self.colours(current)))
+
+    def guessed(self, current: Candidate, scene: Scene, colour: Colour) -> list[tuple[Effect, Guesses]]:
+        """Return the guesses of every effect that is not in ``current``, most promising first.
+
+        Args:
+            current: the model to build on.
+            scene: sizes of the record's signals.
+            colour: autoregression of the innovations.
+
+        Returns:
+            Effects with their guesses.
+        """
+        screen = Screen(self.likelihood, current.fit, self.parts, colour)
+        pairs = self._each(
+            lambda effect: (effect, self.guesses(screen, effect, scene, current)), list(self.eligible(current))
+        )
+        return sorted((pair for pair in pairs if pair[1]), key=lambda pair: pair[1][0].gain, reverse=True)
+
+    def guesses(self, screen: Screen, effect: Effect, scene: Scene, current: Candidate) -> Guesses:
+        """Return the starting values of an effect; a gap that one encoder alone shows starts where it was fitted.
+
+        Args:
+            screen: of the present model.
+            effect: of the bank.
+            scene: sizes of the record's signals.
+            current: the model to build on.
+
+        Returns:
+            The starting values.
+        """
+        hidden = self.hidden
+        if hidden is None or hidden.effects != (effect,):
+            return screen.guesses(effect, scene)
+        values = {short: float(hidden.fit.p[place]) for short, place in effect.places(self.plant).items()}
+        return (Guess(values, max(hidden.fit.fitted - current.fit.fitted, self.settings.least_promise)),)
+
+    def colours(self, current: Candidate) -> list[Colour]:
+        """Return the colours that innovations are screened with.
+
+        An autoregression hides what is slow in the signals, and a constant torque with it, as long as the model lacks
+        it: effects are looked for in white innovations too.
+
+        Args:
+            current: the model to build on.
+
+        Returns:
+            One or two.
+        """
+        own = current.fit.colour
+        return [own] if own.order == 0 else [own, colour_of(current.fit.z, self.parts.fitted, 0)]
+
+    def eligible(self, current: Candidate) -> Iterable[Effect]:
+        """Return the effects that could be added to ``current``.
+
+        Args:
+            current: the model to build on.
+
+        Yields:
+            Each effect.
+        """
+        present = {effect.label for effect in current.effects}
+        replaced = {effect.needs for effect in current.effects}
+        one_way = self.one_way
+        for effect in self.plant.bank:
+            if effect.needs or (effect.angular and in_metres(self.model)):
+                continue
+            blind = effect.both_encoders and self.likelihood.signals.channels < 2
+            # In one direction dry friction and a constant torque are the same, and so are viscous friction and its
+            # difference between the directions: the first of each is what machines have.
+            alike = one_way and effect.name in ("load_torque", "directional_friction")
+            if effect.label not in present | replaced and not blind and not alike:
+                yield effect
+
+    @property
+    def one_way(self) -> bool:
+        """Tell whether the motor turns in one direction only, in all that may be looked at."""
+        signals, ways = self.likelihood.signals, [0.0, 0.0]
+        for rows in signals.stretches(self.parts.seen):
+            angle = signals.y[rows, 0]
+            for n, s in enumerate((1.0, -1.0)):
+                back = float(np.max(np.maximum.accumulate(s * angle) - s * angle))
+                ways[n] = max(ways[n], back / max(float(np.ptp(angle)), 1e-300))
+        return min(ways) < self.settings.one_way
+
+    def shortlist(
+        self, own: list[tuple[Effect, Guesses]], white: Sequence[tuple[Effect, Guesses]] = ()
+    ) -> list[tuple[Effect, Guesses]]:
+        """Return the effects worth a fit: those that promise most, and some that promise most in white innovations.
+
+        Args:
+            own: guesses in the innovations of the model, most promising first.
+            white: guesses in innovations that count as white.
+
+        Returns:
+            Effects with their guesses.
+        """
+        chosen = self._promising(own, self.settings.shortlist)
+        for effect, guesses in self._promising(white, self.settings.shortlist_white):
+            place = next((n for n, pair in enumerate(chosen) if pair[0] is effect), None)
+            if place is None:
+                chosen.append((effect, guesses))
+            else:
+                chosen[place] = (effect, (*chosen[place][1], guesses[0]))
+        return chosen
+
+    def _promising(self, found: Sequence[tuple[Effect, Guesses]], most: int) -> list[tuple[Effect, Guesses]]:
+        """Return the first ``most`` of ``found``, which falls, down to a share of the best; at least one."""
+        if not found:
+            return []
+        least = max(self.settings.least_promise, self.settings.worth * found[0][1][0].gain)
+        return [pair for pair in found[:most] if pair[1][0].gain > least] or list(found[:1])
+
+    def refined(self, found: Sequence[Candidate], current: Candidate, base: Candidate, scene: Scene) -> list[Candidate]:
+        """Return candidates whose effect contains one that pays (Stribeck's friction contains Coulomb's).
+
+        Args:
+            found: fitted candidates.
+            current: the model to build on.
+            base: the model without effects.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The candidates.
+        """
+        trials = []
+        for source in [c for c in (*found, current) if c is current or c.pays_over(current, base)]:
+            for effect in self.plant.bank:
+                simpler = next((e for e in source.effects if e.label == effect.needs), None)
+                if simpler is not None and (source is current or simpler is source.effects[-1]):
+                    trials.append((source, simpler, effect))
+        refined = self._each(lambda trial: self.refine(*trial, scene), trials)
+        return [candidate for candidate in refined if candidate is not None]
+
+    def rescued(self, candidate: Candidate, current: Candidate, base: Candidate) -> Candidate:
+        """Fit a candidate to both parts when it gains much on the first and fails on the second.
+
+        A law that holds where it was fitted may fail where the deciding part reaches further (a spring that hardens
+        faster than its cubic, a limit that is reached once); fitted to both, it shows what it is worth.
+
+        Args:
+            candidate: a fitted model.
+            current: the model to build on.
+            base: the model without effects.
+
+        Returns:
+            The better of both.
+        """
+        gained = candidate.fit.fitted - current.fit.fitted
+        if gained < self.settings.rescued or candidate.pays_over(current, base):
+            return candidate
+        start, stop = (f(self.parts.fitted, self.parts.validated) for f in (_first, _last))
+        both = Parts(slice(start, stop), self.parts.validated, self.parts.held_out)
+        fitted = annealed(self.likelihood, candidate.fit.p, current.fit.q, candidate.fit.free, both, candidate.effects)
+        self._tick(f"{candidate.effects[-1].label}, both parts")
+        whole = fitted.fitted
+        share = self.likelihood.log_likelihood(fitted.z, fitted.q, self.parts.validated, fitted.colour, fitted.p)
+        retried = self.candidate(candidate.effects, replace(fitted, fitted=whole - share, validated=share))
+        return max(candidate, retried, key=lambda c: c.score)
+
+    def refine(self, source: Candidate, simpler: Effect, effect: Effect, scene: Scene) -> Candidate | None:
+        """Return the best fit of ``effect`` in the place of ``simpler``, from several starts; None: not plausible.
+
+        Args:
+            source: the model that has ``simpler``.
+            simpler: the effect that ``effect`` contains.
+            effect: of the bank.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The candidate.
+        """
+        effects = tuple(effect if e is simpler else e for e in source.effects)
+        values = {short: float(source.fit.p[place]) for short, place in simpler.places(self.plant).items()}
+        bare = self.without(source.fit.p, simpler)
+        best: Fit | None = None
+        for start in effect.refine(values, scene):
+            p = effect.put(self.plant, bare, start, self.refitted)
+            fitted = annealed(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, effects)
+            if best is None or fitted.fitted > best.fitted:
+                best = fitted
+        self._tick(effect.label)
+        if best is None:
+            return None
+        final = {short: float(best.p[place]) for short, place in effect.places(self.plant).items()}
+        return self.candidate(effects, best) if effect.plausible(final) else None
+
+    def extend(self, current: Candidate, effect: Effect, guesses: Guesses, scene: Scene) -> Candidate:
+        """Return ``current`` with one more effect: the best of the fits from the guesses.
+
+        Args:
+            current: the model to build on.
+            effect: of the bank.
+            guesses: starting values.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The candidate.
+        """
+        effects = (*current.effects, effect)
+        if self.hidden is not None and self.hidden.effects == effects:
+            return self.hidden
+        free = self.free(effects, scene)
+        starts = [effect.put(self.plant, current.fit.p, guess.values, self.refitted) for guess in guesses]
+        fits = [annealed(self.likelihood, p, current.fit.q, free, self.parts, effects) for p in starts]
+        self._tick(effect.label)
+        return self.candidate(effects, max(fits, key=lambda fitted: fitted.fitted))
+
+    def prune(self, current: Candidate, base: Candidate) -> Candidate:
+        """Take out earlier effects that the last one has made superfluous.
+
+        Args:
+            current: the model to build on.
+            base: the model without effects.
+
+        Returns:
+            The candidate that is left.
+        """
+        scene = scene_of(self.likelihood, current.fit)
+        while len(current.effects) > 1:
+            reduced = self._each(partial(self.reduced, current, scene), current.effects[:-1])
+            best = max(reduced, key=lambda candidate: candidate.score)
+            if current.pays_over(best, base):
+                break
+            current = best
+        return current
+
+    def reduced(self, current: Candidate, scene: Scene, effect: Effect) -> Candidate:
+        """Return ``current`` without one of its effects, fitted again.
+
+        Args:
+            current: the model to build on.
+            scene: sizes of the record's signals.
+            effect: of the bank.
+
+        Returns:
+            The candidate.
+        """
+        kept = tuple(e for e in current.effects if e is not effect)
+        p = self.without(current.fit.p, effect)
+        fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
+        self._tick(f"without {effect.label}")
+        return self.candidate(kept, fitted)
+
+    def candidate(self, effects: tuple[Effect, ...], fitted: Fit) -> Candidate:
+        """Return a fitted model as a candidate.
+
+        Args:
+            effects: of the model.
+            fitted: its fit.
+
+        Returns:
+            The candidate.
+        """
+        return Candidate(effects, fitted, self.settings)
+
+    @property
+    def refitted(self) -> list[int]:
+        """Return the places of the plant's own parameters that every model re-fits."""
+        return [entry.place for entry in self.linear()]
+
+    def linear(self) -> tuple[Free, ...]:
+        """Return the uncertain parameters of the model file; a gear ratio cannot be seen from one side.
+
+        Returns:
+            Their places, scales, bounds and priors.
+        """
+        shaft, both = self.plant.shaft, self.likelihood.signals.channels == len(self.plant.bodies)
+        unseen = "" if both or shaft is None else shaft.ratio
+        return tuple(
+            Free(self.plant.index(u.name), u.standard_deviation, u.minimum, u.maximum, (u.value, u.standard_deviation))
+            for u in self.model.uncertain
+            if u.name != unseen
+        )
+
+    def free(self, effects: Sequence[Effect], scene: Scene) -> tuple[Free, ...]:
+        """Return the uncertain parameters and those of ``effects``.
+
+        Args:
+            effects: of the model.
+            scene: sizes of the record's signals.
+
+        Returns:
+            Their places, scales, bounds and priors.
+        """
+        free = list(self.linear())
+        taken = {entry.place for entry in free}
+        for effect in effects:
+            unit, scales = effect.unit_of_size(scene), effect.scales(scene)
+            for short, place in effect.places(self.plant).items():
+                if place not in taken:
+                    entry = self.plant.entry(place)
+                    low, high = effect.bounds(scene).get(short, (entry.minimum, entry.maximum))
+                    prior = effect.priors(scene).get(short)
+                    free.append(Free(place, scales.get(short, unit), low, high, prior))
+        return tuple(free)
+
+    def without(self, p: Array, effect: Effect) -> Array:
+        """Return ``p`` with one effect switched off.
+
+        Args:
+            p: (parameters,) of the predictor.
+            effect: of the bank.
+
+        Returns:
+            A copy.
+        """
+        return effect.taken_out(self.plant, p, self.plant.extended(self.model.values), self.refitted)
+
+    def _each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """Return ``function`` of each item, in order, computed in threads."""
+
+        def in_time(item: T) -> R:
+            if time.monotonic() > self.deadline:
+                raise TimeUpError
+            return function(item)
+
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            try:
+                return list(pool.map(in_time, items))
+            except TimeUpError:
+                pool.shutdown(cancel_futures=True)
+                raise
+            except BaseException:
+                self.likelihood.halt()  # an interrupt need not wait for the fits that run
+                pool.shutdown(cancel_futures=True)
+                raise
+
+    def _tick(self, what: str) -> None:
+        with self._counting:
+            self.done += 1
+            expected = max(self.done + 2, (len(self.steps) + 1) * (self.settings.shortlist + 2))
+            self.progress(self.done, expected, what)
+
+
+def _first(a: slice, b: slice) -> int:
+    return int(min(a.start, b.start))
+
+
+def _last(a: slice, b: slice) -> int:
+    return int(max(a.stop, b.stop))
+
+
+def in_metres(model: Model) -> bool:
+    """Tell whether the model's position is a length.
+
+    Args:
+        model: that the record is compared with.
+
+    Returns:
+        True when it is.
+    """
+    column = model.columns.get("theta_m")
+    return column is not None and column.unit in ("m", "mm")

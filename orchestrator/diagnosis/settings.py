@@ -1,0 +1,349 @@
+"""Every threshold of a diagnosis, in groups, each with one line of why.
+
+``diagnose(..., settings=...)`` takes others, or the path of a TOML file of them; the result carries those used.
+Log-likelihoods are natural; times are in seconds unless said otherwise.
+"""
+
+from typing import Annotated
+
+import numpy as np
+
+from orchestrator.shared.settings import Settings, note, setting, share
+
+
+class AdmissionSettings(Settings, frozen=True):
+    """What record and model must have before they are compared."""
+
+    least_travel: Annotated[float, setting("travel in noise deviations; a long record of pure noise spans eight")] = (
+        20.0
+    )
+    most_substeps: Annotated[int, setting("integration steps in a sample; more: the model is far too fast", ge=1)] = 100
+
+
+class LikelihoodSettings(Settings, frozen=True):
+    """The one-step predictor, its gains, and the noise of the encoders."""
+
+    head: Annotated[int, setting("samples at the start that only settle the state", ge=1)] = 10
+    settled: Annotated[int, setting("samples after which states and innovations are shown and judged", ge=1)] = 20
+    finer: Annotated[int, setting("times more steps in a sample in which dry friction may turn round", ge=1)] = 8
+    resonance_step: Annotated[
+        float, setting("radians of an added resonance per step: above it, phase is lost", gt=0)
+    ] = 0.5
+    resonance_margin: Annotated[float, setting("added resonances ring above their nominal frequency by this", gt=0)] = (
+        1.3
+    )
+    noise_window: Annotated[int, setting("samples of the sliding cubic whose residual is the noise", ge=6)] = 9
+    unlimited: Annotated[float, setting("torque limits from here on [N.m] are none: clipping is skipped")] = 1e11
+    start_angle: Annotated[float, setting("initial angle's standard deviation, in noise deviations", gt=0)] = 10.0
+    speed_span: Annotated[float, setting("span over which the record's largest speed is taken [s]", gt=0)] = 0.05
+
+
+class RateSettings(Settings, frozen=True):
+    """The rate at which a record is analysed: from its content, not from how often it was sampled."""
+
+    least_rate: Annotated[
+        float, setting("analysis rate that is kept [Hz]: friction turns round within 10 ms", gt=0)
+    ] = 100.0
+    least_rows: Annotated[int, setting("rows that a record keeps in any case", ge=200)] = 500
+    per_band: Annotated[float, setting("rate over the frequency below which nearly all motion lies", gt=2)] = 16.0
+    per_mode: Annotated[float, setting("rate over the model's fastest oscillation", gt=2)] = 30.0
+    shows: Annotated[float, setting("power over that of the noise from which motion shows", ge=1)] = 4.0
+    most_above: Annotated[float, share("share of the squared speed that may lie above the band")] = 0.01
+    pane: Annotated[int, setting("samples of a spectrum's pane at most", ge=64)] = 1024
+    most_interpolated: Annotated[int, setting("rows per measured row that are looked for", ge=2)] = 10
+    on_line: Annotated[
+        float, setting("of the typical second difference: rows so close to a line were interpolated")
+    ] = 1e-3
+    rounding: Annotated[float, share("of a rate that time stamps may be off by")] = 0.02
+    cut_off: Annotated[float, share("of half the lower rate at which the filter before it cuts off")] = 0.8
+    all_but: Annotated[float, share("share of rows that must lie on lines, the corners apart")] = 0.98
+
+
+class FitSettings(Settings, frozen=True):
+    """Damped least squares on whitened innovations, and the repeated fits behind the intervals."""
+
+    fitted: Annotated[float, share("of the record that is fitted: the first half", le=0.9)] = 0.5
+    looked_at: Annotated[float, share("of the record that is fitted or decides; the rest is held out", le=0.95)] = 0.75
+    most_fitted: Annotated[
+        int, setting("rows that are fitted at most; half as many decide, the rest is held out", ge=500)
+    ] = 6000
+    strides: Annotated[tuple[int, ...], note("levels of noise at once, in the order in which they are tried")] = (
+        4,
+        2,
+        1,
+    )
+    passed_over: Annotated[int, setting("failures that the longest stride passes over on its way down", ge=0)] = 2
+    difference: Annotated[
+        float, setting("step of a derivative in a parameter's scale: small beside its curvature", gt=0)
+    ] = 1e-3
+    iterations: Annotated[int, setting("most steps of a fit: more have not changed a verdict", ge=1)] = 8
+    patience: Annotated[int, setting("dampings tried before a fit counts as converged", ge=1)] = 6
+    damping: Annotated[float, setting("first damping, and least one after a failed step", gt=0)] = 1e-4
+    ridge: Annotated[
+        float, setting("added to the normal equations' diagonal: keeps blind directions solvable", gt=0)
+    ] = 1e-9
+    enough: Annotated[float, setting("gain in log-likelihood below which a fit has converged")] = 0.05
+    disputed: Annotated[
+        float, setting("standard errors by which sizes may differ as innovations count as coloured or white")
+    ] = 2.0
+    blocks: Annotated[int, setting("blocks of the record whose disagreement widens intervals", ge=2)] = 4
+    block_iterations: Annotated[int, setting("steps of a block's fit, which starts at the whole's", ge=1)] = 5
+
+
+class ScanSettings(Settings, frozen=True):
+    """The scan for torques that are periodic in the motor's position."""
+
+    peaks: Annotated[
+        int, setting("peaks that become starting values: the true line is rarely below the third", ge=1)
+    ] = 5
+    separation: Annotated[int, setting("grid points within which peaks are one: a line is three wide", ge=0)] = 3
+    highest: Annotated[float, setting("cycles per revolution looked for: teeth and poles lie below", gt=0)] = 60.0
+    highest_per_travel: Annotated[float, setting("or cycles over the whole travel, where that is more", gt=0)] = 300.0
+    lowest_per_travel: Annotated[float, setting("cycles over the travel below which a line is a trend", gt=0)] = 0.7
+    points: Annotated[float, setting("grid points per line width, which is one over the travel", gt=0)] = 3.0
+    sampling: Annotated[float, setting("of the sampling's angular frequency, over pi, that a line may reach", gt=0)] = (
+        2.4
+    )
+    most_points: Annotated[int, setting("grid points at most: bounds the time of the scan", ge=10)] = 3000
+    response_points: Annotated[int, setting("frequencies at which the filter's response is tabulated", ge=2)] = 400
+    least_turns: Annotated[float, setting("travel in revolutions below which there is nothing to scan", gt=0)] = 1e-6
+
+
+class SearchSettings(Settings, frozen=True):
+    """Which candidates are fitted, what an effect must gain, and how far process noise may go."""
+
+    time_limit: Annotated[float, setting("time [s] after which it stops and nothing is named; 0: never", ge=0)] = 0.0
+    most_noise: Annotated[float, setting("largest process noise, as a share of the drive's torque", gt=0)] = 3.0
+    least_noise: Annotated[float, setting("smallest: predictions are nearly free runs there", gt=0)] = 1e-5
+    noise_levels: Annotated[int, setting("levels of process noise, spaced evenly in the logarithm", ge=2)] = 23
+    first_level: Annotated[int, setting("level at which the model without effects starts: the middle", ge=0)] = 10
+    twist_quantile: Annotated[float, share("of the twist's size that counts as its largest: sheds outliers")] = 0.995
+    shortlist_white: Annotated[
+        int, setting("and those fitted beside them that promise most when innovations count as white", ge=0)
+    ] = 3
+    nearly_pays: Annotated[float, setting("least gain of an effect with which long predictions get far better")] = 3.0
+    least_fitted: Annotated[
+        float, setting("and its gain per parameter where it is fitted: chance reaches it once in 100")
+    ] = 3.5
+    shown: Annotated[float, share("share of the squared long-run error that such an effect must remove")] = 0.5
+    least_errors: Annotated[float, setting("standard errors by which a named size must differ from zero")] = 2.0
+    one_way: Annotated[float, share("share of the travel that a machine may go back and still go one way")] = 1e-3
+    most_friction: Annotated[float, setting("dry friction over the largest torque: with more nothing moves")] = 1.0
+    most_torque: Annotated[float, setting("other torques over the largest that was asked for")] = 5.0
+    least_limit: Annotated[float, share("of the largest torque: a drive that is limited to less delivers none")] = 0.02
+    most_delay: Annotated[float, setting("longest dead time [s]: beyond, the signals do not belong together")] = 0.25
+    delay_share: Annotated[float, share("or of the record's length, where that is less")] = 0.1
+    shortlist: Annotated[
+        int, setting("candidates fitted in full: the right one was among them in development", ge=1)
+    ] = 6
+    worth: Annotated[float, share("least share of the best promise that a candidate must promise to be fitted")] = 0.03
+    least_promise: Annotated[float, setting("least promised gain for a fit: below, noise promises as much")] = 3.0
+    penalty: Annotated[float, setting("log-likelihood that each further parameter must earn")] = 5.0
+    pays: Annotated[float, setting("least gain of an effect where what is left is measurement noise")] = 10.0
+    pays_above_noise: Annotated[float, setting("and where it is not, as what is left is then correlated")] = 22.0
+    noise_alone: Annotated[float, setting("largest process noise at which what is left is measurement noise")] = 1e-4
+    least_decided: Annotated[float, setting("least gain on the deciding part alone: it has not been fitted")] = 6.0
+    least_decided_share: Annotated[float, share("of the gain on the fitted part, which is twice as long")] = 0.08
+    first_hidden: Annotated[
+        float, setting("process noise at which a gap without an encoder behind it starts: right models get there", gt=0)
+    ] = 1e-3
+    linearised: Annotated[int, setting("times that such a gap is fitted, gains taken along the fit before", ge=1)] = 2
+    most_effects: Annotated[int, setting("effects named at most: more have no room in one record", ge=0)] = 4
+    most_in_a_repeat: Annotated[
+        int, setting("effects in a search with exchanged parts: one part explains few", ge=0)
+    ] = 2
+    rescued: Annotated[float, setting("gain from which a candidate that fails to decide is fitted to both parts")] = (
+        60.0
+    )
+
+
+class RemainderSettings(Settings, frozen=True):
+    """Generic bases that may predict what the best model leaves."""
+
+    harmonics: Annotated[int, setting("harmonics of an angle", ge=1)] = 3
+    blocks: Annotated[int, setting("blocks whose scatter says how sure a gain is", ge=4)] = 12
+    ridge: Annotated[float, setting("share of the mean diagonal added to the normal equations", gt=0)] = 1e-6
+    hats: Annotated[int, setting("hat functions of a speed or twist", ge=2)] = 9
+    hat_edge: Annotated[float, share("quantile of the outermost hats: outliers get none of their own", le=0.4)] = 0.002
+    plays: Annotated[int, setting("play operators: a basis for anything that remembers", ge=1)] = 5
+    play_reach: Annotated[float, share("quantile of the size that plays are measured by")] = 0.99
+    least_play: Annotated[float, setting("narrowest play, as a share of that reach", gt=0)] = 0.05
+    largest_play: Annotated[float, setting("widest play, as a share of that reach", gt=0)] = 0.9
+
+
+class VerdictSettings(Settings, frozen=True):
+    """When nothing is missing, when it is unknown, and which effects a record cannot tell apart."""
+
+    least_explained: Annotated[
+        float, share("of the missing log-likelihood; right models recover over 0.75, wrong under 0.2")
+    ] = 0.4
+    least_missing: Annotated[float, setting("missing log-likelihood per sample below which nothing is left")] = 0.05
+    grown: Annotated[float, setting("times larger innovations on later parts that tell of a change with time")] = 3.0
+    structured: Annotated[
+        float, setting("out-of-sample gain from which what is left is no noise (four standard errors)")
+    ] = 8.0
+    large_share: Annotated[float, share("or share of the energy that a basis predicts, out of sample")] = 0.2
+    likely: Annotated[float, setting("with at least this gain: chance reaches it once in 70")] = 3.0
+    heavy: Annotated[float, setting("excess kurtosis from which it is none either: pulses, knocks")] = 1.5
+    pulses: Annotated[
+        float, setting("excess kurtosis that only skill at every horizon outweighs: rare, large torques")
+    ] = 4.0
+    proven: Annotated[
+        float, share("share of the squared held-out error that effects remove to stand by themselves")
+    ] = 0.75
+    hopeless: Annotated[
+        float, share("error over that of a motion at constant speed, and R2, beyond which nothing is predicted")
+    ] = 0.5
+    good: Annotated[float, share("R2 of the free run over the held-out part below which trust is amber")] = 0.9
+    notable_misfit: Annotated[
+        float, setting("times the noise: laws of friction and contact that are nearly right leave up to two", ge=1)
+    ] = 3.0
+    far_off: Annotated[float, setting("stated uncertainties by which a re-fitted value is implausible", gt=1)] = 2.0
+    likely_gain: Annotated[
+        float, setting("standard deviation of a drive's gain before a record is seen: data sheets say 10 %", gt=0)
+    ] = 0.06
+    sure_gain: Annotated[float, setting("log-likelihood that one gain must save of many values that are off")] = 8.0
+    least_carriers: Annotated[int, setting("values that must agree on a gain: fewer are no evidence", ge=2)] = 3
+    explained_by_nominal: Annotated[
+        float, setting("gain of re-fitting, per parameter, up to which nominal values hold")
+    ] = 3.0
+    alike: Annotated[float, share("share of the gain within which effects of a family look alike")] = 0.05
+    alike_gain: Annotated[float, setting("or this gain, where that is more: what chance may add to one of two")] = 8.0
+    mostly_explained: Annotated[float, share("share explained below which a note speaks of the rest")] = 0.8
+    follows: Annotated[float, setting("gain from which the rest is said to follow something: chance stays below")] = 8.0
+    remainder: RemainderSettings = RemainderSettings()
+
+
+class PlacesSettings(Settings, frozen=True):
+    """Where record and model disagree: intervals with more missing torque than their share of the samples."""
+
+    bins: Annotated[int, setting("quantiles between which intervals may end", ge=3)] = 24
+    concentrated: Annotated[float, setting("energy share over sample share from which an interval counts", ge=1)] = 1.25
+    narrow: Annotated[float, share("share of the frequency axis below which a band says something")] = 0.06
+    band: Annotated[float, share("energy that a band must hold: most of it")] = 0.5
+    small: Annotated[float, share("share of the misfit below which a place is not worth a line")] = 0.02
+    most: Annotated[int, setting("places reported at most", ge=1)] = 12
+    pane: Annotated[int, setting("samples of a spectrum's pane", ge=16)] = 1024
+    impulse: Annotated[
+        int, setting("samples over which a torque's response is summed: it has faded by then", ge=10)
+    ] = 400
+
+
+class EvidenceSettings(Settings, frozen=True):
+    """What else follows position or direction, and from where on chance does not explain it."""
+
+    lines: Annotated[int, setting("strongest lines looked at", ge=1)] = 3
+    sure: Annotated[float, setting("levels beyond what the best of all periods gains by chance")] = 7.0
+    harmonic_sure: Annotated[float, setting("levels that a second harmonic, of which there is one, must gain")] = 7.0
+    term_sure: Annotated[float, setting("levels that a trend or an asymmetry must gain")] = 7.0
+    own: Annotated[float, share("share of its response that a term keeps beside the free parameters'")] = 0.03
+    least_repeats: Annotated[float, setting("times that a line must repeat within the travel; else it is a trend")] = (
+        2.0
+    )
+    separation: Annotated[int, setting("grid points within which lines are one", ge=0)] = 4
+    harmonic_search: Annotated[float, setting("half-width of the search for a second harmonic, relative")] = 0.002
+    same_period: Annotated[float, setting("relative difference within which periods are the same")] = 0.01
+
+
+class FreeRunSettings(Settings, frozen=True):
+    """Free runs of the exact plant: how their initial states are found."""
+
+    iterations: Annotated[int, setting("Gauss-Newton steps of an initial state", ge=1)] = 12
+    damping: Annotated[float, setting("damping of the first step: a good guess needs hardly any", gt=0)] = 1e-6
+    tries: Annotated[int, setting("dampings tried in a step", ge=1)] = 6
+    enough: Annotated[float, setting("relative gain below which a start has converged")] = 1e-4
+    fade: Annotated[float, setting("share of the trace added to the diagonal: unseen states stay put", gt=0)] = 1e-10
+    close: Annotated[float, setting("rms in noise deviations up to which a run is close", ge=1)] = 1.3
+    growing: Annotated[tuple[float, ...], note("shares of the run over which a start is sought again")] = (
+        0.1,
+        0.25,
+        0.5,
+        1.0,
+    )
+    least_samples: Annotated[int, setting("samples of such a share at least", ge=2)] = 10
+    nudge: Annotated[float, setting("step of a derivative, as a share of a state's typical size", gt=0)] = 0.1
+    relative_size: Annotated[float, setting("typical size of speeds and torques, relative to themselves", gt=0)] = 0.01
+    least_speed: Annotated[float, setting("typical size of a speed at rest [rad/s]", gt=0)] = 1e-3
+
+
+class HorizonSettings(Settings, frozen=True):
+    """Predictions over several horizons on data that no fit has seen, and when they get worse."""
+
+    spans: Annotated[tuple[float, ...], note("horizons [s] beside one sample, a segment and the whole part")] = (
+        0.05,
+        0.5,
+    )
+    starts: Annotated[int, setting("predictions of each horizon, spread over the part", ge=10)] = 60
+    most_segments: Annotated[int, setting("free runs of a segment's length at most", ge=1)] = 8
+    larger: Annotated[float, share("share by which chance may make an error larger")] = 0.01
+    of_noise: Annotated[float, share("and share of the measurement noise")] = 0.05
+    sure: Annotated[float, setting("standard deviations of chance by which predictions must get worse")] = 2.0
+    draws: Annotated[int, setting("draws of the torque noise that say what chance does to long runs", ge=8)] = 24
+    ruled_by_noise: Annotated[float, setting("horizons below this [s] say little of skill: noise rules them")] = 0.1
+
+
+class ProofSettings(Settings, frozen=True):
+    """The misfit on data that no fit has touched."""
+
+    segment: Annotated[float, setting("length of a free run [s]; that of the thesis's tests", gt=0)] = 2.0
+    least_samples: Annotated[int, setting("samples of a free run at least", ge=2)] = 40
+    same_input: Annotated[
+        float, share("rms of two requests' difference over the request: repeats of one experiment")
+    ] = 0.02
+    horizons: HorizonSettings = HorizonSettings()
+    free_run: FreeRunSettings = FreeRunSettings()
+    first_guess: Annotated[int, setting("samples after which the filter's state is a fair first guess", ge=1)] = 20
+
+
+class LearnedSettings(Settings, frozen=True):
+    """A law learned from what no effect explains."""
+
+    fitted: Annotated[
+        int, setting("arguments that are fitted in full, most promising first; 0: none is learned", ge=0)
+    ] = 2
+    left: Annotated[float, share("of the deciding part's misfit that a law may leave: less is not worth a curve")] = 0.7
+    spread: Annotated[float, setting("prior deviation of its values, in torques of the drive", gt=0)] = 1.0
+    formula: Annotated[float, setting("mean square in standard errors up to which a formula runs within the band")] = (
+        1.5
+    )
+
+
+class InverseSettings(Settings, frozen=True):
+    """The torque of the inverse model, as published for EMPS (Janot, Gautier and Brunot 2019)."""
+
+    order: Annotated[int, setting("of the Butterworth filter", ge=1)] = 4
+    cut_off: Annotated[float, setting("of half the sampling rate", gt=0, le=0.99)] = 0.2
+    decimation: Annotated[int, setting("factor by which torques are decimated", ge=2)] = 10
+    border: Annotated[int, setting("samples at either end where the filters settle", ge=1)] = 50
+
+
+class DiagnosisSettings(Settings, frozen=True):
+    """All settings of a diagnosis."""
+
+    admission: AdmissionSettings = AdmissionSettings()
+    rate: RateSettings = RateSettings()
+    likelihood: LikelihoodSettings = LikelihoodSettings()
+    fit: FitSettings = FitSettings()
+    scan: ScanSettings = ScanSettings()
+    search: SearchSettings = SearchSettings()
+    verdict: VerdictSettings = VerdictSettings()
+    places: PlacesSettings = PlacesSettings()
+    evidence: EvidenceSettings = EvidenceSettings()
+    proof: ProofSettings = ProofSettings()
+    learned: LearnedSettings = LearnedSettings()
+    inverse: InverseSettings = InverseSettings()
+
+    def __post_init__(self) -> None:
+        """Refuse settings that contradict each other."""
+        if not 0.05 <= self.fit.fitted < self.fit.looked_at:
+            raise ValueError("`fit.fitted` must be at least 0.05 and less than `fit.looked_at`, but is not")
+        if not self.search.first_level < self.search.noise_levels:
+            raise ValueError("`search.first_level` must be less than `search.noise_levels`, but is not")
+        if not self.search.least_noise < self.search.most_noise:
+            raise ValueError("`search.least_noise` must be less than `search.most_noise`, but is not")
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Return the ladder of process noise, falling, as shares of the drive's torque."""
+        search = self.search
+        return tuple(float(f) for f in np.geomspace(search.most_noise, search.least_noise, search.noise_levels))

@@ -1,0 +1,126 @@
+"""The rules of the verdict: when nothing is named, and how far a result can be trusted."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.outcome import Misfit
+from orchestrator.diagnosis.proof.horizons import Horizons
+from orchestrator.diagnosis.settings import VerdictSettings
+from orchestrator.diagnosis.verdict.remainder import Remainder
+from orchestrator.shared.trust import Level, Reason, Trust, trust_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Prediction errors on the held-out part: of re-fitted parameters alone, and of the final model."""
+
+    base: Horizons
+    final: Horizons
+
+    @property
+    def skill(self) -> float:
+        """Return the share of the squared prediction error that the effects remove."""
+        return self.final.skill_over(self.base)
+
+    @property
+    def even_skill(self) -> float:
+        """Return the smallest share that they remove at any horizon but one sample."""
+        return self.final.even_skill_over(self.base)
+
+
+def _structured(left: Remainder, settings: VerdictSettings) -> bool:
+    """Tell whether what is left is something else than a coloured torque noise."""
+    if left.tails > settings.heavy:
+        return True
+    return any(
+        entry.gain > settings.structured or (entry.share > settings.large_share and entry.gain > settings.likely)
+        for entry in left.predictable
+    )
+
+
+def is_unknown(
+    left: Remainder, floor_off: bool, proof: Proof, named: bool, far_off: bool, settings: VerdictSettings
+) -> bool:
+    """Tell whether a misfit is left that what is named does not explain.
+
+    Args:
+        left: what the final model leaves.
+        floor_off: more is left than measurement noise.
+        proof: of the final model.
+        named: the final model has effects.
+        far_off: re-fitted values lie far outside what the model file allows.
+        settings: the rules' thresholds.
+
+    Returns:
+        True when one is.
+    """
+    # Rare, large torques leave short predictions as bad as they were, whatever their mean explains of long ones.
+    proven = named and proof.skill > settings.proven
+    proven = proven and (left.tails < settings.pulses or proof.even_skill > settings.proven)
+    if proof.final.is_hopeless(settings.hopeless) and (named or floor_off):
+        return True
+    if not floor_off:
+        return left.growth > settings.grown
+    if proven:
+        return False
+    no_noise = _structured(left, settings) or (far_off and not named)
+    return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
+
+
+UNEXPLAINED = "a misfit is left that nothing in the library explains"
+
+
+def doubts(
+    verdict: str, left: Remainder, floor_off: bool, proof: Proof, far_off: Sequence[str], misfit: Sequence[Misfit],
+    warnings: Sequence[str], settings: VerdictSettings,
+) -> Trust:  # fmt: skip
+    """Return how far a result can be trusted.
+
+    Args:
+        verdict: of the diagnosis.
+        left: what the final model leaves.
+        floor_off: more is left than measurement noise.
+        proof: of the final model.
+        far_off: names of parameters whose re-fitted values lie far outside what the model file allows.
+        misfit: of each signal on the held-out part.
+        warnings: the diagnosis's notes.
+        settings: the rules' thresholds.
+
+    Returns:
+        Level and reasons.
+    """
+    red = [UNEXPLAINED] if verdict == "unknown" else []
+    found = [warning for warning in warnings if warning not in red]
+    for entry in misfit:
+        if entry.after > settings.notable_misfit * entry.noise:
+            times = entry.after / entry.noise
+            found.append(f"the misfit of {entry.signal} on held-out data is {times:.1f} times the noise")
+    if floor_off and _structured(left, settings):
+        found.append("what the final model leaves is no noise")
+    if left.growth > settings.grown:
+        found.append(f"innovations are {left.growth:.1f} times larger on the held-out part")
+    worst = float(min(proof.final.r_squared))
+    if worst < settings.good:
+        found.append(f"a free run over the held-out part reaches an R2 of {worst:.2f} only")
+    for name in far_off:
+        found.append(f"`{name}` lies far outside what the model file allows: its value, or a unit, may be wrong")
+    return trust_of([*(Reason(Level.RED, text) for text in red), *(Reason(Level.AMBER, text) for text in found)])
+
+
+def without_effects(trust: Trust, note: str) -> Trust:
+    """Return the trust of a diagnosis whose effects have been withdrawn.
+
+    Args:
+        trust: before.
+        note: why they were withdrawn.
+
+    Returns:
+        The trust, red.
+    """
+    kept = (Reason(Level.AMBER, text) for text in (note, *trust.reasons) if text != UNEXPLAINED)
+    return trust_of([Reason(Level.RED, UNEXPLAINED), *kept])

@@ -1,0 +1,145 @@
+"""What a maximum of the likelihood says: interval, whether a gap is seen, whether the model explains the record."""
+
+import math
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from orchestrator.estimation.cramer_rao import bound_of_fit
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.likelihood import Fit, Likelihood
+from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
+from orchestrator.estimation.profile import profile
+from orchestrator.estimation.protocol import LEVEL, Estimate
+from orchestrator.estimation.settings import VerdictSettings
+from pyfmu_sources.drivetrain_parameters import P_I
+
+
+def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
+    """Return the estimate of a fit: interval, visibility, and what else the fit says.
+
+    Args:
+        likelihood: of the record.
+        fit: its maximum.
+
+    Returns:
+        The estimate.
+    """
+    problem, settings = likelihood.problem, likelihood.settings.verdict
+    place = problem.index("alpha")
+    column = list(fit.free).index(place)
+    alpha = float(fit.point.theta[place])
+    error = math.sqrt(fit.covariance[column, column])
+    curve = profile(likelihood, fit)
+    # Torque noise above the least means that the model is not exact; what it lacks is not white, as the likelihood
+    # takes it to be, so the interval is widened.
+    inexact = max(likelihood.noise(fit.point.theta).torque) > 10.0 * LEAST_TORQUE_NOISE
+    limit = float(chi2.ppf(LEVEL, 1)) * (settings.misfit_widening**2 if inexact else 1.0)
+    low, high = curve.interval(alpha, limit)
+    # A profile point that is not quite the maximum makes the interval too short, never too long.
+    half = math.sqrt(limit) * error
+    low, high = min(low, max(alpha - half, 0.0)), max(high, alpha + half)
+    kept = likelihood.run(fit.point.theta, keep=True)
+    flanks = kept.contacts[kept.contacts != 0]
+    traversals = int(np.count_nonzero(np.diff(flanks))) if alpha > 0.0 else 0
+    white = kept.errors / np.sqrt(kept.variances)
+    diagnostics = {
+        "converged": fit.converged,
+        "iterations": fit.iterations,
+        "traversals": traversals,
+        "profile_limit": limit,
+        "cramer_rao": bound_of_fit(likelihood, fit),
+        "deviance": fit.point.deviance,
+        "parameters": _parameters(likelihood, fit),
+        "innovation_autocorrelation": [float(_autocorrelation(white[:, n])) for n in range(white.shape[1])],
+        "torque_noise": list(likelihood.noise(fit.point.theta).torque),
+        "measurement_noise": list(likelihood.noise(fit.point.theta).measured[: white.shape[1]]),
+    }
+    visible, message = _verdict(alpha, low, high, traversals)
+    still = _standing_still(problem.outputs, likelihood.noise(fit.point.theta).measured, settings)
+    if still:
+        visible, message, error, low, high = False, still, math.inf, 0.0, math.inf
+    drive = float(np.sqrt(np.mean(kept.states[:, 4] ** 2)))
+    lacking = _lacking(diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I], problem.record.size, settings)
+    diagnostics["lacking"] = lacking
+    message = "; ".join(text for text in (message, lacking) if text)
+    curves = {"states": kept.states, "contacts": kept.contacts, "errors": kept.errors, "profile": curve}
+    curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
+    curves["model"] = likelihood.parameters(fit.point.theta)
+    return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
+
+
+def _value(likelihood: Likelihood, fit: Fit, name: str) -> float:
+    names = likelihood.problem.names
+    return float(fit.point.theta[names.index(name)]) if name in names else 0.0
+
+
+def _verdict(alpha: float, low: float, high: float, traversals: int) -> tuple[bool, str]:
+    """Return whether the gap is seen, and the sentence that says so."""
+    visible = low > 0.0 and traversals > 0
+    if alpha > 0.0 and traversals == 0:
+        return visible, (
+            "the gap cannot be seen: the record never traverses it (one flank is loaded throughout); "
+            "an excitation that reverses the shaft torque would show it (`design` proposes one)"
+        )
+    if visible:
+        return True, ""
+    if math.isfinite(high):
+        return False, (
+            f"no gap is seen: with 95 % confidence the half-gap is below {high:.3g} rad; "
+            "`design` proposes a record that would show a smaller one"
+        )
+    return False, "the gap cannot be seen: every size fits the record; `design` proposes an excitation"
+
+
+def _standing_still(outputs: Array, noise: tuple[float, float], settings: VerdictSettings) -> str:
+    """Return the sentence that says which side does not move beyond its noise, or nothing."""
+    sides = (("motor", settings.least_travel_motor), ("load", settings.least_travel_load))
+    for n, (name, least) in enumerate(sides[: outputs.shape[1]]):
+        travel = float(np.nanmax(outputs[:, n]) - np.nanmin(outputs[:, n])) / noise[n]
+        if travel < least:
+            return (
+                f"the gap cannot be seen: the {name} moves by only {travel:.2g} standard deviations of its encoder's "
+                f"noise, and must by {least:g}; `design` proposes an excitation"
+            )
+    return ""
+
+
+def _lacking(diagnostics: dict[str, Any], drive: float, ratio: float, rows: int, settings: VerdictSettings) -> str:
+    """Return the warning that the model lacks something, or nothing.
+
+    Args:
+        diagnostics: of the fit.
+        drive: effective value of the motor's torque [N.m].
+        ratio: gear ratio.
+        rows: of the record.
+        settings: thresholds.
+    """
+    worst = max(abs(value) for value in diagnostics["innovation_autocorrelation"])
+    motor, load = diagnostics["torque_noise"]
+    if max(motor, load / ratio) < settings.notable_torque_noise * drive and worst < max(
+        settings.notable_autocorrelation, settings.chance_autocorrelation / math.sqrt(rows)
+    ):
+        return ""
+    return (
+        f"the model does not explain the record (torque noise {motor:.2g} and {load:.2g} N.m.s^0.5 at motor and load, "
+        f"autocorrelation {worst:.2f} of the one-step errors): the gap may be biased; `diagnose` names what is missing"
+    )
+
+
+def _autocorrelation(white: Array) -> float:
+    """Return the autocorrelation at lag one."""
+    centred = white - white.mean()
+    return float(np.sum(centred[1:] * centred[:-1]) / max(float(np.sum(centred**2)), 1e-300))
+
+
+def _parameters(likelihood: Likelihood, fit: Fit) -> dict[str, dict[str, float]]:
+    """Return value, standard error and nominal of each fitted unknown."""
+    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    table = {}
+    for n, error in zip(fit.free, errors, strict=True):
+        unknown = likelihood.problem.unknowns[n]
+        entry = {"value": float(fit.point.theta[n]), "standard_error": float(error), "nominal": unknown.mean}
+        table[unknown.name] = entry
+    return table

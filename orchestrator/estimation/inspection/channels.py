@@ -1,0 +1,182 @@
+"""Facts of each channel of a record, and of pairs of channels."""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.records.record import Record, quantisation_step
+from orchestrator.shared.inference.noise import robust_noise
+
+Array = NDArray[np.float64]
+
+BANDS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)  # Hz, edges of the bands of the excitation
+LONGEST_LAG = 0.1  # s, of one encoder behind the other
+PARTS = 4  # of a record, whose spread tells a standard error
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What one column of a record is like.
+
+    Attributes:
+        name: of the record's columns.
+        unit: SI unit.
+        least: smallest value.
+        most: largest value.
+        count: step that the values are rounded to; 0.0: none.
+        noise: standard deviation of what changes from sample to sample without motion.
+        saturated: share of the samples at the very ends of the range, in runs of three or more.
+        missing: samples that are missing.
+    """
+
+    name: str
+    unit: str
+    least: float
+    most: float
+    count: float
+    noise: float
+    saturated: float
+    missing: int
+
+
+@dataclass(frozen=True)
+class Band:
+    """Share of the torque's power between two frequencies [Hz], and the mean coherence of motor angle with torque."""
+
+    low: float
+    high: float
+    share: float
+    coherence: float
+
+
+def channels_of(record: Record) -> list[Channel]:
+    """Return the facts of torque and angles.
+
+    Args:
+        record: the record.
+
+    Returns:
+        A channel per column.
+    """
+    missing_u = 0 if record.u_deviation is None else int(np.count_nonzero(record.u_deviation))
+    found = [_channel("u", "N.m", record.u, missing_u)]
+    for name in ("theta_m", "theta_l"):
+        values = getattr(record, name)
+        if values is not None:
+            found.append(_channel(name, "rad", values, int(np.count_nonzero(np.isnan(values)))))
+    return found
+
+
+def _channel(name: str, unit: str, values: Array, missing: int) -> Channel:
+    good = values[np.isfinite(values)]
+    noise = robust_noise(good)
+    count = quantisation_step(good)
+    return Channel(
+        name,
+        unit,
+        float(good.min()),
+        float(good.max()),
+        count,
+        max(noise, count / math.sqrt(12.0)),
+        _saturated(good),
+        missing,
+    )
+
+
+def _saturated(values: Array) -> float:
+    """Return the share of samples that lie in runs of three or more at the largest or smallest value."""
+    if float(np.ptp(values)) == 0.0:
+        return 0.0
+    share = 0
+    for end in (values.min(), values.max()):
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], (values == end).astype(np.int8), [0]])))
+        lengths = edges[1::2] - edges[::2]
+        share += int(lengths[lengths >= 3].sum())
+    return share / values.size
+
+
+def excitation_of(record: Record) -> list[Band]:
+    """Return the torque's power by frequency, and how much of the motor's motion follows it.
+
+    Args:
+        record: the record.
+
+    Returns:
+        The bands, rising.
+    """
+    from scipy.signal import coherence, welch
+
+    filled = record.filled()
+    length = min(filled.size // 4, max(64, round(8.0 / filled.step)))
+    rate = 1.0 / filled.step
+    frequency, power = welch(filled.u, rate, nperseg=length)
+    _, common = coherence(filled.u, np.gradient(filled.theta_m, filled.step), rate, nperseg=length)
+    total = float(power[1:].sum())
+    bands = []
+    for low, high in itertools.pairwise(BANDS):
+        inside = (frequency >= low) & (frequency < high)
+        if inside.any() and low < 0.5 * rate:
+            share = float(power[inside].sum()) / max(total, 1e-300)
+            bands.append(Band(low, min(high, 0.5 * rate), share, float(np.mean(common[inside]))))
+    return bands
+
+
+def delay_between(record: Record) -> tuple[float, float] | None:
+    """Return how far the load's angle lags the motor's, and the standard error of that [s].
+
+    The lag at which a straight line explains one angle by the other best, between samples by a parabola, on four parts
+    of the record, whose spread gives the standard error. The shaft's own compliance is part of the lag. None where
+    there is one encoder.
+
+    Args:
+        record: the record.
+
+    Returns:
+        The lag and its standard error.
+    """
+    if record.theta_l is None:
+        return None
+    filled = record.filled()
+    assert filled.theta_l is not None
+    reach = max(3, min(round(LONGEST_LAG / filled.step), filled.size // (4 * PARTS)))
+    lags = []
+    for rows in np.array_split(np.arange(filled.size), PARTS):
+        motor, load = filled.theta_m[rows[reach:-reach]], filled.theta_l[rows]
+        left = [_unexplained(motor, load[reach + n : reach + n + motor.size]) for n in range(-reach, reach + 1)]
+        best = int(np.argmin(left))
+        bend = 0.0
+        if 0 < best < 2 * reach:
+            before, least, after = left[best - 1 : best + 2]
+            bend = 0.5 * (before - after) / max(before - 2.0 * least + after, 1e-300)
+        lags.append((best - reach + bend) * filled.step)
+    return float(np.mean(lags)), float(np.std(lags, ddof=1)) / math.sqrt(PARTS)
+
+
+def _unexplained(motor: Array, load: Array) -> float:
+    """Return the variance of ``load`` that a straight line in ``motor`` leaves."""
+    a, b = motor - motor.mean(), load - load.mean()
+    return float(b @ b - (a @ b) ** 2 / max(float(a @ a), 1e-300))
+
+
+def reversals_of(record: Record) -> tuple[int, int]:
+    """Return how often the torque and the motor's speed change sign, small wiggles apart.
+
+    Args:
+        record: the record.
+
+    Returns:
+        Both numbers.
+    """
+    filled = record.filled()
+    width = max(1, round(0.02 / record.step))
+    speed = np.convolve(np.gradient(filled.theta_m, filled.step), np.ones(width) / width, "same")
+    return _sign_changes(filled.u), _sign_changes(speed)
+
+
+def _sign_changes(values: Array) -> int:
+    level = 0.1 * float(np.std(values))
+    signs = np.where(values > level, 1, np.where(values < -level, -1, 0))
+    return int(np.count_nonzero(np.diff(signs[signs != 0])))

@@ -1,0 +1,193 @@
+"""A rough machine from a record alone: gear ratio, inertia, friction, lag of the drive, frequency of the shaft."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.model_file import Model, ModelParameter
+from orchestrator.records.plausibility import SMOOTHING_TIME, check_plausible, lagged
+from orchestrator.records.record import Record
+
+Array = NDArray[np.float64]
+
+LAGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # s, tried for the drive
+LEAST_FREQUENCY = 5.0  # Hz, of a shaft
+# How far the rough values may be off, as a share.
+ROUGH = {"J_m": 0.5, "J_l": 0.5, "k": 0.6, "c": 0.9, "b_m": 0.9, "b_l": 0.9, "tau": 0.5, "i": 0.0}
+EFFECTS = ("friction at the motor", "quadratic drag", "gravity or imbalance of the load", "torque ripple (6 a turn)")
+
+
+@dataclass(frozen=True)
+class RoughMachine:
+    """Values by name, and a sentence on each that says where it is from."""
+
+    values: Mapping[str, float]
+    origin: Mapping[str, str]
+
+
+def fits(record: Record, model: Model) -> str:
+    """Return why the record cannot be of this machine, or nothing.
+
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        The reason.
+    """
+    try:
+        check_plausible(record, model)
+    except RecordError as error:
+        return str(error)
+    return ""
+
+
+def rough_machine(record: Record) -> RoughMachine:
+    """Return a machine that could have made the record; what the record does not show is assumed and called that.
+
+    Args:
+        record: the record.
+
+    Returns:
+        Values by parameter, and where each is from.
+    """
+    values: dict[str, float] = {}
+    origin: dict[str, str] = {}
+    record = record.filled()
+    if record.theta_l is None:
+        values["i"], origin["i"] = 1.0, "ASSUMED: one encoder does not show it"
+    else:
+        motor, load = record.theta_m - record.theta_m.mean(), record.theta_l - record.theta_l.mean()
+        ratio = float(motor @ load) / max(float(load @ load), 1e-300)
+        near = round(ratio) if abs(ratio - round(ratio)) < 0.005 * abs(ratio) else ratio
+        values["i"], origin["i"] = float(near) or 1.0, f"from the record: slope of motor over load angle {ratio:.6g}"
+    tau, inertia, friction, share = _balance(record)
+    values["tau"], origin["tau"] = tau, f"ROUGH, from the record: momentum balance, explains {100.0 * share:.1f} %"
+    ratio = abs(values["i"])
+    values["J_m"], origin["J_m"] = (
+        0.5 * inertia,
+        "ASSUMED: half of the inertia seen at the motor; put in the data sheet's",
+    )
+    values["J_l"] = 0.5 * inertia * ratio**2
+    origin["J_l"] = f"ASSUMED: the other half; the record shows J_m + J_l/i^2 = {inertia:.4g} kg.m2"
+    values["b_m"] = values["b_l"] = max(0.5 * friction, 1e-9)
+    values["b_l"] *= ratio**2
+    origin["b_m"] = origin["b_l"] = (
+        f"ROUGH: half of the friction that the record shows, {friction:.3g} N.m.s/rad at the motor"
+    )
+    frequency = _shaft_frequency(record, ratio)
+    reduced = 1.0 / (1.0 / values["J_l"] + 1.0 / (values["J_m"] * ratio**2))
+    values["k"] = reduced * (2.0 * math.pi * frequency) ** 2
+    origin["k"] = f"ROUGH: a shaft that oscillates at {frequency:.3g} Hz; put in the data sheet's"
+    values["c"] = 0.02 * math.sqrt(values["k"] * reduced)
+    origin["c"] = "ASSUMED: 1 % of critical damping"
+    return RoughMachine(values, origin)
+
+
+def as_model(rough: RoughMachine, base: Model) -> Model:
+    """Return ``base`` with the rough values and wide uncertainties.
+
+    Args:
+        rough: the rough values.
+        base: the model to start from.
+
+    Returns:
+        The model.
+    """
+    parameters: dict[str, ModelParameter] = dict(base.parameters)
+    for name, value in rough.values.items():
+        old = parameters[name]
+        held = min(max(value, old.minimum), old.maximum)
+        parameters[name] = replace(old, value=held, uncertainty=ROUGH[name] * abs(held))
+    return replace(base, parameters=parameters, source="rough machine")
+
+
+def _smoothed(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
+    """Return impulse [N.m.s], speed and angle of the motor, smoothed over a short time, and the width of that."""
+    width = max(5, round(SMOOTHING_TIME / record.step))
+    kernel = np.ones(width) / width
+    impulse = np.cumsum(lagged(record.u, tau, record.step)) * record.step
+    speed = np.gradient(record.theta_m, record.step)
+    impulse, speed, angle = (np.convolve(v, kernel, "valid") for v in (impulse, speed, record.theta_m))
+    return impulse, speed, angle, width
+
+
+def _balance(record: Record) -> tuple[float, float, float, float]:
+    """Return lag [s], inertia [kg.m2] and viscous friction at the motor, and the share of the impulse they explain."""
+    best = (1e-3, 1.0, 0.0, -math.inf)
+    for tau in LAGS:
+        impulse, speed, angle, _ = _smoothed(record, tau)
+        time = np.linspace(-1.0, 1.0, speed.size)
+        trend = np.column_stack([np.ones_like(time), time])
+        table = np.column_stack([speed, angle, trend])
+        solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
+        plain, *_ = np.linalg.lstsq(trend, impulse, rcond=None)
+        share = 1.0 - float(np.var(impulse - table @ solution)) / max(float(np.var(impulse - trend @ plain)), 1e-300)
+        if share > best[3]:
+            best = (tau, float(solution[0]), float(solution[1]), share)
+    tau, inertia, friction, share = best
+    return tau, abs(inertia) or 1.0, abs(friction), share
+
+
+def _shaft_frequency(record: Record, ratio: float) -> float:
+    """Return the frequency [Hz] at which the twist oscillates most beyond the band of the torque, or a guess."""
+    rate = 1.0 / record.step
+    guess = min(20.0, 0.1 * rate)
+    if record.theta_l is None:
+        return guess
+    from scipy.signal import welch
+
+    twist = record.theta_m / ratio - record.theta_l
+    frequency, power = welch(np.diff(twist), rate, nperseg=min(record.size // 4, 1024))
+    inside = (frequency > LEAST_FREQUENCY) & (frequency < 0.2 * rate)
+    if not inside.any():
+        return guess
+    return float(frequency[inside][np.argmax(power[inside])])
+
+
+def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]]:
+    """Return the smallest size of each effect that would show in the motor's momentum (three standard errors).
+
+    The balance of impulses over windows of a tenth of a second is fitted with inertia, viscous friction and a constant
+    torque; what it leaves is the noise that an effect must stand out of.
+
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        Name, size and unit of each.
+    """
+    record = record.filled()
+    p = {name: entry.value for name, entry in model.parameters.items()}
+    impulse, speed, angle, width = _smoothed(record, p["tau"])
+    h = record.step
+    load = angle / p["i"]
+    shapes = {
+        EFFECTS[0]: (np.sign(speed), "N.m"),
+        EFFECTS[1]: (speed * np.abs(speed), "N.m.s2/rad2"),
+        EFFECTS[2]: (np.sin(load), "N.m"),
+        EFFECTS[3]: (np.sin(6.0 * angle), "N.m"),
+    }
+    hop = max(width, round(0.1 / h))
+    ends = np.arange(0, speed.size, hop)
+    if ends.size < 20:
+        return []
+    nuisance = np.column_stack([np.diff(speed[ends]), np.diff(angle[ends]), np.diff(ends) * h])
+    target = np.diff(impulse[ends])
+    found = []
+    for name, (shape, unit) in shapes.items():
+        table = np.column_stack([np.diff(np.cumsum(shape)[ends]) * h, nuisance])
+        scale = np.sqrt(np.sum(table**2, axis=0))
+        if np.any(scale <= 0.0):
+            continue
+        scaled = table / scale
+        solution, *_ = np.linalg.lstsq(scaled, target, rcond=None)
+        spread = float(np.std(target - scaled @ solution))
+        inverse = np.linalg.pinv(scaled.T @ scaled)
+        found.append((name, 3.0 * spread * math.sqrt(max(float(inverse[0, 0]), 0.0)) / float(scale[0]), unit))
+    return found

@@ -1,0 +1,105 @@
+"""One likelihood of several records of a machine: the parameters, the gap and the noise are common to all.
+
+Each record has an initial state of its own, and an angle between its encoders' zeros, which may have been set anew.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from orchestrator.estimation.innovations import Array, Innovations
+from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.problem import OFFSET, STATE_NAMES, Problem
+from orchestrator.estimation.protocol import Estimate
+from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
+from orchestrator.records.record import Record
+
+OWN = (*STATE_NAMES, OFFSET)  # the unknowns that each record has for itself
+
+
+def _joint_problem(problems: Sequence[Problem]) -> Problem:
+    """Return the problem of several records; its record is the first, its outputs are all, each about its mean.
+
+    Unknowns of the later records carry their number: ``theta_m_start@2``. A noise level's prior is that of the records'
+    mean.
+    """
+    first = problems[0]
+    unknowns = []
+    for n, unknown in enumerate(first.unknowns):
+        if unknown.name.startswith("log_noise_"):
+            mean = float(np.mean([problem.unknowns[n].mean for problem in problems]))
+            moved = mean - unknown.mean
+            unknowns.append(replace(unknown, mean=mean, lower=unknown.lower + moved, upper=unknown.upper + moved))
+        else:
+            unknowns.append(unknown)
+    for number, problem in enumerate(problems[1:], start=2):
+        unknowns += [replace(u, name=f"{u.name}@{number}") for u in problem.unknowns if u.name in OWN]
+    outputs = np.vstack([problem.outputs - np.nanmean(problem.outputs, axis=0) for problem in problems])
+    return replace(first, unknowns=tuple(unknowns), outputs=outputs)
+
+
+class JointLikelihood(Likelihood):
+    """The likelihood of several records: their innovations one after the other."""
+
+    def __init__(
+        self, problems: Sequence[Problem], threads: int = 1, settings: EstimationSettings = DEFAULT_SETTINGS
+    ) -> None:
+        super().__init__(_joint_problem(problems), threads, settings)
+        names = self.problem.names
+        self._parts = [Likelihood(problem) for problem in problems]
+        self._own = [
+            np.array(
+                [names.index(f"{u.name}@{number}" if number > 1 and u.name in OWN else u.name) for u in p.unknowns]
+            )
+            for number, p in enumerate(problems, start=1)
+        ]
+
+    def run(self, theta: Array, keep: bool = False) -> Innovations:
+        """Return the innovations of all records at ``theta``."""
+        runs = []
+        for part, places in zip(self._parts, self._own, strict=True):
+            part.soft, part.deadline = self.soft, self.deadline
+            runs.append(part.run(theta[places], keep))
+        return Innovations(
+            np.concatenate([run.errors for run in runs]),
+            np.concatenate([run.variances for run in runs]),
+            np.concatenate([run.states for run in runs]),
+            np.concatenate([run.contacts for run in runs]),
+        )
+
+
+def by_record(estimate: Estimate, records: Sequence[Record]) -> Estimate:
+    """Return a joint estimate with what each record says, and with the curves of the first one.
+
+    Args:
+        estimate: of all records together.
+        records: in the order of the fit.
+
+    Returns:
+        The estimate.
+    """
+    edges = np.cumsum([0, *(record.size for record in records)])
+    curves, evidence = dict(estimate.curves), []
+    for record, start, stop in zip(records, edges[:-1], edges[1:], strict=True):
+        evidence.append(_evidence(record, estimate, int(start), int(stop)))
+    for name in ("states", "contacts", "errors"):
+        curves[name] = estimate.curves[name][: edges[1]]
+    diagnostics = dict(estimate.diagnostics) | {"records": evidence}
+    return replace(estimate, curves=curves, diagnostics=diagnostics)
+
+
+def _evidence(record: Record, estimate: Estimate, start: int, stop: int) -> dict[str, Any]:
+    """Return how often a record traverses the gap, and how well the common values explain it."""
+    flanks = estimate.curves["contacts"][start:stop]
+    flanks = flanks[flanks != 0]
+    errors = estimate.curves["errors"][start:stop]
+    noise = estimate.diagnostics["measurement_noise"]
+    return {
+        "source": record.source,
+        "rows": record.size,
+        "missing": record.missing,
+        "traversals": int(np.count_nonzero(np.diff(flanks))),
+        "one_step_error_in_noise": [float(np.sqrt(np.mean(errors[:, k] ** 2))) / noise[k] for k in range(len(noise))],
+    }

@@ -1,0 +1,189 @@
+"""What is unknown about a record under a model: parameters, gap, initial state, noise; and where each is looked for."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.estimation.innovations import Array, NoiseLevels
+from orchestrator.records.model_file import Encoder, Model
+from orchestrator.records.record import Record, quantisation_step
+from orchestrator.shared.inference.noise import robust_noise
+from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
+
+STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
+ALPHA = NAMES[P_ALPHA]
+SCALE = "u_scale"
+OFFSET = "effects.sensor_offset.load.offset"
+IMPULSE = "contact_impulse"
+IMPULSE_DEPTH = 2e-3  # rad, within which a contact's damping sets in; prior standard deviation
+OFFSET_SPREAD = 0.1  # prior standard deviation [rad] of the angle between the encoders' zeros and mid-gap
+NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of seven
+# White torque noise [N.m.s^0.5]. With one encoder a deterministic model can shadow any record, and one whose contact
+# law is not the machine's is too sure of itself; a least noise of motor and load keeps both honest.
+LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-9, 30.0
+LEAST_WHERE_INEXACT = (1e-4, 1e-3)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One unknown: its name, prior mean and standard deviation, and the scale in which steps are taken."""
+
+    name: str
+    mean: float
+    deviation: float
+    scale: float
+    lower: float = -math.inf
+    upper: float = math.inf
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A record and what is unknown about it.
+
+    Attributes:
+        record: the record.
+        base: parameter tuple of the model.
+        unknowns: every unknown, in the order of the vector; free or not is decided per fit.
+        outputs: (n, 1 or 2) measured angles [rad].
+        noise: nominal noise levels, for those that are not among the unknowns.
+    """
+
+    record: Record
+    base: tuple[float, ...]
+    unknowns: tuple[Unknown, ...]
+    outputs: Array
+    noise: NoiseLevels
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the unknowns, in order."""
+        return tuple(unknown.name for unknown in self.unknowns)
+
+    @property
+    def start(self) -> Array:
+        """Return the prior means."""
+        return np.array([unknown.mean for unknown in self.unknowns])
+
+    def index(self, name: str) -> int:
+        """Return the place of an unknown in the vector.
+
+        Args:
+            name: of the unknown.
+
+        Returns:
+            The place, from 0.
+        """
+        return self.names.index(name)
+
+
+def make_problem(record: Record, model: Model) -> Problem:
+    """Return the estimation problem of a record under a model.
+
+    With the motor encoder alone only alpha times the gear ratio can be seen, so the ratio then counts as exact.
+
+    Args:
+        record: the record.
+        model: of the machine.
+
+    Returns:
+        The problem.
+    """
+    both = record.theta_l is not None
+    outputs = record.theta_m[:, None] if record.theta_l is None else np.column_stack([record.theta_m, record.theta_l])
+    unknowns = []
+    for parameter in model.uncertain:
+        if parameter.name == "alpha" or (parameter.name == "i" and not both):
+            continue
+        sd = parameter.standard_deviation
+        lower = max(parameter.minimum, parameter.value - 4.0 * sd) if parameter.value > 0 else parameter.minimum
+        unknowns.append(Unknown(parameter.name, parameter.value, sd, sd, lower, parameter.maximum))
+    ratio = model.parameters["i"].value
+    unknowns.append(Unknown("alpha", 0.0, math.inf, 1e-3, 0.0, 3.0))
+    if both:
+        unknowns.append(Unknown(OFFSET, 0.0, OFFSET_SPREAD, 1e-3))
+    damping = model.parameters["c"].value
+    unknowns.append(Unknown(IMPULSE, 0.0, 0.5 * IMPULSE_DEPTH * damping, 0.5 * IMPULSE_DEPTH * damping))
+    if record.u_scale_uncertainty > 0.0:
+        spread = record.u_scale_uncertainty / math.sqrt(3.0)
+        unknowns.append(Unknown(SCALE, 1.0, spread, spread, 0.1, 10.0))
+    unknowns += _initial_state(record, ratio)
+    levels, noises = [], []
+    for column in ("theta_m", "theta_l")[: outputs.shape[1]]:
+        level = measurement_noise(record, model, column)
+        levels.append(level)
+        encoder = model.encoder(column)
+        known = encoder.noise is not None and encoder.resolution is not None and record.averaged == 1
+        spread = 0.02 if known else NOISE_SPREAD
+        noises.append(
+            Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0)
+        )
+    least = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE) if both else LEAST_WHERE_INEXACT
+    for side, low in zip(("motor", "load"), least, strict=True):
+        noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(LARGEST_TORQUE_NOISE)))
+    if not both:
+        levels.append(levels[0])
+    return Problem(
+        record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0))
+    )
+
+
+def _initial_state(record: Record, ratio: float) -> list[Unknown]:
+    """Return unknowns for the initial state, centred on a straight line through the first rows."""
+    speed_m, angle_m = _first_line(record.time, record.theta_m)
+    if record.theta_l is not None:
+        speed_l, angle_l = _first_line(record.time, record.theta_l)
+        spread_l = 0.02
+    else:
+        speed_l, angle_l, spread_l = speed_m / ratio, angle_m / ratio, 0.1
+    means = (float(angle_m), float(speed_m), float(angle_l), float(speed_l), 0.0)
+    spreads = (0.02, 3.0, spread_l, 1.0, 30.0)
+    scales = (1e-4, 1e-2, 1e-4, 1e-2, 1e-1)
+    return [Unknown(*entry) for entry in zip(STATE_NAMES, means, spreads, scales, strict=True)]
+
+
+def _first_line(times: Array, values: Array) -> tuple[float, float]:
+    """Return slope and value at the first row of a straight line through the first rows that are there."""
+    rows = np.flatnonzero(np.isfinite(values))[:8]
+    slope, start = np.polyfit(times[rows] - times[0], values[rows], 1)
+    return float(slope), float(start)
+
+
+def measurement_noise(record: Record, model: Model, column: str) -> float:
+    """Return the standard deviation of an encoder [rad]: stated noise and rounding, else estimated from the record.
+
+    The estimate takes the third difference of the column, in which motion hardly shows (its gain on white noise
+    is sqrt(20)); rounding adds a twelfth of the squared count. What is stated of an encoder holds for its own samples,
+    not for averages of them.
+
+    Args:
+        record: the record.
+        model: of the machine.
+        column: "theta_m" or "theta_l".
+
+    Returns:
+        The standard deviation.
+    """
+    values = record.theta_m if column == "theta_m" else record.theta_l
+    assert values is not None
+    encoder = model.encoder(column) if record.averaged == 1 else Encoder()
+    count = quantisation_step(values[np.isfinite(values)]) if encoder.resolution is None else encoder.resolution
+    if encoder.noise is not None:
+        level = math.sqrt(encoder.noise**2 + count**2 / 12.0)
+    else:
+        level = max(robust_noise(values), count / math.sqrt(12.0))
+    return max(level, 1e-9)
+
+
+def with_least_torque_noise(problem: Problem, least: tuple[float, float]) -> Problem:
+    """Return the problem with at least this much torque noise [N.m.s^0.5] at motor and load.
+
+    Args:
+        problem: to start from.
+        least: at motor and load.
+
+    Returns:
+        The problem.
+    """
+    low = {f"log_torque_{side}": math.log(value) for side, value in zip(("motor", "load"), least, strict=True)}
+    return replace(problem, unknowns=tuple(replace(u, lower=low.get(u.name, u.lower)) for u in problem.unknowns))

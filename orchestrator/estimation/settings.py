@@ -1,0 +1,77 @@
+"""Every threshold of an estimate, in groups, each with one line of why.
+
+``estimate(..., settings=...)`` takes others, or the path of a TOML file of them; the result carries those used.
+Objectives are twice a negative log-likelihood; torque noise is white, in N.m.s^0.5.
+"""
+
+from typing import Annotated
+
+from orchestrator.shared.settings import Settings, setting, share
+
+
+class FitSettings(Settings, frozen=True):
+    """The maximisation of the likelihood: which fits are started, and when they end."""
+
+    allowed_rise: Annotated[
+        float, setting("rise of the objective for which less torque noise is preferred: 5 % limit at a bound of zero")
+    ] = 2.7
+    steps_per_level: Annotated[int, setting("scoring steps at one level of torque noise", ge=1)] = 10
+    about_as_good: Annotated[
+        float,
+        setting("objective within which a smaller size is tried too: much noise hides that others are too large"),
+    ] = 15.0
+    different: Annotated[float, setting("ratio from which two sizes are fitted apart", ge=1)] = 1.5
+    flat_information: Annotated[
+        float, setting("information on a log noise level below which the record cannot tell it from none")
+    ] = 0.3
+    calm_torque_noise: Annotated[
+        float, setting("torque noise at the load to which a fit of one encoder must get down", gt=0)
+    ] = 0.011
+    clear_impulse: Annotated[
+        float, setting("standard errors from which the machine's contact law is another than the model's")
+    ] = 3.0
+    long_record: Annotated[int, setting("rows above which a record is first fitted to its beginning", ge=200)] = 9000
+    short_record: Annotated[int, setting("rows of that beginning", ge=200)] = 6000
+    enough_traversals: Annotated[int, setting("traversals that the beginning must hold to start from it", ge=0)] = 6
+
+
+class VerdictSettings(Settings, frozen=True):
+    """Whether a gap is seen, and whether the model explains the record."""
+
+    notable_torque_noise: Annotated[
+        float,
+        setting("torque noise over the drive's torque [s^0.5] that a right model never reaches"),
+    ] = 1e-3
+    notable_autocorrelation: Annotated[
+        float, share("autocorrelation of one-step errors that such a model never reaches")
+    ] = 0.15
+    chance_autocorrelation: Annotated[
+        float, setting("or this many standard errors of it, where that is more: chance in a short record")
+    ] = 4.0
+    least_travel_motor: Annotated[
+        float, setting("travel of the motor in standard deviations of its encoder's noise, below which nothing is seen")
+    ] = 100.0
+    least_travel_load: Annotated[float, setting("the same of the load, which moves by the gear ratio less")] = 30.0
+    misfit_widening: Annotated[
+        float, setting("factor on the interval where the model is not exact: what it lacks is not white", ge=1)
+    ] = 1.3
+
+
+class TrustSettings(Settings, frozen=True):
+    """Where green ends."""
+
+    beyond: Annotated[float, setting("standard errors by which a value may lie outside its stated range")] = 2.0
+    far_beyond: Annotated[float, setting("times its stated range at which a fitted value cannot be right", ge=1)] = 2.0
+    least_traversals: Annotated[int, setting("traversals below which one odd contact decides the size", ge=0)] = 3
+    widest: Annotated[float, setting("standard error over half-gap above which the size is a guess", gt=0)] = 0.2
+
+
+class EstimationSettings(Settings, frozen=True):
+    """All thresholds of an estimate."""
+
+    fit: FitSettings = FitSettings()
+    verdict: VerdictSettings = VerdictSettings()
+    trust: TrustSettings = TrustSettings()
+
+
+DEFAULT_SETTINGS = EstimationSettings()

@@ -1,0 +1,91 @@
+"""How far an estimate of the half-gap can be trusted.
+
+The maximum-likelihood fit checks itself: whether it explains the record, whether the values that it needs are those the
+user allows, whether the gap was traversed. The other methods have no such check; they are held against that fit.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from orchestrator.estimation.protocol import Estimate
+from orchestrator.estimation.settings import TrustSettings
+from orchestrator.records.model_file import Model
+from orchestrator.shared.trust import Level, Reason, Trust, trust_of
+
+FITTED = "maximum_likelihood"
+
+
+def trust_of_estimates(
+    estimates: Sequence[Estimate], model: Model, settings: TrustSettings | None = None
+) -> dict[str, Trust]:
+    """Return how far each estimate of one record can be trusted.
+
+    Args:
+        estimates: of the methods that apply, each once.
+        model: what the record was compared with.
+        settings: where green ends.
+
+    Returns:
+        Method -> trust.
+    """
+    chosen = settings or TrustSettings()
+    fit = next((e for e in estimates if e.method == FITTED), None)
+    own = trust_of(_of_fit(fit, model, chosen)) if fit is not None else None
+    found: dict[str, Trust] = {}
+    for estimate in estimates:
+        if estimate.method == FITTED and own is not None:
+            found[estimate.method] = own
+        else:
+            found[estimate.method] = trust_of(_beside(estimate, fit, own))
+    return found
+
+
+def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Reason]:
+    """Yield what keeps the fit from green."""
+    lacking = fit.diagnostics.get("lacking")
+    if lacking:
+        yield Reason(Level.AMBER, str(lacking))
+    if not fit.diagnostics.get("converged", True):
+        yield Reason(Level.AMBER, "the fit stopped before it converged")
+    if not math.isfinite(fit.interval[1]):
+        yield Reason(Level.AMBER, "the record cannot show a gap of any size")
+    elif fit.visible:
+        traversals = int(fit.diagnostics.get("traversals", settings.least_traversals))
+        if traversals < settings.least_traversals:
+            yield Reason(Level.AMBER, f"the gap is traversed {traversals} times only")
+        if fit.standard_error > settings.widest * fit.alpha:
+            yield Reason(Level.AMBER, "the standard error is more than a fifth of the half-gap")
+    yield from _of_values(fit.diagnostics.get("parameters", {}), model, settings)
+
+
+def _of_values(
+    parameters: Mapping[str, Mapping[str, float]], model: Model, settings: TrustSettings
+) -> Iterator[Reason]:
+    """Yield each fitted value that lies outside what the model file allows."""
+    for name, entry in parameters.items():
+        stated = model.parameters.get(name)
+        if stated is None or stated.uncertainty <= 0.0:
+            continue
+        off = abs(entry["value"] - stated.value)
+        if off <= stated.uncertainty + settings.beyond * entry["standard_error"]:
+            continue
+        level = Level.RED if off > settings.far_beyond * stated.uncertainty else Level.AMBER
+        text = f"{name} is fitted as {entry['value']:.4g}, but stated as {stated.value:.4g} to within"
+        yield Reason(level, f"{text} {stated.uncertainty:.2g}")
+
+
+def _beside(estimate: Estimate, fit: Estimate | None, own: Trust | None) -> Iterator[Reason]:
+    """Yield what keeps a method that does not check itself from green."""
+    if estimate.message:
+        yield Reason(Level.AMBER, estimate.message)
+    if fit is None or own is None:
+        yield Reason(
+            Level.AMBER,
+            f"{estimate.method} does not check whether the model explains the record, and its interval holds scatter "
+            f"alone; {FITTED} beside it would tell",
+        )
+        return
+    low, high = estimate.interval
+    if not low <= fit.alpha <= high:
+        yield Reason(Level.RED, f"its interval does not hold the half-gap of {FITTED}, {fit.alpha:.5g} rad")
+    yield Reason(own.level, f"{FITTED} beside it is {own.level.word}")

@@ -1,0 +1,42 @@
+"""What is wrong with a system or the file that describes it, all of it at once."""
+
+from dataclasses import dataclass
+
+from orchestrator.errors import ConnectionMismatchError, ScenarioError
+from orchestrator.master.values import one_line
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What is wrong with a scenario, and where.
+
+    Attributes:
+        path: such as ``$.connections[2].to``.
+        text: "`x` must ..., but is ...".
+        mismatch: two variables cannot be connected.
+    """
+
+    path: str
+    text: str
+    mismatch: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.text}"
+
+
+def raise_problems(problems: list[Problem], origin: str = "", *arguments: str) -> None:
+    """Raise one error that names all ``problems``; none, no error.
+
+    Args:
+        problems: of one system or file.
+        origin: what the text begins with, such as a file's name.
+
+    Raises:
+        ConnectionMismatchError: all of them are connections that cannot be made.
+        ScenarioError: otherwise.
+    """
+    if not problems:
+        return
+    text = one_line((f"{origin}: " if origin else "") + "; ".join(str(p) for p in problems))
+    kind = ConnectionMismatchError if all(p.mismatch for p in problems) else ScenarioError
+    raise kind(text, *arguments)

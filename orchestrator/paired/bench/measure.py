@@ -1,0 +1,130 @@
+"""Runs tools in turn, each in a process of its own, and takes medians."""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestrator.paired.bench.job import BenchJob
+from orchestrator.paired.bench.reference import reference_ends
+from orchestrator.paired.bench.tools import TOOLS
+
+TIMEOUT = 900.0
+
+
+@dataclass(frozen=True)
+class ToolRow:
+    """What one tool took.
+
+    Attributes:
+        tool: key of ``TOOLS``.
+        title: for the table.
+        version: of the tool; ``None`` when it did not run.
+        scheme: order in which values are exchanged.
+        wall: median wall time of a run [s]; ``None`` when there was none.
+        cpu: median processor time of a run [s]; ``None`` also when the tool has a clock of its own.
+        runs: number of runs.
+        peak: largest memory of its process [MiB].
+        deviation: largest difference between the ends of the watched outputs and those of plain FMI calls in the
+            same scheme, in the outputs' unit.
+        note: why there are no times.
+    """
+
+    tool: str
+    title: str
+    version: str | None
+    scheme: str
+    wall: float | None
+    cpu: float | None
+    runs: int
+    peak: float | None
+    deviation: float | None
+    note: str
+
+
+@dataclass
+class _Found:
+    """What the processes of one tool have reported so far."""
+
+    note: str = ""
+    times: list[tuple[float, float | None]] = field(default_factory=list)
+    ends: dict[str, float] = field(default_factory=dict)
+    version: str | None = None
+    peak: float | None = None
+
+
+def compare(
+    job: BenchJob,
+    tools: Sequence[str],
+    rounds: int,
+    pythons: Mapping[str, str] | None = None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> list[ToolRow]:
+    """Run every tool ``rounds`` times in turn and return one row each.
+
+    Args:
+        job: what is run.
+        tools: keys of ``TOOLS``.
+        rounds: turns that every tool gets; each is a process with ``runner.RUNS`` runs.
+        pythons: interpreter by tool, for tools that live in an environment of their own.
+        progress: is told what runs.
+
+    Returns:
+        Times and ends of each tool, in the order of ``tools``.
+    """
+    found = {name: _Found() for name in tools}
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+        path, result = Path(folder) / "job.json", Path(folder) / "result.json"
+        job.write(path)
+        for number in range(rounds):
+            for name in tools:
+                if found[name].note:
+                    continue
+                python = (pythons or {}).get(name, sys.executable)
+                words = [python, "-m", "orchestrator.paired.bench.runner", name, str(path), str(result)]
+                progress(f"round {number + 1} of {rounds}: {TOOLS[name].title}")
+                try:
+                    _one(words, result, found[name])
+                except RuntimeError as error:
+                    found[name].note = str(error)
+    expected = {s: reference_ends(job, s) for s in {TOOLS[n].scheme for n in tools if found[n].ends}}
+    return [_row(name, found[name], expected.get(TOOLS[name].scheme, {})) for name in tools]
+
+
+def _one(words: list[str], result: Path, found: _Found) -> None:
+    result.unlink(missing_ok=True)
+    root = str(Path(__file__).resolve().parents[3])
+    paths = [root, *([os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else [])]
+    # What tools extract and log goes away with the folder.
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "TMPDIR": str(result.parent)}
+    try:
+        run = subprocess.run(words, env=environment, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+    except OSError as error:
+        raise RuntimeError(f"failed: {error.strerror}: {words[0]}") from None
+    except subprocess.TimeoutExpired:
+        raise RuntimeError(f"took more than {TIMEOUT:g} s") from None
+    if not result.exists():
+        lines = run.stderr.strip().splitlines() or [f"exit code {run.returncode}"]
+        raise RuntimeError(f"failed: {lines[-1][:200]}")
+    content = json.loads(result.read_text(encoding="utf-8"))
+    if not content:
+        found.note = "not installed"
+        return
+    found.times += [(wall, cpu) for wall, cpu in content["times"]]
+    found.peak = max(content["peak_kib"] / 1024.0, found.peak or 0.0)
+    found.ends, found.version = content["ends"], content["version"]
+
+
+def _row(name: str, found: _Found, expected: dict[str, float]) -> ToolRow:
+    tool = TOOLS[name]
+    cpus = [cpu for _, cpu in found.times if cpu is not None]
+    wall = statistics.median(wall for wall, _ in found.times) if found.times else None
+    cpu = statistics.median(cpus) if cpus else None
+    deviation = max((abs(value - expected[key]) for key, value in found.ends.items()), default=None)
+    runs = len(found.times)
+    return ToolRow(name, tool.title, found.version, tool.scheme, wall, cpu, runs, found.peak, deviation, found.note)

@@ -1,0 +1,15 @@
+"""What ``bench.json`` holds, as types that the API fills and the page reads."""
+
+from orchestrator.paired.bench.alone import RecordCost, SweepCost
+from orchestrator.paired.bench.measure import ToolRow
+from orchestrator.paired.bench.scaling import Cost
+from orchestrator.shared.results import Found
+
+
+class BenchFound(Found, frozen=True, kw_only=True):
+    """``bench``: times of each tool; with ``scaling`` also the cost by numbers of FMUs and steps, and memory."""
+
+    rows: tuple[ToolRow, ...] = ()
+    scaling: tuple[Cost, ...] = ()
+    sweeps: tuple[SweepCost, ...] = ()
+    records: tuple[RecordCost, ...] = ()

@@ -1,0 +1,1 @@
+"""The plants: compiled sources, description, predictor, controller design, an independent reference."""

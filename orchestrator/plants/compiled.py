@@ -1,0 +1,94 @@
+"""The plant's, controller's and estimator's own source, compiled by numba.
+
+The functions of ``pyfmu_sources`` are plain Python on floats and tuples. Here each is compiled in a private copy of
+its module, whose names lead to the compiled functions, so that the FMU and the orchestrator share one source.
+
+The copies lie in the user's cache directory, each in a folder named by a hash of what it needs: numba keeps its machine
+code beside them, and a changed source can never meet machine code made from an older one.
+"""
+
+import hashlib
+import importlib.util
+import inspect
+import re
+import sys
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numba
+
+import pyfmu_sources
+from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.numba_cache import kept
+from orchestrator.shared.output import write_text
+
+_PACKAGE = pyfmu_sources.__name__
+_SOURCES = Path(pyfmu_sources.__file__).parent
+
+
+@cache
+def compiled(name: str) -> ModuleType:
+    """Return a copy of ``pyfmu_sources.NAME`` whose functions are compiled by numba (at their first call).
+
+    Args:
+        name: of the source's module.
+
+    Returns:
+        The module; one copy per process and name.
+
+    Raises:
+        ModuleNotFoundError: there is no such source.
+    """
+    full_name = f"_compiled_{name}"
+    original = f"{_PACKAGE}.{name}"
+    if not (_SOURCES / f"{name}.py").exists():
+        raise ModuleNotFoundError(original)
+    path = _copied_source(name)
+    spec = importlib.util.spec_from_file_location(original, path)
+    assert spec is not None
+    assert spec.loader is not None
+    copy = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(copy)
+    copy.__name__ = full_name
+    sys.modules[full_name] = copy
+    for attribute, value in list(vars(copy).items()):
+        if not inspect.isfunction(value):
+            continue
+        home = value.__module__.rpartition(".")[2]
+        if home == name:
+            value.__module__ = full_name
+            setattr(copy, attribute, kept()(value))
+        elif value.__module__.startswith(_PACKAGE + "."):
+            setattr(copy, attribute, getattr(compiled(home), attribute))
+    return copy
+
+
+@cache
+def _copied_source(name: str) -> Path:
+    """Return the copy of a source in a folder named by a hash of it and of all that it imports."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for module in sorted(_closure(name)):
+        digest.update((_SOURCES / f"{module}.py").read_bytes())
+    folder = cache_directory("numba") / digest.hexdigest()[:20]
+    folder.mkdir(exist_ok=True)
+    target = folder / f"{name}.py"
+    source = (_SOURCES / f"{name}.py").read_bytes()
+    try:
+        intact = target.read_bytes() == source
+    except OSError:
+        intact = False
+    if not intact:
+        write_text(target, source.decode())
+    return target
+
+
+def _closure(name: str) -> set[str]:
+    found: set[str] = set()
+    waiting = {name}
+    while waiting:
+        module = waiting.pop()
+        found.add(module)
+        text = (_SOURCES / f"{module}.py").read_text(encoding="utf-8")
+        waiting |= set(re.findall(r"^from \.(\w+) import", text, re.MULTILINE)) - found
+    return found

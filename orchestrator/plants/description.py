@@ -1,0 +1,399 @@
+"""A plant as a described object: what it measures, where torques act, its speeds and twist, its events, its effects."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.plants.compiled import compiled
+from orchestrator.plants.effects import Effect
+from pyfmu_sources.drivetrain_parameters import BIG, Parameter
+
+Array = NDArray[np.float64]
+
+STATES = 8  # places of the predictor's state, as in ``pyfmu_sources.equations``
+STEP = 0.35  # of the fastest oscillation: a Runge-Kutta step, whose error then lies far below an encoder's count
+FADING = 1.0  # of the fastest time constant of what only fades, where an error of a step fades too
+
+
+class CompiledEquations(NamedTuple):
+    """The compiled equations of a plant, as the predictor takes them.
+
+    Attributes:
+        friction: ``friction(x, p)``: levels of dry friction [N.m] of the first and the second body.
+        rates: ``rates(x, signs, p, u)``: derivatives of the eight states; ``signs`` are friction's mean directions.
+        presliding: places in ``p`` of the logarithm of friction's build-up distance of either body.
+    """
+
+    friction: Any
+    rates: Any
+    presliding: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body at which torques act.
+
+    Attributes:
+        name: of the site, "motor" or "load".
+        angle, speed: places of its states.
+        inertia: name of its parameter.
+        geared: True if it lies behind the gear.
+        encoder: name of the encoder that measures its angle: a column of a record and an output of the FMU.
+    """
+
+    name: str
+    angle: int
+    speed: int
+    inertia: str
+    encoder: str
+    geared: bool = False
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """The elastic shaft and the gear between the two bodies: names of its stiffness, ratio and half-gap ("": none)."""
+
+    stiffness: str
+    ratio: str
+    gap: str = ""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a requested torque passes: place of the delivered torque; names of lag, dead time, limit.
+
+    Also those of a second lag's time constant and of the largest rate; "": none.
+    """
+
+    torque: int
+    lag: str
+    delay: str
+    limit: str
+    second_lag: str = ""
+    rate: str = ""
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """An added inertia on a spring, which needs short steps: names of its inertia and frequency."""
+
+    inertia: str
+    frequency: str
+
+
+def _nothing_refused(values: Mapping[str, float]) -> str:
+    return ""
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """One plant that records can be compared with.
+
+    The predictor's state has eight places (as in ``pyfmu_sources.equations``), of which a plant may use fewer.
+
+    Attributes:
+        name: of the FMU.
+        table: its parameters.
+        linear: names of the parameters of the plant with every effect off.
+        states: places of the state that the plant with every effect off uses.
+        bodies: the driven body first; each has an encoder.
+        drive: what a requested torque passes.
+        starts: place of a state -> name of its start value in the FMU.
+        offsets: names of the encoder offsets, in the order of the bodies.
+        bank: the effects that it may lack.
+        stage: returns the compiled equations.
+        runner: returns the compiled, event-located simulation
+            ``run(start, p, early, late, first, h, out)``; see :mod:`orchestrator.diagnosis.proof.free_run`. The start
+            has the eight states and a ninth entry, the request [N.m] behind a second lag and a limited rate.
+        shaft: between the two bodies; None: a single body.
+        resonance: an added inertia; None: the plant has none.
+        followers: (place, followed place): states that are shifted with another when that is corrected.
+        nuisances: parameters of the predictor alone, appended to the table.
+        events: names of what makes the equations switch.
+        enumerations: names of parameters whose FMU variable counts from one.
+        spread: relative uncertainty of each linear parameter where a model file states none.
+        refused: values by name -> why records cannot be diagnosed against such a plant; "": they can.
+        realised: predictor's parameters -> those of the FMU (n,), with what the predictor alone has fitted put in.
+        inverse: (position, speed, acceleration, p) -> torque [N.m] that such a motion needs; None: not defined.
+    """
+
+    name: str
+    table: tuple[Parameter, ...]
+    linear: tuple[str, ...]
+    states: tuple[int, ...]
+    bodies: tuple[Body, ...]
+    drive: Drive
+    starts: Mapping[int, str]
+    offsets: tuple[str, ...]
+    bank: tuple[Effect, ...]
+    stage: Callable[[], CompiledEquations]
+    runner: Callable[[], Any]
+    shaft: Shaft | None = None
+    resonance: Resonance | None = None
+    followers: tuple[tuple[int, int], ...] = ()
+    nuisances: tuple[Parameter, ...] = ()
+    events: tuple[str, ...] = ()
+    enumerations: tuple[str, ...] = ()
+    spread: float = 0.0
+    refused: Callable[[Mapping[str, float]], str] = _nothing_refused
+    realised: Callable[[Array], Array] | None = None
+    inverse: Callable[[Array, Array, Array, Array], Array] | None = None
+    _index: dict[str, int] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        """Number the parameters."""
+        self._index.update({name: n for n, name in enumerate(self.names)})
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the parameters' names in table order, then those of the predictor alone."""
+        return tuple(entry.name for entry in (*self.table, *self.nuisances))
+
+    @property
+    def measured(self) -> tuple[int, ...]:
+        """Return the places of the angles that encoders measure."""
+        return tuple(body.angle for body in self.bodies)
+
+    @property
+    def encoders(self) -> tuple[str, ...]:
+        """Return the names of the encoders: columns of a record, outputs of the FMU."""
+        return tuple(body.encoder for body in self.bodies)
+
+    @property
+    def sites(self) -> tuple[str, ...]:
+        """Return the names of the places at which an unknown torque may act, as in :meth:`torque_columns`."""
+        first, *others = (body.name for body in self.bodies)
+        return (first, "shaft", *others) if self.shaft else (first,)
+
+    def entry(self, place: int) -> Parameter:
+        """Return the table row of a parameter.
+
+        Args:
+            place: in the predictor's tuple.
+
+        Returns:
+            Name, default, bounds and unit.
+        """
+        return self.table[place] if place < len(self.table) else self.nuisances[place - len(self.table)]
+
+    def index(self, name: str) -> int:
+        """Return the place of a parameter in the flat tuple.
+
+        Args:
+            name: of the parameter.
+
+        Returns:
+            The place, from 0.
+
+        Raises:
+            ValueError: the plant has no such parameter.
+        """
+        if name not in self._index:
+            raise ValueError(f"{name!r} is not a parameter of {self.name}")
+        return self._index[name]
+
+    def value(self, p: Array, name: str) -> float:
+        """Return the value of a parameter.
+
+        Args:
+            p: the predictor's parameters, (n,).
+            name: of the parameter.
+
+        Returns:
+            The value, in the parameter's unit.
+        """
+        return float(p[self.index(name)])
+
+    def body(self, site: str) -> Body:
+        """Return the body at a site; that of the driven one for sites that have none of their own.
+
+        Args:
+            site: name of a body, or of another part of the machine.
+
+        Returns:
+            The body.
+        """
+        return next((body for body in self.bodies if body.name == site), self.bodies[0])
+
+    def ratio(self, p: Array) -> float:
+        """Return the gear ratio: angle of the motor over that of the load; 1.0 without a gear.
+
+        Args:
+            p: the predictor's parameters, (n,).
+
+        Returns:
+            The ratio.
+        """
+        return self.value(p, self.shaft.ratio) if self.shaft else 1.0
+
+    def twist(self, p: Array, x: Array) -> Array:
+        """Return the shaft's twist (n,) [rad, load side], the gap's play included, of states (n, 8).
+
+        Args:
+            p: the predictor's parameters, (n,).
+            x: states.
+
+        Returns:
+            The twist.
+
+        Raises:
+            ValueError: the plant has no shaft.
+        """
+        motor, load = self._ends()
+        return np.asarray(x[:, motor.angle] / self.ratio(p) - x[:, load.angle])
+
+    def twist_rate(self, p: Array, x: Array) -> Array:
+        """Return the rate (n,) [rad/s] of :meth:`twist`.
+
+        Args:
+            p: the predictor's parameters, (n,).
+            x: states (n, 8).
+
+        Returns:
+            The rate.
+        """
+        motor, load = self._ends()
+        return np.asarray(x[:, motor.speed] / self.ratio(p) - x[:, load.speed])
+
+    def extended(self, values: Sequence[float]) -> Array:
+        """Return the plant's values followed by the predictor's own parameters at their defaults.
+
+        Args:
+            values: of the table's parameters, in its order.
+
+        Returns:
+            Shape (n,).
+        """
+        return np.array([*values, *(entry.default for entry in self.nuisances)])
+
+    def own(self, p: Array) -> Array:
+        """Return the FMU's parameters (n,) of the predictor's ``p``.
+
+        Args:
+            p: the predictor's parameters, (n,).
+
+        Returns:
+            The parameters, in the order of the table.
+        """
+        return self.realised(p) if self.realised else np.asarray(p[: len(self.table)])
+
+    def followed(self, p: Array, u: Array, h: float) -> tuple[Array, Array]:
+        """Return what requests (n,) [N.m] become behind a second lag and a limited rate.
+
+        Args:
+            p: parameters.
+            u: requests (n,), each held for ``h``.
+            h: sample time [s].
+
+        Returns:
+            their mean over each sample (n,), and the value at its beginning (n,).
+        """
+        if not self.drive.rate:
+            return u, u
+        lag, rate = self.value(p, self.drive.second_lag), self.value(p, self.drive.rate)
+        if lag == 0.0 and rate >= BIG:
+            return u, u
+        means, begins = np.empty_like(u), np.empty_like(u)
+        request = float(u[0])
+        follow = compiled("effects").followed_request
+        for n, asked in enumerate(u.tolist()):
+            begins[n] = request
+            request, means[n] = follow(request, asked, lag, rate, h)
+        return means, begins
+
+    def transition(self, p: Array, h: float) -> Array:
+        """Return the discrete transition matrix of the linear plant (every effect off) for a step ``h`` [s].
+
+        Args:
+            p: the predictor's parameters, (n,).
+            h: [s].
+
+        Returns:
+            Shape (states, states), in the order of ``states``.
+        """
+        from scipy.linalg import expm
+
+        A = np.asarray(expm(self.jacobian(p) * h))
+        if p[self.index(self.drive.lag)] == 0.0:
+            # Without a lag there is no drive state; its place would stand for an integrator.
+            row = self.states.index(self.drive.torque)
+            A[row, :] = A[:, row] = 0.0
+        return A
+
+    def jacobian(self, p: Array) -> Array:
+        """Return the matrix of the linear plant, by differences of its own (linear) rates.
+
+        Args:
+            p: the predictor's parameters, (n,).
+
+        Returns:
+            Shape (states, states), in the order of ``states``.
+        """
+        rates = self.stage().rates
+        plain = self.extended([entry.default for entry in self.table])
+        for name in self.linear:
+            plain[self.index(name)] = p[self.index(name)]
+        flat = tuple(plain.tolist())
+        columns = []
+        for place in self.states:
+            x = [0.0] * STATES
+            x[place] = 1.0
+            rate = rates(tuple(x), (0.0, 0.0), flat, 0.0)
+            columns.append([rate[s] for s in self.states])
+        return np.array(columns).T
+
+    def torque_columns(self, p: Array) -> Array:
+        """Return (states, sites): what a unit torque at each of :attr:`sites` does to the rates.
+
+        The shaft's column is that of a unit twist error times the stiffness.
+
+        Args:
+            p: the predictor's parameters, (n,).
+
+        Returns:
+            The columns.
+        """
+        at = {place: row for row, place in enumerate(self.states)}
+        columns = np.zeros((len(self.states), len(self.sites)))
+        first = self.bodies[0]
+        columns[at[first.speed], 0] = 1.0 / p[self.index(first.inertia)]
+        if self.shaft:
+            motor, load = self._ends()
+            k, ratio = p[self.index(self.shaft.stiffness)], p[self.index(self.shaft.ratio)]
+            columns[at[motor.speed], 1] = -k / ratio / p[self.index(motor.inertia)]
+            columns[at[load.speed], 1] = k / p[self.index(load.inertia)]
+            columns[at[load.speed], 2] = 1.0 / p[self.index(load.inertia)]
+        return columns
+
+    def substeps(self, p: Array, h: float) -> int:
+        """Return how many Runge-Kutta steps a sample of ``h`` [s] needs.
+
+        Args:
+            p: the predictor's parameters, (n,).
+            h: [s].
+
+        Returns:
+            At least 1.
+        """
+        modes = np.linalg.eigvals(self.jacobian(p))
+        return max(1, math.ceil(h * float(np.max(np.abs(modes) / np.where(modes.imag == 0.0, FADING, STEP)))))
+
+    def fastest(self, p: Array) -> float:
+        """Return the largest rate [1/s] of the linear plant's modes.
+
+        Args:
+            p: the predictor's parameters, (n,).
+
+        Returns:
+            The rate.
+        """
+        return float(np.max(np.abs(np.linalg.eigvals(self.jacobian(p)))))
+
+    def _ends(self) -> tuple[Body, Body]:
+        if self.shaft:
+            return self.bodies[0], self.bodies[1]
+        raise ValueError(f"{self.name} has no shaft")

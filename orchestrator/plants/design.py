@@ -1,0 +1,268 @@
+"""Controller and estimator gains, computed with python-control, and the rank report that comes before them.
+
+Models are those of the thesis with its errata mended: the regulator works on the controllable five-state model, the
+estimator on six states with the load torque as an integrated disturbance. All gains are for a sampled system whose
+input is held over a sample.
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, solve_discrete_are
+
+from orchestrator.errors import DesignError
+
+Array = NDArray[np.float64]
+
+REGULATOR_STATES = ("theta_m", "omega_m", "theta_l", "omega_l", "T_m")
+ESTIMATOR_STATES = ("theta_m", "omega_m", "theta_l", "omega_l", "T_l", "T_m")
+RANK_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class DrivetrainValues:
+    """The linear drivetrain's values in SI units; defaults are the thesis's."""
+
+    J_m: float = 0.4
+    J_l: float = 5.6
+    k: float = 3300.0
+    c: float = 1.0
+    b_m: float = 0.1
+    b_l: float = 1.0
+    i: float = 3.984
+    tau: float = 1.0
+
+
+@dataclass(frozen=True)
+class LinearModel:
+    """A linear model ``x' = A x + B u``, ``y = C x`` with named states."""
+
+    A: Array
+    B: Array
+    C: Array
+    states: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RankReport:
+    """What controllability and observability say of a model.
+
+    ``uncontrollable`` names the modes (eigenvalues, 1/s) that no input moves, ``stabilisable`` tells whether all
+    of them decay by themselves (Popov-Belevitch-Hautus test).
+    """
+
+    order: int
+    controllable: int
+    observable: int
+    uncontrollable: tuple[complex, ...]
+    stabilisable: bool
+    detectable: bool
+
+
+@dataclass(frozen=True)
+class Regulator:
+    """State feedback ``u = -K x`` of the sampled five-state model."""
+
+    gains: tuple[float, float, float, float, float]
+    sample_time: float
+    poles: tuple[complex, ...]
+
+
+@dataclass(frozen=True)
+class KalmanFilter:
+    """Stationary Kalman filter of the sampled six-state model: see ``pyfmu_sources.kalman``.
+
+    ``A`` 6 x 6, ``B`` 6, ``L`` 6 x 2 (filter gain), ``S_inverse`` 2 x 2 (inverse innovation covariance, 1/rad2).
+    """
+
+    A: Array
+    B: Array
+    L: Array
+    S_inverse: Array
+    sample_time: float
+
+
+def six_state_model(values: DrivetrainValues) -> LinearModel:
+    """Return the model of eq. 3.5 with states ``ESTIMATOR_STATES`` and outputs ``(theta_m, theta_l)``.
+
+    Args:
+        values: the physical values, SI units.
+
+    Returns:
+        The model.
+    """
+    v = values
+    A = np.zeros((6, 6))
+    A[0, 1] = A[2, 3] = 1.0
+    A[1] = [
+        -v.k / (v.J_m * v.i**2),
+        -(v.c / v.i**2 + v.b_m) / v.J_m,
+        v.k / (v.J_m * v.i),
+        v.c / (v.J_m * v.i),
+        0.0,
+        1.0 / v.J_m,
+    ]
+    A[3] = [v.k / (v.J_l * v.i), v.c / (v.J_l * v.i), -v.k / v.J_l, -(v.c + v.b_l) / v.J_l, -1.0 / v.J_l, 0.0]
+    A[5, 5] = -1.0 / v.tau
+    B = np.array([[0.0], [0.0], [0.0], [0.0], [0.0], [1.0 / v.tau]])
+    C = np.array([[1.0, 0, 0, 0, 0, 0], [0, 0, 1.0, 0, 0, 0]])
+    return LinearModel(A, B, C, ESTIMATOR_STATES)
+
+
+def five_state_model(values: DrivetrainValues) -> LinearModel:
+    """Return the model without the load torque, states ``REGULATOR_STATES``: what a regulator can control.
+
+    Args:
+        values: the physical values, SI units.
+
+    Returns:
+        The model.
+    """
+    six = six_state_model(values)
+    keep = [0, 1, 2, 3, 5]
+    return LinearModel(six.A[np.ix_(keep, keep)], six.B[keep], six.C[:, keep], REGULATOR_STATES)
+
+
+def rank_report(model: LinearModel) -> RankReport:
+    """Return ranks, uncontrollable modes, stabilisability and detectability of ``model``.
+
+    Args:
+        model: continuous in time.
+
+    Returns:
+        Ranks and the modes that are missed [1/s].
+    """
+    stuck = _missed_modes(model.A, model.B)
+    hidden = _missed_modes(model.A.T, model.C.T)
+    order = model.A.shape[0]
+    return RankReport(
+        order=order,
+        controllable=_krylov_rank(model.A, model.B),
+        observable=_krylov_rank(model.A.T, model.C.T),
+        uncontrollable=tuple(stuck),
+        stabilisable=all(mode.real < -RANK_TOLERANCE for mode in stuck),
+        detectable=all(mode.real < -RANK_TOLERANCE for mode in hidden),
+    )
+
+
+def _krylov_rank(A: Array, B: Array) -> int:
+    """Return the dimension of what ``B`` reaches, by an orthonormal staircase that scaling does not fool."""
+    scale = max(1.0, float(np.abs(A).max()))
+    basis = np.zeros((A.shape[0], 0))
+    fresh = B
+    while fresh.shape[1] and basis.shape[1] < A.shape[0]:
+        size = np.linalg.norm(fresh, axis=0)
+        fresh = fresh - basis @ (basis.T @ fresh)
+        fresh = fresh - basis @ (basis.T @ fresh)
+        left, values, _ = np.linalg.svd(fresh, full_matrices=False)
+        rank = int(np.sum(values > RANK_TOLERANCE * max(float(size.max(initial=0.0)), 1.0 / scale)))
+        basis = np.hstack([basis, left[:, :rank]])
+        fresh = A @ left[:, :rank]
+    return int(basis.shape[1])
+
+
+def _missed_modes(A: Array, B: Array) -> list[complex]:
+    missed = []
+    for mode in np.linalg.eigvals(A):
+        pencil = np.hstack([A - mode * np.eye(A.shape[0]), B])
+        pencil = pencil / np.maximum(np.linalg.norm(pencil, axis=1, keepdims=True), 1e-300)
+        if np.linalg.svd(pencil, compute_uv=False)[-1] < RANK_TOLERANCE or not np.all(np.any(pencil != 0.0, axis=1)):
+            missed.append(complex(mode))
+    return missed
+
+
+def sampled(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
+    """Return (A, B) of ``model`` with its input held over ``sample_time`` [s].
+
+    Args:
+        model: continuous in time.
+        sample_time: [s].
+
+    Returns:
+        Matrices of shape (states, states) and (states, inputs).
+    """
+    n, m = model.B.shape
+    augmented = np.zeros((n + m, n + m))
+    augmented[:n, :n] = model.A
+    augmented[:n, n:] = model.B
+    step = expm(augmented * sample_time)
+    return step[:n, :n], step[:n, n:]
+
+
+def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float) -> Regulator:
+    """Return the sampled LQR of ``model`` for the continuous weights ``Q`` and ``R`` times the sample time.
+
+    Args:
+        model: continuous in time.
+        Q: (states, states) weights of the states.
+        R: weight of the torque.
+        sample_time: [s].
+
+    Returns:
+        Gains and the poles of the closed loop.
+
+    Raises:
+        DesignError: ``model`` is not stabilisable, or the Riccati equation has no solution.
+    """
+    import control  # takes a second to import, which every command would pay
+
+    report = rank_report(model)
+    if not report.stabilisable:
+        modes = ", ".join(f"{mode:.3g}" for mode in report.uncontrollable)
+        raise DesignError(
+            f"`model` must be stabilisable, but is not: (A, B) has rank {report.controllable} of {report.order} and "
+            f"no input moves the mode at {modes} 1/s; leave the uncontrollable states out of the regulator and "
+            "feed their estimate forward"
+        )
+    A, B = sampled(model, sample_time)
+    gains, _, poles = _quiet(control.dlqr, A, B, Q * sample_time, np.array([[R * sample_time]]))
+    if not np.all(np.abs(poles) < 1.0):
+        raise DesignError("the regulator's Riccati equation has no stabilising solution for these weights")
+    k = tuple(float(g) for g in np.asarray(gains).ravel())
+    return Regulator(k, sample_time, tuple(complex(p) for p in poles))  # type: ignore[arg-type]
+
+
+def design_estimator(model: LinearModel, process: Array, measurement: Array, sample_time: float) -> KalmanFilter:
+    """Return the stationary Kalman filter of ``model``.
+
+    Args:
+        model: six-state model.
+        process: intensities of the white noise on each state, 6 values, unit^2/s.
+        measurement: variances of both encoders [rad2].
+        sample_time: [s].
+
+    Returns:
+        The filter, sampled.
+
+    Raises:
+        DesignError: ``model`` is not detectable, or the Riccati equation has no solution.
+    """
+    if not rank_report(model).detectable:
+        raise DesignError("`model` must be detectable, but a mode that does not decay reaches no output")
+    A, B = sampled(model, sample_time)
+    Q = _sampled_noise(model.A, np.diag(process), sample_time)
+    R = np.diag(measurement)
+    try:
+        P = solve_discrete_are(A.T, model.C.T, Q, R)
+    except np.linalg.LinAlgError as error:
+        raise DesignError(f"the estimator's Riccati equation has no solution: {error}") from None
+    S = model.C @ P @ model.C.T + R
+    L = P @ model.C.T @ np.linalg.inv(S)
+    return KalmanFilter(A, B[:, 0], L, np.linalg.inv(S), sample_time)
+
+
+def _sampled_noise(A: Array, intensity: Array, h: float) -> Array:
+    """Return the covariance that white noise of ``intensity`` gathers in ``h`` (Van Loan, IEEE TAC 23(3), 1978)."""
+    n = A.shape[0]
+    block = np.block([[-A, intensity], [np.zeros((n, n)), A.T]])
+    step = expm(block * h)
+    transposed = step[n:, n:].T
+    return np.asarray(transposed @ step[:n, n:])
+
+
+def _quiet(function: object, *arguments: object) -> tuple[Array, Array, Array]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PendingDeprecationWarning)
+        return function(*arguments)  # type: ignore[operator]

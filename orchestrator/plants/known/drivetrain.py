@@ -1,0 +1,165 @@
+"""Motor with lag, gear with backlash, elastic shaft, load: the FMU ``Drivetrain``."""
+
+import math
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, built_up
+from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant, Resonance, Shaft
+from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD, LEAD, SHIFT
+from pyfmu_sources import drivetrain_parameters as dt
+from pyfmu_sources.backlash_models import GRADUAL, MODELS
+
+Array = NDArray[np.float64]
+
+NUISANCES = ("presliding.motor", "presliding.load", "contact.onset")
+
+
+def refused(values: Mapping[str, float]) -> str:
+    """Return why a drivetrain's backlash model cannot be diagnosed: the one-step predictor is elastic.
+
+    Args:
+        values: of the plant's parameters, by name.
+
+    Returns:
+        The reason; empty where it can be diagnosed.
+    """
+    chosen = MODELS[int(values["backlash_model"])]
+    if chosen.predicted:
+        return ""
+    *others, last = (model.name for model in MODELS if model.predicted)
+    return f"`backlash_model` must be {', '.join(others)} or {last} for a diagnosis, but is {chosen.name}"
+
+
+@cache
+def _stage() -> CompiledEquations:
+    """Return the compiled equations, with the damping of teeth that meet growing with their penetration."""
+    from numba import njit
+
+    from orchestrator.plants.compiled import compiled
+
+    source = compiled("equations")
+    rates, twist, contact_of, elastic = source.rates, source.twist, source.contact_of, source.elastic_torque
+    twist_rate, twist_slope, friction_m, friction_l = (
+        source.twist_rate, source.twist_slope, source.friction_m, source.friction_l,
+    )  # fmt: skip
+    alpha_at, end, set_in_at = dt.P_ALPHA, dt.COUNT, dt.P_ONSET
+    damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
+    loaded, lag_at = (dt.P_LOADED_M, dt.P_LOADED_L), dt.P_TAU
+
+    @njit(error_model="numpy")
+    def whole(x: Any, u: float) -> Any:
+        # The predictor bends its own bristles, gets a filtered request, and its last state is the shaft's memory.
+        return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], 0.0, 0.0, 0.0, x[7], u)
+
+    @njit(error_model="numpy")
+    def friction(x: Any, p: Any) -> Any:
+        full, shaft = whole(x, 0.0), 0.0
+        if p[loaded[0]] + p[loaded[1]] > 0.0:
+            contact = contact_of(twist(full, p), p[alpha_at]) if p[alpha_at] > 0.0 else 1
+            shaft = elastic(full, contact, p)
+        return friction_m(full, shaft * twist_slope(full, p), p), friction_l(full, shaft, p)
+
+    @njit(error_model="numpy")
+    def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
+        full = whole(x, u)
+        angle = twist(full, p)
+        contact = contact_of(angle, p[alpha_at]) if p[alpha_at] > 0.0 else 1
+        r = rates(full, contact, signs[0], signs[1], p, u, 0.0)
+        motor, load = 0.0, 0.0
+        if p[alpha_at] > 0.0 and contact != 0 and p[set_in_at] == 0.0:
+            depth = abs(angle) - p[alpha_at]
+            lacking = p[damping_at] * twist_rate(full, p) * math.exp(-depth / math.exp(p[onset_at]))
+            motor, load = lacking * twist_slope(full, p) / p[motor_at], lacking / p[load_at]
+        lag = (u - x[4]) / p[lag_at]
+        return (r[0], r[1] + motor, r[2], r[3] - load, lag, r[5], r[6], r[10])
+
+    return CompiledEquations(friction, smoothed, (end, end + 1))
+
+
+@cache
+def _runner() -> Any:
+    """Return the compiled, event-located simulation."""
+    from numba import njit
+
+    from orchestrator.plants.compiled import compiled
+
+    source = compiled("drivetrain")
+    advance, initial_mode, prepare, consistent = (
+        source.advance, source.initial_mode, source.prepare, source.consistent_start,
+    )  # fmt: skip
+
+    @njit
+    def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
+        x = consistent((start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0), p)
+        x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], start[7], start[8])
+        mode = initial_mode(x, p)
+        whole = prepare(p, h)
+        before, after = prepare(p, max(first, 1e-9)), prepare(p, max(h - first, 1e-9))
+        for n in range(out.shape[0]):
+            out[n, 0], out[n, 1] = x[0], x[2]
+            if first <= 1e-9:
+                x, mode = advance(x, mode, p, late[n], 0.0, h, whole)
+            else:
+                x, mode = advance(x, mode, p, early[n], 0.0, first, before)
+                x, mode = advance(x, mode, p, late[n], 0.0, h - first, after)
+
+    return run
+
+
+def realised(p: Array) -> Array:
+    """Return the FMU's own parameters of a model (n,): fitted distances of friction and contact included.
+
+    Args:
+        p: the predictor's parameters, (n,).
+
+    Returns:
+        The parameters, in the order of the FMU's table.
+    """
+    own = np.array(p[: dt.COUNT], dtype=float)
+    motor = own[dt.P_COULOMB_M] + own[dt.P_STRIBECK_M] + own[dt.P_BREAKAWAY_M]
+    load = own[dt.P_COULOMB_L] + own[dt.P_STRIBECK_L] + own[dt.P_BREAKAWAY_L]
+    gap = own[dt.P_ALPHA] if int(own[dt.P_MODEL]) in GRADUAL else 0.0
+    places = (dt.P_PRESLIDING_M, dt.P_PRESLIDING_L, dt.P_ONSET)
+    for place, on, fitted in zip(places, (motor, load, gap), p[dt.COUNT : dt.COUNT + len(places)], strict=True):
+        if on > 0.0:
+            own[place] = built_up(own[place], float(fitted))
+    return own
+
+
+PLANT = Plant(
+    name="Drivetrain",
+    table=dt.PARAMETERS,
+    linear=("J_m", "J_l", "k", "c", "b_m", "b_l", "i", "tau"),
+    spread=0.05,
+    states=(0, 1, 2, 3, 4),
+    bodies=(
+        Body("motor", angle=0, speed=1, inertia="J_m", encoder="theta_m"),
+        Body("load", angle=2, speed=3, inertia="J_l", encoder="theta_l", geared=True),
+    ),
+    shaft=Shaft(stiffness="k", ratio="i", gap="alpha"),
+    drive=Drive(
+        4,
+        "tau",
+        "effects.input_delay.delay",
+        "effects.torque_saturation.limit",
+        "effects.drive_filter.time_constant",
+        "effects.rate_limit.rate",
+    ),
+    resonance=Resonance("effects.extra_resonance.inertia", "effects.extra_resonance.frequency"),
+    followers=((5, 2), (6, 3)),
+    starts={0: "theta_m_start", 1: "omega_m_start", 2: "theta_l_start", 3: "omega_l_start", 4: "T_m_start"},
+    offsets=("effects.sensor_offset.motor.offset", "effects.sensor_offset.load.offset"),
+    nuisances=(*(PRESLIDING._replace(name=name) for name in NUISANCES), LEAD, SHIFT),
+    events=("contact of the teeth", "stick and slip of the motor", "stick and slip of the load"),
+    enumerations=("backlash_model",),
+    bank=(*DRIVETRAIN_BANK, EARLY_TORQUE, LATE_LOAD),
+    stage=_stage,
+    runner=_runner,
+    refused=refused,
+    realised=realised,
+)

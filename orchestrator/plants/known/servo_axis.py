@@ -1,0 +1,134 @@
+"""One inertia, or mass, behind the lag of its drive: the FMU ``ServoAxis``."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, built_up
+from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant
+from orchestrator.plants.measurement import EARLY_TORQUE, LEAD
+from pyfmu_sources import servo_axis as sa
+from pyfmu_sources import servo_axis_parameters as ap
+
+Array = NDArray[np.float64]
+
+# Not searched: a spring and a varying inertia. Without a second encoder they take up what an imperfect law of dry
+# friction leaves; the FMU has them.
+_SHARED = ("coulomb_friction@motor", "stribeck_friction@motor", "input_delay@actuator", "torque_saturation@actuator",
+           "torque_ripple@motor", "load_torque@load", "gravity_load@load", "quadratic_drag@load",
+           "drive_filter@actuator", "directional_friction@motor")  # fmt: skip
+
+SERVO_AXIS_BANK = tuple(effect for effect in DRIVETRAIN_BANK if effect.label in _SHARED)
+
+
+@cache
+def stage() -> CompiledEquations:
+    """Return the compiled equations.
+
+    Returns:
+        Friction, rates and places of friction's build-up distances.
+    """
+    from numba import njit
+
+    from orchestrator.plants.compiled import compiled
+
+    source = compiled("servo_axis")
+    rates, level = source.rates, source.friction
+    end = ap.COUNT
+
+    @njit(error_model="numpy")
+    def friction(x: Any, p: Any) -> Any:
+        return level((x[0], x[1], x[4], 0.0, 0.0), p), 0.0
+
+    @njit(error_model="numpy")
+    def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
+        speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
+        return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
+
+    return CompiledEquations(friction, smoothed, (end, end))
+
+
+@cache
+def runner() -> Any:
+    """Return the compiled, event-located simulation.
+
+    Returns:
+        A function, see ``Plant.runner``.
+    """
+    from numba import njit
+
+    from orchestrator.plants.compiled import compiled
+
+    source = compiled("servo_axis")
+    advance, initial_mode, begin = source.advance, source.initial_mode, source.start
+
+    @njit
+    def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
+        x = begin(start[0], start[1], start[4], p)
+        x = (x[0], x[1], x[2], x[3], start[8])
+        mode = initial_mode(x, p, early[0])
+        for n in range(out.shape[0]):
+            out[n, 0], out[n, 1] = x[0], 0.0
+            if first > 1e-9:
+                x, mode = advance(x, mode, p, early[n], 0.0, first)
+            x, mode = advance(x, mode, p, late[n], 0.0, h - first)
+
+    return run
+
+
+def inverse(position: Array, speed: Array, acceleration: Array, p: Array) -> Array:
+    """Return the torque (n,) [N.m] that a motion (n,) needs, without the drive's lag.
+
+    Args:
+        position: (n,) [rad].
+        speed: (n,) [rad/s].
+        acceleration: (n,) [rad/s^2].
+        p: the plant's parameters.
+
+    Returns:
+        The torque.
+    """
+    flat = tuple(p[: ap.COUNT].tolist())
+    return np.array(
+        [
+            sa.inertia((x, v, 0.0, 0.0, 0.0), flat) * rate - sa.sliding_torque((x, v, 0.0, 0.0, 0.0), flat, 0.0, 0.0)
+            + np.sign(v) * sa.friction((x, v, 0.0, 0.0, 0.0), flat)
+            for x, v, rate in zip(position.tolist(), speed.tolist(), acceleration.tolist(), strict=True)
+        ]
+    )  # fmt: skip
+
+
+def _realised(p: Array) -> Array:
+    """Return the FMU's own parameters of a model (n,): the fitted distance of friction included."""
+    own = np.array(p[: ap.COUNT], dtype=float)
+    if own[ap.P_COULOMB] + own[ap.P_STRIBECK] + own[ap.P_BREAKAWAY] > 0.0:
+        own[ap.P_PRESLIDING] = built_up(own[ap.P_PRESLIDING], float(p[ap.COUNT]))
+    return own
+
+
+PLANT = Plant(
+    name="ServoAxis",
+    table=ap.PARAMETERS,
+    linear=("J", "b", "tau"),
+    states=(0, 1, 4),
+    bodies=(Body("motor", angle=0, speed=1, inertia="J", encoder="theta_m"),),
+    drive=Drive(
+        4,
+        "tau",
+        "effects.input_delay.delay",
+        "effects.torque_saturation.limit",
+        "effects.drive_filter.time_constant",
+        "effects.rate_limit.rate",
+    ),
+    starts={0: "theta_m_start", 1: "omega_m_start", 4: "T_m_start"},
+    offsets=("effects.sensor_offset.motor.offset",),
+    nuisances=(PRESLIDING._replace(name="presliding.motor"), LEAD),
+    events=("stick and slip",),
+    bank=(*SERVO_AXIS_BANK, EARLY_TORQUE),
+    stage=stage,
+    runner=runner,
+    realised=_realised,
+    inverse=inverse,
+)

@@ -1,0 +1,178 @@
+"""A plant with one more torque whose law is no formula: straight lines between knots over a signal of the plant.
+
+It is for what no effect of the bank explains. The torque acts at the site that its signal belongs to, and may grow with
+the speed of the driven body beside. Its knots and values are parameters of the predictor alone.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.plants.description import CompiledEquations, Plant
+from orchestrator.plants.predictor import sample_of
+from pyfmu_sources.drivetrain_parameters import BIG, Parameter
+
+Array = NDArray[np.float64]
+
+KNOTS = 11
+
+
+@dataclass(frozen=True)
+class Argument:
+    """What a law is a function of.
+
+    Attributes:
+        code: its number in the compiled equations.
+        signal: in words.
+        site: where the torque acts.
+        unit: of the signal, of an angle in radians.
+        with_speed: the torque is the law's value times the speed of the last body, without its sign.
+    """
+
+    code: int
+    signal: str
+    site: str
+    unit: str
+    with_speed: bool = False
+
+    @property
+    def words(self) -> str:
+        """Return what the torque follows, in words."""
+        return f"{self.signal}, times the load's speed" if self.with_speed else self.signal
+
+
+MOTOR_SPEED, LOAD_SPEED, LOAD_ANGLE, TWIST, DRIVE = range(1, 6)
+WITH_SPEED = 10  # added to the code
+
+
+def arguments_of(plant: Plant) -> tuple[Argument, ...]:
+    """Return what a law of a plant may be a function of.
+
+    Args:
+        plant: the plant.
+
+    Returns:
+        Each argument, with the site at which the torque then acts.
+    """
+    alone = [
+        Argument(MOTOR_SPEED, "speed", "motor", "rad/s"),
+        Argument(DRIVE, "torque of the drive", "motor", "N.m"),
+    ]
+    if plant.shaft is None:
+        return (*alone, Argument(LOAD_ANGLE, "position", "motor", "rad"))
+    plain = (
+        *alone,
+        Argument(LOAD_SPEED, "speed", "load", "rad/s"),
+        Argument(LOAD_ANGLE, "angle", "load", "rad"),
+        Argument(TWIST, "twist", "shaft", "rad"),
+    )
+    grown = (replace(one, code=one.code + WITH_SPEED, with_speed=True) for one in plain if one.code in (TWIST, DRIVE))
+    return (*plain, *grown)
+
+
+def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    """Return the names of the law's parameters.
+
+    Returns:
+        That of the argument's code, those of the knots, those of the values.
+    """
+    return (
+        "law.argument",
+        tuple(f"law.knot_{n}" for n in range(KNOTS)),
+        tuple(f"law.value_{n}" for n in range(KNOTS)),
+    )
+
+
+@cache
+def with_law(plant: Plant) -> Plant:
+    """Return a plant with such a law, which is off until its argument is set.
+
+    Args:
+        plant: without it.
+
+    Returns:
+        The plant, with the law's parameters behind all others.
+    """
+    code, knots, values = names()
+    added = (
+        Parameter(code, "1", 0.0, 0.0, 100.0, "Argument of the learned law"),
+        *(Parameter(name, "1", float(n), -BIG, BIG, "Knot of the learned law") for n, name in enumerate(knots)),
+        *(Parameter(name, "N.m", 0.0, -BIG, BIG, "Value of the learned law") for name in values),
+    )
+    first = len(plant.names)
+    extended = replace(plant, nuisances=(*plant.nuisances, *added), realised=np.asarray, _index={})
+    stage = cache(lambda: _stage(plant, first))
+    extended = replace(extended, stage=stage, _index={})
+    return replace(extended, runner=cache(lambda: _runner(extended)), _index={})
+
+
+def _stage(plant: Plant, first: int) -> CompiledEquations:
+    from numba import njit
+
+    friction, rates, presliding = plant.stage()
+    motor, last = plant.bodies[0], plant.bodies[-1]
+    J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)
+    ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
+    speed_m, speed_l, angle_m, angle_l = motor.speed, last.speed, motor.angle, last.angle
+    drive = plant.drive.torque
+    knot_at, value_at = first + 1, first + 1 + KNOTS
+
+    @njit(error_model="numpy")
+    def law(s: float, p: Any) -> float:
+        n = 1
+        while n < KNOTS - 1 and s > p[knot_at + n]:
+            n += 1
+        share = (s - p[knot_at + n - 1]) / (p[knot_at + n] - p[knot_at + n - 1])
+        return float(p[value_at + n - 1] + share * (p[value_at + n] - p[value_at + n - 1]))
+
+    @njit(error_model="numpy")
+    def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
+        r = rates(x, signs, p, u)
+        code = int(p[first])
+        if code == 0:
+            return r
+        kind = code % WITH_SPEED
+        ratio = p[ratio_at] if ratio_at >= 0 else 1.0
+        if kind == MOTOR_SPEED:
+            s = x[speed_m]
+        elif kind == LOAD_SPEED:
+            s = x[speed_l]
+        elif kind == LOAD_ANGLE:
+            s = x[angle_l]
+        elif kind == TWIST:
+            s = x[angle_m] / ratio - x[angle_l]
+        else:
+            s = x[drive]
+        torque = law(s, p) * (abs(x[speed_l]) if code >= WITH_SPEED else 1.0)
+        on_motor, on_load = 0.0, 0.0
+        if kind in (MOTOR_SPEED, DRIVE) or ratio_at < 0:
+            on_motor = -torque / p[J_m]
+        elif kind == TWIST:
+            on_motor, on_load = -torque / ratio / p[J_m], torque / p[J_l]
+        else:
+            on_load = -torque / p[J_l]
+        if ratio_at < 0:
+            return (r[0], r[1] + on_motor, r[2], r[3], r[4], r[5], r[6], r[7])
+        return (r[0], r[1] + on_motor, r[2], r[3] + on_load, r[4], r[5], r[6], r[7])
+
+    return CompiledEquations(friction, with_torque, presliding)
+
+
+def _runner(plant: Plant) -> Any:
+    from numba import njit
+
+    rest_of, reach_of, sample = sample_of(plant)
+
+    @njit(error_model="numpy", nogil=True)
+    def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
+        x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
+        rest, reach = rest_of(p), reach_of(p)
+        memory = (0.0, 0.0, 0.0, 0.0)
+        for n in range(late.size):
+            out[n, 0], out[n, 1] = x[0], x[2]
+            x, memory = sample(x, memory, p, rest, reach, (early[n], late[n]), first, h, (4, 16))
+
+    return run

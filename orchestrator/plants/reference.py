@@ -1,0 +1,234 @@
+"""An independent solution of the drivetrain, which shares no code with the FMU: the truth that tests compare with.
+
+Each smooth mode is integrated by SciPy's DOP853 with terminal events; the equations are written out again, as a
+matrix differential equation of ``(theta_m, omega_m, theta_l, omega_l, T_m, z)`` with ``z`` the shaft's own twist.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+
+from orchestrator.errors import SimulationError
+from orchestrator.plants.design import DrivetrainValues
+
+Array = NDArray[np.float64]
+MAX_EVENTS_PER_SAMPLE = 1000
+
+
+@dataclass(frozen=True)
+class ReferencePlant(DrivetrainValues):
+    """The drivetrain's physical values, SI units, ``alpha`` the half-gap at the load [rad]."""
+
+    alpha: float = 0.0
+    model: str = "dead_zone"
+
+    def matrix(self, touching: bool) -> Array:
+        """Return A of ``x' = A x + B (u, T_l, offset)``, 5 x 5, of one mode (eq. 3.5 without T_l).
+
+        Args:
+            touching: whether the teeth are in contact.
+
+        Returns:
+            The matrix, SI units.
+        """
+        k, c = (self.k, self.c) if touching else (0.0, 0.0)
+        i, J_m, J_l = self.i, self.J_m, self.J_l
+        return np.array(
+            [
+                [0, 1, 0, 0, 0],
+                [-k / (J_m * i**2), -(c / i**2 + self.b_m) / J_m, k / (J_m * i), c / (J_m * i), 1 / J_m],
+                [0, 0, 0, 1, 0],
+                [k / (J_l * i), c / (J_l * i), -k / J_l, -(c + self.b_l) / J_l, 0],
+                [0, 0, 0, 0, -1 / self.tau],
+            ]
+        )
+
+    def inputs(self, touching: bool) -> Array:
+        """Return B, 5 x 3, for ``(u, T_l, offset)``; ``offset`` is the flank's angle [rad].
+
+        Args:
+            touching: whether the teeth are in contact.
+
+        Returns:
+            The matrix, SI units.
+        """
+        k = self.k if touching else 0.0
+        return np.array(
+            [
+                [0, 0, 0],
+                [0, 0, k / (self.J_m * self.i)],
+                [0, 0, 0],
+                [0, -1 / self.J_l, -k / self.J_l],
+                [1 / self.tau, 0, 0],
+            ]
+        )
+
+
+def linear_solution(plant: ReferencePlant, u: Array, h: float, start: Array, T_l: float = 0.0) -> Array:
+    """Return the exact states, shape (n + 1, 5), of a gear without gap: ``expm`` of the augmented matrix.
+
+    Args:
+        plant: the drivetrain; ``alpha`` is not looked at.
+        u: requested torque [N.m] of each of the n samples.
+        h: sample time [s].
+        start: start state, 5 values.
+        T_l: load torque [N.m].
+
+    Returns:
+        Angles [rad], speeds [rad/s] and the motor's torque [N.m].
+    """
+    augmented = np.zeros((8, 8))
+    augmented[:5, :5] = plant.matrix(touching=True)
+    augmented[:5, 5:] = plant.inputs(touching=True)
+    step = expm(augmented * h)
+    states = np.empty((len(u) + 1, 5))
+    states[0] = start
+    for n, torque in enumerate(u):
+        states[n + 1] = step[:5, :5] @ states[n] + step[:5, 5:] @ (torque, T_l, 0.0)
+    return states
+
+
+def reference_solution(
+    plant: ReferencePlant,
+    u: Array,
+    h: float,
+    start: Array | None = None,
+    T_l: float = 0.0,
+    rtol: float = 1e-12,
+    atol: float = 1e-14,
+) -> Array:
+    """Return the states ``(theta_m, omega_m, theta_l, omega_l, T_m)``, shape (n + 1, 5), at the samples.
+
+    Args:
+        plant: the drivetrain; its model is ``dead_zone`` or ``nordin``.
+        u: requested torque [N.m] of each of the n samples, held.
+        h: sample time [s].
+        start: start state, 5 values; default zero.
+        T_l: load torque [N.m].
+        rtol: relative tolerance of the integrator.
+        atol: absolute tolerance of the integrator.
+
+    Returns:
+        Angles [rad], speeds [rad/s] and the motor's torque [N.m].
+
+    Raises:
+        SimulationError: the integrator failed or the contact chatters.
+    """
+    x = np.zeros(6)
+    if start is not None:
+        x[:5] = start
+    flank = first_flank(plant, x)
+    states = np.empty((len(u) + 1, 5))
+    states[0] = x[:5]
+    for n, torque in enumerate(u):
+        x, flank = reference_sample(plant, x, flank, float(torque), T_l, h, rtol, atol)
+        states[n + 1] = x[:5]
+    return states
+
+
+def first_flank(plant: ReferencePlant, x: Array) -> int:
+    """Return the flank (-1, 0, 1) at which a state of at least 3 values starts.
+
+    Args:
+        plant: the drivetrain.
+        x: state; motor's angle [rad] first, load's angle third.
+
+    Returns:
+        The flank; 0 inside the gap.
+    """
+    if plant.alpha == 0.0:
+        return 1
+    wound = x[0] / plant.i - x[2]
+    return int(np.sign(wound)) if abs(wound) > plant.alpha else 0
+
+
+def reference_sample(
+    plant: ReferencePlant, x: Array, flank: int, u: float, T_l: float, h: float, rtol: float, atol: float
+) -> tuple[Array, int]:
+    """Return state (6 values: the five of ``reference_solution`` and the shaft's own twist) and flank after ``h``.
+
+    Args:
+        plant: the plant.
+        x: state at the start, 6 values.
+        flank: which flank is in contact: -1, 0 or 1.
+        u: requested torque [N.m], held.
+        T_l: torque on the load [N.m], held.
+        h: length [s].
+        rtol: relative tolerance of the integrator.
+        atol: absolute tolerance of the integrator.
+
+    Returns:
+        State and flank after ``h``.
+
+    Raises:
+        SimulationError: the integrator failed, or the sample has too many events.
+    """
+    time = 0.0
+    for _ in range(MAX_EVENTS_PER_SAMPLE):
+        slope = _slope(plant, flank, u, T_l)
+        events = _events(plant, flank)
+        run = solve_ivp(slope, (time, h), x, method="DOP853", rtol=rtol, atol=atol, events=events)
+        if run.status < 0:
+            raise SimulationError(f"reference solution failed: {run.message}")
+        x = run.y[:, -1].copy()
+        if run.status == 0:
+            return x, flank
+        time = float(run.t[-1])
+        which = next(k for k, hits in enumerate(run.t_events) if len(hits))
+        x, flank = _crossed(plant, x, flank, which)
+    raise SimulationError("reference solution chatters at the edge of the gap")
+
+
+def _slope(plant: ReferencePlant, flank: int, u: float, T_l: float) -> Callable[[float, Array], Array]:
+    A = plant.matrix(touching=flank != 0)
+    drive = plant.inputs(touching=flank != 0) @ (u, T_l, flank * plant.alpha)
+    unwinding = plant.k / plant.c if plant.model == "nordin" and plant.c > 0.0 and flank == 0 else 0.0
+
+    def slope(_time: float, x: Array) -> Array:
+        return np.append(A @ x[:5] + drive, -unwinding * x[5])
+
+    return slope
+
+
+def _events(plant: ReferencePlant, flank: int) -> list[Callable[[float, Array], float]]:
+    if plant.alpha == 0.0:
+        return []
+    i, alpha, nordin = plant.i, plant.alpha, plant.model == "nordin"
+
+    def wound(x: Array) -> float:
+        return float(x[0] / i - x[2])
+
+    def torque(_time: float, x: Array) -> float:
+        return plant.k * (wound(x) - flank * alpha) + plant.c * float(x[1] / i - x[3])
+
+    def leaves(_time: float, x: Array) -> float:
+        return wound(x) - flank * alpha
+
+    def reaches_front(_time: float, x: Array) -> float:
+        return wound(x) - float(x[5]) - alpha
+
+    def reaches_back(_time: float, x: Array) -> float:
+        return wound(x) - float(x[5]) + alpha
+
+    if flank == 0:
+        reaches_front.direction, reaches_back.direction = 1.0, -1.0  # type: ignore[attr-defined]
+        chosen = [reaches_front, reaches_back]
+    else:
+        chosen = [torque if nordin else leaves]
+        chosen[0].direction = -float(flank)  # type: ignore[attr-defined]
+    for event in chosen:
+        event.terminal = True  # type: ignore[attr-defined]
+    return list(chosen)
+
+
+def _crossed(plant: ReferencePlant, x: Array, flank: int, which: int) -> tuple[Array, int]:
+    x = x.copy()
+    if flank == 0:
+        x[5] = 0.0
+        return x, 1 if which == 0 else -1
+    x[5] = x[0] / plant.i - x[2] - flank * plant.alpha if plant.model == "nordin" and plant.c > 0.0 else 0.0
+    return x, 0

@@ -1,0 +1,1 @@
+"""Measured records and the model files that they are compared with."""

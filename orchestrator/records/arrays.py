@@ -1,0 +1,136 @@
+"""The record itself: arrays of one length, and what is known of how they were logged."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.records.columns import Array
+from orchestrator.records.timing import Timing
+
+MINIMUM_ROWS = 200
+
+
+@dataclass(frozen=True)
+class Record:
+    """A checked record.
+
+    A missing sample is NaN in ``theta_m`` and ``theta_l``; ``u`` is then interpolated, and ``u_deviation`` says how
+    far that may be off.
+
+    Attributes:
+        time: (n,) s, uniform.
+        u: (n,) N.m, requested torque, held from sample to sample.
+        theta_m: (n,) rad, motor encoder; NaN: missing.
+        theta_l: (n,) rad, load encoder, or None; NaN: missing.
+        source: file name or description, for messages and plots.
+        further: other columns that were asked for by name, (n,) each.
+        u_deviation: (n,) standard deviation of ``u`` where it is interpolated [N.m], 0.0 elsewhere; None: nowhere.
+        u_scale_uncertainty: by what share the scale of ``u`` may be off at most.
+        timing: what the time stamps said, or None.
+        notes: what was detected and assumed, one sentence each.
+        averaged: how many samples of the file went into one of these by ``rate``.
+    """
+
+    time: Array
+    u: Array
+    theta_m: Array
+    theta_l: Array | None = None
+    source: str = "record"
+    further: Mapping[str, Array] = field(default_factory=dict)
+    u_deviation: Array | None = None
+    u_scale_uncertainty: float = 0.0
+    timing: Timing | None = None
+    notes: tuple[str, ...] = ()
+    averaged: int = 1
+
+    @property
+    def size(self) -> int:
+        """Return the number of rows."""
+        return int(self.time.size)
+
+    @property
+    def step(self) -> float:
+        """Return the sample time [s]."""
+        return float((self.time[-1] - self.time[0]) / (self.time.size - 1))
+
+    @property
+    def duration(self) -> float:
+        """Return the time from the first to the last row [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def missing(self) -> int:
+        """Return the number of rows in which a measured angle or the torque is missing."""
+        return int(np.count_nonzero(self.lost))
+
+    @property
+    def lost(self) -> NDArray[np.bool_]:
+        """Return the rows (n,) in which a measured angle or the torque is missing."""
+        lost = np.isnan(self.theta_m)
+        if self.theta_l is not None:
+            lost = lost | np.isnan(self.theta_l)
+        if self.u_deviation is not None:
+            lost = lost | (self.u_deviation > 0.0)
+        return lost
+
+    def part(self, start: int, stop: int) -> "Record":
+        """Return rows ``start`` to ``stop`` (exclusive) as a record of their own.
+
+        Args:
+            start: first row, from 0.
+            stop: row to stop before.
+
+        Returns:
+            A view of this record's arrays.
+        """
+        rows = slice(start, stop)
+        return replace(
+            self,
+            time=self.time[rows],
+            u=self.u[rows],
+            theta_m=self.theta_m[rows],
+            theta_l=None if self.theta_l is None else self.theta_l[rows],
+            further={name: values[rows] for name, values in self.further.items()},
+            u_deviation=None if self.u_deviation is None else self.u_deviation[rows],
+        )
+
+    def without_load_encoder(self) -> "Record":
+        """Return the same record with ``theta_l`` dropped.
+
+        Returns:
+            A copy.
+        """
+        return replace(self, theta_l=None)
+
+    def filled(self) -> "Record":
+        """Return the record with straight lines over missing samples, for looks and for checks of plausibility.
+
+        Returns:
+            A copy; this record itself when nothing is missing.
+        """
+        if not self.missing:
+            return self
+        return replace(
+            self,
+            theta_m=lined(self.theta_m),
+            theta_l=None if self.theta_l is None else lined(self.theta_l),
+            u_deviation=None,
+        )
+
+
+def lined(values: Array) -> Array:
+    """Return values with straight lines over NaN.
+
+    Args:
+        values: (n,).
+
+    Returns:
+        Shape (n,); unchanged when nothing is missing, or everything.
+    """
+    good = np.isfinite(values)
+    if good.all() or not good.any():
+        return values
+    places = np.arange(values.size)
+    return np.interp(places, places[good], values[good])

@@ -1,0 +1,184 @@
+"""What the columns of a record must be: finite, in range, moving; and what an encoder's count is."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+
+Array = NDArray[np.float64]
+
+LARGEST_VALUE = 1e12  # of any number in a record
+LARGEST_ANGLE = 1e7  # rad
+LEAVING = 0.4  # of the rms speed: a machine that is slower was coming to rest
+LARGEST_GAP = 0.3  # rad, load side: motion beyond it that one encoder misses is no gap
+LARGEST_SHARE_MISSING = 0.2  # of the rows of one column
+
+
+def check_finite(values: Array, name: str, source: str) -> None:
+    """Refuse infinite and huge values; NaN is a missing sample, of which there may be some.
+
+    Args:
+        values: (n,).
+        name: of the column.
+        source: file name, for messages.
+
+    Raises:
+        RecordError: the message names row and column.
+    """
+    bad = np.flatnonzero(np.isinf(values) | (np.abs(values) > LARGEST_VALUE))
+    if bad.size:
+        more = f" (and {bad.size - 1} more rows)" if bad.size > 1 else ""
+        value = float(values[bad[0]])
+        must = f"between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}" if math.isfinite(value) else "a finite number"
+        raise RecordError(
+            f"{source}: row {bad[0] + 1}, column `{name}` must be {must}, but is {value:g}{more}: "
+            "mend or empty the cell"
+        )
+    missing = int(np.count_nonzero(np.isnan(values)))
+    if missing > LARGEST_SHARE_MISSING * values.size:
+        raise RecordError(
+            f"{source}: row {int(np.flatnonzero(np.isnan(values))[0]) + 1}, column `{name}` must have at most "
+            f"{100 * LARGEST_SHARE_MISSING:g} % of its samples missing, but {missing} of {values.size} are: keep a "
+            "part with values by `part` START:END, or name another column"
+        )
+
+
+def check_range(values: Array, name: str, source: str) -> None:
+    """Refuse angles that no encoder reaches.
+
+    Args:
+        values: (n,) [rad].
+        name: of the column.
+        source: file name, for messages.
+
+    Raises:
+        RecordError: the message names row and column.
+    """
+    far = np.flatnonzero(np.abs(values) > LARGEST_ANGLE)
+    if far.size:
+        where = f"{source}: row {far[0] + 1}, column `{name}`"
+        raise RecordError(
+            f"{where} must be an angle below {LARGEST_ANGLE:g} rad, but is {values[far[0]]:g}: say its unit, such as "
+            '`unit = "counts"`, in `[columns]` of the model file'
+        )
+
+
+def check_driven(u: Array, label: str, source: str) -> None:
+    """Refuse a torque that is zero throughout.
+
+    Args:
+        u: (n,) [N.m].
+        label: name of the column in the file.
+        source: file name, for messages.
+
+    Raises:
+        RecordError: it is, so the column is another or nothing drove the machine.
+    """
+    if not np.any(u[np.isfinite(u)]):
+        raise RecordError(
+            f"{source}: column `{label}` must drive the machine, but is 0 in all {u.size} rows: name the right one by "
+            '`[columns.u] name = "..."`, or log a run with torque'
+        )
+
+
+def check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str) -> None:
+    """Refuse an encoder that is stuck, or saturated at an end of its range, while the machine moves.
+
+    Args:
+        arrays: columns by name, (n,) each.
+        name: of the encoder.
+        label: what the file calls it.
+        source: file name, for the message.
+
+    Raises:
+        RecordError: it is stuck or saturated; the message says from which row on.
+    """
+    values = arrays[name]
+    other = arrays.get("theta_l" if name == "theta_m" else "theta_m")
+    start, stop = _longest_constant(values)
+    length, size = stop - start, values.size
+    if length == size:
+        if np.ptp(arrays["u"]) > 0.0 or (other is not None and np.ptp(other) > 0.0):
+            raise RecordError(
+                f"{source}: column `{label}` must change, but is {values[0]:g} in all {size} rows: "
+                "the encoder is stuck or not connected; name another column (`model`), or log again"
+            )
+        return
+    if length < max(20, size // 100):
+        return
+    if other is None or name not in ("theta_m", "theta_l"):
+        missed = start > 0 and _leaving_speed(values, start, stop) * length > 30.0 * _resolution(values)
+    else:
+        # The load may rest while the motor crosses the gap, so only more than any gap counts.
+        load, motor = arrays["theta_l"], arrays["theta_m"]
+        ratio = float(np.std(motor)) / max(float(np.std(load)), 1e-12)
+        moved = float(np.ptp(other[start:stop]))
+        missed = moved / (ratio if name == "theta_l" else 1.0) > LARGEST_GAP
+    if not missed:
+        return
+    at_end = values[start] in (values.max(), values.min())
+    word = "saturated at an end of its range" if at_end else "stuck"
+    raise RecordError(
+        f"{source}: row {start + 1}, column `{label}` must follow the motion, but is {values[start]:g} "
+        f"for {length} rows: the encoder is {word}; keep a part without that by `part` START:END"
+    )
+
+
+def _longest_constant(values: Array) -> tuple[int, int]:
+    """Return start and stop (exclusive) of the longest run of equal values."""
+    edges = np.flatnonzero(np.diff(values) != 0.0) + 1
+    bounds = np.concatenate(([0], edges, [values.size]))
+    longest = int(np.argmax(np.diff(bounds)))
+    return int(bounds[longest]), int(bounds[longest + 1])
+
+
+def _leaving_speed(values: Array, start: int, stop: int) -> float:
+    """Return the smaller of the mean speeds [units per row] over the rows just before and after a run.
+
+    A machine that comes to rest, held by its friction, slows down first; an encoder that sticks does not. Speeds of a
+    few counts, or far below the record's own, tell nothing.
+    """
+    speeds = []
+    if start >= 5:
+        speeds.append(abs(values[start] - values[start - 4]) / 4.0)
+    if stop + 5 <= values.size:
+        speeds.append(abs(values[stop + 3] - values[stop - 1]) / 4.0)
+    slowest = float(min(speeds)) if speeds else 0.0
+    typical = float(np.sqrt(np.mean(np.diff(values) ** 2)))
+    return slowest if slowest > max(3.0 * _resolution(values), LEAVING * typical) else 0.0
+
+
+def _resolution(values: Array) -> float:
+    """Return the smallest change between neighbouring rows, which is the count of a quantised encoder."""
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 1e-12 * max(1.0, float(np.abs(values).max()))]
+    return float(steps.min()) if steps.size else 1.0
+
+
+def quantisation_step(values: Array) -> float:
+    """Return the encoder count [unit of ``values``] that a column is rounded to, or 0.0 when it is not.
+
+    A column counts as rounded when its changes are whole multiples of the smallest one.
+
+    Args:
+        values: (n,).
+
+    Returns:
+        The count.
+    """
+    unit = _resolution(values)
+    if unit <= 0.0 or (np.unique(values).size > 0.9 * values.size and unit < 1e-6):
+        return 0.0
+    steps = np.abs(np.diff(values))
+    if not np.any(steps > 0.0):
+        return 0.0
+    # Differences carry the rounding of two printed numbers; the mean of the smallest class averages it out.
+    smallest = steps[(steps > 0.5 * unit) & (steps < 1.5 * unit)]
+    unit = float(np.mean(smallest))
+    multiples = steps / unit
+    small = multiples < 20.0
+    off = np.abs(multiples[small] - np.round(multiples[small]))
+    return unit if unit > 0.0 and float(np.percentile(off, 99)) < 0.05 else 0.0

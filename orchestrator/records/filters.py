@@ -1,0 +1,97 @@
+"""Decimation of a record with an anti-alias filter."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.arrays import MINIMUM_ROWS, Record
+
+Array = NDArray[np.float64]
+
+TAPS_PER_STEP = 5.0  # half length of the filter in new samples; with the next two, white noise stays white
+KAISER = 6.0  # of the window: 60 dB
+CUT_OFF = 0.5  # of the new rate
+LARGEST_MISSING = 0.1  # weight of missing samples in a new one, beyond which it is missing too
+
+
+def decimated(record: Record, rate: float) -> Record:
+    """Return the record at ``rate`` samples per second, or the nearest whole fraction of its own rate above it.
+
+    All columns go through the same symmetric low-pass filter, so linear dynamics between them stay as they are and
+    nothing is delayed; ``u`` is then averaged over the sample in which the slower record holds it. Contacts shorter
+    than a new sample are blurred.
+
+    Args:
+        record: at its own rate.
+        rate: [1/s].
+
+    Returns:
+        The slower record; the same one when the rate is not lower.
+
+    Raises:
+        RecordError: too few rows would be left.
+    """
+    factor = math.floor(1.0 / (record.step * rate) + 1e-6)
+    if factor < 2:
+        return record
+    taps = _low_pass(factor)
+    half = taps.size // 2
+    centres = np.arange(half, record.size - half - factor, factor)
+    if centres.size < MINIMUM_ROWS:
+        raise RecordError(
+            f"{record.source}: `rate` must leave at least {MINIMUM_ROWS} rows, but {rate:g} Hz leaves {centres.size}"
+            ": ask for a higher rate"
+        )
+    held = np.convolve(_filled(record.u), taps, "same")
+    held = np.convolve(held, np.ones(factor) / factor, "full")[factor - 1 :][: record.size]
+    columns = {
+        name: None if values is None else _at(values, taps, centres)
+        for name, values in (("theta_m", record.theta_m), ("theta_l", record.theta_l))
+    }
+    assert columns["theta_m"] is not None
+    deviation = None
+    if record.u_deviation is not None:
+        deviation = np.sqrt(np.convolve(record.u_deviation**2, np.ones(factor) / factor, "full"))[factor - 1 :][centres]
+    note = (
+        f"brought from {1.0 / record.step:.6g} to {1.0 / (record.step * factor):.6g} Hz: filter to "
+        f"{CUT_OFF / (record.step * factor):.4g} Hz, every {factor}th sample kept"
+    )
+    return replace(
+        record,
+        time=record.time[centres],
+        u=held[centres],
+        theta_m=columns["theta_m"],
+        theta_l=columns["theta_l"],
+        further={name: _at(values, taps, centres) for name, values in record.further.items()},
+        u_deviation=deviation,
+        notes=(*record.notes, note),
+        averaged=record.averaged * factor,
+    )
+
+
+def _low_pass(factor: int) -> Array:
+    half = math.ceil(TAPS_PER_STEP * factor)
+    n = np.arange(-half, half + 1)
+    taps = np.sinc(2.0 * CUT_OFF * n / factor) * np.kaiser(2 * half + 1, KAISER)
+    return np.asarray(taps / taps.sum())
+
+
+def _filled(values: Array) -> Array:
+    good = np.isfinite(values)
+    if good.all():
+        return values
+    places = np.arange(values.size)
+    return np.interp(places, places[good], values[good])
+
+
+def _at(values: Array, taps: Array, centres: NDArray[np.int64]) -> Array:
+    """Return the filtered values at ``centres``, NaN where too many of their samples are missing."""
+    out: Array = np.convolve(_filled(values), taps, "same")[centres]
+    missing = np.isnan(values)
+    if missing.any():
+        weight = np.convolve(missing.astype(float), np.abs(taps) / np.abs(taps).sum(), "same")[centres]
+        out[weight > LARGEST_MISSING] = np.nan
+    return out

@@ -1,0 +1,100 @@
+"""Readers of file formats, one module each, behind the interface of :mod:`orchestrator.records.formats.source`."""
+
+import importlib
+from pathlib import Path
+
+from orchestrator.errors import RecordError
+from orchestrator.records.formats.source import MAXIMUM_BYTES, RecordSource
+
+# First bytes of a file (and where they stand) and the module that reads it.
+_MAGIC = (
+    (0, b"PAR1", "parquet"),
+    (0, b"MDF     ", "mdf"),
+    (0, b"UnFinMF ", "mdf"),
+    (0, b"MATLAB 5.0", "mat"),
+    (0, b"MATLAB 7.3", "hdf5"),
+    (0, b"\x89HDF\r\n\x1a\n", "hdf5"),
+    (512, b"\x89HDF\r\n\x1a\n", "hdf5"),
+    (0, b"\x93NUMPY", "numpy_file"),
+)
+# What is no record, and what to do then.
+_OTHERS = (
+    (b"\x1f\x8b", "is compressed (gzip): unpack it first"),
+    (b"BZh", "is compressed (bzip2): unpack it first"),
+    (b"\xfd7zXZ", "is compressed (xz): unpack it first"),
+    (b"\x28\xb5\x2f\xfd", "is compressed (zstd): unpack it first"),
+    (b"7z\xbc\xaf", "is a 7z archive: unpack it first"),
+    (b"\xd0\xcf\x11\xe0", "is an Excel workbook (xls): save the sheet as CSV"),
+    (b"TDSm", "is a TDMS file: export it as CSV, Parquet or MDF4"),
+    (b"%PDF", "is a PDF: export the data as CSV"),
+    (b"SQLite format 3", "is a database: export the table as CSV"),
+    (b"ARROW1", "is an Arrow or Feather file: save it as Parquet"),
+)
+FORMATS = "CSV, Parquet, MDF4, MAT or NumPy"
+
+
+def open_source(path: Path) -> RecordSource:
+    """Return the opened file; its first bytes decide on the reader, not its name.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its channels, read when they are asked for.
+
+    Raises:
+        RecordError: the file is missing, too large, of an unknown format, or its reader is not installed.
+    """
+    head = _first_bytes(path)
+    if not head:
+        raise RecordError(f"{path}: a record must have a header and rows, but the file is empty")
+    if head.startswith(b"PK\x03\x04"):
+        return _opened("numpy_file", path)
+    for place, magic, module in _MAGIC:
+        if head[place : place + len(magic)] == magic:
+            return _opened(module, path)
+    for magic, text in _OTHERS:
+        if head.startswith(magic):
+            raise RecordError(f"{path}: must be {FORMATS}, but {text}")
+    return _opened("text", path)
+
+
+def _first_bytes(path: Path) -> bytes:
+    try:
+        if path.is_dir():
+            raise RecordError(f"{path}: a record must be a file ({FORMATS}), but this is a directory")
+        if not path.is_file() and path.exists():
+            raise RecordError(f"{path}: a record must be a file ({FORMATS}), but this is a device or a pipe")
+        if path.stat().st_size > MAXIMUM_BYTES:
+            raise RecordError(
+                f"{path}: a record must be at most {MAXIMUM_BYTES // 10**6} MB, but has "
+                f"{path.stat().st_size / 1e6:.0f} MB: cut it, or save it at a lower rate"
+            )
+        with path.open("rb") as file:
+            return file.read(600)
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError:
+        raise RecordError(f"{str(path)!r}: not a file name") from None
+
+
+def _opened(module: str, path: Path) -> RecordSource:
+    source: RecordSource = importlib.import_module(f"orchestrator.records.formats.{module}").open_file(path)
+    return source
+
+
+def missing_extra(path: Path, kind: str, package: str, extra: str) -> RecordError:
+    """Return the error that says which extra reads a format.
+
+    Args:
+        path: the file.
+        kind: what the file is, with an article.
+        package: that reads it.
+        extra: of this distribution, which installs the package.
+
+    Returns:
+        The error.
+    """
+    return RecordError(
+        f"{path}: is {kind}, which needs `{package}`: pip install 'backlash-cosim[{extra}]', or save the record as CSV"
+    )

@@ -1,0 +1,125 @@
+"""Records in MDF 3 and 4 (measurement data format), by asammdf."""
+
+import gc
+import logging
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.formats import missing_extra
+from orchestrator.records.formats.dialect import named
+from orchestrator.records.formats.source import (
+    MAXIMUM_BYTES,
+    MAXIMUM_CHANNELS,
+    Head,
+    RecordSource,
+    as_numbers,
+    in_a_line,
+)
+
+FORMULA_4, FORMULA_3 = 3, 10  # conversion types of the two versions
+
+
+class MdfSource(RecordSource):
+    """An MDF file; each channel group is a raster of its own, its master the time."""
+
+    def __init__(self, path: Path, file: Any) -> None:
+        self._path, self._file = path, file
+        self._at: list[tuple[int, int | None]] = []
+        heads = []
+        for number, group in enumerate(file.groups):
+            master = file.masters_db.get(number)
+            heads.append(Head("time", "s", "number", number, "time" if number == 0 else f"time of group {number}"))
+            self._at.append((number, None))
+            for index, channel in enumerate(group.channels):
+                if index == master:
+                    continue
+                unit = channel.unit or getattr(channel.conversion, "unit", "") or ""
+                heads.append(named(channel.name, unit if isinstance(unit, str) else "", "number", number))
+                self._at.append((number, index))
+        self.heads: Sequence[Head] = heads
+        self.dialect = f"MDF {file.version}, {len(file.groups)} groups, {len(heads) - len(file.groups)} channels"
+        self.rate = None
+
+    def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
+        """Return the values of some channels, physical where the file says how."""
+        out = []
+        for place in places:
+            group, index = self._at[place]
+            try:
+                if index is None:
+                    values = np.asarray(self._file.get_master(group), dtype=float)
+                else:
+                    self._refuse_formula(group, index)
+                    values = np.asarray(self._file.get(group=group, index=index).samples)
+            except RecordError:
+                raise
+            except Exception as error:  # asammdf raises whatever a broken file makes it meet
+                raise _broken(self._path, error) from None
+            out.append(as_numbers(values, self.heads[place].name, self._path))
+        return out
+
+    def _refuse_formula(self, group: int, index: int) -> None:
+        """Refuse conversions that are formulas: a file's text is never run."""
+        conversion = self._file.groups[group].channels[index].conversion
+        kind = getattr(conversion, "conversion_type", None)
+        if conversion is not None and kind == (FORMULA_4 if str(self._file.version) >= "4" else FORMULA_3):
+            raise RecordError(
+                f"{self._path}: column `{self._file.groups[group].channels[index].name}` must have a linear "
+                "conversion, but has a formula: export it converted"
+            )
+
+
+def open_file(path: Path) -> MdfSource:
+    """Return the opened file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its channels, read when they are asked for.
+
+    Raises:
+        RecordError: asammdf is not installed, or the file is broken or too large.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import asammdf
+
+        logging.getLogger("asammdf").setLevel(logging.CRITICAL)
+    except ImportError:
+        raise missing_extra(path, "an MDF file", "asammdf", "mdf") from None
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            file = asammdf.MDF(path)
+            rows = sum(int(group.channel_group.cycles_nr) for group in file.groups)
+            channels = sum(len(group.channels) for group in file.groups)
+    except Exception as error:  # asammdf raises whatever a broken file makes it meet
+        told = _broken(path, error)
+        _drop_silently(error)
+        raise told from None
+    if rows * 8 > MAXIMUM_BYTES or channels > MAXIMUM_CHANNELS:
+        raise RecordError(f"{path}: a record must have at most {MAXIMUM_BYTES // 8} rows, but has {rows}")
+    return MdfSource(path, file)
+
+
+def _drop_silently(error: Exception) -> None:
+    """Let go of the half-made files that an error holds now: their destructors complain."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        error.__traceback__ = None
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
+
+
+def _broken(path: Path, error: BaseException) -> RecordError:
+    return RecordError(f"{path}: must be a whole MDF file, but is not: {in_a_line(error)}")

@@ -1,0 +1,131 @@
+"""Records as NumPy files: npz with an array per column, npy with named or numbered columns. Never a pickle."""
+
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.formats.dialect import named
+from orchestrator.records.formats.source import (
+    MAXIMUM_BYTES,
+    MAXIMUM_CHANNELS,
+    Head,
+    RecordSource,
+    as_numbers,
+    in_a_line,
+)
+
+
+class ArraySource(RecordSource):
+    """Arrays in memory, by name."""
+
+    def __init__(self, path: Path, arrays: dict[str, NDArray[Any]], dialect: str, units: dict[str, str]) -> None:
+        self._path = path
+        self._arrays = [np.ravel(values) for values in arrays.values()]
+        if len(arrays) > MAXIMUM_CHANNELS:
+            raise RecordError(f"{path}: a record must have at most {MAXIMUM_CHANNELS} columns, but has {len(arrays)}")
+        lengths = {values.size: n for n, values in enumerate(self._arrays)}
+        self.heads: Sequence[Head] = [
+            _head(name, units.get(name, ""), values, lengths[values.size])
+            for name, values in zip(arrays, self._arrays, strict=True)
+        ]
+        self.dialect = dialect
+        self.rate = None
+
+    def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
+        """Return the values of some arrays."""
+        return [as_numbers(self._arrays[place], self.heads[place].name, self._path) for place in places]
+
+
+def _head(name: str, unit: str, values: NDArray[Any], raster: int) -> Head:
+    kind = "stamp" if values.dtype.kind == "M" else "number"
+    head = named(name, unit)
+    return Head(head.name, head.unit, kind, raster, head.full)
+
+
+def columns_of(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    """Return the columns of an array: itself, its named fields, or the columns of a table, numbered from 1.
+
+    Args:
+        name: of the array.
+        array: of any shape.
+
+    Returns:
+        Vectors by name; empty where there are no numbers.
+    """
+    if array.dtype.names:
+        return {field: array[field] for field in array.dtype.names if array[field].dtype.kind in "fiubM"}
+    if array.dtype.kind not in "fiubM" or array.size < 2:
+        return {}
+    if array.ndim == 1 or (array.ndim == 2 and 1 in array.shape):
+        return {name: array}
+    if array.ndim != 2:
+        return {}
+    table = array if array.shape[0] >= array.shape[1] else array.T
+    prefix = f"{name}#" if name else "#"
+    return {f"{prefix}{n + 1}": table[:, n] for n in range(table.shape[1])}
+
+
+def open_file(path: Path) -> ArraySource:
+    """Return the opened file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its vectors.
+
+    Raises:
+        RecordError: it holds objects, is broken, or unpacks to too much.
+    """
+    try:
+        with path.open("rb") as file:
+            if file.read(4) == b"PK\x03\x04":
+                return _npz(path)
+            _check_npy(path)
+            array = np.load(path, allow_pickle=False)
+        return ArraySource(path, columns_of("", array), f"NumPy array of {' x '.join(map(str, array.shape))}", {})
+    except RecordError:
+        raise
+    except Exception as error:  # numpy's and zip's readers raise whatever a broken file makes them meet
+        raise RecordError(f"{path}: must be a NumPy file of plain numbers, but is not: {in_a_line(error)}") from None
+
+
+def _npz(path: Path) -> ArraySource:
+    with zipfile.ZipFile(path) as archive:
+        entries = archive.infolist()
+        names = [entry.filename for entry in entries]
+        if any(name.startswith("xl/") for name in names):
+            raise RecordError(
+                f"{path}: must be CSV, Parquet, MDF4, MAT or NumPy, but is an Excel workbook: save the sheet as CSV"
+            )
+        if not names or not all(name.endswith(".npy") for name in names):
+            raise RecordError(
+                f"{path}: must be CSV, Parquet, MDF4, MAT or NumPy, but is a zip archive: unpack it first"
+            )
+        if sum(entry.file_size for entry in entries) > MAXIMUM_BYTES or len(names) > MAXIMUM_CHANNELS:
+            raise RecordError(f"{path}: must unpack to at most {MAXIMUM_BYTES // 10**6} MB, but would to more")
+    arrays: dict[str, NDArray[Any]] = {}
+    with np.load(path, allow_pickle=False) as content:
+        for name in content.files:
+            arrays |= columns_of(name, content[name])
+    return ArraySource(path, arrays, f"NumPy archive of {len(names)} arrays", {})
+
+
+def _check_npy(path: Path) -> None:
+    """Refuse a head that claims more than the file holds, before anything is allocated."""
+    with path.open("rb") as file:
+        version = np.lib.format.read_magic(file)
+        read = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}.get(version)
+        if read is None:
+            raise ValueError(f"version {version} of the format")
+        shape, _, kind = read(file)
+        size = kind.itemsize
+        for length in shape:
+            size *= int(length)
+        if size > path.stat().st_size:
+            raise ValueError("its head claims more than it holds")

@@ -1,0 +1,86 @@
+"""Records in Parquet, by pyarrow."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.formats import missing_extra
+from orchestrator.records.formats.dialect import named
+from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, Head, RecordSource, in_a_line
+
+
+class ParquetSource(RecordSource):
+    """A Parquet file."""
+
+    def __init__(self, path: Path, file: Any) -> None:
+        self._path, self._file = path, file
+        schema = file.schema_arrow
+        self.heads: Sequence[Head] = [_head(schema.field(n)) for n in range(len(schema.names))]
+        self.dialect = f"Parquet, {file.metadata.num_rows} rows"
+        self.rate = None
+
+    def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
+        """Return the values of some columns."""
+        names = [self._file.schema_arrow.names[place] for place in places]
+        try:
+            table = self._file.read(columns=names)
+            return [_values(table.column(name), name, self._path) for name in names]
+        except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
+            raise RecordError(f"{self._path}: must be a whole Parquet file, but is not: {in_a_line(error)}") from None
+
+
+def open_file(path: Path) -> ParquetSource:
+    """Return the opened file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        Its columns, read when they are asked for.
+
+    Raises:
+        RecordError: pyarrow is not installed, or the file is broken or too large.
+    """
+    try:
+        import pyarrow.parquet
+    except ImportError:
+        raise missing_extra(path, "a Parquet file", "pyarrow", "parquet") from None
+    try:
+        # Memory for decoding is bounded: a small file may claim to hold much.
+        file = pyarrow.parquet.ParquetFile(
+            path, thrift_string_size_limit=2**24, thrift_container_size_limit=2**20, pre_buffer=False
+        )
+        columns, rows = len(file.schema_arrow.names), file.metadata.num_rows
+    except (OSError, ValueError, KeyError, NotImplementedError, MemoryError) as error:
+        raise RecordError(f"{path}: must be a whole Parquet file, but is not: {in_a_line(error)}") from None
+    if columns > MAXIMUM_CHANNELS or rows * 8 > MAXIMUM_BYTES:
+        raise RecordError(
+            f"{path}: a record must have at most {MAXIMUM_BYTES // 8} rows and {MAXIMUM_CHANNELS} columns, but has "
+            f"{rows} and {columns}"
+        )
+    return ParquetSource(path, file)
+
+
+def _head(field: Any) -> Head:
+    import pyarrow
+
+    meta = {key.lower(): value for key, value in (field.metadata or {}).items()}
+    unit = next((meta[key].decode("utf-8", "replace") for key in (b"unit", b"units") if key in meta), "")
+    stamp = pyarrow.types.is_timestamp(field.type)
+    number = stamp or pyarrow.types.is_integer(field.type) or pyarrow.types.is_floating(field.type)
+    head = named(field.name, unit)
+    return Head(head.name, head.unit, "stamp" if stamp else "number" if number else "text", 0, head.full)
+
+
+def _values(column: Any, name: str, path: Path) -> NDArray[Any]:
+    import pyarrow
+
+    if pyarrow.types.is_timestamp(column.type):
+        return np.asarray(column.cast(pyarrow.timestamp("ns")).to_numpy())
+    if not (pyarrow.types.is_integer(column.type) or pyarrow.types.is_floating(column.type)):
+        raise RecordError(f"{path}: column `{name}` must hold numbers, but holds {column.type}")
+    return np.asarray(column.cast(pyarrow.float64()).to_numpy(), dtype=float)

@@ -1,0 +1,92 @@
+"""What every reader of a format gives: named channels with units, and their values on demand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+
+MAXIMUM_BYTES = 500_000_000  # of a file, and of the arrays that one may unpack to
+MAXIMUM_CHANNELS = 20_000
+
+
+@dataclass(frozen=True)
+class Head:
+    """One channel of a file.
+
+    Attributes:
+        name: as the file writes it, without its unit.
+        unit: as the file writes it, or empty.
+        kind: "number", or "stamp" where the values are dates or times of day.
+        raster: which channels share their rows; channels of another raster have other time stamps.
+        full: name and unit as the file writes them together, which also names the channel.
+    """
+
+    name: str
+    unit: str = ""
+    kind: str = "number"
+    raster: int = 0
+    full: str = ""
+
+
+class RecordSource(Protocol):
+    """An opened file.
+
+    Attributes:
+        heads: its channels.
+        dialect: what was detected, in one line.
+        rate: samples per second where the file states it outside its channels, or None.
+    """
+
+    heads: Sequence[Head]
+    dialect: str
+    rate: float | None
+
+    def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
+        """Return the values of the channels at ``places``, float64 or datetime64; NaN or NaT where one is missing.
+
+        Args:
+            places: of the channels in ``heads``.
+
+        Returns:
+            An array (n,) per place; those of one raster have the same length.
+
+        Raises:
+            RecordError: a value is not a number; the message names row and column.
+        """
+
+
+def as_numbers(values: NDArray[Any], name: str, path: Path) -> NDArray[Any]:
+    """Return a channel's values as float64, dates and times as datetime64[ns].
+
+    Args:
+        values: as the file's reader gives them.
+        name: of the channel, for messages.
+        path: of the file, for messages.
+
+    Returns:
+        Shape (n,).
+
+    Raises:
+        RecordError: they are no vector of numbers.
+    """
+    if values.ndim == 1 and values.dtype.kind in "fiub":
+        return values.astype(float)
+    if values.ndim == 1 and values.dtype.kind == "M":
+        return values.astype("datetime64[ns]")
+    raise RecordError(f"{path}: column `{name}` must hold numbers, but holds {values.dtype}")
+
+
+def in_a_line(error: BaseException) -> str:
+    """Return what a library says of a broken file, short enough for a message.
+
+    Args:
+        error: raised by the library.
+
+    Returns:
+        At most 120 characters without line breaks.
+    """
+    return " ".join(str(error).split())[:120]

@@ -1,0 +1,170 @@
+"""Does a record fit its model at all: units, signs, exchanged columns.
+
+The sampling rate must resolve the shaft's oscillation. Three numbers of the record are compared with the model's, each
+only where the motion is large enough for it to mean something: the slope of the load's angle over the motor's, the
+inertia that the torque seems to move, and their signs.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+
+DEGREES = 180.0 / math.pi
+LARGE_TRAVEL = 0.5  # rad of the load, beyond which twist no longer disturbs the slope
+LONGEST_STEP = 1.5  # rad of the shaft's oscillation
+SMOOTHING_TIME = 0.05  # s
+NEEDED_FIT = 0.8
+
+
+def check_plausible(record: Record, model: Model) -> None:
+    """Refuse a record of a ``Drivetrain`` whose units, signs or columns cannot be what the format demands.
+
+    Args:
+        record: of the machine.
+        model: of the machine.
+
+    Raises:
+        RecordError: the message names the column and what it seems to hold.
+    """
+    if model.fmu != "Drivetrain":
+        return
+    record = record.filled()
+    parameters = {name: entry.value for name, entry in model.parameters.items()}
+    _check_rate(record, own_frequency(model))
+    if record.theta_l is not None:
+        _check_slope(record, record.theta_l, parameters["i"])
+    _check_inertia(record, parameters)
+
+
+def own_frequency(model: Model) -> float:
+    """Return how fast [rad/s] the shaft of a ``Drivetrain`` oscillates, its motor free to turn.
+
+    Args:
+        model: of the machine.
+
+    Returns:
+        The frequency.
+    """
+    p = {name: entry.value for name, entry in model.parameters.items()}
+    return math.sqrt(p["k"] * (1.0 / p["J_l"] + 1.0 / (p["J_m"] * p["i"] ** 2)))
+
+
+def _check_rate(record: Record, own: float) -> None:
+    """Refuse records that are too slow for the shaft's own oscillation."""
+    if own * record.step > LONGEST_STEP:
+        raise RecordError(
+            f"{record.source}: column `time` must step by at most {LONGEST_STEP / own:.3g} s to show a shaft that "
+            f"oscillates at {own:.3g} rad/s, but steps by {record.step:g} s: log faster, or "
+            "mend `k`, `J_m`, `J_l` (`model`)"
+        )
+
+
+def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> None:
+    """Compare the slope of load over motor angle with 1/i."""
+    motor = record.theta_m - record.theta_m.mean()
+    load = theta_l - theta_l.mean()
+    if min(float(np.ptp(motor)) / ratio, float(np.ptp(load))) < LARGE_TRAVEL:
+        return
+    correlation = float(motor @ load) / math.sqrt(float(motor @ motor) * float(load @ load))
+    if abs(correlation) < 0.95:
+        raise RecordError(
+            f"{record.source}: column `theta_l` must follow `theta_m`, but their correlation is "
+            f"{correlation:.2f}: name the right column by `[columns.theta_l] name = ...` in the model file"
+        )
+    relative = float(np.std(load) / np.std(motor)) * ratio
+    if correlation < 0.0:
+        raise RecordError(
+            f"{record.source}: column `theta_l` must grow with `theta_m`, but falls: one of them has the wrong "
+            "sign; say `[columns.theta_l] factor = -1` (or that of theta_m and u) in the model file"
+        )
+    in_degrees = 'say `[columns.{}] unit = "deg"` (`model`)'
+    suspects = (
+        (DEGREES, "column `theta_l` must be in radians, but seems to be in degrees", in_degrees.format("theta_l")),
+        (
+            1.0 / DEGREES,
+            "column `theta_m` must be in radians, but seems to be in degrees",
+            in_degrees.format("theta_m"),
+        ),
+        (
+            ratio * ratio,
+            "columns `theta_m` and `theta_l` must be those of motor and load, but seem to be exchanged",
+            'say `[columns.theta_m] name = "theta_l"` and the reverse in the model file',
+        ),
+    )
+    for factor, text, cure in suspects:
+        if abs(math.log(relative / factor)) < 0.2:
+            raise RecordError(
+                f"{record.source}: {text} (theta_m/theta_l is {ratio / relative:.4g}, i is {ratio:g}): {cure}"
+            )
+    if abs(math.log(relative)) > 0.3:
+        raise RecordError(
+            f"{record.source}: columns `theta_m` and `theta_l` must have the model's gear ratio {ratio:g}, but have "
+            f"{ratio / relative:.4g}: mend `[columns.theta_m] unit` or `[parameters.i] value` (`model`)"
+        )
+
+
+def _check_inertia(record: Record, p: dict[str, float]) -> None:
+    """Compare the inertia that the torque moves with the model's.
+
+    The momentum balance ``integral of T = J omega + b theta + constant + slope t`` is fitted to smoothed data.
+    """
+    width = max(5, round(SMOOTHING_TIME / record.step))
+    if record.size < 20 * width:
+        return
+    kernel = np.ones(width) / width
+    torque = lagged(record.u, p["tau"], record.step)
+    impulse = np.cumsum(torque) * record.step
+    speed = np.gradient(record.theta_m, record.step)
+    speed, angle, impulse = (np.convolve(v, kernel, "valid") for v in (speed, record.theta_m, impulse))
+    if np.ptp(angle) < 0.2:
+        return
+    time = np.linspace(-1.0, 1.0, speed.size)
+    table = np.column_stack([speed, angle, np.ones_like(time), time])
+    solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
+    left = impulse - table @ solution
+    trend, *_ = np.linalg.lstsq(table[:, 2:], impulse, rcond=None)
+    explained = 1.0 - float(np.var(left)) / max(float(np.var(impulse - table[:, 2:] @ trend)), 1e-300)
+    if explained < NEEDED_FIT:
+        return
+    relative = float(solution[0]) / (p["J_m"] + p["J_l"] / p["i"] ** 2)
+    if relative < -0.2:
+        raise RecordError(
+            f"{record.source}: column `u` must be positive where it drives `theta_m` forward, but the motion goes "
+            "against it: the sign of `u` or of the angles is wrong; say `[columns.u] factor = -1` (`model`)"
+        )
+    if abs(relative) < 3.0 / DEGREES:
+        raise RecordError(
+            f"{record.source}: column `theta_m` must be in radians, but seems to be in degrees (the torque would move "
+            f'only {relative:.2g} of the model\'s inertia): say `[columns.theta_m] unit = "deg"` (`model`)'
+        )
+    if relative > DEGREES / 3.0:
+        raise RecordError(
+            f"{record.source}: column `u` must be in N.m and `theta_m` in radians, but the torque would move "
+            f"{relative:.3g} times the model's inertia: say `[columns.u] unit` and `[columns.theta_m] unit`, or the "
+            "machine's `[parameters.J_m] value` and `[parameters.J_l] value` (`model`)"
+        )
+
+
+def lagged(u: NDArray[np.float64], tau: float, step: float) -> NDArray[np.float64]:
+    """Return the motor's torque [N.m] for a request held from sample to sample.
+
+    Args:
+        u: (n,) requested torque [N.m].
+        tau: time constant of the drive [s].
+        step: sample time [s].
+
+    Returns:
+        Shape (n,); the drive starts at rest.
+    """
+    keep = math.exp(-step / tau)
+    torque = np.empty_like(u)
+    value = 0.0
+    for n, request in enumerate(u.tolist()):
+        torque[n] = value
+        value = keep * value + (1.0 - keep) * request
+    return torque

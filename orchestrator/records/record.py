@@ -1,0 +1,169 @@
+"""Measured records: read from a file of any of the known formats, checked, handed on as arrays.
+
+The format's own columns are ``time,u,theta_m,theta_l`` (s, N.m, rad, rad); ``theta_l`` may be absent. Channels of other
+names and units are recognised, or named in the model file. Time is uniform and there are at least 200 rows. ``u`` is
+held from sample to sample. Rows are counted from 1 at the first row below the names. See ``docs/records.md``.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from orchestrator.errors import RecordError
+from orchestrator.records.arrays import MINIMUM_ROWS, Record, lined
+from orchestrator.records.checks import check_driven, check_finite, check_moving, check_range, quantisation_step
+from orchestrator.records.columns import COLUMNS, Array, Column
+from orchestrator.records.filters import decimated
+from orchestrator.records.formats import open_source
+from orchestrator.records.loading import Reading, load
+from orchestrator.records.timing import RESAMPLING, Grid, grid_of
+
+__all__ = ["COLUMNS", "MINIMUM_ROWS", "RESAMPLING", "Column", "Reading", "Record", "quantisation_step", "read_record"]
+
+
+def read_record(
+    path: Path,
+    columns: Mapping[str, Column] | None = None,
+    further: Sequence[str] = (),
+    reading: Reading | None = None,
+) -> Record:
+    """Read and check a record: CSV of any dialect, Parquet, MDF, MAT or NumPy.
+
+    Args:
+        path: the file.
+        columns: for some of ``COLUMNS``, their names and units in the file (default: recognised).
+        further: names of other columns to keep; those that are absent are left out.
+        reading: part, rate and resampling (default: the whole file as it is).
+
+    Returns:
+        The record, in SI units.
+
+    Raises:
+        RecordError: the file is missing or unreadable, or breaks a rule; the message names the place and the cure.
+    """
+    reading = reading or Reading()
+    loaded = load(open_source(path), path, columns or {}, further, reading)
+    check_driven(loaded.table["u"], loaded.labels["u"], path.name)
+    record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
+    scale = (columns or {}).get("u", Column()).relative_uncertainty
+    record = replace(record, u_scale_uncertainty=scale, notes=(*loaded.notes, *record.notes))
+    if reading.rate is not None:
+        record = decimated(record, reading.rate)
+    return record
+
+
+def record_from_columns(
+    table: Mapping[str, Array], source: str, shown: Mapping[str, str] | None = None, trust_rows: bool = False
+) -> Record:
+    """Check columns that are already numbers (any mapping of name to (n,) array) and return the record.
+
+    Args:
+        table: ``time``, ``u``, ``theta_m``, perhaps ``theta_l``, and further columns; NaN where a sample is missing.
+        source: name used in messages.
+        shown: how columns are called in messages, where that differs.
+        trust_rows: whether rows are uniform whatever their stamps say.
+
+    Returns:
+        The record.
+
+    Raises:
+        RecordError: a rule of the format is broken.
+    """
+    arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in table.items()}
+    label = {name: name for name in arrays} | dict(shown or {})
+    arrays = _stamped(arrays, label["time"], source)
+    size = arrays["time"].size
+    if size < MINIMUM_ROWS:
+        raise RecordError(
+            f"{source}: a record must have at least {MINIMUM_ROWS} rows, but has {size}: log a longer run"
+        )
+    for name, values in arrays.items():
+        check_finite(values, label[name], source)
+    grid = grid_of(arrays["time"], label["time"], source, trust_rows)
+    if np.isnan(arrays["u"]).all() or np.isnan(arrays["theta_m"]).all():
+        raise RecordError(f"{source}: columns `{label['u']}` and `{label['theta_m']}` must hold numbers, but are empty")
+    for name in ("theta_m", "theta_l"):
+        if name in arrays:
+            check_range(arrays[name], label[name], source)
+            check_moving({key: lined(values) for key, values in arrays.items()}, name, label[name], source)
+    return _on_grid(arrays, grid, source, trust_rows)
+
+
+def _stamped(arrays: dict[str, Array], label: str, source: str) -> dict[str, Array]:
+    """Return the rows that have a time."""
+    good = np.isfinite(arrays["time"])
+    lost = int(np.count_nonzero(~good))
+    if lost == 0:
+        return arrays
+    if lost > 0.2 * good.size:
+        raise RecordError(
+            f"{source}: row {int(np.flatnonzero(~good)[0]) + 1}, column `{label}` must be a finite number, but {lost} "
+            "rows are not: name another time, or say `[columns.time] rate = ...`"
+        )
+    return {name: values[good] for name, values in arrays.items()}
+
+
+def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: bool) -> Record:
+    """Return the record on its uniform grid; rows that the file lacks are missing samples."""
+    timing, notes = grid.timing, []
+    table: dict[str, Array] = {}
+    if timing.missing == 0 and not trust_rows:
+        table.update(arrays)
+    else:
+        for name, values in arrays.items():
+            spread = np.full(grid.size, np.nan)
+            spread[grid.place] = values
+            table[name] = spread
+        table["time"] = np.asarray(grid.start + timing.step * np.arange(grid.size), dtype=np.float64)
+    u, deviation = _interpolated(table["u"])
+    rest = {name: lined(values) for name, values in table.items() if name not in COLUMNS}
+    record = Record(table["time"], u, table["theta_m"], table.get("theta_l"), source, rest, deviation, 0.0, timing)
+    if record.missing:
+        share = 100.0 * record.missing / record.size
+        notes.append(f"{record.missing} rows ({share:.2g} %) have missing samples; estimates leave them out")
+    if timing.jitter > 1e-3 * timing.step or timing.missing:
+        notes.append(timing.describe())
+    return replace(record, notes=tuple(notes))
+
+
+def _interpolated(u: Array) -> tuple[Array, Array | None]:
+    """Return the torque with lines over missing samples, and how far they may be off [N.m].
+
+    What a line over a gap of some length misses is measured on the record itself, at the middle of spans that long.
+    Errors within one gap go together, so each sample's deviation is raised by the root of the gap's length.
+    """
+    lost = np.isnan(u)
+    if not lost.any():
+        return u, None
+    filled = lined(u)
+    deviation = np.zeros(u.size)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], lost.astype(np.int8), [0]])))
+    known: dict[int, float] = {}
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        length = int(stop - start)
+        if length not in known:
+            span = min(length + 1, u.size - 2)
+            middle = span // 2
+            guess = filled[:-span] + (filled[span:] - filled[:-span]) * middle / span
+            known[length] = float(np.sqrt(np.mean((filled[middle : middle + guess.size] - guess) ** 2)))
+        deviation[start:stop] = known[length] * np.sqrt(length)
+    return filled, deviation
+
+
+def write_record(path: Path, record: Record) -> None:
+    """Write ``record`` as CSV with the columns of ``COLUMNS`` that it has; missing samples as empty cells.
+
+    Args:
+        path: the file.
+        record: in SI units.
+    """
+    names = [name for name in COLUMNS if getattr(record, name) is not None]
+    columns = [getattr(record, name).tolist() for name in names]
+    lines = [",".join(names)]
+    lines += [
+        ",".join("" if value != value else f"{value:.9g}" for value in row)  # noqa: PLR0124
+        for row in zip(*columns, strict=True)
+    ]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,0 +1,95 @@
+"""Dates and times of day as text: ISO 8601, German and clock stamps, to times."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+
+_ISO = re.compile(r"(\d{4})-(\d\d?)-(\d\d?)[T _]+(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?(Z|[+-]\d\d:?\d\d)?")
+_GERMAN = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})[T _]+(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?")
+_CLOCK = re.compile(r"(\d\d?):(\d\d):(\d\d)(?:[.,](\d{1,12}))?")
+DAY = 86_400 * 10**9  # ns
+
+
+def is_stamp(cell: str) -> bool:
+    """Return whether a cell is a date with a time, or a time of day.
+
+    Args:
+        cell: its text.
+
+    Returns:
+        True when it is.
+    """
+    plain = cell.strip().strip('"')
+    return any(pattern.fullmatch(plain) for pattern in (_ISO, _GERMAN, _CLOCK))
+
+
+def parse_stamps(cells: Sequence[str], label: str, path: Path) -> NDArray[Any]:
+    """Return the stamps as datetime64[ns]; a clock that passes midnight goes on.
+
+    Args:
+        cells: of one column.
+        label: name of the column, for messages.
+        path: of the file, for messages.
+
+    Returns:
+        Shape (n,).
+
+    Raises:
+        RecordError: a cell is no stamp; the message names its row.
+    """
+    out = np.empty(len(cells), dtype=np.int64)
+    pattern = next((p for p in (_ISO, _GERMAN, _CLOCK) if cells and p.fullmatch(cells[0])), _ISO)
+    days: dict[tuple[str, str, str], int] = {}
+    previous, shift = -(2**62), 0
+    for n, cell in enumerate(cells):
+        found = pattern.fullmatch(cell)
+        if found is None:
+            raise RecordError(
+                f"{path}: row {n + 1}, column `{label}` must be a time like the first row's, but is `{cell[:40]}`"
+            )
+        value = _nanoseconds(found, pattern, days, label, path, n)
+        if pattern is _CLOCK:
+            value += shift
+            if value < previous - DAY // 2:
+                shift += DAY
+                value += DAY
+        out[n] = previous = value
+    return out.view("datetime64[ns]")
+
+
+def _nanoseconds(
+    found: re.Match[str],
+    pattern: re.Pattern[str],
+    days: dict[tuple[str, str, str], int],
+    label: str,
+    path: Path,
+    row: int,
+) -> int:
+    parts = found.groups()
+    date, clock, zone = 0, parts, None
+    if pattern is not _CLOCK:
+        key = (parts[0], parts[1], parts[2]) if pattern is _ISO else (parts[2], parts[1], parts[0])
+        if key not in days:
+            try:
+                day = np.datetime64(f"{key[0]}-{int(key[1]):02d}-{int(key[2]):02d}", "ns")
+            except ValueError:
+                raise RecordError(
+                    f"{path}: row {row + 1}, column `{label}` must be a date, but is `{found[0][:40]}`"
+                ) from None
+            days[key] = int(day.astype(np.int64))
+        date, clock = days[key], parts[3:7]
+        zone = parts[7] if pattern is _ISO else None
+    hours, minutes, seconds, fraction = clock
+    whole = (int(hours) * 60 + int(minutes)) * 60 + int(seconds or 0)
+    value = date + whole * 10**9 + int((fraction or "0").ljust(9, "0")[:9])
+    if zone and zone != "Z":
+        digits = zone[1:].replace(":", "")
+        away = (int(digits[:2]) * 60 + int(digits[2:])) * 60 * 10**9
+        value -= away if zone[0] == "+" else -away
+    return value

@@ -1,0 +1,253 @@
+"""The time of a record: its step, jitter and gaps, and the uniform grid that the methods work on."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+
+Array = NDArray[np.float64]
+
+LEAST_STEP = 1e-6  # s
+LARGEST_STEP = 0.5  # s
+NO_JITTER = 1e-6  # of a step: what is left of the arithmetic
+LARGEST_JITTER = 0.1  # of a step: stamps this close to the grid are on it
+LARGEST_MISSING = 0.2  # of the rows: with more, what is assumed in between decides
+RESAMPLING = ("uniform", "linear", "cubic")
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What the time stamps of a file say.
+
+    Attributes:
+        step: mean sample time [s].
+        jitter: root mean square distance of the stamps from a uniform grid [s].
+        largest_jitter: the largest such distance [s].
+        missing: rows that the grid has and the file has not.
+        gaps: places of the gaps on the grid: (first missing row, rows) each.
+        rounded: step that the stamps themselves are rounded to [s], 0.0: none found.
+    """
+
+    step: float
+    jitter: float
+    largest_jitter: float
+    missing: int
+    gaps: tuple[tuple[int, int], ...] = ()
+    rounded: float = 0.0
+
+    def describe(self) -> str:
+        """Return the timing in words.
+
+        Returns:
+            One line, without a full stop.
+        """
+        words = f"{1.0 / self.step:.6g} Hz, no jitter"
+        if self.largest_jitter > NO_JITTER * self.step:
+            jitter, largest = 1e6 * self.jitter, 1e6 * self.largest_jitter
+            words = f"{1.0 / self.step:.6g} Hz, jitter {jitter:.3g} us (largest {largest:.3g})"
+        if not self.missing:
+            return f"{words}, no gaps"
+        longest = max(rows for _, rows in self.gaps)
+        return f"{words}, {self.missing} rows missing in {len(self.gaps)} gaps (longest {longest * self.step:.3g} s)"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A uniform grid for rows: ``place`` (n,) is where each row of the file belongs on its ``size`` rows."""
+
+    start: float
+    timing: Timing
+    place: NDArray[np.int64]
+    size: int
+
+
+def grid_of(time: Array, label: str, source: str, trust_rows: bool = False) -> Grid:
+    """Return the uniform grid of time stamps (n,) [s].
+
+    Args:
+        time: stamps in the order of the file.
+        label: name of the column, for messages.
+        source: file name, for messages.
+        trust_rows: whether the rows are uniform whatever their stamps say (``resample uniform``).
+
+    Returns:
+        The grid and the row of each stamp on it.
+
+    Raises:
+        RecordError: the stamps go back, step by what no record can, or are on no uniform grid.
+    """
+    where = f"{source}: column `{label}`"
+    _check_increasing(time, label, source)
+    step = float(np.median(np.diff(time)))
+    if trust_rows:
+        step = float((time[-1] - time[0]) / (time.size - 1))
+        place = np.arange(time.size)
+    else:
+        step, place = _places(time, step)
+    _check_step(step, where)
+    off = time - (time[0] + step * place)
+    off = off - 0.5 * (off.max() + off.min())
+    largest, rounded = float(np.abs(off).max()), _rounding(time)
+    if not trust_rows:
+        _check_grid(off, np.diff(place), step, rounded, time, label, source)
+    jumps = np.flatnonzero(np.diff(place) > 1)
+    gaps = tuple((int(place[n]) + 1, int(place[n + 1] - place[n]) - 1) for n in jumps)
+    size = int(place[-1]) + 1
+    missing = size - time.size
+    if missing > LARGEST_MISSING * size:
+        first = int(jumps[0]) if jumps.size else 0
+        longest = max(gaps, key=lambda gap: gap[1])
+        raise RecordError(
+            f"{source}: row {first + 2}, column `{label}` must have at most {100 * LARGEST_MISSING:g} % of its rows "
+            f"missing, but {100 * missing / size:.3g} % are (longest gap {longest[1] * step:.3g} s from "
+            f"{time[0] + (longest[0] - 1) * step:.6g} s on): keep a part without it by `part` START:END"
+        )
+    return Grid(
+        float(time[0]), Timing(step, float(np.sqrt(np.mean(off**2))), largest, missing, gaps, rounded), place, size
+    )
+
+
+def _check_increasing(time: Array, label: str, source: str) -> None:
+    difference = np.diff(time)
+    back = np.flatnonzero(~(difference > 0.0))
+    if back.size:
+        row = int(back[0]) + 2
+        word = "repeats the row before" if difference[back[0]] == 0.0 else "goes back"
+        if back.size > 0.2 * time.size and difference[back[0]] == 0.0:
+            cure = (
+                "the stamps are too coarse: log them finer, or say `[columns.time] rate = ...` [Hz] in the model file"
+            )
+        else:
+            cure = "sort the rows by time, delete repeats, or keep one run by `part` START:END"
+        raise RecordError(
+            f"{source}: row {row}, column `{label}` must increase, but {word} ({time[row - 2]:g} then "
+            f"{time[row - 1]:g} s): {cure}"
+        )
+
+
+def _check_step(step: float, where: str) -> None:
+    if step < LEAST_STEP:
+        raise RecordError(
+            f"{where} must step by at least {LEAST_STEP:g} s, but steps by {step:g} s: say its `[columns.time] unit`"
+        )
+    if step >= LARGEST_STEP:
+        hint = " This looks like milliseconds." if step < 100.0 else ""
+        raise RecordError(
+            f"{where} must be in seconds with steps below {LARGEST_STEP:g} s, but steps by {step:g} s: say "
+            f'`[columns.time] unit = "ms"` (or us, min) in the model file (`model`).{hint}'
+        )
+
+
+def _places(time: Array, step: float) -> tuple[float, NDArray[np.int64]]:
+    """Return the step of the grid that fits the stamps best, and the row of each stamp on it."""
+    steps = np.maximum(np.rint(np.diff(time) / step), 1.0)
+    regular = steps == 1.0
+    if np.count_nonzero(regular) > 0.5 * steps.size:
+        step = float(np.mean(np.diff(time)[regular]))
+        steps = np.maximum(np.rint(np.diff(time) / step), 1.0)
+    total = float(np.sum(steps))
+    place = np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
+    if total > 1e9:
+        return step, place
+    # Stamps that jitter move the counts by one here and there; the line through them all does not.
+    for _ in range(3):
+        slope, start = np.polyfit(place - place.mean(), time - time[0], 1)
+        if slope <= 0.0:
+            break
+        first = start - slope * place.mean()
+        new = np.rint((time - time[0] - first) / slope).astype(np.int64)
+        new -= new[0]
+        if np.any(np.diff(new) <= 0):
+            break
+        step = float(slope)
+        if np.array_equal(new, place):
+            break
+        place = new
+    return step, place
+
+
+def _rounding(time: Array) -> float:
+    """Return the decimal power that all stamps are whole multiples of [s], or 0.0."""
+    away = time - time[0]
+    for digits in (1, 2, 3, 4, 5, 6):
+        unit = 10.0**-digits
+        if np.all(np.abs(away / unit - np.rint(away / unit)) < 1e-3):
+            return unit
+    return 0.0
+
+
+def _check_grid(
+    off: Array, steps: NDArray[np.int64], step: float, rounded: float, time: Array, label: str, source: str
+) -> None:
+    """Refuse stamps that are too far from the grid."""
+    allowed = LARGEST_JITTER * step + 1e-9 * float(np.abs(time).max()) + 0.5 * rounded * (rounded < 1.01 * step)
+    bad = np.flatnonzero(np.abs(off) > allowed)
+    if not bad.size and np.all(steps > 0):
+        return
+    row = int(bad[0]) if bad.size else int(np.flatnonzero(steps <= 0)[0])
+    raise RecordError(
+        f"{source}: row {row + 1}, column `{label}` must be uniform with a step of {step:.6g} s, but is off by "
+        f"{1e3 * abs(off[row]):.3g} ms, jitter {1e3 * float(np.std(off)):.3g} ms: say how to resample: `resample` "
+        "uniform (only the stamps jitter), linear or cubic (the samples do)"
+    )
+
+
+def resampled_grid(time: Array) -> tuple[Array, float]:
+    """Return the uniform grid (n,) [s] of the same mean rate that non-uniform stamps are resampled to, and its step.
+
+    Args:
+        time: (n,) stamps [s].
+
+    Returns:
+        The grid and its step [s].
+    """
+    step = float(np.median(np.diff(time)))
+    rows = max(math.floor((time[-1] - time[0]) / step + 1e-6) + 1, 2)
+    return time[0] + step * np.arange(rows), step
+
+
+def interpolated(grid: Array, time: Array, values: Array, how: str) -> Array:
+    """Return ``values`` at ``time`` brought to ``grid``, by lines or by a spline through the points.
+
+    Args:
+        grid: (m,) [s].
+        time: (n,) stamps [s].
+        values: (n,); NaN: missing.
+        how: "linear" or "cubic".
+
+    Returns:
+        Shape (m,).
+    """
+    good = np.isfinite(values)
+    if how == "cubic":
+        from scipy.interpolate import CubicSpline
+
+        return np.asarray(CubicSpline(time[good], values[good])(grid))
+    return np.interp(grid, time[good], values[good])
+
+
+def interpolation_cost(grid: Array, time: Array, values: Array, how: str) -> float:
+    """Return the root mean square error that resampling makes, measured on every second row of the file itself.
+
+    Every other row is left out and interpolated from its neighbours; at half the distance the error is a quarter
+    (linear) or a sixteenth (cubic) of that.
+
+    Args:
+        grid: (m,) [s].
+        time: (n,) stamps [s].
+        values: (n,); NaN: missing.
+        how: "linear" or "cubic".
+
+    Returns:
+        The error, in the unit of ``values``; 0.0 for fewer than eight samples.
+    """
+    good = np.isfinite(values)
+    t, v = time[good], values[good]
+    if t.size < 8:
+        return 0.0
+    guess = interpolated(t[1:-1:2], t[::2], v[::2], how)[: t[1:-1:2].size]
+    error = float(np.sqrt(np.mean((guess - v[1:-1:2]) ** 2)))
+    return error / (4.0 if how == "linear" else 16.0)

@@ -1,0 +1,1 @@
+"""Scenarios of FMUs: read from TOML, run, swept."""

@@ -1,0 +1,39 @@
+"""A run inside a child process: what the parent asks for, as plain arrays. Light, for every child imports it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from orchestrator.master.algorithms import Algorithm
+from orchestrator.master.session import Session
+from orchestrator.master.system import System
+
+
+@dataclass(frozen=True)
+class UnpackedRun:
+    """A system whose FMUs are unpacked folders, and how to run it; see ``Session``."""
+
+    system: System
+    record: tuple[str, ...]
+    algorithm: Algorithm
+    stop: float
+    start: float
+
+
+def opened(job: UnpackedRun) -> Callable[[Any], list[Any]]:
+    """Return a handler that runs the job once for each mapping of start values.
+
+    Args:
+        job: what the parent sent.
+
+    Returns:
+        Called with start values by ``instance.variable``, it gives the recorded values and the statistics.
+    """
+    session = Session(job.system, job.record, job.algorithm, job.stop, job.start)
+
+    def run(start: Any) -> list[Any]:
+        result = session.run(start)
+        s = result.statistics
+        return [result.values, s.steps, s.rejected, dict(s.do_steps), s.sweeps, s.loop]
+
+    return run

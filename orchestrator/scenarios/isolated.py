@@ -1,0 +1,209 @@
+"""Runs of FMUs that are not ours: in a child process behind walls, with limits of time and memory.
+
+Which FMU a process died of cannot be told when several are in it, so messages name all that are not ours.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.errors import ChildError, FmuError, OrchestratorError, SimulationError
+from orchestrator.fmi.extraction import content_hash
+from orchestrator.fmi.instances import FmuFactory
+from orchestrator.fmi.ours import is_ours
+from orchestrator.master.algorithms import step_count
+from orchestrator.master.compiled import prepare
+from orchestrator.master.result import LOOPS, Recording, Statistics
+from orchestrator.master.system import System
+from orchestrator.scenarios.definition import Scenario
+from orchestrator.scenarios.inside import UnpackedRun
+from orchestrator.shared.isolation.archives import unpack
+from orchestrator.shared.isolation.jail import Jail
+from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
+from orchestrator.shared.isolation.scratch import Scratch
+from orchestrator.shared.isolation.walls import support
+
+DEFAULT_TIME_LIMIT = 300.0
+DEFAULT_MEMORY_LIMIT = 2048 * MEBIBYTE
+_LARGEST_FILE = 64 * MEBIBYTE
+_MOST_FILES = 256 * MEBIBYTE
+_SLACK = 1 << 20
+
+
+@dataclass(frozen=True)
+class Safety:
+    """How far FMUs are trusted.
+
+    Attributes:
+        trust: all of them are treated as ours: they run in this process, with the rights of the user.
+        time: seconds that a run may take; ``None``: the default for FMUs that are not ours, no limit for others.
+        memory: resident bytes of a child process.
+        allow_nonfinite: a result may hold NaN and infinities.
+    """
+
+    trust: bool = False
+    time: float | None = None
+    memory: int = DEFAULT_MEMORY_LIMIT
+    allow_nonfinite: bool = False
+
+
+def foreign_fmus(system: System) -> list[Path]:
+    """Return the FMUs of a system that are not ours, each once.
+
+    Args:
+        system: whose FMUs are in question.
+
+    Returns:
+        Their paths.
+    """
+    paths = [i.create.path for i in system.instances if isinstance(i.create, FmuFactory)]
+    return [path for path in dict.fromkeys(paths) if not is_ours(path)]
+
+
+def described(system: System, safety: Safety) -> dict[str, Any]:
+    """Return what a result file says of the walls around a run of ``system``.
+
+    Args:
+        system: whose FMUs are in question.
+        safety: how far its FMUs are trusted, and the limits.
+
+    Returns:
+        Plain data.
+    """
+    foreign = foreign_fmus(system)
+    walls = support()
+    return {
+        "foreign_fmus": [str(path) for path in foreign],
+        "own_process": bool(foreign) and not safety.trust,
+        "landlock": walls.landlock if foreign and not safety.trust else None,
+        "seccomp": walls.seccomp if foreign and not safety.trust else None,
+        "not_enforced": walls.missing if foreign and not safety.trust else "",
+    }
+
+
+def run_safely(scenario: Scenario, safety: Safety) -> Recording:
+    """Run a scenario once, in a child process when an FMU is not ours or the time is limited.
+
+    Args:
+        scenario: what to run.
+        safety: how far its FMUs are trusted, and the limits.
+
+    Returns:
+        The recorded signals.
+
+    Raises:
+        SimulationError: the run went wrong, or the child ended or broke a limit.
+        InputError: the scenario or an FMU is wrong.
+    """
+    foreign = [] if safety.trust else foreign_fmus(scenario.system)
+    movable = all(isinstance(i.create, FmuFactory) for i in scenario.system.instances)
+    if movable and (foreign or safety.time is not None):
+        result = _in_child(scenario, safety, foreign)
+    else:
+        with scenario.session() as session:
+            result = session.run()
+    if not safety.allow_nonfinite:
+        _require_finite(result)
+    return result
+
+
+def _require_finite(result: Recording) -> None:
+    """Refuse a result with NaN or infinities.
+
+    Raises:
+        SimulationError: names the first one in time.
+    """
+    bad = ~np.isfinite(result.values)
+    if not bad.any():
+        return
+    at = int(np.argmax(bad.any(axis=0)))
+    k = int(np.argmax(bad[:, at]))
+    text = f"`{result.names[k]}` must be finite, but is {result.values[k, at]} at t = {result.time[at]:.9g} s"
+    raise SimulationError(f"{text} (`allow_nonfinite` keeps such results)", "allow_nonfinite")
+
+
+@contextmanager
+def unpacked(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]:
+    """Yield ``system`` with its FMUs unpacked for a child: the system, the folder, and the FMU of each subfolder.
+
+    Args:
+        system: whose FMUs are in question.
+
+    Yields:
+        The three; they are gone when the block ends.
+
+    Raises:
+        FmuError: one cannot be unpacked.
+        OutputError: there is no room for them.
+    """
+    with Scratch("fmus") as scratch:
+        origins: dict[str, str] = {}
+        instances = []
+        for instance in system.instances:
+            factory = instance.create
+            assert isinstance(factory, FmuFactory)
+            folder = scratch.path / content_hash(factory.path)[:24]
+            if str(folder) not in origins:
+                try:
+                    unpack(factory.path, folder)
+                except FmuError as error:
+                    raise FmuError(f"$.instances.{instance.name}: {error}") from None
+                origins[str(folder)] = str(factory.path)
+            instances.append(replace(instance, create=replace(factory, path=folder)))
+        yield replace(system, instances=tuple(instances)), scratch, origins
+
+
+def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Recording:
+    time = DEFAULT_TIME_LIMIT if safety.time is None else safety.time
+    limits = Limits(time, safety.memory, _LARGEST_FILE, 2.0 * time + 600.0, _MOST_FILES)
+    steps = step_count(scenario.start, scenario.stop, scenario.algorithm.step)
+    shape = (len(scenario.record), steps + 1)
+    limits = replace(limits, memory=limits.memory + 24 * shape[0] * shape[1])
+    with unpacked(scenario.system) as (system, scratch, origins):
+        job = UnpackedRun(system, scenario.record, scenario.algorithm, scenario.stop, scenario.start)
+        names = ", ".join(map(str, foreign)) or "the scenario"
+        prepare()
+        try:
+            with Jail(
+                "orchestrator.scenarios.inside:opened", job, read=[scratch.path], limits=limits, walls=bool(foreign)
+            ) as jail:
+                jail.start(time)
+                answer = jail.call({}, most=8 * shape[0] * shape[1] + _SLACK)
+        except ChildError as error:
+            raise SimulationError(f"{names}: {_worded(error, time)}", "time_limit") from None
+        except OrchestratorError as error:
+            text = str(error)
+            for folder, origin in origins.items():
+                text = text.replace(folder, origin)
+            raise type(error)(text, *error.arguments) from None
+    return _result(answer, scenario, shape, names)
+
+
+def _worded(error: ChildError, time: float) -> str:
+    if error.reason == "time":
+        return f"the run must take at most {time:g} s (`time_limit`), but takes longer"
+    said = f" (it printed: {error.said})" if error.said else ""
+    return f"the run must come to its end, but {error}{said}"
+
+
+def _result(answer: Any, scenario: Scenario, shape: tuple[int, int], names: str) -> Recording:
+    """Return the result, after a look at what the child claims it to be."""
+    match answer:
+        case [
+            np.ndarray() as values,
+            int() as steps,
+            int() as rejected,
+            dict() as calls,
+            int() as sweeps,
+            str() as loop,
+        ] if values.shape == shape and values.dtype == np.float64 and loop in LOOPS:
+            counts = {i.name: c for i in scenario.system.instances if isinstance(c := calls.get(i.name), int)}
+        case _:
+            raise SimulationError(f"{names}: the run must return {shape[0]} signals of {shape[1]} values, but does not")
+    times = scenario.start + scenario.algorithm.step * np.arange(shape[1], dtype=np.float64)
+    units = {name: getattr(scenario.system.unit(name), "name", None) for name in scenario.record}
+    return Recording(times, values, scenario.record, units, Statistics(steps, rejected, counts, sweeps, loop))

@@ -1,0 +1,352 @@
+"""Scenarios: which FMUs run, how they are connected, what is fed in, which master runs them and what is recorded.
+
+A scenario is written as TOML (``load_scenario``) or made in code (``Scenario``). All that is wrong with a file is
+reported at once, each problem with its path in the file.
+"""
+
+import math
+import os
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from orchestrator.building.build import ensure_built
+from orchestrator.building.sources import catalogue
+from orchestrator.errors import FmuError, ScenarioError
+from orchestrator.fmi.instances import fmu_instance
+from orchestrator.master import signals
+from orchestrator.master.algorithms import ALGORITHMS, Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
+from orchestrator.master.problems import Problem, raise_problems
+from orchestrator.master.protocol import Value
+from orchestrator.master.result import Recording
+from orchestrator.master.system import Connection, Instance, Quantity, SignalSource, System
+from orchestrator.master.values import one_line
+from orchestrator.scenarios.definition import Scenario
+from orchestrator.scenarios.isolated import Safety, run_safely
+
+MAXIMUM_BYTES = 16 * 2**20
+
+
+def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
+    """Run a scenario once; FMUs that are not ours run in a child process.
+
+    Args:
+        scenario: what to run.
+        safety: how far its FMUs are trusted (default: not at all).
+
+    Returns:
+        The recorded signals.
+
+    Raises:
+        InputError: the scenario or an FMU is wrong.
+        SimulationError: the run went wrong, or its result is not finite.
+    """
+    try:
+        return run_safely(scenario, safety or Safety())
+    except FmuError as error:  # of what only comes out when an FMU is unpacked or loaded
+        raise FmuError(f"{scenario.origin}: {error}" if scenario.origin else str(error)) from None
+
+
+def run_scenario(scenario: Scenario | Path | str, safety: Safety | None = None) -> Recording:
+    """Run a scenario, or the file that describes one; raises as ``load_scenario`` and ``simulate`` do.
+
+    Args:
+        scenario: what to run, or its file.
+        safety: how far its FMUs are trusted (default: not at all).
+
+    Returns:
+        The recorded signals.
+    """
+    return simulate(scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario)), safety)
+
+
+# What a file may hold ---------------------------------------------------------------------------------------------
+
+
+class _Strict(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
+    """Base: unknown keys are refused."""
+
+
+class _Quantity(_Strict, frozen=True, kw_only=True):
+    value: float
+    unit: str
+
+
+class _Instance(_Strict, frozen=True, kw_only=True):
+    fmu: str
+    parameters: dict[str, Any] = {}
+
+
+class _Connection(_Strict, frozen=True, kw_only=True):
+    source: str = msgspec.field(name="from")
+    target: str = msgspec.field(name="to")
+    unit: str | None = None
+    factor: float = 1.0
+    offset: float = 0.0
+    quantum: float = 0.0
+
+
+class _Source(_Strict, tag_field="kind", frozen=True, kw_only=True):
+    target: str = msgspec.field(name="to")
+    unit: str | None = None
+    at: str | None = None
+
+
+class _Constant(_Source, tag="constant", frozen=True, kw_only=True):
+    value: float
+
+
+class _Step(_Source, tag="step", frozen=True, kw_only=True):
+    after: float
+    time: float = 0.0
+    before: float = 0.0
+
+
+class _Sine(_Source, tag="sine", frozen=True, kw_only=True):
+    amplitude: float
+    frequency: float
+    phase: float = 0.0
+    offset: float = 0.0
+
+
+class _Square(_Source, tag="square", frozen=True, kw_only=True):
+    amplitude: float
+    period: float
+    offset: float = 0.0
+    delay: float = 0.0
+
+
+class _Noise(_Source, tag="noise", frozen=True, kw_only=True):
+    deviation: float
+    seed: int
+    period: float | None = None
+
+
+class _Table(_Source, tag="table", frozen=True, kw_only=True):
+    file: str
+    column: str
+    time: str = "time"
+    hold: bool = False
+
+
+_AnySource = _Constant | _Step | _Sine | _Square | _Noise | _Table
+
+
+class _Master(_Strict, frozen=True, kw_only=True):
+    step: float
+    algorithm: str = "gauss_seidel"
+    order: list[str] = []
+    compiled: bool | None = None
+    tolerance: float | None = None
+    iterations: int | None = None
+    first: float | None = None
+    smallest: float | None = None
+    largest: float | None = None
+
+
+class _Top(_Strict, frozen=True, kw_only=True):
+    stop: float
+    master: Any
+    instances: dict[str, Any]
+    record: list[str]
+    start: float = 0.0
+    name: str = "scenario"
+    connections: list[Any] = []
+    sources: list[Any] = []
+
+
+_SETTINGS: dict[type[Algorithm], tuple[str, ...]] = {
+    GaussSeidel: ("compiled",),
+    Jacobi: ("compiled",),
+    Iterated: ("tolerance", "iterations"),
+    Adaptive: ("tolerance", "first", "smallest", "largest"),
+}
+
+
+def load_scenario(path: Path) -> Scenario:
+    """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be.
+
+    Args:
+        path: a TOML file.
+
+    Returns:
+        The scenario, without problems.
+
+    Raises:
+        ScenarioError: the file cannot be read or is wrong; the text names the file and every problem with its path.
+        ConnectionMismatchError: there is nothing wrong but connections.
+        FmuError: an FMU is missing or not usable.
+    """
+    content = _content(path)
+    problems: list[Problem] = []
+    top = _converted(content, _Top, "$", problems)
+    if top is None:
+        raise_problems(problems, str(path))
+        raise AssertionError("a failed conversion leaves a problem")
+    reader = _Reader(path, problems)
+    algorithm, order = reader.master(top)
+    instances = reader.instances(top.instances)
+    connections = reader.connections(top.connections)
+    sources = reader.sources(top.sources, algorithm.step if algorithm else math.nan, top.start)
+    if algorithm is not None:
+        try:
+            step_count(top.start, top.stop, algorithm.step)
+        except ScenarioError as error:
+            problems.append(Problem("$.stop", str(error)))
+    raise_problems(problems, str(path))
+    assert algorithm is not None
+    system = System(instances, connections, sources, order)
+    raise_problems(system.problems() + system.record_problems(tuple(top.record)), str(path))
+    return Scenario(system, tuple(top.record), algorithm, top.stop, top.start, top.name, str(path))
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        if path.stat().st_size > MAXIMUM_BYTES:
+            raise ScenarioError(f"{path}: must be at most {MAXIMUM_BYTES >> 20} MB, but is larger")
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"`scenario` must be a readable file, but {path} is not: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise ScenarioError(f"{path}: must be UTF-8 text, but is not") from None
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        text = "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
+        raise ScenarioError(f"{path}: must be TOML, but is not: {text}") from None
+
+
+def _converted(value: Any, kind: Any, path: str, problems: list[Problem]) -> Any:
+    try:
+        return msgspec.convert(value, kind)
+    except (msgspec.ValidationError, RecursionError) as error:
+        text, _, place = str(error).partition(" - at `$")
+        problems.append(Problem(path + place.rstrip("`"), text[:1].lower() + text[1:]))
+        return None
+
+
+class _Reader:
+    """Turns the checked pieces of a file into the parts of a scenario, collecting what is wrong with them."""
+
+    def __init__(self, path: Path, problems: list[Problem]) -> None:
+        self.path, self.problems = path, problems
+
+    def master(self, top: _Top) -> tuple[Algorithm | None, tuple[str, ...]]:
+        master: _Master | None = _converted(top.master, _Master, "$.master", self.problems)
+        if master is None:
+            return None, ()
+        kind = ALGORITHMS.get(master.algorithm)
+        if kind is None:
+            text = f"must be one of {', '.join(ALGORITHMS)}, but is {master.algorithm!r}"
+            self.problems.append(Problem("$.master.algorithm", text))
+            return None, ()
+        settings: dict[str, Any] = {}
+        for name in ("compiled", "tolerance", "iterations", "first", "smallest", "largest"):
+            value = getattr(master, name)
+            if value is None:
+                continue
+            if name not in _SETTINGS[kind]:
+                text = f"must be left out, but is given, and {master.algorithm!r} does not use it"
+                self.problems.append(Problem(f"$.master.{name}", text))
+            elif not isinstance(value, bool) and not (math.isfinite(value) and value > 0):
+                self.problems.append(Problem(f"$.master.{name}", f"must be finite and positive, but is {value!r}"))
+            else:
+                settings[name] = value
+        return kind(master.step, **settings), tuple(master.order)
+
+    def instances(self, tables: dict[str, Any]) -> tuple[Instance, ...]:
+        found = []
+        for name, table in tables.items():
+            path = f"$.instances.{name}"
+            instance: _Instance | None = _converted(table, _Instance, path, self.problems)
+            if instance is None:
+                continue
+            start = {}
+            for key, value in instance.parameters.items():
+                parameter = self._parameter(value, f"{path}.parameters.{key}")
+                if parameter is not None:
+                    start[key] = parameter
+            try:
+                found.append(fmu_instance(name, self._fmu(instance.fmu), start))
+            except FmuError as error:
+                raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
+        return tuple(found)
+
+    def _parameter(self, value: Any, path: str) -> Value | Quantity | None:
+        if isinstance(value, dict):
+            quantity: _Quantity | None = _converted(value, _Quantity, path, self.problems)
+            return None if quantity is None else Quantity(quantity.value, quantity.unit)
+        if isinstance(value, (bool, int, float, str)):
+            return value
+        text = f"must be a number, a string, true, false or a table with value and unit, but is {value!r}"
+        self.problems.append(Problem(path, text))
+        return None
+
+    def _fmu(self, text: str) -> Path:
+        if text in catalogue():
+            return ensure_built([text])[text]
+        if "\0" in text:
+            raise FmuError(f"`fmu` must be a path or one of {', '.join(catalogue())}, but is {text!r}")
+        path = self.path.parent / text
+        if not os.path.isfile(path):  # unlike Path.is_file it takes names of any length
+            raise FmuError(f"must be a file or one of {', '.join(catalogue())}, but {text!r} is neither")
+        return path
+
+    def connections(self, tables: list[Any]) -> tuple[Connection, ...]:
+        found = []
+        for k, table in enumerate(tables):
+            c: _Connection | None = _converted(table, _Connection, f"$.connections[{k}]", self.problems)
+            if c is not None:
+                found.append(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit))
+        return tuple(found)
+
+    def sources(self, tables: list[Any], step: float, start: float) -> tuple[SignalSource, ...]:
+        found = []
+        for k, table in enumerate(tables):
+            path = f"$.sources[{k}]"
+            source = _converted(table, _AnySource, path, self.problems)
+            if source is None:
+                continue
+            before = len(self.problems)
+            for name in ("value", "after", "time", "before", "amplitude", "frequency", "phase", "offset", "delay"):
+                self._bounded(source, name, path, math.isfinite, "finite")
+            self._bounded(source, "deviation", path, lambda x: 0.0 <= x < math.inf, "finite and not negative")
+            self._bounded(source, "seed", path, lambda x: x >= 0, "not negative")
+            self._bounded(source, "period", path, lambda x: 0.0 < x < math.inf, "finite and positive")
+            if len(self.problems) == before:
+                signal = self._signal(source, step, start, path)
+                if signal is not None:
+                    found.append(SignalSource(source.target, signal, source.unit, source.at))
+        return tuple(found)
+
+    def _bounded(self, source: Any, name: str, path: str, holds: Callable[[float], bool], expected: str) -> None:
+        value = getattr(source, name, None)
+        if isinstance(value, (int, float)) and not holds(value):
+            self.problems.append(Problem(f"{path}.{name}", f"must be {expected}, but is {value!r}"))
+
+    def _signal(self, source: _AnySource, step: float, start: float, path: str) -> signals.Signal | None:
+        match source:
+            case _Constant():
+                return signals.Constant(source.value)
+            case _Step():
+                return signals.Step(source.time, source.after, source.before)
+            case _Sine():
+                return signals.Sine(source.amplitude, source.frequency, source.phase, source.offset)
+            case _Square():
+                return signals.Square(source.amplitude, source.period, source.offset, source.delay)
+            case _Noise():
+                period = step if source.period is None else source.period
+                return signals.Noise(source.deviation, source.seed, period, start)
+            case _Table():
+                return self._table(source, path)
+
+    def _table(self, source: _Table, path: str) -> signals.Signal | None:
+        if "\0" in source.file:
+            self.problems.append(Problem(f"{path}.file", f"must be a path, but is {source.file!r}"))
+            return None
+        try:
+            return signals.read_table(self.path.parent / source.file, source.column, source.time, source.hold)
+        except ScenarioError as error:
+            self.problems.append(Problem(f"{path}.file", str(error)))
+            return None

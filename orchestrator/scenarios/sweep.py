@@ -1,0 +1,102 @@
+"""Any scenario over any parameters of its FMUs: one run per case, each recorded signal summed up in five numbers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from orchestrator.engine import Case, DesignCases, ResultColumn, Work
+from orchestrator.engine.cases import Value
+from orchestrator.errors import ScenarioError
+from orchestrator.fmi.instances import FmuFactory, fmu_instance
+from orchestrator.master.compiled import prepare
+from orchestrator.master.problems import Problem, raise_problems
+from orchestrator.master.session import Session
+from orchestrator.master.system import Instance, System
+from orchestrator.scenarios.isolated import foreign_fmus
+from orchestrator.scenarios.scenario import Scenario
+
+SUMMARIES = ("last", "min", "max", "mean", "rms")
+# So many cases are looked at before a sweep starts; a wrong value beyond them becomes a row.
+CHECKED_CASES = 10_000
+
+
+def check_parameters(system: System, cases: DesignCases, ignored: frozenset[str] = frozenset()) -> None:
+    """Refuse names and values that the system's FMUs do not take.
+
+    Args:
+        system: whose parameters are varied.
+        cases: what a sweep visits.
+        ignored: names that are not parameters of an FMU.
+
+    Raises:
+        ScenarioError: names every parameter that is wrong, once.
+    """
+    problems: dict[str, Problem] = {}
+    if set(cases.names) <= ignored:
+        return
+    for index in range(min(len(cases), CHECKED_CASES)):
+        for name, value in cases[index].parameters.items():
+            if name not in ignored and name not in problems and value is not None:
+                _, text = system.start_value(name, value)
+                if text is not None:
+                    problems[name] = Problem(name, text)
+    raise_problems(list(problems.values()), "`vary`", "vary")
+
+
+def scenario_work(scenario: Scenario, cases: DesignCases, trust: bool = False) -> Work:
+    """Return what a worker process does for each case of a sweep over ``scenario``.
+
+    Args:
+        scenario: what is run.
+        cases: what is varied.
+        trust: FMUs that are not ours run with all rights of the user.
+
+    Returns:
+        Columns, files and functions.
+
+    Raises:
+        ScenarioError: a varied parameter does not exist or cannot have a value, or nothing is recorded.
+    """
+    if not scenario.record:
+        raise ScenarioError("`record` must name at least one signal, but is empty")
+    check_parameters(scenario.system, cases)
+    prepare()
+    files = {i.name: _path(i) for i in scenario.system.instances}
+    units = {name: getattr(scenario.system.unit(name), "name", None) or "1" for name in scenario.record}
+    columns = tuple(ResultColumn(f"{name}.{what}", units[name]) for name in scenario.record for what in SUMMARIES)
+    bare = replace(scenario.system, instances=())
+    starts = {i.name: dict(i.start) for i in scenario.system.instances}
+    payload = _Payload(replace(scenario, system=bare), starts)
+    walls = not trust and bool(foreign_fmus(scenario.system))
+    return Work(_prepare, _run, columns, payload, files, {"scenario": repr(payload)}, unpacked=True, walls=walls)
+
+
+@dataclass(frozen=True)
+class _Payload:
+    scenario: Scenario
+    starts: Mapping[str, Mapping[str, Any]]
+
+
+def _path(instance: Instance) -> Path:
+    if not isinstance(instance.create, FmuFactory):
+        raise ScenarioError(f"`{instance.name}` must be an FMU to be swept, but is not")
+    return instance.create.path
+
+
+def _prepare(payload: _Payload, files: Mapping[str, Path]) -> Session:
+    instances = tuple(fmu_instance(name, files[name], start) for name, start in payload.starts.items())
+    scenario = replace(payload.scenario, system=replace(payload.scenario.system, instances=instances))
+    return scenario.session()
+
+
+def _run(session: Session, case: Case) -> dict[str, Value]:
+    start = {name: value for name, value in case.parameters.items() if value is not None}
+    result = session.run(start)
+    summary: dict[str, Value] = {}
+    for name, values in zip(result.names, result.values, strict=True):
+        numbers = (values[-1], values.min(), values.max(), values.mean(), np.sqrt(np.mean(values**2)))
+        summary |= {f"{name}.{what}": float(number) for what, number in zip(SUMMARIES, numbers, strict=True)}
+    return summary

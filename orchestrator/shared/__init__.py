@@ -1,0 +1,1 @@
+"""What every room uses: result directories on disk, caches, the number of cores."""

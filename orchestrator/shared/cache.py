@@ -1,0 +1,42 @@
+"""Where the project keeps what it can make again: compiled code, calibrations."""
+
+import atexit
+import os
+import shutil
+import tempfile
+from functools import cache
+from pathlib import Path
+
+_PROBE = 1 << 16
+"""Bytes that must find room: an empty file can be made on a full disk, too."""
+
+
+@cache
+def cache_directory(name: str) -> Path:
+    """Return the folder ``name`` in the user's cache (``$XDG_CACHE_HOME`` or ``~/.cache``), made if needed.
+
+    Where the cache cannot be written, or is full, a temporary folder takes its place until the process ends.
+
+    Args:
+        name: of the folder.
+
+    Returns:
+        Its path.
+    """
+    try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(base) / "backlash-cosim" / name
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder) as probe:
+            probe.write(bytes(_PROBE))
+            probe.flush()
+    except (OSError, RuntimeError):  # the latter where the user has no home
+        return _temporary()
+    return folder
+
+
+def _temporary() -> Path:
+    # The process in the name tells a later run whether the folder is still in use.
+    folder = Path(tempfile.mkdtemp(prefix=f"backlash-cosim-{os.getpid()}-cache-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder

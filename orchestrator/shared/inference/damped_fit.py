@@ -1,0 +1,86 @@
+"""Damped Gauss-Newton steps (Levenberg 1944, Marquardt 1963) for any model that can be linearised."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Linearised(Generic[T]):
+    """A cost near one point.
+
+    Attributes:
+        hessian: (k, k) of the cost, Gauss-Newton's.
+        gradient: (k,) of the cost.
+        cost: at the point.
+        moved: (k,) step -> the point there and its cost, which may be infinite or NaN.
+    """
+
+    hessian: Array
+    gradient: Array
+    cost: float
+    moved: Callable[[Array], tuple[T, float]]
+
+
+@dataclass(frozen=True)
+class Damping:
+    """How steps are damped.
+
+    Attributes:
+        first: damping of the first step, in units of the Hessian's diagonal.
+        floor: least damping after a step that failed.
+        ridge: Hessian -> what is added to its diagonal, so that blind directions stay put.
+        tries: dampings tried in one step.
+    """
+
+    first: float
+    floor: float
+    ridge: Callable[[Array], float]
+    tries: int
+
+
+def damped_fit(
+    start: T,
+    linearise: Callable[[T], Linearised[T] | None],
+    damping: Damping,
+    iterations: int,
+    converged: Callable[[float, float], bool],
+) -> tuple[T, Array | None]:
+    """Return the point at which damped steps end, and the last Hessian (None: not even one was made).
+
+    Args:
+        start: the first point.
+        linearise: the cost near a point; None ends the fit there.
+        damping: how steps are damped.
+        iterations: most steps.
+        converged: (gain of the step, cost after it) -> True when the fit may end; a failed step gains nothing.
+
+    Returns:
+        The point at which steps end, and the last Hessian (k, k), or None where no step was tried.
+    """
+    point, strength = start, damping.first
+    hessian: Array | None = None
+    for _ in range(iterations):
+        near = linearise(point)
+        if near is None:
+            break
+        hessian = near.hessian
+        ridge = damping.ridge(hessian)
+        gain, cost = 0.0, near.cost
+        for _ in range(damping.tries):
+            damped = hessian + np.diag(strength * np.diag(hessian) + ridge)
+            step: Array = np.asarray(-np.linalg.solve(damped, near.gradient))
+            moved, new = near.moved(step)
+            if np.isfinite(new) and new < cost:
+                gain, cost, point, strength = float(cost - new), new, moved, strength / 10.0
+                break
+            strength = max(strength * 10.0, damping.floor)
+        if converged(gain, cost):
+            break
+    return point, hessian

@@ -1,0 +1,55 @@
+"""The noise of a sampled signal: of a smooth motion's measurement, rounding included."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MAD_TO_DEVIATION = 1.4826  # standard deviation over median absolute deviation, of a normal distribution
+
+
+def residual_noise(values: Array, count: float, window: int = 9) -> float:
+    """Return the standard deviation of measurement noise from what a sliding cubic leaves.
+
+    Args:
+        values: (n,) samples of a smooth motion.
+        count: the unit that they are rounded to; its error, ``count / sqrt(12)``, is the least result.
+        window: samples of the cubic.
+
+    Returns:
+        The standard deviation, in the unit of ``values``.
+    """
+    basis, _ = np.linalg.qr(np.vander(np.arange(window) - (window - 1) / 2, 4))
+    panes = np.lib.stride_tricks.sliding_window_view(values, window)
+    left = panes - (panes @ basis) @ basis.T
+    spread = np.sqrt(np.mean(left**2, axis=1) * window / (window - 4))
+    scale = 1e-9 * max(float(np.abs(values).max()), 1e-12)
+    return max(float(np.sqrt(np.mean(spread**2))), count / math.sqrt(12.0), scale)
+
+
+def robust_noise(values: Array) -> float:
+    """Return the standard deviation of white noise on a smooth motion (n,), from its third differences.
+
+    Motion hardly shows in them, their gain on white noise is sqrt(20), and their median sheds impacts.
+
+    Args:
+        values: (n,) samples; NaN: missing.
+
+    Returns:
+        The standard deviation, in the unit of ``values``.
+    """
+    return MAD_TO_DEVIATION * float(np.nanmedian(np.abs(np.diff(values, 3)))) / math.sqrt(20.0)
+
+
+def rms(values: Array) -> float:
+    """Return the root mean square of all values.
+
+    Args:
+        values: of any shape.
+
+    Returns:
+        The root mean square, in their unit.
+    """
+    return float(np.sqrt(np.mean(values**2)))

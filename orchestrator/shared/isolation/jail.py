@@ -1,0 +1,369 @@
+"""A Python entry point in a child process behind walls, asked over a private channel, killed at a deadline.
+
+    with Jail("package.module:opened", argument, read=[unpacked_fmu]) as jail:
+        answer = jail.call(request, time=30.0)
+
+In the child, ``opened(argument)`` is called once, after the walls are up, and returns the handler; every ``call`` then
+runs ``handler(request)``. Arguments and requests are pickled (they go from the trusted to the untrusted side);
+answers are plain data and arrays of float64, int64 and bool (see ``wire``). An ``OrchestratorError`` of the handler is
+raised again by ``call``, and the child lives on; any other exception becomes a ``SimulationError``.
+
+What holds for the child, from before the first foreign byte is loaded:
+ - it has a session and process group of its own, no terminal, an environment without secrets, and dies with the
+   thread that made the ``Jail``, also when that is killed;
+ - limits of time, memory, size and number of files, threads and descriptors (``Limits``);
+ - with ``walls`` (the default) and where the kernel can: it reads system libraries, the interpreter, this package, its
+   compiled C files and ``read``; it writes in its scratch folder, which is its working and temporary directory; it
+   opens no socket, starts no process and sends no signal.
+Python code is imported from ``sys.path`` of the parent; of what is not installed, only the top-level packages of the
+entry point, of this project and of ``packages`` can be seen.
+
+A call costs about 0.03 ms beyond the time of the handler; what a child imports is what its start takes.
+What a child says is a claim: whoever asks checks shapes and ranges, and never runs any of it.
+"""
+
+import contextlib
+import os
+import pickle
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from orchestrator import errors
+from orchestrator.errors import ChildError, OrchestratorError, OutputError, SimulationError
+from orchestrator.shared.isolation import wire
+from orchestrator.shared.isolation.inmate import ANSWER, NONCE, REFUSAL
+from orchestrator.shared.isolation.limits import Limits, Setup
+from orchestrator.shared.isolation.scratch import Scratch, usage
+from orchestrator.shared.isolation.strays import Strays
+from orchestrator.shared.isolation.surroundings import code_folders, environment, launch, system_folders
+from orchestrator.shared.isolation.walls import Walls, support
+from orchestrator.shared.machine_code import machine_code_folder
+
+START_LIMIT = 120.0
+MOST_BYTES = 256 << 20
+_DISK_INTERVAL = 0.5
+_LAST_MOMENTS = 2.0
+_MOST_GIVEN = 100_000
+_NAMES = {k: v for k, v in vars(errors).items() if isinstance(v, type) and issubclass(v, OrchestratorError)}
+
+
+class Jail:
+    """One child process; see the module. Use as a context manager, or call ``close``; one thread at a time.
+
+    Args:
+        entry: ``module:function`` that the child calls with ``argument``.
+        argument: anything that can be pickled.
+        read: further files and folders that the child may read, such as unpacked FMUs.
+        write: further folders that it may change.
+        limits: what it may use.
+        walls: whether the kernel's walls are wanted; without them limits, time and cleaning up remain.
+        packages: further top-level packages that the child may import.
+        adopt: without a filter of system calls, find processes that leave the child's group, too: this process then
+            becomes the parent of its orphaned descendants (Linux).
+
+    Attributes:
+        walls: what the kernel enforces, once the child has started; ``None`` when it was not wanted.
+        scratch: the child's only writable folder.
+
+    Raises:
+        OutputError: the temporary directory cannot be written.
+        SimulationError: no process can be started.
+    """
+
+    def __init__(
+        self,
+        entry: str,
+        argument: Any = None,
+        *,
+        read: Sequence[Path] = (),
+        write: Sequence[Path] = (),
+        limits: Limits | None = None,
+        walls: bool = True,
+        packages: Sequence[str] = (),
+        adopt: bool = False,
+    ) -> None:
+        self.limits = limits or Limits()
+        self.walls: Walls | None = None
+        self.started = False
+        self._wanted = walls
+        self._watched = tuple(write)
+        self._given = sum(usage(folder, _MOST_GIVEN)[0] for folder in write)
+        self._strays = Strays(adopt and not (walls and support().seccomp))
+        self._process: subprocess.Popen[bytes] | None = None
+        self._root = Scratch("jail")
+        self._usage_time = 0.0
+        try:
+            self.scratch = self._root.folder("work")
+            temporary = self._root.folder("work/tmp")
+            code = code_folders(self._root.folder("code"), (entry.partition(":")[0].partition(".")[0], *packages))
+            self._born = time.monotonic()
+            self._log = tempfile.TemporaryFile(dir=self._root.path)  # noqa: SIM115 - closed with the jail
+            ours, theirs = socket.socketpair()
+            self._link = ours
+            variables = environment(temporary, walls) | self._strays.mark
+            with theirs:
+                self._process = launch(theirs, self._log, self.scratch if walls else Path.cwd(), variables)
+            allowed = (*system_folders(), *code, self._root.path / "code", machine_code_folder(), *read)
+            setup = Setup(
+                os.getpid(), (str(self._root.path / "code"), *map(os.path.abspath, sys.path)), entry,
+                pickle.dumps(argument), self.limits, tuple(map(str, allowed)),
+                (str(self.scratch), "/dev/null", *map(str, write)), walls,
+            )  # fmt: skip
+            self._guarded(wire.send, pickle.dumps(setup), time.monotonic() + START_LIMIT)
+        except OSError as error:
+            self.close()
+            raise SimulationError(f"a child process cannot be started: {error.strerror}") from None
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> "Jail":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def start(self, time_limit: float = START_LIMIT) -> None:
+        """Wait until the entry point has returned its handler; ``call`` does so by itself.
+
+        Args:
+            time_limit: [s].
+
+        Raises:
+            As ``call`` does.
+        """
+        if not self.started:
+            found = self._exchange(b"", time_limit, 1 << 20)
+            if self._wanted:
+                self.walls = Walls(*found)
+            self.started = True
+
+    def call(self, request: Any, time: float | None = None, most: int = MOST_BYTES) -> Any:
+        """Return the handler's answer to ``request``.
+
+        Args:
+            request: anything that can be pickled.
+            time: seconds until the child is killed (default: the limit's).
+            most: bytes that the answer may have.
+
+        Returns:
+            The answer.
+
+        Raises:
+            ChildError: the child ended, broke a limit or said what is no answer; it is gone.
+            OrchestratorError: raised by the handler, whatever its class; the child is well.
+        """
+        self.start()
+        return self._exchange(pickle.dumps(request), self.limits.time if time is None else time, most)
+
+    @property
+    def pid(self) -> int:
+        """The child's process."""
+        assert self._process is not None
+        return self._process.pid
+
+    def resident(self) -> int:
+        """Return the child's resident memory in bytes; 0 where the system does not tell.
+
+        Returns:
+            The bytes.
+        """
+        return _resident(self.pid)[0]
+
+    def printed_bytes(self) -> int:
+        """Return how much the child has printed.
+
+        Returns:
+            The bytes.
+        """
+        return os.fstat(self._log.fileno()).st_size
+
+    def finish(self) -> bool:
+        """Let the child end by itself, then kill what is left of it; return whether processes of its own were left.
+
+        Returns:
+            True when there were.
+        """
+        process = self._process
+        if process is None:
+            return False
+        self._link.close()
+        if process.returncode is None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                _collect(process, _LAST_MOMENTS)
+        if process.returncode is None:
+            self._kill()
+        return _kill_group(process) | self._strays.kill()
+
+    def interrupt(self) -> None:
+        """Kill the child; may be called by any thread, and a ``call`` under way then raises ``ChildError``."""
+        process = self._process
+        if process is not None and process.returncode is None:
+            process.kill()
+
+    def close(self) -> None:
+        """Kill the child and what is left of its process group, and remove its files; harmless when done before."""
+        self._kill()
+        self._strays.kill()
+        for name in ("_link", "_log"):
+            stream = getattr(self, name, None)
+            if stream is not None:
+                stream.close()
+        self._root.close()
+
+    # ------------------------------------------------------------------------------------------------------------
+
+    def _exchange(self, body: bytes, limit: float, most: int) -> Any:
+        if self._process is None or self._process.returncode is not None:
+            raise ChildError("the process has ended before", "exit")
+        if wire.pending(self._link):
+            raise self._forged("it spoke without being asked")
+        deadline = min(time.monotonic() + limit, self._born + self.limits.total)
+        nonce = secrets.token_bytes(NONCE)
+        self._guarded(wire.send, nonce + body, deadline)
+        data = self._guarded(lambda link, d, t: wire.receive(link, most, d, t), deadline)
+        try:
+            message = wire.decode(data)
+        except wire.WireError as error:
+            raise self._forged(str(error)) from None
+        match message:
+            case [bytes() as echo, int() as kind, value] if secrets.compare_digest(echo, nonce):
+                if kind == ANSWER:
+                    return value
+                if kind == REFUSAL and isinstance(value, list) and len(value) == 2 and all(map(_is_text, value)):
+                    known = _NAMES.get(value[0])
+                    raise known(value[1]) if known else SimulationError(f"{value[0]}: {value[1]}".rstrip(": "))
+        raise self._forged("its answer belongs to no request")
+
+    def _guarded(self, action: Any, *arguments: Any) -> Any:
+        """Send or receive; whatever goes wrong there ends the child and becomes an error that says why."""
+        try:
+            return action(self._link, *arguments, self._tick)
+        except wire.LateError:
+            self._kill()
+            raise ChildError("the process took too long", "time") from None
+        except wire.ClosedError:
+            raise self._ended() from None
+        except wire.WireError as error:
+            raise self._forged(str(error)) from None
+        except BaseException:
+            self._kill()
+            raise
+
+    def _tick(self) -> None:
+        """Look at what the child uses; called every few hundredths of a second."""
+        memory, threads = _resident(self.pid)
+        if memory > self.limits.memory:
+            self._kill()
+            raise ChildError(f"the process used more than {self.limits.memory >> 20} MiB of memory", "memory")
+        if threads > self.limits.threads:
+            self._kill()
+            raise ChildError(f"the process started more than {self.limits.threads} threads", "threads")
+        if time.monotonic() - self._usage_time > _DISK_INTERVAL:
+            self._usage_time = time.monotonic()
+            counts = [usage(folder, self.limits.entries) for folder in (self.scratch, *self._watched)]
+            written = sum(size for size, _ in counts) - self._given
+            entries = max(number for _, number in counts)
+            if written > self.limits.disk or entries > self.limits.entries:
+                self._kill()
+                raise ChildError(f"the process wrote more than {self.limits.disk >> 20} MiB of files", "disk")
+
+    def _forged(self, text: str) -> ChildError:
+        self._kill()
+        return ChildError(f"the process broke the protocol: {text}", "protocol")
+
+    def _ended(self) -> ChildError:
+        """Collect the process and say how it ended."""
+        assert self._process is not None
+        try:
+            peak = _collect(self._process, _LAST_MOMENTS)
+        except subprocess.TimeoutExpired:
+            return self._forged("it hung up")
+        code = self._process.returncode
+        said = self._printed()
+        if code == -getattr(signal, "SIGXCPU", 0):
+            return ChildError("the process took too much processor time", "time")
+        if code < 0 and peak > self.limits.memory:
+            return ChildError(f"the process used more than {self.limits.memory >> 20} MiB of memory", "memory")
+        if code < 0:
+            with contextlib.suppress(ValueError):
+                return ChildError(f"the process was ended by {signal.Signals(-code).name}", "signal", -code, said)
+        return ChildError(f"the process ended with exit code {code}", "exit", abs(code), said)
+
+    def _printed(self) -> str:
+        try:
+            self._log.seek(0, os.SEEK_END)
+            self._log.seek(max(0, self._log.tell() - 4096))
+            lines = self._log.read(4096).decode("utf-8", "replace").strip().splitlines()
+        except (OSError, ValueError):
+            return ""
+        return lines[-1][:300] if lines else ""
+
+    def _kill(self) -> None:
+        process = self._process
+        if process is not None and process.returncode is None:
+            _kill_group(process)  # before the process is collected, its number cannot be another's
+            process.kill()
+            process.wait()
+
+
+def _kill_group(process: "subprocess.Popen[bytes]") -> bool:
+    """Kill the process group of a child; return whether anything was in it."""
+    if os.name != "posix":
+        return False
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        return False
+    return True
+
+
+def _collect(process: "subprocess.Popen[bytes]", limit: float) -> int:
+    """Wait for a child to end; return its peak of resident memory in bytes, 0 where that may be another's.
+
+    Raises:
+        TimeoutExpired: it does not.
+    """
+    if os.name != "posix":
+        process.wait(limit)
+        return 0
+    import resource
+
+    end = time.monotonic() + limit
+    while True:
+        pid, status, used = os.wait4(process.pid, os.WNOHANG)
+        if pid:
+            break
+        if time.monotonic() > end:
+            raise subprocess.TimeoutExpired(process.args, limit)
+        time.sleep(0.002)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    # Linux counts what the child had between fork and exec, which is the memory of its parent.
+    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    unit = 1 if sys.platform == "darwin" else 1024
+    return used.ru_maxrss * unit if used.ru_maxrss > own else 0
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _resident(pid: int) -> tuple[int, int]:
+    """Resident memory of a process in bytes and its number of threads; 0 where the system does not tell."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
+            fields = file.read().rpartition(")")[2].split()
+        return int(fields[21]) * os.sysconf("SC_PAGE_SIZE"), int(fields[17])
+    except (OSError, IndexError, ValueError):
+        return 0, 0
+
+
+__all__ = ["ChildError", "Jail", "Limits", "OutputError"]

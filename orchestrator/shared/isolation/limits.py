@@ -1,0 +1,54 @@
+"""What a child process may use. Imported by the child before its walls are up: standard library only."""
+
+from dataclasses import dataclass
+
+MEBIBYTE = 1 << 20
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a child may use.
+
+    Attributes:
+        time: seconds that one answer may take.
+        memory: resident bytes.
+        output: bytes of any one file, and of the printed text.
+        total: seconds in all.
+        disk: bytes of all files in the scratch folder.
+        entries: number of files and folders in the scratch folder.
+        threads: number of threads.
+        open_files: number of descriptors.
+    """
+
+    time: float = 20.0
+    memory: int = 2048 * MEBIBYTE
+    output: int = 8 * MEBIBYTE
+    total: float = 600.0
+    disk: int = 64 * MEBIBYTE
+    entries: int = 10_000
+    threads: int = 256
+    open_files: int = 256
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What a child is told before anything else; plain data.
+
+    Attributes:
+        parent: process that owns the child.
+        path: ``sys.path`` of the child.
+        entry: ``module:function`` to be called with the unpickled ``argument``.
+        argument: pickled.
+        limits: what the child may use.
+        read, write: files and folders that it may read and run libraries from, and those that it may write too.
+        walls: whether the kernel shall enforce ``read``, ``write``, no network and no further processes.
+    """
+
+    parent: int
+    path: tuple[str, ...]
+    entry: str
+    argument: bytes
+    limits: Limits
+    read: tuple[str, ...]
+    write: tuple[str, ...]
+    walls: bool

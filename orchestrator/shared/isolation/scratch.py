@@ -1,0 +1,159 @@
+"""Scratch folders in the temporary directory: removed on every way out, and by the next run what a killed one left."""
+
+import contextlib
+import errno
+import itertools
+import os
+import shutil
+import stat
+import tempfile
+from pathlib import Path
+
+from orchestrator.errors import OutputError
+from orchestrator.shared.processes import alive
+
+PREFIX = "backlash-cosim-"
+_swept: set[str] = set()
+
+
+class Scratch:
+    """A private folder of this process; use as a context manager, or call ``close``.
+
+    Raises:
+        OutputError: the temporary directory cannot be written.
+    """
+
+    def __init__(self, purpose: str = "run") -> None:
+        place = tempfile.gettempdir()
+        if place not in _swept:
+            _swept.add(place)
+            _remove_abandoned(Path(place))
+        try:
+            self.path = Path(tempfile.mkdtemp(prefix=f"{PREFIX}{os.getpid()}-{purpose}-", dir=place))
+        except OSError as error:
+            raise OutputError(
+                f"the temporary directory {place} must be writable, but is not: {error.strerror}"
+            ) from None
+        self._owner = os.getpid()
+
+    def __enter__(self) -> "Scratch":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def folder(self, name: str) -> Path:
+        """Return the folder ``name`` in it, made when need be.
+
+        Args:
+            name: of the folder.
+
+        Returns:
+            Its path.
+
+        Raises:
+            OutputError: it cannot be made.
+        """
+        path = self.path / name
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"cannot write to {self.path}: {error.strerror}") from None
+        return path
+
+    def close(self) -> None:
+        """Remove it with all that is in it; a forked copy of this process leaves it alone."""
+        if self._owner == os.getpid():
+            remove(self.path)
+
+
+def _remove_abandoned(place: Path) -> None:
+    """Remove the scratch folders in ``place`` whose processes are gone; those of other users are left alone."""
+    with contextlib.suppress(OSError):
+        for path in place.glob(f"{PREFIX}*-*"):
+            owner = path.name.removeprefix(PREFIX).partition("-")[0]
+            info = path.lstat()
+            if owner.isdigit() and stat.S_ISDIR(info.st_mode) and _mine(info.st_uid) and not alive(int(owner)):
+                remove(path)
+
+
+def _mine(owner: int) -> bool:
+    return os.name != "posix" or owner == os.getuid()
+
+
+def remove(folder: Path) -> None:
+    """Remove a folder whatever is in it: depth beyond what recursion takes, folders without rights, odd names.
+
+    Args:
+        folder: that may be missing.
+    """
+    with contextlib.suppress(OSError, RecursionError):
+        shutil.rmtree(folder)
+        return
+    if not folder.is_symlink() and folder.is_dir():
+        with contextlib.suppress(OSError):
+            _empty(os.fsencode(folder))
+            os.rmdir(folder)
+
+
+def _empty(top: bytes) -> None:
+    """Empty ``top``; every folder found is first moved up to it, so that no path gets long."""
+    waiting, count = [top], 0
+    while waiting:
+        current = waiting.pop()
+        with os.scandir(current) as entries:
+            found = [(e.path, e.is_dir(follow_symlinks=False)) for e in entries]
+        for path, is_folder in found:
+            if not is_folder:
+                os.unlink(path)
+                continue
+            os.chmod(path, 0o700)
+            target = path
+            if current != top:
+                target = _moved(path, top, count)
+                count += 1
+            waiting.append(target)
+        if current != top:
+            os.rmdir(current)
+
+
+def _moved(path: bytes, top: bytes, count: int) -> bytes:
+    while True:
+        target = os.path.join(top, b"~%d" % count)
+        try:
+            os.rename(path, target)
+            return target
+        except OSError as error:
+            if error.errno not in (errno.EEXIST, errno.ENOTEMPTY, errno.ENOTDIR):
+                raise
+            count += 1
+
+
+def usage(folder: Path, most_entries: int) -> tuple[int, int]:
+    """Return bytes and number of the entries below ``folder``; counting stops beyond ``most_entries``.
+
+    What cannot be looked at (a folder without rights, or too deep for a path) counts as too many.
+
+    Args:
+        folder: to look into.
+        most_entries: number of entries at which counting stops.
+
+    Returns:
+        Bytes and number.
+    """
+    total, count, waiting = 0, 0, [os.fspath(folder)]
+    while waiting and count <= most_entries:
+        try:
+            with os.scandir(waiting.pop()) as entries:
+                found = list(itertools.islice(entries, most_entries + 1))
+        except FileNotFoundError:
+            continue
+        except OSError:
+            return total, most_entries + 1
+        count += len(found)
+        for entry in found:
+            with contextlib.suppress(OSError):
+                total += entry.stat(follow_symlinks=False).st_blocks * 512 if os.name == "posix" else 0
+                if entry.is_dir(follow_symlinks=False):
+                    waiting.append(entry.path)
+    return total, count

@@ -1,0 +1,111 @@
+"""The walls that a child process puts up around itself, before it loads anything that is not ours.
+
+Standard library only, and one thread: what is imported or started before the walls are up is outside of them.
+"""
+
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+from dataclasses import dataclass
+
+from orchestrator.shared.isolation import landlock, seccomp
+from orchestrator.shared.isolation.limits import Limits
+
+_SET_DEATH_SIGNAL = 1
+_OWN = ("/proc/self",)
+_LONGEST = 1e8
+
+
+@dataclass(frozen=True)
+class Walls:
+    """What the kernel enforces.
+
+    Attributes:
+        landlock: version of Landlock's interface; 0: files are not protected.
+        seccomp: whether sockets and further processes are refused.
+    """
+
+    landlock: int
+    seccomp: bool
+
+    @property
+    def missing(self) -> str:
+        """What is not enforced, in words; empty when everything is."""
+        lacks = []
+        if not self.landlock:
+            lacks.append("files of the user are not protected (no Landlock)")
+        if not self.seccomp:
+            lacks.append("network and further processes are not refused (no seccomp)")
+        return "; ".join(lacks)
+
+    @property
+    def in_words(self) -> str:
+        """What is enforced, or what is not, for a result file."""
+        return self.missing or "files, network, processes"
+
+
+def support() -> Walls:
+    """Return what the kernel of this machine would enforce.
+
+    Returns:
+        Version of Landlock and whether there are filters of system calls.
+    """
+    return Walls(landlock.version(), seccomp.available())
+
+
+def follow_parent(parent: int) -> None:
+    """End with the process ``parent`` (Linux; to be exact, with the thread of it that started this process).
+
+    Args:
+        parent: its process id.
+    """
+    if sys.platform.startswith("linux"):
+        ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
+        if os.getppid() != parent:  # it was gone before the line above
+            os._exit(1)
+
+
+def bound(limits: Limits) -> None:
+    """Set the limits that the kernel keeps: processor time, address space, size of files, descriptors, no core file.
+
+    Args:
+        limits: memory [bytes], time [s] and so on.
+    """
+    if os.name != "posix":
+        return
+    import resource
+
+    # Address space is more than what is resident: libraries reserve far more than they touch.
+    pairs = [
+        (resource.RLIMIT_AS, 2 * limits.memory + (1 << 30)),
+        (resource.RLIMIT_CPU, (os.cpu_count() or 1) * int(min(limits.total, _LONGEST) + 1)),
+        (resource.RLIMIT_FSIZE, limits.output),
+        (resource.RLIMIT_NOFILE, limits.open_files),
+        (resource.RLIMIT_CORE, 0),
+    ]
+    for what, value in pairs:
+        _, hard = resource.getrlimit(what)
+        most = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        with contextlib.suppress(ValueError, OSError):
+            resource.setrlimit(what, (most, most))
+
+
+def enclose(read: tuple[str, ...], write: tuple[str, ...]) -> Walls:
+    """Put up every wall that this kernel has, for good.
+
+    Args:
+        read: files and folders that may be read.
+        write: folders that may be written.
+
+    Returns:
+        The walls that stand.
+
+    Raises:
+        OSError: the kernel has the walls but refused to put them up; nothing foreign must be loaded then.
+    """
+    if not sys.platform.startswith("linux"):
+        return Walls(0, seccomp=False)
+    seccomp.forbid_privileges()
+    return Walls(landlock.restrict((*read, *_OWN), write), seccomp.restrict())

@@ -1,0 +1,180 @@
+"""Messages between a process and its child: frames over a socket pair, with a deadline on both ends of every frame.
+
+The child is not trusted. Its messages are plain data (numbers, text, bytes, lists, maps, arrays of numbers) that are
+decoded without running anything, of a bounded size, and each must answer the request that is open. What travels to
+the child is pickled.
+"""
+
+import math
+import socket
+import struct
+import time
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import numpy as np
+
+_LENGTH = struct.Struct(">Q")
+_ARRAY = 1
+_KINDS = {b"d": np.float64, b"q": np.int64, b"?": np.bool_}
+_MOST_AXES = 8
+SLICE = 0.05
+Tick = Callable[[], None]
+
+
+class WireError(Exception):
+    """What came is no message, or none came where one must."""
+
+
+class ClosedError(WireError):
+    """The other end has hung up."""
+
+
+class LateError(WireError):
+    """The deadline has passed."""
+
+
+def encode(value: Any) -> bytes:
+    """Return plain data as bytes; arrays of float64, int64 and bool keep their shape.
+
+    Args:
+        value: numbers, texts, bytes, lists, dictionaries, arrays.
+
+    Returns:
+        The bytes.
+
+    Raises:
+        TypeError: ``value`` holds something else.
+    """
+    return msgspec.msgpack.encode(value, enc_hook=_packed)
+
+
+def decode(data: bytes) -> Any:
+    """Return what ``encode`` was given; tuples come back as lists.
+
+    Args:
+        data: from anybody.
+
+    Returns:
+        The data.
+
+    Raises:
+        WireError: the bytes are no such data.
+    """
+    try:
+        return msgspec.msgpack.decode(data, ext_hook=_unpacked)
+    except (msgspec.DecodeError, ValueError, RecursionError, OverflowError, struct.error) as error:
+        raise WireError(f"a message must be plain data, but is not: {error}") from None
+
+
+def _packed(value: Any) -> Any:
+    if isinstance(value, np.ndarray) and value.dtype.char in "dlq?":
+        kind = {"l": "q"}.get(value.dtype.char, value.dtype.char)
+        head = struct.pack(f">cB{value.ndim}Q", kind.encode(), value.ndim, *value.shape)
+        return msgspec.msgpack.Ext(_ARRAY, head + np.ascontiguousarray(value).tobytes())
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a message must be plain data, but has a {type(value).__name__}")
+
+
+def _unpacked(code: int, data: memoryview) -> Any:
+    if code != _ARRAY or len(data) < 2:
+        raise ValueError("an unknown extension")
+    kind, axes = struct.unpack_from(">cB", data)
+    if kind not in _KINDS or axes > _MOST_AXES:
+        raise ValueError("an unknown kind of array")
+    shape = struct.unpack_from(f">{axes}Q", data, 2)
+    body = data[2 + 8 * axes :]
+    if math.prod(shape) * np.dtype(_KINDS[kind]).itemsize != len(body):
+        raise ValueError("an array of another size than it says")
+    return np.frombuffer(body, _KINDS[kind]).reshape(shape).copy()
+
+
+def send(link: socket.socket, data: bytes, deadline: float = math.inf, tick: Tick = lambda: None) -> None:
+    """Send one frame.
+
+    Args:
+        link: the socket.
+        data: the frame.
+        deadline: of ``time.monotonic``.
+        tick: called every ``SLICE`` seconds while waiting.
+
+    Raises:
+        ClosedError: the other end has hung up.
+        LateError: it does not take the frame in time.
+    """
+    rest = memoryview(_LENGTH.pack(len(data)) + data)
+    link.settimeout(None if deadline == math.inf else SLICE)
+    while rest:
+        try:
+            rest = rest[link.send(rest) :]
+        except TimeoutError:
+            _wait(deadline, tick)
+        except OSError:
+            raise ClosedError("the other end has hung up") from None
+
+
+def receive(link: socket.socket, most: int, deadline: float = math.inf, tick: Tick = lambda: None) -> bytes:
+    """Return one frame of at most ``most`` bytes; arguments and errors as those of ``send``.
+
+    Args:
+        link: a socket.
+        most: bytes that the frame may have.
+        deadline: on the monotonic clock [s].
+        tick: called while nothing comes.
+
+    Returns:
+        The frame's content.
+
+    Raises:
+        WireError: the frame is larger.
+    """
+    (length,) = _LENGTH.unpack(_exactly(link, _LENGTH.size, deadline, tick))
+    if length > most:
+        raise WireError(f"a message must have at most {most} bytes, but has {length}")
+    return bytes(_exactly(link, length, deadline, tick))
+
+
+def _exactly(link: socket.socket, count: int, deadline: float, tick: Tick) -> bytearray:
+    link.settimeout(None if deadline == math.inf else SLICE)
+    # Grown as bytes come: a length alone must not take memory.
+    data = bytearray()
+    while len(data) < count:
+        try:
+            piece = link.recv(min(count - len(data), 1 << 20))
+        except TimeoutError:
+            _wait(deadline, tick)
+            continue
+        except OSError:
+            piece = b""
+        if not piece:
+            raise ClosedError("the other end has hung up")
+        data += piece
+        if time.monotonic() > deadline:
+            raise LateError("too late")
+    return data
+
+
+def _wait(deadline: float, tick: Tick) -> None:
+    tick()
+    if time.monotonic() > deadline:
+        raise LateError("too late")
+
+
+def pending(link: socket.socket) -> bool:
+    """Return whether bytes lie there that nobody has asked for.
+
+    Args:
+        link: a socket.
+
+    Returns:
+        True when there are.
+    """
+    link.settimeout(0.0)
+    try:
+        return bool(link.recv(1, socket.MSG_PEEK))
+    except (BlockingIOError, TimeoutError):
+        return False
+    except OSError:
+        return False

@@ -1,0 +1,87 @@
+"""Functions compiled by numba whose machine code is kept on disk, with a hash: what is damaged is compiled anew.
+
+Numba's own cache (``cache=True``) runs whatever bytes lie there, ends with a traceback where they are cut short, and
+refuses to work where no folder can be written.
+"""
+
+import contextlib
+import hashlib
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numba import njit
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+def kept(**options: Any) -> Callable[[Any], Any]:
+    """Return a decorator like ``numba.njit`` that keeps machine code for later processes, where there is a place.
+
+    Args:
+        options: of ``njit``, but for ``cache``.
+
+    Returns:
+        The decorator.
+    """
+
+    def compiled(function: Any) -> Any:
+        dispatcher = njit(**options)(function)
+        # Without a folder that can be written the function is compiled in every process.
+        with contextlib.suppress(RuntimeError, OSError):
+            dispatcher._cache = _Cache(function)
+        return dispatcher
+
+    return compiled
+
+
+class _Files(IndexDataCacheFile):
+    """Index and machine code of one function, each file behind a hash of the version of numba and of its content."""
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep machine code; a full disk only means that it is compiled again."""
+        with contextlib.suppress(OSError):
+            super().save(key, data)
+
+    def load(self, key: Any) -> Any:
+        """Return the machine code for a signature, ``None`` where there is none that is intact."""
+        name = self._load_index().get(key)
+        return None if name is None else self._intact(self._data_path(name))
+
+    def _load_index(self) -> dict[Any, str]:
+        stamp, overloads = self._intact(self._index_path) or (None, {})
+        return dict(overloads) if stamp == self._source_stamp else {}
+
+    def _save_index(self, overloads: dict[Any, str]) -> None:
+        self._keep(self._index_path, (self._source_stamp, overloads))
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._keep(self._data_path(name), data)
+
+    def _keep(self, path: str, value: Any) -> None:
+        body = self._dump(value)
+        with self._open_for_write(path) as file:
+            file.write(self._digest(body) + body)
+
+    def _intact(self, path: str) -> Any:
+        try:
+            content = Path(path).read_bytes()
+        except OSError:
+            return None
+        body = content[_DIGEST:]
+        return pickle.loads(body) if self._digest(body) == content[:_DIGEST] else None
+
+    def _digest(self, body: bytes) -> bytes:
+        return hashlib.sha256(self._version.encode() + body).digest()
+
+
+class _Cache(FunctionCache):
+    """Numba's cache of a function, on files of ours."""
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        stamp = self._impl.locator.get_source_stamp()
+        # Another ending than numba's own, whose files a version without hashes may have left beside these.
+        self._cache_file = _Files(self._cache_path, f"{self._impl.filename_base}.checked", stamp)

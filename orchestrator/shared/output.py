@@ -1,0 +1,154 @@
+"""Result directories that are written whole or not at all."""
+
+import errno
+import json
+import math
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import OutputError
+from orchestrator.shared.processes import alive
+from orchestrator.shared.results import as_plain
+from orchestrator.shared.version import __version__
+
+STAGING = ".partial-"
+_PROBE = 1 << 16
+DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by writes, which name no file
+
+
+@contextmanager
+def staged(directory: Path) -> Iterator[Path]:
+    """Yield a staging directory whose files are moved into ``directory`` when the block ends without error.
+
+    Args:
+        directory: where the files shall end up; made when it does not exist.
+
+    Yields:
+        The staging directory.
+
+    Raises:
+        OutputError: ``directory`` cannot be made or written. Nothing is left behind.
+    """
+    made: list[Path] = []
+    try:
+        missing = [p for p in (directory, *directory.parents) if not p.exists()]
+        directory.mkdir(parents=True, exist_ok=True)
+        made = missing
+        _remove_abandoned(directory)
+        staging = Path(tempfile.mkdtemp(prefix=f"{STAGING}{os.getpid()}-", dir=directory))
+    except OSError as error:
+        _remove_empty(made)
+        raise OutputError(
+            f"`out` must be a writable directory, but {directory} is not: {error.strerror}", "out"
+        ) from None
+    try:
+        yield staging
+        _publish(staging, directory)
+    except OSError as error:
+        named = error.filename is not None and str(staging) in str(error.filename)
+        # A write that fails names no file: it may have been standard output, a cache or a temporary file.
+        if named or (error.errno in DISK_ERRORS and error.filename is None and _full(staging)):
+            raise OutputError(f"cannot write to {directory}: {error.strerror}") from None
+        raise
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+        _remove_empty(made)
+
+
+def _full(folder: Path) -> bool:
+    """Whether no more can be written to ``folder``."""
+    try:
+        with tempfile.NamedTemporaryFile(dir=folder) as probe:
+            probe.write(bytes(_PROBE))
+            probe.flush()
+    except OSError:
+        return True
+    return False
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write ``text`` to ``path`` so that no reader ever sees a part of it.
+
+    Args:
+        path: the file.
+        text: its content, written as UTF-8.
+    """
+    handle, part = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+        os.replace(part, path)
+    except BaseException:
+        Path(part).unlink(missing_ok=True)
+        raise
+
+
+def _remove_abandoned(directory: Path) -> None:
+    """Remove the staging directories of processes that were killed."""
+    for path in directory.glob(f"{STAGING}*-*"):
+        owner = path.name.removeprefix(STAGING).partition("-")[0]
+        if owner.isdigit() and not alive(int(owner)):
+            shutil.rmtree(path, ignore_errors=True)
+
+
+def _publish(staging: Path, directory: Path) -> None:
+    for source in sorted(staging.rglob("*")):
+        target = directory / source.relative_to(staging)
+        if source.is_dir():
+            target.mkdir(exist_ok=True)
+        else:
+            os.replace(source, target)
+
+
+def _remove_empty(directories: list[Path]) -> None:
+    for path in directories:
+        try:
+            path.rmdir()
+        except OSError:
+            return
+
+
+def write_result(directory: Path, command: str, arguments: Mapping[str, Any], seed: int | None, results: Any) -> Path:
+    """Write ``DIR/COMMAND.json``, the machine-readable result that every command leaves.
+
+    Non-finite numbers become ``null``: JSON has no other way to say them.
+
+    Args:
+        directory: where to.
+        command: whose result.
+        arguments: what was asked for.
+        seed: of what is random, or None.
+        results: what was found: a struct of ``shared.results``, or a mapping by name.
+
+    Returns:
+        The path of the file.
+    """
+    document = {
+        "command": command,
+        "version": __version__,
+        "arguments": dict(arguments),
+        "seed": seed,
+        "results": as_plain(results),
+    }
+    path = directory / f"{command}.json"
+    path.write_text(json.dumps(_plain(document), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return path
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    return str(value)

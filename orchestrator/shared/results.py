@@ -1,0 +1,188 @@
+"""What result files hold, as types: the API fills them, commands write them, pages read them.
+
+A field that a file lacks has its default, so that pages of older files can be made; a field that pages do not know is
+passed over. ``schema_version`` goes up when a field changes its meaning or goes.
+"""
+
+from collections.abc import Mapping
+from typing import Any, Literal, TypeVar
+
+import msgspec
+
+F = TypeVar("F", bound=msgspec.Struct)
+
+
+class Found(msgspec.Struct, frozen=True, kw_only=True):
+    """Base: what one command found."""
+
+    schema_version: int = 1
+
+
+class GapFound(msgspec.Struct, frozen=True):
+    """A half-gap with its interval [rad]; None where it is not finite."""
+
+    alpha: float | None
+    lower: float | None
+    upper: float | None
+
+
+class PairFound(Found, frozen=True, kw_only=True):
+    """``simulate``: both loops. ``alpha`` and ``S`` in rad; ``experiment`` as the class of that name."""
+
+    alpha: float
+    S: float | None
+    estimate: GapFound | None = None
+    no_estimate: str = ""
+    crossings: int | None = None
+    play: dict[str, Any] = {}
+    experiment: dict[str, Any] = {}
+
+
+class LiveFound(msgspec.Struct, frozen=True):
+    """What a page needs to simulate a plant beside its record.
+
+    ``values`` are those of ``fmu`` that differ from its defaults. From each row of the record in ``rows`` on it starts
+    anew, from the ``starts`` of the same place. ``step`` in seconds.
+    """
+
+    fmu: str
+    step: float
+    values: dict[str, float] = {}
+    rows: list[int] = []
+    starts: list[dict[str, float]] = []
+
+
+class SignalFound(msgspec.Struct, frozen=True):
+    """A recorded signal: its values as a reader sees them, in ``unit``."""
+
+    signal: str
+    unit: str = ""
+    first: str = ""
+    last: str = ""
+    smallest: str = ""
+    largest: str = ""
+
+
+class SignalsFound(Found, frozen=True, kw_only=True):
+    """``simulate`` of a scenario and ``ssp run``: recorded signals, steps, and the walls around the run."""
+
+    signals: list[SignalFound] = []
+    steps: int | None = None
+    isolation: dict[str, Any] = {}
+
+
+class ColumnFound(msgspec.Struct, frozen=True):
+    """A column of results in ``sweep.csv``."""
+
+    name: str
+    unit: str
+
+
+class ErrorsFound(msgspec.Struct, frozen=True):
+    """Errors of the estimates at one noise level [rad]: shares in percent, ``mse`` in rad^2, ``coverage`` of 1."""
+
+    noise: float
+    count: int
+    mean_percent: float | None
+    worst_percent: float | None
+    mse: float | None
+    coverage: float | None
+
+
+class CalibrationFound(msgspec.Struct, frozen=True):
+    """Where a calibration comes from; sizes and width in rad, ``settings`` by name."""
+
+    digest: str = ""
+    runs: int | None = None
+    seed_branch: int | None = None
+    smallest: float | None = None
+    largest: float | None = None
+    level: float | None = None
+    width: float | None = None
+    version: str | None = None
+    settings: dict[str, Any] = {}
+
+
+class SweptScenario(msgspec.Struct, frozen=True):
+    """The scenario of a sweep: its name, recorded signals and end [s]."""
+
+    name: str
+    record: list[str] = []
+    stop: float | None = None
+
+
+class SweepFound(Found, frozen=True, kw_only=True):
+    """``sweep``: counts and columns always; of the pair the errors and their origin, of a scenario its name."""
+
+    cases: int
+    failed: int
+    columns: list[ColumnFound] = []
+    statistics: list[ErrorsFound] = []
+    trust: dict[str, Any] | None = None
+    experiment: dict[str, Any] | None = None
+    calibrations: dict[str, CalibrationFound] = {}
+    fmus: dict[str, str] | None = None
+    fmu_kind: str | None = None
+    scenario: SweptScenario | None = None
+    play: dict[str, Any] = {}
+    isolation: dict[str, Any] | None = None
+
+
+class FindingFound(msgspec.Struct, frozen=True):
+    """A violated rule: where, what was expected and found, and what to do."""
+
+    severity: Literal["error", "warning", "info"]
+    rule: str
+    path: str = ""
+    message: str = ""
+    advice: str = ""
+
+
+class CheckedFmu(msgspec.Struct, frozen=True):
+    """An FMU that was checked: counts by severity, and facts by name."""
+
+    fmu: str
+    ok: bool
+    executed: bool = False
+    counts: dict[str, int] = {}
+    facts: dict[str, Any] = {}
+    findings: list[FindingFound] = []
+
+
+class CheckFound(Found, frozen=True, kw_only=True):
+    """``check``: whether no FMU has an error, counts by severity, and each FMU."""
+
+    ok: bool
+    counts: dict[str, int] = {}
+    fmus: list[CheckedFmu] = []
+
+
+def as_plain(found: Any) -> Any:
+    """Turn results into what JSON knows.
+
+    Args:
+        found: a struct or a dataclass, or a mapping already.
+
+    Returns:
+        Nested dictionaries, lists, numbers and texts.
+    """
+    return found if isinstance(found, Mapping) else msgspec.to_builtins(found)
+
+
+def read(results: Any, kind: type[F]) -> F:
+    """Read results from a file's content.
+
+    Args:
+        results: nested dictionaries, as the file has them.
+        kind: the struct.
+
+    Returns:
+        The results.
+
+    Raises:
+        ValueError: a field is missing or of another type; the text says where.
+    """
+    try:
+        return msgspec.convert(results, kind)
+    except msgspec.ValidationError as error:
+        raise ValueError(str(error)) from None

@@ -1,0 +1,154 @@
+"""Settings: frozen structs of thresholds, each with its reason, read from TOML and written into results."""
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from orchestrator.errors import ScenarioError
+
+MAXIMUM_BYTES = 2**20
+S = TypeVar("S", bound="Settings")
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Base of settings: immutable, unknown names refused."""
+
+
+def setting(why: str, ge: float | None = 0.0, le: float | None = None, gt: float | None = None) -> msgspec.Meta:
+    """Return what a setting means and its bounds, for ``Annotated``.
+
+    Args:
+        why: what the value does and why it is what it is, in a line.
+        ge: least value; None: no bound.
+        le: largest value; None: no bound.
+        gt: value that must be exceeded, in place of ``ge``.
+
+    Returns:
+        What ``Annotated`` takes beside the type.
+    """
+    if gt is not None:
+        return msgspec.Meta(description=why, gt=gt, le=le)
+    return msgspec.Meta(description=why, ge=ge, le=le)
+
+
+def share(why: str, le: float = 1.0) -> msgspec.Meta:
+    """Return the meaning of a setting that is a share, between zero and ``le``.
+
+    Args:
+        why: what the value does and why it is what it is, in a line.
+        le: largest value.
+
+    Returns:
+        What ``Annotated`` takes beside the type.
+    """
+    return msgspec.Meta(description=why, ge=0.0, le=le)
+
+
+def note(why: str) -> msgspec.Meta:
+    """Return the meaning of a setting that has no bounds of its own.
+
+    Args:
+        why: what the value does and why it is what it is, in a line.
+
+    Returns:
+        What ``Annotated`` takes beside the type.
+    """
+    return msgspec.Meta(description=why)
+
+
+def read_settings(path: Path, kind: type[S]) -> S:
+    """Return settings with the values of a TOML file; what it does not name keeps its default.
+
+    Args:
+        path: the file; its tables are the groups of settings.
+        kind: the settings class.
+
+    Returns:
+        All settings of that class.
+
+    Raises:
+        ScenarioError: the file cannot be read, is not TOML, or a name or value is wrong; the message says which.
+    """
+    try:
+        if path.stat().st_size > MAXIMUM_BYTES:
+            raise ScenarioError(f"{path}: must be at most {MAXIMUM_BYTES >> 20} MB, but is larger")
+        content = tomllib.loads(path.read_bytes().decode("utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from None
+    except RecursionError:
+        raise ScenarioError(f"{path}: must be TOML, but is nested too deeply") from None
+    except ValueError as error:  # of which TOMLDecodeError and UnicodeDecodeError are two
+        raise ScenarioError(f"{path}: must be TOML in UTF-8, but is not: {error}") from None
+    return settings_of(content, kind, str(path))
+
+
+def settings_of(content: dict[str, Any], kind: type[S], where: str = "settings") -> S:
+    """Return settings with the values of nested tables; what they do not name keeps its default.
+
+    Args:
+        content: group -> name -> value.
+        kind: the settings class.
+        where: the tables' origin, for messages.
+
+    Returns:
+        All settings of that class.
+
+    Raises:
+        ScenarioError: a name or value is wrong.
+    """
+    try:
+        found = msgspec.convert(content, kind)
+    except msgspec.ValidationError as error:
+        text, _, place = str(error).partition(" - at `$")
+        key = place.rstrip("`").lstrip(".") or "settings"
+        raise ScenarioError(f"{where}: `{key}` is wrong: {text[:1].lower()}{text[1:]}") from None
+    _check_finite(as_tables(found), where, "")
+    return found
+
+
+def as_tables(settings: Settings) -> dict[str, Any]:
+    """Return settings as nested tables of plain values, for a result file.
+
+    Args:
+        settings: of any class.
+
+    Returns:
+        Group -> name -> value.
+    """
+    tables = msgspec.to_builtins(settings)
+    assert isinstance(tables, dict)
+    return tables
+
+
+def described(kind: type[Settings], prefix: str = "") -> list[tuple[str, Any, str]]:
+    """Return (dotted name, default, why) of every setting, group by group.
+
+    Args:
+        kind: the settings class.
+        prefix: of the names, for groups within groups.
+
+    Returns:
+        One row for each setting.
+    """
+    rows: list[tuple[str, Any, str]] = []
+    for entry in msgspec.structs.fields(kind):
+        if isinstance(entry.default, Settings):
+            rows += described(type(entry.default), f"{prefix}{entry.name}.")
+        else:
+            notes = [note for note in getattr(entry.type, "__metadata__", ()) if isinstance(note, msgspec.Meta)]
+            rows.append((f"{prefix}{entry.name}", entry.default, (notes[0].description or "") if notes else ""))
+    return rows
+
+
+def _check_finite(value: Any, where: str, path: str) -> None:
+    if isinstance(value, dict):
+        for name, entry in value.items():
+            _check_finite(entry, where, f"{path}.{name}".lstrip("."))
+    elif isinstance(value, list):
+        for entry in value:
+            _check_finite(entry, where, path)
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise ScenarioError(f"{where}: `{path}` must be finite, but is {value:g}")

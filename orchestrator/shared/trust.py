@@ -1,0 +1,69 @@
+"""How far a result can be trusted: one level with its reasons, computed once and shown everywhere.
+
+Green: the answer may be used as it stands. Amber: it may be right, and the reasons say what was not shown. Red: it must
+not be used. A level is the worst of what single checks find, so that no good news outweighs a bad one.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+
+class Level(IntEnum):
+    """Levels of trust, worst last."""
+
+    GREEN = 0
+    AMBER = 1
+    RED = 2
+
+    @property
+    def word(self) -> str:
+        """The level's name in results: "green", "amber" or "red"."""
+        return self.name.lower()
+
+
+@dataclass(frozen=True)
+class Reason:
+    """What one check found: a level and a sentence part without a full stop."""
+
+    level: Level
+    text: str
+
+
+@dataclass(frozen=True)
+class Trust:
+    """A level with the reasons that keep it from green; no reasons: green.
+
+    Attributes:
+        level: the worst level of the reasons.
+        reasons: what was found, worst first.
+    """
+
+    level: Level
+    reasons: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the level's word and the reasons, as they stand in result files.
+
+        Returns:
+            ``level`` and ``reasons``.
+        """
+        return {"level": self.level.word, "reasons": list(self.reasons)}
+
+    def __str__(self) -> str:
+        """Return one line: the level, then the reasons."""
+        return self.level.word if not self.reasons else f"{self.level.word}: {'; '.join(self.reasons)}"
+
+
+def trust_of(found: Iterable[Reason]) -> Trust:
+    """Return the trust that single checks leave.
+
+    Args:
+        found: what the checks found; green ones say nothing.
+
+    Returns:
+        The worst level, with the reasons of all that is not green, worst first.
+    """
+    reasons = sorted((r for r in found if r.level is not Level.GREEN), key=lambda r: -r.level)
+    return Trust(reasons[0].level if reasons else Level.GREEN, tuple(r.text for r in reasons))

@@ -1,0 +1,384 @@
+"""Dry friction of motor and load: how large it may be at rest, and how it builds up over a distance.
+
+Friction that builds up is that of Dahl's and LuGre's bristle (Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE
+Trans. Automatic Control 40(3), 1995): the torque is ``stiffness z + damping z'`` with ``z' = v - |v| z / reach(v)``,
+where ``reach(v) = distance friction(v) / breakaway`` and ``stiffness = breakaway / distance``. The bristle ``z`` is a
+state while it bends; once it has settled, the part slides at the friction of its speed, without the stiff equation of
+the bristle, until it slows down. The elastic backlash models have it; rigid teeth do not.
+"""
+
+from .drivetrain_parameters import (
+    P_BREAKAWAY_L,
+    P_BREAKAWAY_M,
+    P_BRISTLE_C_L,
+    P_BRISTLE_C_M,
+    P_COULOMB_L,
+    P_COULOMB_M,
+    P_LOADED_L,
+    P_LOADED_M,
+    P_PRESLIDING_L,
+    P_PRESLIDING_M,
+    P_STRIBECK_L,
+    P_STRIBECK_M,
+    P_STRIBECK_SPEED_L,
+    P_STRIBECK_SPEED_M,
+    P_WAVY_L,
+    P_WAVY_M,
+    P_WAVY_N_L,
+    P_WAVY_N_M,
+    P_WAVY_PHASE_L,
+    P_WAVY_PHASE_M,
+)
+from .effects import bristle_rate, dependent_friction
+from .equations import Mode, Parameters, State, elastic_torque, friction_l, friction_m, is_rigid, twist_slope
+
+# A bristle has settled when it is this near to its reach.
+SETTLED = 1e-6
+# Where friction falls with speed, a bristle follows its reach with a lag: it counts as settled so near to it where its
+# equation is quicker than this [1/s]; beyond these many Stribeck speeds friction falls no more.
+SETTLED_FALLING = 0.02
+QUICKEST = 5e3
+FALLEN = 4.0
+# Faster than it was left, so that no part goes to and fro between both ways of computing it.
+ENTER = 1.2
+LEAST_SPEED = 1e-9
+
+
+def breakaway(coulomb: float, sliding: float, static: float) -> float:
+    """Return the torque [N.m] below which a part that stands still keeps standing.
+
+    Args:
+        coulomb: Coulomb friction [N.m].
+        sliding: Stribeck's friction at high speed, above Coulomb's [N.m].
+        static: Stribeck's friction at rest, above Coulomb's [N.m].
+
+    Returns:
+        The torque.
+    """
+    return coulomb + max(sliding, static)
+
+
+def has_friction_m(p: Parameters) -> bool:
+    """Tell whether the motor has dry friction.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        True when it has.
+    """
+    return p[P_COULOMB_M] + p[P_STRIBECK_M] + p[P_BREAKAWAY_M] + p[P_LOADED_M] + abs(p[P_WAVY_M]) > 0.0
+
+
+def has_friction_l(p: Parameters) -> bool:
+    """Tell whether the load has dry friction.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        True when it has.
+    """
+    return p[P_COULOMB_L] + p[P_STRIBECK_L] + p[P_BREAKAWAY_L] + p[P_LOADED_L] + abs(p[P_WAVY_L]) > 0.0
+
+
+def capacity_m(x: State, contact: int, p: Parameters) -> float:
+    """Return the breakaway torque [N.m] of the motor.
+
+    Args:
+        x: state, as in ``equations``.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    level = breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
+    if p[P_LOADED_M] == 0.0 and p[P_WAVY_M] == 0.0:
+        return level
+    return dependent_friction(
+        level, carried_m(x, contact, p), p[P_LOADED_M], x[0], p[P_WAVY_M], p[P_WAVY_N_M], p[P_WAVY_PHASE_M]
+    )
+
+
+def capacity_l(x: State, contact: int, p: Parameters) -> float:
+    """Return the breakaway torque [N.m] of the load.
+
+    Args:
+        x: state, as in ``equations``.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    level = breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
+    if p[P_LOADED_L] == 0.0 and p[P_WAVY_L] == 0.0:
+        return level
+    return dependent_friction(
+        level, carried_l(x, contact, p), p[P_LOADED_L], x[2], p[P_WAVY_L], p[P_WAVY_N_L], p[P_WAVY_PHASE_L]
+    )
+
+
+def carried_m(x: State, contact: int, p: Parameters) -> float:
+    """Return the shaft's torque on the motor [N.m] that its friction depends on; rigid teeth leave it out.
+
+    Args:
+        x: state, as in ``equations``.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    return 0.0 if is_rigid(p) or p[P_LOADED_M] == 0.0 else elastic_torque(x, contact, p) * twist_slope(x, p)
+
+
+def carried_l(x: State, contact: int, p: Parameters) -> float:
+    """Return the shaft's torque on the load [N.m] that its friction depends on; rigid teeth leave it out.
+
+    Args:
+        x: state, as in ``equations``.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    return 0.0 if is_rigid(p) or p[P_LOADED_L] == 0.0 else elastic_torque(x, contact, p)
+
+
+def rest_m(p: Parameters) -> float:
+    """Return the breakaway torque [N.m] of the motor, without what depends on load and position.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    return breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
+
+
+def rest_l(p: Parameters) -> float:
+    """Return the breakaway torque [N.m] of the load, without what depends on load and position.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    return breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
+
+
+def builds_up_m(p: Parameters) -> bool:
+    """Tell whether the motor's friction builds up over a distance.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        True when it does.
+    """
+    return p[P_PRESLIDING_M] > 0.0 and rest_m(p) > 0.0 and not is_rigid(p)
+
+
+def builds_up_l(p: Parameters) -> bool:
+    """Tell whether the load's friction builds up over a distance.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        True when it does.
+    """
+    return p[P_PRESLIDING_L] > 0.0 and rest_l(p) > 0.0 and not is_rigid(p)
+
+
+def leaving_speed(distance: float, falls: bool, stribeck_speed: float) -> float:
+    """Return the speed [rad/s] below which the bristle of a part that slides must be followed.
+
+    Args:
+        distance: over which friction builds up [rad].
+        falls: whether friction depends on the speed.
+        stribeck_speed: [rad/s].
+
+    Returns:
+        The speed.
+    """
+    return min(FALLEN * stribeck_speed, QUICKEST * distance) if falls else 0.0
+
+
+def leaving_speed_m(p: Parameters) -> float:
+    """Return :func:`leaving_speed` of the motor [rad/s].
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The speed.
+    """
+    return leaving_speed(p[P_PRESLIDING_M], p[P_STRIBECK_M] != p[P_BREAKAWAY_M], p[P_STRIBECK_SPEED_M])
+
+
+def leaving_speed_l(p: Parameters) -> float:
+    """Return :func:`leaving_speed` of the load [rad/s].
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The speed.
+    """
+    return leaving_speed(p[P_PRESLIDING_L], p[P_STRIBECK_L] != p[P_BREAKAWAY_L], p[P_STRIBECK_SPEED_L])
+
+
+def reach_m(x: State, contact: int, p: Parameters) -> float:
+    """Return the bending [rad] at which the motor's bristle slides at its speed.
+
+    Args:
+        x: state, as in ``equations``.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The bending.
+    """
+    return p[P_PRESLIDING_M] * friction_m(x, carried_m(x, contact, p), p) / rest_m(p)
+
+
+def reach_l(x: State, contact: int, p: Parameters) -> float:
+    """Return the bending [rad] at which the load's bristle slides at its speed.
+
+    Args:
+        x: state, as in ``equations``.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The bending.
+    """
+    return p[P_PRESLIDING_L] * friction_l(x, carried_l(x, contact, p), p) / rest_l(p)
+
+
+def bent_sign(bristle: float, rate: float, reach: float, stiffness: float, damping: float) -> float:
+    """Return the direction of friction (-1 to 1 without damping) of a bristle that bends at ``rate`` [rad/s].
+
+    Args:
+        bristle: its bending [rad].
+        rate: [rad/s].
+        reach: bending at which it slides [rad].
+        stiffness: of the bristle [N.m/rad].
+        damping: of the bristle [N.m.s/rad].
+
+    Returns:
+        The direction.
+    """
+    if reach <= 0.0:
+        return 0.0
+    return (bristle + damping / stiffness * rate) / reach
+
+
+def has_settled(bristle: float, speed: float, reach: float, leaving: float, falls: bool) -> bool:
+    """Tell whether a bristle has settled at the reach of a part that slides.
+
+    Args:
+        bristle: its bending [rad].
+        speed: of the part [rad/s].
+        reach: bending at which it slides [rad].
+        leaving: speed below which the bristle must be followed [rad/s].
+        falls: whether friction depends on the speed.
+
+    Returns:
+        True when it has.
+    """
+    side = 1.0 if speed > 0.0 else -1.0
+    if abs(speed) < max(LEAST_SPEED, ENTER * leaving) or reach <= 0.0:
+        return False
+    near = SETTLED_FALLING if falls and abs(speed) > QUICKEST * reach else SETTLED
+    return abs(side * bristle - reach) <= near * reach
+
+
+def bent(x: State, z_m: float, z_l: float) -> State:
+    """Return the state with the bristles at ``z_m`` and ``z_l`` [rad].
+
+    Args:
+        x: state, as in ``equations``.
+        z_m: of the motor's bristle [rad].
+        z_l: of the load's [rad].
+
+    Returns:
+        The state.
+    """
+    return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], z_m, z_l, x[10], x[11])
+
+
+def resting_bristles(x: State, contact: int, p: Parameters) -> State:
+    """Return the state as a simulation starts: bristles of what moves have settled, others are straight.
+
+    Args:
+        x: state, as in ``equations``.
+        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The state.
+    """
+    z_m = 0.0
+    z_l = 0.0
+    if builds_up_m(p) and x[1] != 0.0:
+        z_m = reach_m(x, contact, p) if x[1] > 0.0 else -reach_m(x, contact, p)
+    if builds_up_l(p) and x[3] != 0.0:
+        z_l = reach_l(x, contact, p) if x[3] > 0.0 else -reach_l(x, contact, p)
+    return bent(x, z_m, z_l)
+
+
+def turned_signs(x: State, mode: Mode, p: Parameters) -> tuple[float, float, float, float]:
+    """Return the directions of friction of motor and load, and the rates of their bristles [rad/s].
+
+    Args:
+        x: state, as in ``equations``.
+        mode: contact, and the directions in which motor and load slide.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The four.
+    """
+    contact, slip_m, slip_l = mode
+    sign_m = float(slip_m)
+    sign_l = float(slip_l)
+    rate_m = 0.0
+    rate_l = 0.0
+    if slip_m == 0 and builds_up_m(p):
+        reach = reach_m(x, contact, p)
+        rate_m = bristle_rate(x[8], x[1], reach)
+        sign_m = bent_sign(x[8], rate_m, reach, rest_m(p) / p[P_PRESLIDING_M], p[P_BRISTLE_C_M])
+    if slip_l == 0 and builds_up_l(p):
+        reach = reach_l(x, contact, p)
+        rate_l = bristle_rate(x[9], x[3], reach)
+        sign_l = bent_sign(x[9], rate_l, reach, rest_l(p) / p[P_PRESLIDING_L], p[P_BRISTLE_C_L])
+    return (sign_m, sign_l, rate_m, rate_l)
+
+
+def settled_slips(x: State, mode: Mode, p: Parameters) -> Mode:
+    """Return the mode with parts whose bristles have settled sliding.
+
+    Args:
+        x: state, as in ``equations``.
+        mode: contact, and the directions in which motor and load slide.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The mode.
+    """
+    contact, slip_m, slip_l = mode
+    if slip_m == 0 and builds_up_m(p):
+        falls = p[P_STRIBECK_M] != p[P_BREAKAWAY_M]
+        if has_settled(x[8], x[1], reach_m(x, contact, p), leaving_speed_m(p), falls):
+            slip_m = 1 if x[1] > 0.0 else -1
+    if slip_l == 0 and builds_up_l(p):
+        falls = p[P_STRIBECK_L] != p[P_BREAKAWAY_L]
+        if has_settled(x[9], x[3], reach_l(x, contact, p), leaving_speed_l(p), falls):
+            slip_l = 1 if x[3] > 0.0 else -1
+    return (contact, slip_m, slip_l)

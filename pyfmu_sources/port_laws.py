@@ -1,0 +1,91 @@
+"""Laws of effects that act around an FMU at its ports: a force against the motion, of position and speed.
+
+Each is a plain function of floats. The loop that fits them compiles this very source; the effect FMU of a corrected
+system runs it. ``x`` and ``v`` are position and speed of the port, in the middle of a step.
+"""
+
+from math import cos, exp, sin
+
+COULOMB, STRIBECK, QUADRATIC, VISCOUS, SPRING, HARDENING, GRAVITY, RIPPLE, LOAD, DIRECTIONAL, INERTIA = range(1, 12)
+
+
+def built_up(z: float, v: float, distance: float, time: float) -> float:
+    """Return how far dry friction has built up (-1 to 1) after ``time`` at speed ``v``.
+
+    Dahl's law, ``dz/dt = (v - |v| z)/distance``, solved exactly for a constant speed.
+
+    Args:
+        z: at the beginning, -1 to 1.
+        v: speed, in the port's unit.
+        distance: over which it builds up, in the port's unit.
+        time: [s].
+
+    Returns:
+        The state at the end.
+    """
+    if v == 0.0:
+        return z
+    end = 1.0 if v > 0.0 else -1.0
+    return end + (z - end) * exp(-abs(v) * time / distance)
+
+
+def has_memory(kind: int) -> bool:
+    """Tell whether a law builds up over a distance (the last of its parameters).
+
+    Args:
+        kind: number of the law.
+
+    Returns:
+        True when it does.
+    """
+    return kind in (COULOMB, STRIBECK)
+
+
+def distance_of(kind: int, q1: float, q3: float) -> float:
+    """Return the distance over which a law with memory builds up.
+
+    Args:
+        kind: number of the law.
+        q1: second parameter of the law.
+        q3: its fourth parameter.
+
+    Returns:
+        The distance, in the port's unit.
+    """
+    return q1 if kind == COULOMB else q3
+
+
+def resistance(kind: int, x: float, v: float, a: float, z: float, q0: float, q1: float, q2: float) -> float:
+    """Return the force against the motion.
+
+    Args:
+        kind: one of the constants above.
+        x, v, a: position, speed and acceleration.
+        z: how far dry friction has built up, -1 to 1.
+        q0, q1, q2: parameters of the law.
+
+    Returns:
+        The force, in the port's unit.
+    """
+    if kind == COULOMB:
+        return q0 * z
+    if kind == STRIBECK:
+        ratio = v / q2
+        return (q0 + (q1 - q0) * exp(-ratio * ratio)) * z
+    if kind == QUADRATIC:
+        return q0 * v * abs(v)
+    if kind == VISCOUS:
+        return q0 * v
+    if kind == SPRING:
+        return q0 * x
+    if kind == HARDENING:
+        return q0 * x * x * x
+    if kind == GRAVITY:
+        return q0 * sin(x) + q1 * cos(x)
+    if kind == RIPPLE:
+        return q0 * sin(q2 * x) + q1 * cos(q2 * x)
+    if kind == LOAD:
+        return q0
+    if kind == DIRECTIONAL:
+        return q0 * abs(v)
+    return q0 * a

@@ -1,0 +1,134 @@
+"""``import orchestrator as oc``: quick, complete, and what the docs show runs as it stands."""
+
+import doctest
+import importlib
+import os
+import re
+import rlcompleter
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import orchestrator as oc
+from orchestrator.building.build import ensure_built
+from tools import api_page
+
+ROOT = Path(__file__).resolve().parents[2]
+BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+FUNCTIONS = sorted(name for name in oc.__all__ if name.islower() and not name.startswith("_"))
+# Examples that take more than a few seconds.
+SLOW = {"diagnose", "benchmark", "calibrate", "design", "diagnose_fmu"}
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A folder with the files that the docs speak of, as the current one."""
+    for name in ("machine.csv", "machine.toml", "loop.toml", "axis.csv", "axis_map.toml"):
+        shutil.copy(ROOT / "docs" / "examples" / name, tmp_path)
+    built = ensure_built(["Drivetrain", "ServoAxis"])
+    shutil.copy(built["Drivetrain"], tmp_path / "other.fmu")
+    shutil.copy(built["ServoAxis"], tmp_path / "axis.fmu")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(code, folder):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    words = [sys.executable, "-W", "error", "-c", code]
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_completion_shows_the_public_names_and_nothing_else():
+    completer = rlcompleter.Completer({"oc": oc})
+    shown = {re.match(r"oc\.(\w+)", text)[1] for text in completer.attr_matches("oc.")}
+    public = {name for name in oc.__all__ if not name.startswith("_")}
+    assert shown == public
+    assert set(dir(oc)) == set(oc.__all__)
+
+
+def test_every_public_name_exists():
+    for name in oc.__all__:
+        assert getattr(oc, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        oc.nothing  # noqa: B018
+
+
+def test_no_public_name_is_also_a_module():
+    for name in oc.__all__:
+        assert not (ROOT / "orchestrator" / name).exists(), name
+        assert not (ROOT / "orchestrator" / f"{name}.py").exists(), name
+
+
+def test_stubs_name_what_is_public():
+    assert api_page.STUB.read_text(encoding="utf-8") == api_page.stub(), "write it anew: python -m tools.api_page"
+
+
+def test_importing_loads_no_workflow(tmp_path):
+    heavy = "numpy", "scipy", "numba", "fmpy", "matplotlib", "rich", "msgspec"
+    code = f"import sys, orchestrator; print([n for n in {heavy!r} if n in sys.modules])"
+    done = run(code, tmp_path)
+    assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
+
+
+@pytest.mark.slow
+def test_the_page_runs_as_written(place):
+    code = "\n".join(BLOCK.findall((ROOT / "docs" / "python.md").read_text(encoding="utf-8")))
+    assert "found.build" in code
+    done = run(code + "\nprint(theta.shape, fmu, len(sweep))", place)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.rstrip().endswith("(2001,) out/Drivetrain_machine.fmu 40")
+    for name in ("signals.png", "out/Drivetrain_machine.fmu", "sweep.csv", "results/pair/report.html"):
+        assert (place / name).stat().st_size > 1000
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if n in SLOW else ()) for n in FUNCTIONS])
+def test_example_of_the_docstring(place, name):
+    function = getattr(oc, name)
+    example = doctest.DocTestParser().get_doctest(function.__doc__, {"oc": oc}, name, None, 0)
+    assert example.examples, f"{name} has no example"
+    result = doctest.DocTestRunner(verbose=False).run(example)
+    assert result.failed == 0
+
+
+def test_results_show_themselves(place):
+    pair = oc.run_pair(alpha=0.02)
+    assert "actual half-gap" in str(pair)
+    assert "0.02" in str(pair)
+    assert pair._repr_html_().count("<tr>") == 1 + len(pair.blocks()[0].rows)
+    with pytest.raises(KeyError, match=r"must be one of plant.theta_m, .* but is 'plant.x'"):
+        oc.simulate("loop.toml")["plant.x"]
+
+
+def test_errors_carry_the_name_of_the_argument(place):
+    for call, name in (
+        (lambda: oc.run_pair(alpha=-1.0), "alpha"),
+        (lambda: oc.run_pair(experiment="no"), "experiment"),
+        (lambda: oc.sweep(seeds=0), "seeds"),
+        (lambda: oc.sweep(noise=[0.0, 0.0]), "noise"),
+        (lambda: oc.sweep(sizes="random:0"), "sizes"),
+        (lambda: oc.sweep(workers=0), "workers"),
+        (lambda: oc.estimate("machine.csv", method="guess"), "method"),
+        (lambda: oc.simulate("loop.toml", step=0.1), "step"),
+        (lambda: oc.build(["Gear"]), "names"),
+        (lambda: oc.run_pair().save("machine.csv"), "out"),
+    ):
+        with pytest.raises(oc.InputError) as caught:
+            call()
+        assert name in caught.value.arguments
+        assert f"`{name}`" in str(caught.value)
+
+
+def test_every_module_of_the_api_is_public():
+    for path in (ROOT / "orchestrator" / "api").glob("*.py"):
+        importlib.import_module(f"orchestrator.api.{path.stem}")
+
+
+def test_the_page_of_the_api_is_up_to_date():
+    said = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    assert said == api_page.page(), "write it anew: python -m tools.api_page"
+    for name in oc.__all__:
+        assert name.startswith("_") or f"`{name}`" in said

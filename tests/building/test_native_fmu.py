@@ -1,0 +1,54 @@
+"""Native FMUs against the Python FMUs of the same source: values to the last bit, statuses, messages, states."""
+
+import importlib
+from pathlib import Path
+
+import pytest
+
+from orchestrator.building.build import ensure_built
+from orchestrator.building.compilers import find_compiler
+from orchestrator.building.native_build import ensure_native
+from tests.support.native_bits import EFFECTS, MODELS, Comparison
+from tests.support.native_pair import Driver, random_calls
+
+pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
+
+NAMES = {
+    "Drivetrain": "drivetrain_slave",
+    "LqrController": "lqr_slave",
+    "KalmanEstimator": "kalman_slave",
+    "BacklashEstimator": "backlash_estimator_slave",
+    "ServoAxis": "servo_axis_slave",
+}
+
+
+@pytest.fixture(scope="module")
+def native(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return ensure_native(list(NAMES), tmp_path_factory.mktemp("native"), here=True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_random_calls_give_the_same_as_the_python_fmu(native: dict[str, Path], name: str) -> None:
+    python = ensure_built([name])[name]
+    table = getattr(importlib.import_module(f"pyfmu_sources.{NAMES[name]}"), name).table
+    count, seeds = (60, 1) if name == "BacklashEstimator" else (300, 4)
+    stepped = sum(random_calls([Driver(python), Driver(native[name])], table, count, seed) for seed in range(seeds))
+    assert stepped > count * seeds // 6
+
+
+@pytest.mark.parametrize("effect", ["no effect", *EFFECTS])
+def test_every_bit_of_every_model_and_effect(native: dict[str, Path], effect: str) -> None:
+    """A sample; ``python -m benchmarks.native_bits`` does a million."""
+    for model in range(1, len(MODELS) + 1):
+        comparison = Comparison(native["Drivetrain"], model, EFFECTS.get(effect, {}), seed=10 + model)
+        for n in range(150):
+            assert comparison.step(), f"{MODELS[model - 1]}, {effect}: step {n}"
+        assert comparison.taken > 130
+
+
+def test_a_difference_in_the_last_bit_is_seen(native: dict[str, Path]) -> None:
+    comparison = Comparison(native["Drivetrain"], 2, {}, seed=1)
+    stiffness = 2
+    p = comparison.python._p
+    comparison.python._p = tuple(x * (1.0 + 2.0**-52) if n == stiffness else x for n, x in enumerate(p))
+    assert not all(comparison.step() for _ in range(300))

@@ -1,0 +1,89 @@
+"""A slave written by the documentation alone becomes a native FMU; what is outside the subset is refused."""
+
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestrator.building import build
+from orchestrator.building.compilers import find_compiler
+
+pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
+
+RUN = """
+import json, sys
+from fmpy import simulate_fmu
+r = simulate_fmu(sys.argv[1], stop_time=1.0, output_interval=0.01, start_values={"u": 2.0, "T": 0.25}, output=["y"])
+print(json.dumps([list(map(float, row)) for row in r]))
+"""
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the project with the slave of the documentation."""
+    copy = tmp_path_factory.mktemp("project")
+    for package in ("orchestrator", "pyfmu_sources"):
+        shutil.copytree(build.ROOT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
+    page = (build.ROOT / "docs" / "native.md").read_text(encoding="utf-8")
+    code = re.search(r"```python\n(\"\"\"The FMU ``LowPass``.*?)```", page, re.DOTALL)
+    assert code is not None
+    assert len(code[1].splitlines()) <= 50
+    (copy / "pyfmu_sources" / "low_pass_slave.py").write_text(code[1], encoding="utf-8")
+    return copy
+
+
+def run(project: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PYTHONPATH": str(project)}
+    command = [sys.executable, *words]
+    return subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_a_slave_of_forty_lines_is_native_in_one_command(project: Path) -> None:
+    words = ("build", "--native", "LowPass", "--platforms", "here", "--directory", "native", "--out", "out")
+    built = run(project, "-m", "orchestrator", *words)
+    assert built.returncode == 0, built.stderr
+    fmu = project / "native" / "LowPass.fmu"
+    rows = json.loads(run(project, "-c", RUN, str(fmu)).stdout)
+    assert len(rows) == 101
+    for time, y in rows:
+        assert y == pytest.approx(2.0 * (1.0 - math.exp(-time / 0.25)), abs=1e-12)
+    checked = run(project, "-m", "orchestrator", "check", str(fmu), "--out", "checked")
+    assert "no findings" in checked.stdout, checked.stdout
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("    return {1.0: u}[1.0]", "is outside the subset"),
+        ("    return [y, u][0]", "a list must be assigned to a variable of declared type"),
+        ("    return (u - y) ** 2", "squares and cubes must be written as products"),
+        ("    while y < u:\n        y += step\n    return None", "a value must be"),
+        ("    z = y\n    z = (y, u)\n    return y", "must keep its type"),
+        ("    import os\n    return float(len(os.sep))", "is outside the subset"),
+        ("    return filtered(y, u, time_constant, step)", "must not call itself"),
+        ("    if y > u:\n        return y", "must end with `return` on every path"),
+    ],
+)
+def test_what_is_outside_the_subset_is_refused_with_file_and_line(project: Path, line: str, message: str) -> None:
+    source = project / "pyfmu_sources" / "low_pass_slave.py"
+    text = source.read_text(encoding="utf-8")
+    other = project / "pyfmu_sources" / "odd_slave.py"
+    changed = text.replace("    return u + (y - u) * exp(-step / time_constant)", line).replace("LowPass", "Odd")
+    assert changed != text.replace("LowPass", "Odd")
+    other.write_text(changed, encoding="utf-8")
+    try:
+        built = run(
+            project, "-m", "orchestrator", "build", "--native", "Odd", "--platforms", "here", "--directory", "x"
+        )
+    finally:
+        other.unlink()
+    assert built.returncode == 2
+    assert message in built.stderr
+    assert re.search(r"odd_slave\.py:\d+: ", built.stderr)
+    assert "Traceback" not in built.stderr

@@ -1,0 +1,77 @@
+"""Every broken FMU is named by its rule and by no other; the FMU they are made from has no finding."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from orchestrator.checking.check import check_fmu
+from orchestrator.checking.rules import RULES
+from tests.support.broken_fmus import QUICK, Broken, corpus, good
+from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
+)
+DOCS = Path(__file__).parents[2] / "docs" / "check.md"
+CORPUS = corpus() if have_compiler() else []
+
+
+def test_the_good_fmu_has_no_finding(tmp_path: Path) -> None:
+    report = check_fmu(good(tmp_path / "good.fmu"), QUICK)
+    assert report.findings == ()
+    assert report.executed
+
+
+@pytest.mark.parametrize("broken", CORPUS, ids=lambda b: b.name)
+def test_names_the_rule(broken: Broken, tmp_path: Path) -> None:
+    path = tmp_path / "broken.fmu"
+    broken.make(path)
+    report = check_fmu(path, broken.options)
+    named = {f.rule for f in report.findings if f.severity != "info"}
+    assert named == {broken.rule}, "\n".join(f"{f.rule} {f.path}: {f.message}" for f in report.findings)
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "old", "new"),
+    [
+        ("asynchronous", "canHandleVar", 'canRunAsynchronuously="true" canHandleVar'),
+        ("ends_early", "canHandleVar", "canHandleVar"),
+        ("instantiate_once", "canHandleVar", 'canBeInstantiatedOnlyOncePerProcess="true" canHandleVar'),
+        ("variable_refused", 'StepSize="true"', 'StepSize="false"'),
+        ("state_refused", 'canGetAndSetFMUstate="true" canSerializeFMUstate="true"', ""),
+        ("serialised_empty", 'canSerializeFMUstate="true"', ""),
+    ],
+)
+def test_what_the_flags_do_not_promise_is_not_asked_for(behaviour: str, old: str, new: str, tmp_path: Path) -> None:
+    files = fmu_files(behaviour)
+    xml = " ".join(files["modelDescription.xml"].decode().split())
+    assert xml.count(old) == 1
+    path = write_fmu(tmp_path / "flags.fmu", files | {"modelDescription.xml": xml.replace(old, new).encode()})
+    report = check_fmu(path, QUICK)
+    assert report.findings == ()
+    assert report.executed
+
+
+def test_an_fmu_that_writes_to_our_pipe_forges_no_finding(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "forged_messages"), QUICK)
+    assert report.findings == ()
+
+
+def test_the_corpus_is_large_and_covers_the_rules() -> None:
+    covered = {b.rule for b in CORPUS}
+    assert len(CORPUS) >= 40
+    assert f"{len(CORPUS)} FMUs, each broken by one mutation" in DOCS.read_text(encoding="utf-8")
+    assert len({b.name for b in CORPUS}) == len(CORPUS)
+    uncovered = {r for r, rule in RULES.items() if rule.severity != "info"} - covered
+    assert uncovered == NOT_IN_THE_CORPUS
+
+
+# Rules that no single mutation of the C FMU shows; tests/checking/test_check_rules.py has them.
+NOT_IN_THE_CORPUS = {
+    "model.vendor-annotation",
+    "run.failed",
+    "schema.fmpy",
+    "variable.alias-start",
+    "variable.name-flat",
+}

@@ -1,0 +1,183 @@
+"""Rules one by one, where no whole FMU is needed."""
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from lxml import etree
+
+from orchestrator.checking import xml_reading
+from orchestrator.checking.archive import ArchiveLimits
+from orchestrator.checking.check import CheckOptions, check_fmu
+from orchestrator.checking.description import read_description
+from orchestrator.checking.findings import Finding, FmuFindings, ordered
+from orchestrator.checking.layered import _read_csv
+from orchestrator.checking.rules import RULES
+from orchestrator.checking.rules_model import check_model
+from orchestrator.checking.rules_variables import check_variables
+from orchestrator.checking.units import dimension_of
+from orchestrator.checking.writing import as_junit, as_lines
+from tests.support.c_fmu import have_compiler, model_description
+
+DOCS = Path(__file__).parents[2] / "docs" / "check.md"
+
+
+def rules_of(text: str) -> set[str]:
+    """Rules of the modelDescription alone that ``text`` violates."""
+    description = read_description(etree.fromstring(text.encode()))
+    return {f.rule for f in (*check_variables(description), *check_model(description))}
+
+
+def variables(*lines: str, convention: str = "flat", head: str = "") -> str:
+    """A modelDescription with the given ScalarVariables and an exact InitialUnknowns for none."""
+    return (
+        f'<fmiModelDescription fmiVersion="2.0" variableNamingConvention="{convention}"><CoSimulation/>{head}'
+        f"<ModelVariables>{''.join(lines)}</ModelVariables><ModelStructure/></fmiModelDescription>"
+    )
+
+
+def real(name: str, reference: int = 0, attributes: str = 'causality="parameter" variability="fixed"') -> str:
+    return f'<ScalarVariable name="{name}" valueReference="{reference}" {attributes}><Real start="1"/></ScalarVariable>'
+
+
+@pytest.mark.parametrize(
+    "name", ["x", "_x1", "a.b[1,2].c", "der(x)", "der(a.b[3],2)", "'odd name'.x", "'it\\'s'", "a['1']"[:1]]
+)
+def test_structured_names_that_are_valid(name: str) -> None:
+    assert rules_of(variables(real(name), convention="structured")) == set()
+
+
+@pytest.mark.parametrize("name", ["1x", "a..b", "a b", "a[1", "a[]", "der(x", "a.", "'", "a-b", "der(der(x))"])
+def test_structured_names_that_are_not_valid(name: str) -> None:
+    assert rules_of(variables(real(name), convention="structured")) == {"variable.name-structured"}
+
+
+def test_flat_names_may_be_anything_but_control_characters() -> None:
+    assert rules_of(variables(real("1 ä-b"))) == set()
+    assert rules_of(variables(real("a&#9;b"))) == {"variable.name-flat"}
+
+
+CONSTANT = 'causality="local" variability="constant"'
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (variables(real("a", 0, CONSTANT), real("b", 0, CONSTANT)), set()),
+        (variables(real("a", 0, CONSTANT), real("b", 0, CONSTANT).replace('"1"', '"2"')), {"variable.alias-start"}),
+        (variables(real("a", 0), real("b", 1)), set()),
+        (variables(real("a", 0), real("b", 0)), {"variable.alias-settable"}),
+    ],
+    ids=["equal constants", "different constants", "no aliases", "two parameters"],
+)
+def test_aliases(text: str, expected: set[str]) -> None:
+    assert rules_of(text) == expected
+
+
+def test_vendor_annotations_are_unique() -> None:
+    twice = '<VendorAnnotations><Tool name="a"/><Tool name="a"/></VendorAnnotations>'
+    assert rules_of(variables(real("a"), head=twice)) == {"model.vendor-annotation"}
+
+
+def test_the_good_description_breaks_no_rule_and_paths_are_xpaths() -> None:
+    assert rules_of(model_description()) == set()
+    root, problems = xml_reading.parse(model_description().replace('start="40"', 'start="-40"').encode(), "m.xml")
+    assert problems == []
+    assert root is not None
+    (finding,) = check_variables(read_description(root))
+    file, _, path = finding.path.partition(":")
+    assert file == "modelDescription.xml"
+    assert root.xpath(path) == ["-40"]
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("N.m", {"kg": 1, "m": 2, "s": -2}),
+        ("N.m.s/rad", {"kg": 1, "m": 2, "s": -1}),
+        ("rad/(N.m)", {"kg": -1, "m": -2, "s": 2}),
+        ("kg.m2", {"kg": 1, "m": 2}),
+        ("m/s2", {"m": 1, "s": -2}),
+        ("s^-1", {"s": -1}),
+        ("1", {}),
+        ("furlong", None),
+        ("m/s/s", None),
+        ("", None),
+    ],
+)
+def test_dimensions_of_unit_names(name: str, expected: dict[str, int] | None) -> None:
+    found = dimension_of(name)
+    assert (None if found is None else {k: v for k, v in found.items() if v}) == expected
+
+
+def test_a_document_type_is_refused_in_any_encoding() -> None:
+    text = '<?xml version="1.0" encoding="{}"?><!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]><a>&b;</a>'
+    for encoding in ("UTF-8", "UTF-16", "ISO-8859-1"):
+        root, findings = xml_reading.parse(text.format(encoding).encode(encoding), "a.xml")
+        assert root is None
+        assert [f.rule for f in findings] == ["xml.doctype"]
+
+
+def test_fmpy_has_the_last_word(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not have_compiler():
+        pytest.skip("the FMU is built with a C compiler")
+    from tests.support.broken_fmus import good
+
+    monkeypatch.setattr("fmpy.validation.validate_fmu", lambda _: ["something new"])
+    report = check_fmu(good(tmp_path / "good.fmu"), CheckOptions(static=True))
+    assert [f.rule for f in report.findings] == ["schema.fmpy"]
+
+
+def test_an_unpacked_fmu_is_checked_too(tmp_path: Path) -> None:
+    (tmp_path / "modelDescription.xml").write_text(model_description(), encoding="utf-8")
+    (tmp_path / "resources").mkdir()
+    (tmp_path / "resources" / "link").symlink_to("/etc/passwd")
+    report = check_fmu(tmp_path, CheckOptions(archive=ArchiveLimits()))
+    assert {f.rule for f in report.findings} == {"archive.symlink", "binary.none"}
+    assert not report.executed
+
+
+def test_errors_come_first_and_repeats_go() -> None:
+    warning, error = Finding("file.icon", "model.png", "w"), Finding("model.guid", "", "e")
+    assert ordered([warning, error, warning]) == (error, warning)
+    with pytest.raises(KeyError, match="must be one of RULES"):
+        Finding("no.such-rule", "", "")
+
+
+def test_hostile_names_reach_neither_terminal_nor_junit() -> None:
+    report = FmuFindings("x.fmu", (Finding("archive.odd-name", "a\x1b[31m\nfake: no findings", "<&\"'\x00"),))
+    assert all("\x1b" not in line and "\n" not in line for line in as_lines(report))
+    suite = etree.fromstring(as_junit([report]).encode())[0]
+    assert suite.get("tests") == "1"
+    assert suite.get("failures") == "0"
+
+
+def test_the_documentation_lists_every_rule() -> None:
+    rows = re.findall(r"^\| `([a-z0-9.-]+)` \| (\w+) \| (.+?) \| (.+?) \|$", DOCS.read_text(encoding="utf-8"), re.M)
+    written = {name: (severity, expects, advice) for name, severity, expects, advice in rows}
+    assert written == {name: (r.severity, r.expects, r.advice) for name, r in RULES.items()}
+
+
+@given(st.binary(max_size=300) | st.text(max_size=200).map(lambda t: f"<a b='{t}'/>".encode(errors="replace")))
+@settings(max_examples=200, deadline=None)
+def test_any_bytes_are_xml_or_a_finding(data: bytes) -> None:
+    root, findings = xml_reading.parse(data, "a.xml")
+    assert root is not None or len(findings) == 1
+
+
+_CELL = st.text(st.characters(blacklist_categories=()), max_size=6) | st.floats().map(str)
+
+
+@given(st.lists(st.lists(_CELL, max_size=4), max_size=6), st.binary(max_size=20))
+@settings(max_examples=200, deadline=None)
+def test_any_bytes_are_a_reference_result_or_refused(rows: list[list[str]], tail: bytes) -> None:
+    data = b"time,x\n0,1\n" + "\n".join(",".join(r) for r in rows).encode(errors="replace") + tail
+    try:
+        result = _read_csv("r.csv", data, {"x"})
+    except (ValueError, csv.Error):
+        return
+    assert result.names == ("x",)
+    assert all(len(r) == 2 for r in result.rows)

@@ -1,0 +1,48 @@
+"""Tables on a terminal: side by side where their words fit, else a list; lines end between words."""
+
+import re
+import sys
+
+import pytest
+
+from orchestrator.commands._console import print_blocks, print_table
+
+COLUMNS = ("tool", "version", "wall [s]", "times ours", "note")
+ROWS = [["ours", "0.2.0", "1.25", "1", ""], ["another-tool-of-others", "10.11.12", "12.5", "10", "needs an own Python"]]
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch):
+    def of(width: int) -> None:
+        monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+        monkeypatch.setenv("COLUMNS", str(width))
+
+    return of
+
+
+def test_a_table_that_fits_is_a_table(terminal, capsys: pytest.CaptureFixture[str]) -> None:
+    terminal(80)
+    print_table("Tools", COLUMNS, ROWS)
+    told = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out)
+    assert "┃" in told
+    assert max(len(line.rstrip()) for line in told.splitlines()) <= 80
+
+
+def test_one_that_does_not_is_a_list_of_named_values(terminal, capsys: pytest.CaptureFixture[str]) -> None:
+    terminal(50)
+    print_table("Tools", COLUMNS, ROWS)
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:4] == ["Tools", "ours", "  version     0.2.0", "  wall [s]    1.25"]
+    assert "another-tool-of-others" in lines
+    assert "  note        needs an own Python" in lines
+    assert max(len(line) for line in lines) <= 50
+
+
+def test_lines_end_between_words_on_a_terminal_only(terminal, capsys: pytest.CaptureFixture[str]) -> None:
+    print_blocks(["one two three " * 10])
+    assert capsys.readouterr().out.count("\n") == 1
+    terminal(40)
+    print_blocks(["one two three " * 10])
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 2
+    assert all(len(line) <= 40 for line in lines)

@@ -1,0 +1,229 @@
+"""Foreign FMUs in C against records of independent equations: diagnosed, calibrated, delivered; broken ones refused."""
+
+import dataclasses
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from orchestrator.api.any_fmu import calibrate, diagnose_fmu, draft_map
+from orchestrator.cli import main
+from orchestrator.errors import InputError, OrchestratorError
+from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
+from tests.support.c_fmu import have_compiler
+
+pytestmark = pytest.mark.skipif(not have_compiler(), reason="no C compiler")
+SPRING, TWO_MASS, CIRCUIT, TANKS = DOMAINS
+
+
+@pytest.fixture
+def made(tmp_path):
+    def make(domain, names=(), seed=11, rows=700, fault="", noise=True, **options):
+        case = record(domain, names, np.random.default_rng(seed), rows, **options)
+        return (
+            case,
+            write_record(tmp_path / "record.csv", case),
+            write_fmu(tmp_path / f"{domain.name}.fmu", domain, fault),
+            write_map(tmp_path / "map.toml", domain, noise),
+        )
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("domain", "name", "tolerance"),
+    [
+        (SPRING, "coulomb_friction", 0.02),
+        (TWO_MASS, "input_delay", 0.01),
+        (CIRCUIT, "quadratic_drag", 0.02),
+        (TANKS, "input_saturation", 0.01),
+    ],
+    ids=lambda v: getattr(v, "name", str(v)),
+)
+def test_a_hidden_effect_is_named_with_its_size(made, domain, name, tolerance):
+    case, *files = made(domain, (name,))
+    found = diagnose_fmu(*files)
+    try:
+        assert found.verdict == "effects"
+        assert [f.effect.kind.name for f in found.effects] == [name]
+        assert found.effects[0].estimates[0].value == pytest.approx(case.sizes[0], rel=tolerance)
+        assert max(m.corrected for m in found.outcome.misfit) < 1.3
+    finally:
+        found.close()
+
+
+@pytest.mark.parametrize("disturbance", [0.0, 0.01])
+def test_where_nothing_is_hidden_nothing_is_named(made, disturbance):
+    _, *files = made(SPRING, disturbance=disturbance)
+    found = diagnose_fmu(*files)
+    found.close()
+    assert found.verdict in ("none", "parameters")
+    assert not found.effects
+
+
+def test_a_load_that_comes_is_unknown_and_says_when(made):
+    case, *files = made(SPRING, ("unknown_coming_load",))
+    found = diagnose_fmu(*files)
+    found.close()
+    assert found.verdict == "unknown"
+    assert not found.effects
+    assert found.outcome.where
+    assert case.sizes[0] > 0.0
+
+
+def test_the_command_delivers_a_system_that_reproduces_the_fit(made, tmp_path):
+    _, record_path, fmu, map_path = made(SPRING, ("quadratic_drag",))
+    out = tmp_path / "out"
+    words = ["diagnose", str(record_path), "--fmu", str(fmu), "--map", str(map_path), "--out", str(out)]
+    assert main(words) == 0
+    results = json.loads((out / "diagnose.json").read_text())["results"]
+    assert [e["name"] for e in results["effects"]] == ["quadratic_drag"]
+    assert results["delivery"][0]["difference_over_noise"] < 0.1
+    assert {p.name for p in out.iterdir()} >= {"corrected.ssp", "report.html", "diagnose.csv", "diagnose_signals.png"}
+
+
+def test_calibration_finds_the_parameters_within_their_intervals(made):
+    case, *files = made(TWO_MASS)
+    found = calibrate(*files).calibration
+    assert found.explained
+    for value, estimate in zip(case.parameters, found.parameters, strict=True):
+        assert abs(value - estimate.value) < 4.5 * estimate.standard_error
+        assert found.learned[estimate.name] > 0.5
+
+
+def test_parameters_that_act_as_one_are_named(made, tmp_path):
+    _, record_path, fmu, map_path = made(SPRING)
+    text = map_path.read_text().replace("[parameters]", "[parameters]\n# m, k and c scale with the force")
+    map_path.write_text(text.replace('m = { uncertainty = "5 %" }', "").replace('c = { uncertainty = "5 %" }', ""))
+    found = calibrate(record_path, fmu, map_path).calibration
+    assert [e.name for e in found.parameters] == ["k"]
+
+
+def test_a_drafted_map_can_be_used_as_it_is(made, tmp_path):
+    _, record_path, fmu, _ = made(TWO_MASS)
+    text = draft_map(record_path, fmu)
+    assert 'input = "M"' in text
+    assert 'position = "phi' in text
+    (tmp_path / "drafted.toml").write_text(text)
+    assert calibrate(record_path, fmu, tmp_path / "drafted.toml").calibration.explained
+
+
+@pytest.mark.parametrize(
+    "fault", ["reset_ignored", "reset_refused", "terminate_refused", "input_reversed", "setup_forgets", "stop_told"]
+)
+def test_an_fmu_that_misbehaves_mildly_is_diagnosed_all_the_same(made, fault):
+    _, *files = made(SPRING, ("quadratic_drag",), rows=500, fault=fault)
+    if fault == "input_reversed":
+        text = files[2].read_text().replace('hold = "zero"', 'hold = "zero", factor = -1.0')
+        files[2].write_text(text)
+    found = diagnose_fmu(*files)
+    found.close()
+    assert [f.effect.kind.name for f in found.effects] == ["quadratic_drag"]
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["instantiate_null", "instantiate_crashes", "exits", "init_refused", "nan", "random", "get_refused",
+     "input_refused", "step_crashes", "step_refused", "fatal", "stop_time", "output_stuck", "input_ignored"],
+)  # fmt: skip
+def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault, monkeypatch):
+    monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.LOADING", 8.0)
+    _, *files = made(SPRING, rows=300, fault=fault)
+    if fault in ("output_stuck", "input_ignored"):
+        found = diagnose_fmu(*files)
+        found.close()
+        assert found.verdict == "unknown"
+        return
+    with pytest.raises(OrchestratorError) as caught:
+        diagnose_fmu(*files)
+    assert "\n" not in str(caught.value)
+    assert "Spring.fmu" in str(caught.value)
+
+
+@pytest.mark.parametrize("fault", ["step_hangs", "instantiate_hangs", "reset_hangs"])
+def test_an_fmu_that_hangs_is_ended(made, fault, monkeypatch):
+    monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.LOADING", 3.0)
+    monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.PATIENCE", 2.0)
+    monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.MOST_LOST", 1)
+    _, *files = made(SPRING, rows=300, fault=fault)
+    with pytest.raises(OrchestratorError, match="hangs"):
+        diagnose_fmu(*files)
+
+
+def test_an_fmu_that_is_too_slow_for_its_budget_is_refused_with_an_estimate(made):
+    _, *files = made(SPRING, rows=100, fault="slow")
+    files[2].write_text(files[2].read_text() + "[options]\nbudget = 20\n")
+    with pytest.raises(OrchestratorError, match="a run takes about"):
+        diagnose_fmu(*files)
+
+
+def test_a_search_that_is_cut_short_says_so_and_names_nothing(made):
+    _, *files = made(SPRING, ("quadratic_drag",), rows=300)
+    files[2].write_text(files[2].read_text() + "[options]\nbudget = 0.2\n")
+    found = diagnose_fmu(*files)
+    found.close()
+    assert found.verdict == "unknown"
+    assert not found.effects
+    assert any("cut short" in note for note in found.outcome.warnings)
+
+
+def test_an_fmu_with_a_step_of_its_own_is_stepped_by_it(made):
+    _, *files = made(SPRING, rows=300, fault="own_grid")
+    found = diagnose_fmu(*files)
+    found.close()
+    assert found.outcome.problem.m == 1
+    assert any("step of its own" in note for note in found.outcome.warnings)
+
+
+def test_a_second_record_shows_the_misfit_and_settings_are_followed(made, tmp_path):
+    _, record_path, fmu, map_path = made(SPRING, ("quadratic_drag",), rows=500)
+    other = write_record(tmp_path / "other.csv", record(SPRING, (), np.random.default_rng(3), 400))
+    thresholds = tmp_path / "settings.toml"
+    thresholds.write_text("[search]\nmost = 1\n")
+    out = tmp_path / "out"
+    words = ["diagnose", str(record_path), "--fmu", str(fmu), "--map", str(map_path), "--out", str(out)]
+    assert main([*words, "--validate", str(other), "--settings", str(thresholds)]) == 0
+    results = json.loads((out / "diagnose.json").read_text())["results"]
+    assert results["settings"]["search"]["most"] == 1
+    assert results["validation"]["x"]["corrected"] > 1.5  # it was made without the drag, and with other parameters
+    assert any("second record" in note for note in results["warnings"])
+
+
+def test_an_fmu_that_changes_from_run_to_run_is_made_anew_for_each(made):
+    _, *files = made(SPRING, rows=300, fault="drifts")
+    found = diagnose_fmu(*files)
+    found.close()
+    assert any("new instance" in note for note in found.outcome.warnings)
+
+
+def test_parameters_that_do_nothing_are_left_out(made):
+    _, *files = made(SPRING, rows=300, fault="parameters_ignored")
+    found = diagnose_fmu(*files)
+    found.close()
+    assert any("changes nothing" in note for note in found.outcome.warnings)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: t.replace("k = {", "kk = {"), "did you mean 'k'"),
+        (lambda t: t.replace('"5 %"', '"five"', 1), "uncertainty must be"),
+        (lambda t: t.replace('hold = "zero"', 'hold = "cubic"'), "hold must be"),
+        (lambda t: t.replace('hold = "zero"', 'column = "nothing"'), "no such column"),
+        (lambda t: t + "surprise = 1\n", "unknown field"),
+        (lambda t: t.replace("[inputs]", "[inputs"), "Expected"),
+        (lambda t: t.replace('position = "x"', 'position = "m"'), "causality"),
+    ],
+)
+def test_a_wrong_map_is_refused_in_one_line(made, change, words):
+    _, record_path, fmu, map_path = made(SPRING, rows=300)
+    map_path.write_text(change(map_path.read_text()))
+    with pytest.raises(InputError, match=words) as caught:
+        diagnose_fmu(record_path, fmu, map_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_domains_differ_in_more_than_names():
+    assert len({dataclasses.astuple(d)[0] for d in DOMAINS}) == 4
+    assert shutil.which("cc")

@@ -1,0 +1,72 @@
+"""Effects in series against closed forms, and against the stepping code of the delivered effect FMU."""
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.blackbox import series
+from orchestrator.diagnosis.blackbox.bank import BANK, Effect, Scene
+from orchestrator.diagnosis.blackbox.problem import at_input
+from pyfmu_sources.attachment import SERIES, AttachedEffect
+
+STEP = 0.01
+
+
+@pytest.fixture
+def signal():
+    rng = np.random.default_rng(3)
+    return np.repeat(rng.standard_normal(60), 5)
+
+
+def test_a_delay_of_whole_steps_shifts(signal):
+    late = series.delayed(signal, STEP, 7 * STEP, 0.5)
+    assert late[:7] == pytest.approx(0.5)
+    assert late[7:] == pytest.approx(signal[:-7])
+
+
+def test_a_lag_gives_the_mean_of_the_exponential():
+    out = series.lagged(np.ones(400), STEP, 0.2, 0.0)
+    ends = np.arange(1, 401) * STEP
+    mean = 1.0 - 0.2 / STEP * (np.exp(-(ends - STEP) / 0.2) - np.exp(-ends / 0.2))
+    assert out == pytest.approx(mean, abs=1e-12)
+
+
+def test_a_limited_rate_rises_in_a_straight_line():
+    out = series.rate_limited(np.ones(100), STEP, 2.0, 0.0)
+    assert out[:50] == pytest.approx(2.0 * STEP * (np.arange(50) + 0.5))
+    assert out[51:] == pytest.approx(1.0)
+
+
+def test_an_output_that_is_read_late_follows_a_cubic_exactly():
+    t = np.arange(100) * STEP
+    late = series.later(t**3 - t, STEP, 0.0234)
+    s = t - 0.0234
+    assert late[5:] == pytest.approx((s**3 - s)[5:], abs=1e-12)
+
+
+def test_an_output_behind_a_lag_follows_a_ramp():
+    t = np.arange(500) * STEP
+    out = series.smoothed(t, STEP, 0.1)
+    assert out == pytest.approx(t - 0.1 * (1.0 - np.exp(-t / 0.1)), abs=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "value"), [
+    ("gain", 0.2), ("offset", 0.3), ("delay", 0.0337), ("lag", 0.05), ("saturation", 0.8), ("dead_zone", 0.3),
+    ("rate_limit", 20.0), ("quantisation", 0.25),
+])  # fmt: skip
+def test_the_effect_fmu_does_what_was_fitted(signal, kind, value):
+    for at_rest in (False, True):
+        compare(signal + 0.7, kind, value, at_rest)
+
+
+def compare(signal, kind, value, at_rest):
+    effect = AttachedEffect(instance_name="effect")
+    effect.series, effect.q0, effect.at_rest = SERIES.index(kind), value, at_rest
+    effect.exit_initialization_mode()
+    found = []
+    for k, u in enumerate(signal):
+        effect.signal = float(u)
+        assert effect.do_step(k * STEP, STEP)
+        found.append(effect.result)
+    scene = Scene(STEP, 1.0, 1.0, signal)
+    fitted = at_input(Effect(BANK[f"input_{kind}"], "u", scene, at_rest), signal, STEP, value)
+    assert found == pytest.approx(fitted, abs=1e-9)

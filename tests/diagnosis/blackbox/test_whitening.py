@@ -1,0 +1,47 @@
+"""The surrogate and its filter against what is known exactly."""
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.blackbox.whitening import level, realised
+
+A = np.array([[0.98, 0.05], [-0.3, 0.9]])
+B = np.array([[0.001], [0.05]])
+C = np.array([[1.0, 0.0]])
+
+
+def impulses(n):
+    x, out = B, []
+    for _ in range(n):
+        out.append(C @ x)
+        x = A @ x
+    return np.stack(out)
+
+
+def test_a_linear_system_is_realised_from_its_impulse_response():
+    found = realised(impulses(400))
+    assert found.order == 2
+    assert np.sort_complex(np.linalg.eigvals(found.A)) == pytest.approx(np.sort_complex(np.linalg.eigvals(A)), abs=1e-6)
+
+
+def test_no_response_gives_no_surrogate():
+    assert realised(np.zeros((100, 1, 1))).order == 0
+
+
+@pytest.mark.parametrize("q", [0.02, 0.3])
+def test_what_noise_at_the_port_makes_of_a_response_becomes_white_of_variance_one(q):
+    rng = np.random.default_rng(5)
+    n = 4000
+    x, rows = np.zeros((2, 1)), []
+    for _ in range(n):
+        rows.append(float((C @ x)[0, 0]) * 30.0 + rng.standard_normal())
+        x = A @ x + B * q * rng.standard_normal()
+    found = realised(30.0 * impulses(400))
+    e = level(found, q, 0.0, np.ones(1), n).whiten(np.array(rows)[:, None, None])[:, 0, 0]
+    assert np.mean(e**2) == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / n))
+    assert abs(np.mean(e[1:] * e[:-1])) < 5.0 / np.sqrt(n)
+
+
+def test_without_noise_at_the_port_nothing_is_changed():
+    columns = np.random.default_rng(1).standard_normal((50, 1, 3))
+    assert np.array_equal(level(realised(impulses(100)), 0.0, 0.0, np.ones(1), 50).whiten(columns), columns)

@@ -1,0 +1,312 @@
+"""The rules of the search, one by one, and a small search from start to end."""
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
+from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder, parameter_count
+from orchestrator.diagnosis.search.hidden_gap import at_the_floor
+from orchestrator.diagnosis.search.scene import scene_of
+from orchestrator.diagnosis.search.screening import Guess
+from orchestrator.diagnosis.search.search import Search, in_metres
+from orchestrator.plants.effects import Effect
+from orchestrator.records.columns import Column
+from orchestrator.records.model_file import default_model
+from tests.support.short_records import AXIS, SETTINGS, axis_likelihood, drivetrain_likelihood
+from tests.support.small_search import search_of
+
+SEARCH = SETTINGS.search
+BANK = {effect.label: effect for effect in AXIS.bank}
+PLAIN = BANK["load_torque@load"]  # one parameter, leaves 1 %
+FRICTION = BANK["coulomb_friction@motor"]  # leaves 4 %
+STRIBECK = BANK["stribeck_friction@motor"]  # three parameters
+PARTS = Parts(slice(10, 120), slice(120, 180), slice(180, 240))
+
+
+def candidate(fitted: float, validated: float, *effects: Effect, q: float = 1e-5, settings=SEARCH) -> Candidate:
+    found = Fit(np.zeros(1), q, np.zeros((1, 1)), (), np.zeros((0, 0)), fitted, validated)
+    return Candidate(effects, found, settings)
+
+
+BASE = candidate(0.0, 0.0)
+
+
+# -- candidates --------------------------------------------------------------------------------------------------------
+
+
+def test_each_parameter_costs_its_penalty() -> None:
+    assert parameter_count(candidate(0, 0, PLAIN, STRIBECK)) == 4
+    assert candidate(30.0, 12.0, PLAIN, STRIBECK).score == 42.0 - 4 * 5.0
+    assert candidate(30.0, 12.0, PLAIN).gain_over(candidate(10.0, 4.0, PLAIN)) == 28.0
+    free = msgspec.structs.replace(SEARCH, penalty=0.0)
+    assert candidate(30.0, 12.0, PLAIN, settings=free).score == 42.0
+
+
+@pytest.mark.parametrize(
+    ("fitted", "validated", "pays"),
+    [
+        (10.0, 6.5, True),
+        (8.5, 6.5, False),  # 10.0 in all after the penalty: not more than the least gain
+        (8.6, 6.5, True),
+        (20.0, 6.0, False),  # the deciding part must gain more than 6
+        (20.0, 6.01, True),
+        (5.0, 20.0, False),  # the fitted part must gain more than the penalty
+        (5.01, 20.0, True),
+    ],
+)
+def test_what_an_effect_must_gain(fitted: float, validated: float, pays: bool) -> None:
+    assert candidate(fitted, validated, PLAIN).pays_over(BASE, BASE) is pays
+
+
+def test_more_must_be_gained_above_measurement_noise() -> None:
+    assert candidate(15.0, 11.0, PLAIN, q=1e-4).pays_over(BASE, BASE)
+    assert not candidate(15.0, 11.0, PLAIN, q=1.1e-4).pays_over(BASE, BASE)
+    assert not candidate(15.0, 12.0, PLAIN, q=1.1e-4).pays_over(BASE, BASE)
+    assert candidate(15.0, 12.1, PLAIN, q=1.1e-4).pays_over(BASE, BASE)
+
+
+def test_a_later_effect_must_gain_more_than_earlier_laws_may_leave() -> None:
+    """Friction's law leaves 4 % of what it gained over the base: 40 of 1000."""
+    before = candidate(700.0, 300.0, FRICTION)
+    assert not candidate(725.0, 320.0, FRICTION, PLAIN).pays_over(before, BASE)
+    assert candidate(725.1, 320.0, FRICTION, PLAIN).pays_over(before, BASE)
+    exact = candidate(700.0, 300.0, PLAIN)  # 1 %: the least gain of 10 counts
+    assert candidate(708.0, 308.0, PLAIN, FRICTION).pays_over(exact, BASE)
+    better_base = candidate(400.0, 200.0)
+    assert candidate(712.0, 310.0, FRICTION, PLAIN).pays_over(before, better_base)
+
+
+def test_what_replaces_a_simpler_law_pays_for_its_further_parameters() -> None:
+    before = candidate(100.0, 50.0, FRICTION)
+    assert not candidate(110.0, 90.0, STRIBECK).pays_over(before, BASE)
+    assert candidate(110.1, 90.0, STRIBECK).pays_over(before, BASE)
+    fewer = candidate(100.0, 50.0, STRIBECK)
+    assert candidate(105.1, 66.0, FRICTION).pays_over(fewer, BASE)
+    assert not candidate(105.0, 66.0, FRICTION).pays_over(fewer, BASE)
+
+
+def test_what_is_gained_where_it_was_fitted_must_hold_elsewhere() -> None:
+    assert candidate(100.0, 8.1, PLAIN).holds_over(BASE)
+    assert not candidate(100.0, 8.0, PLAIN).holds_over(BASE)
+    assert candidate(200.0, 108.1, PLAIN).holds_over(candidate(100.0, 100.0))
+
+
+def test_impacts_keep_the_process_noise_up() -> None:
+    levels = [1.0, 0.1, 1e-2, 1e-3, 1e-4]
+    gap = next(e for e in drivetrain_likelihood(20)[0].plant.bank if e.name == "backlash")
+    assert ladder(levels, (), 1.0) == levels
+    assert ladder(levels, (PLAIN,), 1e-4) == levels
+    assert ladder(levels, (gap, PLAIN), 1.0) == levels[:4]
+    assert ladder(levels, (gap,), 1e-3) == levels[:4]
+    assert ladder(levels, (gap,), 1e-4) == levels
+
+
+# -- the search --------------------------------------------------------------------------------------------------------
+
+
+def labels(effects) -> set[str]:
+    return {effect.label for effect in effects}
+
+
+def test_which_effects_may_be_added() -> None:
+    likelihood, _ = axis_likelihood()
+    search = search_of(likelihood)
+    everything = labels(AXIS.bank)
+    assert labels(search.eligible(BASE)) == everything - {STRIBECK.label}
+    assert labels(search.eligible(candidate(0, 0, PLAIN))) == everything - {STRIBECK.label, PLAIN.label}
+    assert FRICTION.label not in labels(search.eligible(candidate(0, 0, STRIBECK)))
+    metric = replace(search.model, columns={"theta_m": Column("x", "mm")})
+    assert in_metres(metric)
+    assert not in_metres(search.model)
+    assert not in_metres(replace(search.model, columns={"theta_m": Column("x", "deg")}))
+    assert "gravity_load@load" not in labels(replace(search, model=metric).eligible(BASE))
+
+
+def test_offsets_between_encoders_need_both() -> None:
+    for channels, seen in ((1, False), (2, True)):
+        likelihood, _ = drivetrain_likelihood(40, channels=channels)
+        search = Search(likelihood, default_model(), PARTS, 4)
+        assert ("sensor_offset@load" in labels(search.eligible(BASE))) is seen
+
+
+def guesses(**gains: float) -> list:
+    falling = sorted(gains.items(), key=lambda pair: -pair[1])
+    return [(replace(PLAIN, name=name), (Guess({}, gain),)) for name, gain in falling]
+
+
+def test_the_shortlist_holds_what_promises_enough() -> None:
+    likelihood, _ = axis_likelihood()
+    search = search_of(likelihood, shortlist=3)
+    names = lambda found: [effect.name for effect, _ in found]  # noqa: E731
+    assert names(search.shortlist(guesses(a=10, b=1000, c=40, d=31))) == ["b", "c", "d"]
+    assert names(search.shortlist(guesses(b=1000, c=30, d=31))) == ["b", "d"]  # 3 % of 1000
+    assert names(search.shortlist(guesses(a=20, b=3, c=3.1))) == ["a", "c"]
+    assert names(search.shortlist(guesses(a=1, b=2))) == ["b"]  # the best is always fitted
+    assert search.shortlist([]) == []
+
+
+def test_free_parameters_of_a_model() -> None:
+    likelihood, _ = axis_likelihood()
+    search = search_of(likelihood)
+    model = fit(likelihood, likelihood.nominal, 0.01, (), PARTS)
+    scene = scene_of(likelihood, model)
+    linear = search.linear()
+    assert [AXIS.names[entry.place] for entry in linear] == ["J", "b"]
+    assert linear[0].prior == (1.0, pytest.approx(0.1 / np.sqrt(3.0)))
+    free = search.free((FRICTION,), scene)[2:]
+    assert [AXIS.names[entry.place] for entry in free] == ["effects.coulomb_friction.motor.torque", "presliding.motor"]
+    assert free[0].scale == pytest.approx(0.01 * scene.torque)
+    assert free[1].prior is not None
+    assert free[1].scale == 0.2
+    ripple = search.free((BANK["torque_ripple@motor"],), scene)
+    low = next(entry for entry in ripple if AXIS.names[entry.place].endswith("cycles_per_rev"))
+    assert low.minimum == pytest.approx(0.7 / scene.turns)
+    assert search.refitted == [AXIS.index("J"), AXIS.index("b")]
+    p = likelihood.nominal.copy()
+    p[AXIS.index("effects.load_torque.torque")] = 3.0
+    assert np.array_equal(search.without(p, PLAIN), likelihood.nominal)
+
+
+@pytest.fixture(scope="module")
+def friction():
+    likelihood, p = axis_likelihood(effects__coulomb_friction__motor__torque=0.8, J=1.04)
+    done = []
+    search = search_of(likelihood, noise_levels=7, first_level=3, shortlist=2, most_effects=2)
+    search.progress = lambda *values: done.append(values)
+    return search, p, *search.run(), done
+
+
+def test_a_search_finds_what_is_hidden_and_stops(friction) -> None:
+    search, p, base, best, done = friction
+    assert base.effects == ()
+    assert labels(best.effects) == {"coulomb_friction@motor"}
+    for name in ("effects.coulomb_friction.motor.torque", "J"):
+        assert best.fit.p[AXIS.index(name)] == pytest.approx(AXIS.value(p, name), rel=0.02)
+    assert [step.accepted for step in search.steps] == [True, False]
+    assert search.steps[0].before is base
+    assert search.steps[1].before.effects == best.effects
+    for step in search.steps:
+        scores = [c.score for c in step.candidates]
+        assert scores == sorted(scores, reverse=True)
+    assert [entry[0] for entry in done] == list(range(1, len(done) + 1))
+    assert done[0][2] == "parameters"
+    assert all(expected > number for number, expected, _ in done)
+
+
+def test_at_most_so_many_effects_are_named(friction) -> None:
+    search = replace(friction[0], most=0, steps=[])
+    base, best = search.run()
+    assert best is base
+    assert search.steps == []
+
+
+def test_a_search_whose_time_is_up_stops_with_what_it_has(friction) -> None:
+    search = replace(friction[0], steps=[], deadline=0.0)
+    base, best = search.run()
+    assert search.stopped
+    assert best is base
+    assert not friction[0].stopped
+
+
+def test_a_search_without_anything_hidden_names_nothing() -> None:
+    likelihood, _ = axis_likelihood(J=1.03)
+    search = search_of(likelihood, noise_levels=7, first_level=3, shortlist=2)
+    base, best = search.run()
+    assert best is base
+    assert len(search.steps) == 1
+
+
+def test_superfluous_effects_are_taken_out(friction) -> None:
+    search, _, base, best, _ = friction
+    fitted = best.fit
+    scene = scene_of(search.likelihood, fitted)
+    both = (PLAIN, FRICTION)
+    start = PLAIN.put(AXIS, fitted.p, {"torque": 0.05}, ())
+    level = search.likelihood.settings.levels[-1]
+    fitted = annealed(search.likelihood, start, level, search.free(both, scene), PARTS, both)
+    double = search.candidate(both, fitted)
+    pruned = search.prune(double, base)
+    assert labels(pruned.effects) == {FRICTION.label}
+    assert pruned.fit.p[AXIS.index("effects.load_torque.torque")] == 0.0
+    reduced = search.reduced(double, scene, PLAIN)
+    assert labels(reduced.effects) == {FRICTION.label}
+    needed = search.candidate((FRICTION, PLAIN), double.fit)
+    assert labels(search.prune(needed, base).effects) == labels(both)
+
+
+def test_a_law_that_contains_another_is_tried_where_that_pays(friction) -> None:
+    search, _, base, best, _ = friction
+    scene = scene_of(search.likelihood, best.fit)
+    tried = search.refined((), best, base, scene)
+    assert all(labels(c.effects) == {STRIBECK.label} for c in tried)
+    assert search.refined((), base, base, scene) == []
+    found = search.refine(best, FRICTION, STRIBECK, scene)
+    assert found is None or found.fit.p[AXIS.index("effects.coulomb_friction.motor.torque")] == 0.0
+    implausible = replace(STRIBECK, plausible=lambda values: False)
+    assert search.refine(best, FRICTION, implausible, scene) is None
+
+
+def test_what_fails_to_decide_is_fitted_to_both_parts(friction) -> None:
+    search, _, base, best, _ = friction
+    assert search.rescued(best, base, base) is best  # it pays already
+    weak = search.candidate(best.effects, replace(best.fit, fitted=base.fit.fitted + 59.0, validated=-1e6))
+    assert search.rescued(weak, base, base) is weak
+    short = replace(best.fit, fitted=base.fit.fitted + 70.0, validated=base.fit.validated - 500.0)
+    failing = search.candidate(best.effects, short)
+    again = search.rescued(failing, base, base)
+    assert again.score >= failing.score
+    whole = again.fit.fitted + again.fit.validated
+    assert whole == pytest.approx(best.fit.fitted + best.fit.validated, abs=40.0)
+
+
+def test_an_error_in_a_thread_stops_the_search() -> None:
+    likelihood, _ = axis_likelihood()
+    search = search_of(likelihood)
+
+    def fails(item):
+        raise KeyError(item)
+
+    with pytest.raises(KeyError):
+        search._each(fails, [1, 2])
+    assert search.likelihood._halted.is_set()
+    assert search_of(axis_likelihood()[0])._each(lambda n: n * n, [3, 1, 2]) == [9, 1, 4]
+
+
+# -- a gap without an encoder behind it --------------------------------------------------------------------------------
+
+
+def hidden_search(likelihood, model):
+    return Search(likelihood, model, PARTS, 4)
+
+
+def test_the_ratio_is_not_fitted_from_one_side() -> None:
+    names = []
+    for channels in (1, 2):
+        likelihood, _ = drivetrain_likelihood(size=240, channels=channels)
+        search = hidden_search(likelihood, default_model())
+        names.append({search.plant.names[entry.place] for entry in search.linear()})
+    assert names[1] - names[0] == {"i"}
+
+
+def test_no_gap_is_looked_for_where_all_is_measured_or_explained(monkeypatch) -> None:
+    called = []
+    monkeypatch.setattr("orchestrator.diagnosis.search.search.gap_of_the_estimator", lambda *_: called.append(1))
+    for channels, at_floor, expected in ((2, False, 0), (1, True, 0), (1, False, 1)):
+        monkeypatch.setattr("orchestrator.diagnosis.search.search.at_the_floor", lambda *_, known=at_floor: known)
+        likelihood, p = drivetrain_likelihood(size=240, channels=channels)
+        search = hidden_search(likelihood, default_model())
+        base = search.candidate((), fit(likelihood, p, 1e-3, (), PARTS))
+        called.clear()
+        assert search.hidden_gap(base) is None
+        assert len(called) == expected
+
+
+def test_what_a_model_leaves_above_the_noise_is_not_at_the_floor() -> None:
+    likelihood, p = drivetrain_likelihood(size=240, channels=1)
+    assert at_the_floor(likelihood, fit(likelihood, p, likelihood.settings.levels[-1], (), PARTS), PARTS.fitted)
+    wrong = p.copy()
+    wrong[likelihood.plant.index("k")] *= 0.5
+    assert not at_the_floor(likelihood, fit(likelihood, wrong, 1e-3, (), PARTS), PARTS.fitted)

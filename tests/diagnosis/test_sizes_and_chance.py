@@ -1,0 +1,141 @@
+"""Standard errors under a colour, sizes on which fits disagree, harm by chance, and signals that a log has shifted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from orchestrator.diagnosis.fit.fitting import Free, Parts, fit
+from orchestrator.diagnosis.fit.record_likelihood import Signals
+from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized
+from orchestrator.diagnosis.outcome import Misfit
+from orchestrator.diagnosis.proof.horizons import Horizons
+from orchestrator.diagnosis.verdict.chance import torque_noise
+from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
+from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED, Proof, doubts, is_unknown
+from orchestrator.diagnosis.verdict.remainder import Remainder
+from orchestrator.plants.known.drivetrain import PLANT
+from orchestrator.plants.measurement import LEAD, SHIFT
+from orchestrator.records.model_file import default_model
+from orchestrator.shared.inference.long_run import long_run_covariance
+from tests.support.short_records import SETTINGS, axis_likelihood, drivetrain_likelihood
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.8])
+def test_the_covariance_of_a_sum_is_that_of_a_first_order_process(pole: float) -> None:
+    terms = lfilter([1.0], [1.0, -pole], np.random.default_rng(3).standard_normal((2, 20_000)), axis=1).T
+    found = long_run_covariance(terms)
+    assert np.diag(found) == pytest.approx(20_000 / (1.0 - pole) ** 2, rel=0.25)
+    assert abs(found[0, 1]) < 0.15 * found[0, 0]
+
+
+def test_white_innovations_have_nothing_to_dispute() -> None:
+    likelihood, _ = axis_likelihood()
+    free = (Free(likelihood.plant.index("b"), 0.01, 0.0, 10.0),)
+    parts = Parts(slice(10, 160), slice(160, 200), slice(200, likelihood.stop))
+    found = fit(likelihood, likelihood.nominal, 1e-3, free, parts, most=0)
+    same = sized(likelihood, found, parts, (), (1e-3,))
+    assert same.disputed == ()
+    assert np.array_equal(same.fit.p, found.p)
+    robust = _with_robust_errors(likelihood, found, parts.fitted)
+    assert robust.standard_error(free[0].place) == pytest.approx(found.standard_error(free[0].place), rel=1.0)
+
+
+def horizons(errors: list[float], squares: np.ndarray | None = None) -> Horizons:
+    """Four horizons of one encoder; the third is of runs, the last of the whole part."""
+    values = np.array(errors)[:, None]
+    steps = tuple(np.full((40, 1), e**2) for e in errors[:3]) if squares is None else (squares,) * 3
+    return Horizons(
+        ("one sample", "50 ms", "500 ms", "whole part"), values, np.full((4, 1), 9.0), np.array([0.99]),
+        np.array([0.01]), steps, ((),), SETTINGS.proof.horizons,
+    )  # fmt: skip
+
+
+def test_harm_over_the_whole_is_what_chance_does_not_explain() -> None:
+    before, after = horizons([0.1, 0.2, 0.3, 1.0]), horizons([0.1, 0.2, 0.3, 1.2])
+    assert after.harm_over(before) == ("whole part",)
+    assert after.harm_over(before, lambda mine, theirs: np.array([0.5])) == ()
+    assert after.harm_over(before, lambda mine, theirs: np.array([0.3])) == ("whole part",)
+
+
+def test_harm_of_many_starts_must_stand_out_of_their_scatter() -> None:
+    rng = np.random.default_rng(1)
+    noisy = rng.chisquare(1, (60, 1))
+    small, large = noisy + 0.02 * rng.standard_normal((60, 1)) + 1e-3, noisy + 0.5
+    errors = [1.0, 1.0, 1.0, 1.0]
+    worse = [1.02, 1.02, 1.02, 1.0]
+    assert horizons(worse, small).harm_over(horizons(errors, noisy)) == ()
+    assert horizons(worse, large).harm_over(horizons(errors, noisy)) == ("one sample", "50 ms", "500 ms")
+
+
+def test_pulses_are_outweighed_by_skill_at_every_horizon_only() -> None:
+    base = horizons([0.1, 1.0, 1.0, 1.0])
+    left = Remainder(100.0, 0.0, 1.0, (), tails=9.0)
+    even, late = (Proof(base, horizons([0.1, short, 0.1, 0.1])) for short in (0.1, 0.9))
+    assert not is_unknown(left, True, even, True, False, SETTINGS.verdict)
+    assert is_unknown(left, True, late, True, False, SETTINGS.verdict)
+
+
+def test_doubts_are_listed_once_and_worst_first() -> None:
+    base = horizons([0.1, 1.0, 1.0, 1.0])
+    misfit = (Misfit("theta_m", "rad", 0.1, (("nominal", 2.0), ("parameters", 0.4))),)
+    left = Remainder(0.0, 1.0, 1.0, ())
+    trust = doubts("unknown", left, False, Proof(base, base), ["J"], misfit, ["a note"], SETTINGS.verdict)
+    assert trust.level.word == "red"
+    assert trust.reasons[0] == UNEXPLAINED
+    assert trust.reasons[1:3] == ("a note", "the misfit of theta_m on held-out data is 4.0 times the noise")
+    assert any("`J` lies far outside" in reason for reason in trust.reasons)
+
+
+def test_torque_noise_passes_the_lag_of_the_drive() -> None:
+    likelihood, _ = drivetrain_likelihood()
+    free = (Free(likelihood.plant.index("b_m"), 0.01, 0.0, 10.0),)
+    part = slice(20, likelihood.stop)
+    model = fit(likelihood, likelihood.nominal, 1e-2, free, Parts(part, part, part), 1)
+    noise = torque_noise(likelihood, model, part, likelihood.nominal)
+    assert noise.torque.mean() == pytest.approx(0.0, abs=1e-12)
+    wanted = np.sin(0.3 * np.arange(50))
+    pole = np.exp(-likelihood.signals.h / likelihood.plant.value(model.p, "tau"))
+    passed = lfilter([0.0, 1.0 - pole], [1.0, -pole], noise._requested(wanted), zi=[wanted[0]])[0]
+    assert passed == pytest.approx(wanted, abs=1e-9)
+    still = replace(noise, torque=np.zeros(10))
+    outputs = np.zeros((20, 2))
+    start = np.zeros(8)
+    quiet = still.drift(start, outputs, slice(0, 20), 0)
+    assert noise.drift(start, outputs, slice(0, 20), 0) != pytest.approx(quiet, abs=1e-15)
+
+
+def test_a_shifted_log_is_put_right() -> None:
+    t = np.arange(400)
+    h, late, lead = 0.005, 1.3, 2.25
+    load = np.sin(0.1 * (t - late))
+    signals = Signals(
+        np.column_stack([np.sin(0.1 * t), load]), np.where(t < 200, 1.0, 3.0), h, 2, np.full(2, 1e-4), 1.0
+    )  # fmt: skip
+    p = PLANT.extended([entry.default for entry in PLANT.table])
+    assert signals.aligned(PLANT, p) is signals
+    p[PLANT.index(SHIFT.name)], p[PLANT.index(LEAD.name)] = late * h, lead * h
+    found = signals.aligned(PLANT, p)
+    assert found.y[10:-10, 1] == pytest.approx(np.sin(0.1 * t[10:-10]), abs=2e-5)
+    assert np.array_equal(found.y[:, 0], signals.y[:, 0])
+    assert found.u[196:200].tolist() == [1.0, 1.5, 3.0, 3.0]
+    assert found.u.sum() == pytest.approx(signals.u.sum() + 2.25 * 2.0)
+
+
+def test_one_gain_is_likelier_than_many_values_off_by_one_factor() -> None:
+    model = default_model()
+    nominal = model.plant.extended(model.values)
+    assert gain_of(model, nominal, SETTINGS.verdict) is None
+    carriers = ("J_m", "J_l", "k", "c", "b_m", "b_l")
+    p, one = nominal.copy(), nominal.copy()
+    for name in carriers:
+        p[model.plant.index(name)] /= 0.89
+    one[model.plant.index("k")] /= 0.89
+    gain = gain_of(model, p, SETTINGS.verdict)
+    assert gain is not None
+    assert gain.value == pytest.approx(0.89, abs=0.02)
+    assert as_nuisance(gain).parameters["gain"].interval[0] < 0.89 < as_nuisance(gain).parameters["gain"].interval[1]
+    assert far_off(model, p, SETTINGS.verdict) == []
+    assert gain_of(model, one, SETTINGS.verdict) is None
+    assert far_off(model, one, SETTINGS.verdict) == ["k"]

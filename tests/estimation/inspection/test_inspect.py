@@ -1,0 +1,99 @@
+"""``inspect``, and the way of a drive's log from nothing but the file to the half-gap."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import orchestrator as oc
+from orchestrator.cli import main
+from orchestrator.estimation.inspection.channels import channels_of, delay_between
+from orchestrator.records.model_file import read_model
+from orchestrator.records.record import record_from_columns
+from tests.support.drive_record import COUNTS, HALF_GAP, RATED, write_log
+from tests.support.independent_plant import make_record, write_csv
+
+
+@pytest.fixture(scope="module")
+def columns() -> dict[str, np.ndarray]:
+    return make_record({"alpha": 0.01}, seed=3, duration=6.0)[0]
+
+
+def test_channels_say_what_they_are_rounded_to_and_where_they_end(columns) -> None:
+    clipped = dict(columns) | {"u": np.clip(columns["u"], -50.0, 50.0)}
+    torque, motor, _ = channels_of(record_from_columns(clipped, "clipped"))
+    assert (torque.least, torque.most) == (-50.0, 50.0)
+    assert torque.saturated > 0.1
+    assert motor.count == pytest.approx(2.0 * np.pi / 10_000, rel=1e-3)
+    assert motor.saturated < 0.01
+
+
+def test_a_late_load_encoder_is_measured() -> None:
+    columns = make_record({"alpha": 0.01}, seed=3, duration=20.0)[0]
+    late = dict(columns) | {"theta_l": np.concatenate([columns["theta_l"][:1].repeat(6), columns["theta_l"][:-6]])}
+    plain, delayed = (delay_between(record_from_columns(table, "r")) for table in (columns, late))
+    assert plain is not None
+    assert delayed is not None
+    assert delayed[0] - plain[0] == pytest.approx(0.03, abs=0.003)
+
+
+def test_a_record_of_one_flank_shows_no_gap(columns, tmp_path: Path) -> None:
+    still = dict(columns) | {"u": 1e-6 * columns["u"]}
+    weak = oc.inspect(record_from_columns(still, "weak"), oc.read_model())
+    strong = oc.inspect(record_from_columns(columns, "strong"))
+    assert strong.smallest_gap <= 0.001
+    assert weak.smallest_gap > 0.01
+
+
+def test_from_a_drives_log_to_its_half_gap(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """One look, one edit of the model file that it leaves, one estimate."""
+    log, first, second = tmp_path / "drive.csv", tmp_path / "seen", tmp_path / "gap"
+    write_log(log)
+    assert main(["inspect", str(log), "--out", str(first)]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "100 N.m at 100 % of u" in told
+    text = (first / "model.toml").read_text()
+    assert text.count("ASSUMED: put in the drive's") == 4
+    assert float(re.search(r"\[parameters.i\]\nvalue = (\S+)", text)[1]) == pytest.approx(
+        20.0 * COUNTS[0] / COUNTS[1], rel=1e-3
+    )
+    model = tmp_path / "model.toml"
+    model.write_text(_edited(text))
+    read_model(model)
+    assert main(["estimate", str(log), "--model", str(model), "--no-diagnose", "--out", str(second)]) == 0
+    result = json.loads((second / "estimate.json").read_text())["results"]
+    assert result["alpha"] == pytest.approx(HALF_GAP, rel=5e-3)
+    assert result["interval"][0] < HALF_GAP < result["interval"][1]
+
+
+def _edited(text: str) -> str:
+    """Put what the data sheet says in place of what was assumed."""
+    sheet = {"J_m": 0.0041, "J_l": 1.85, "k": 8800.0, "c": 4.0, "b_m": 0.006, "b_l": 2.0, "i": 20.0, "tau": 0.004}
+    spread = {"c": 0.3, "b_m": 0.3, "b_l": 0.3, "tau": 0.1, "i": 0.0}
+    text = re.sub(r"rated_value = \S+", f"rated_value = {RATED}", text)
+    text = re.sub(r"rate = 1000\b", "rate = 500", text)
+    for name, counts in zip(("theta_m", "theta_l"), COUNTS, strict=True):
+        text = re.sub(rf"(?s)(\[columns\.{name}\].*?counts_per_rev = )\S+", rf"\g<1>{counts}", text, count=1)
+    for name, value in sheet.items():
+        share = spread.get(name, 0.05)
+        text = re.sub(
+            rf"(\[parameters\.{name}\]\nvalue = )\S+(.*\nrelative_uncertainty = )\S+",
+            rf"\g<1>{value}\g<2>{share}",
+            text,
+        )
+    return text
+
+
+def test_the_page_and_the_picture_are_written(columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = tmp_path / "data.csv", tmp_path / "out"
+    write_csv(path, columns)
+    assert main(["inspect", str(path), "--out", str(out)]) == 0
+    assert "Model file to start from" in capsys.readouterr().out
+    assert (out / "inspect_record.png").stat().st_size > 10_000
+    assert "Inspection of a record" in (out / "report.html").read_text()
+    seen = json.loads((out / "inspect.json").read_text())["results"]
+    assert seen["smallest_gap"] <= 0.001
+    starter = read_model(out / "model.toml")
+    assert starter.parameters["J_l"].value == pytest.approx(5.6)

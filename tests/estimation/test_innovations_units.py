@@ -1,0 +1,133 @@
+"""The estimator's filter against the joint normal distribution of a whole record, and against the exact plant."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.stats import multivariate_normal
+
+from orchestrator.estimation.innovations import FADING, Innovations, NoiseLevels, affine_model, innovations, simulate
+from pyfmu_sources import contact, drivetrain
+from pyfmu_sources import drivetrain_parameters as dt
+
+H = 0.005
+U = np.where(np.arange(30) % 10 < 5, 40.0, -40.0)
+NOISE = NoiseLevels((3e-4, 1.5e-4), (0.2, 0.5))
+START = np.array([0.1, 0.5, 0.02, 0.1, 2.0])
+
+
+def joint(y: np.ndarray, p: tuple[float, ...]) -> float:
+    """Return twice the negative log density of a record, without 2 pi, from its mean and covariance as a whole."""
+    model = affine_model(p)
+    A, b, outputs = model.matrices[2], model.inputs, y.shape[1]
+    block = np.zeros((6, 6))
+    block[:5, :5], block[:5, 5] = A * H, b * H
+    step = expm(block)
+    phi, drive = step[:5, :5], step[:5, 5]
+    Q = np.zeros((5, 5))
+    for body, row in enumerate((0, 2)):
+        q = (NOISE.torque[body] * model.mobility[body]) ** 2
+        Q[row : row + 2, row : row + 2] = q * np.array([[H**3 / 3.0, H**2 / 2.0], [H**2 / 2.0, H]])
+    C = np.eye(5)[[0, 2][:outputs]]
+    n = len(y)
+    mean, covariances = [START], [np.zeros((5, 5))]
+    for k in range(n - 1):
+        mean.append(phi @ mean[-1] + drive * U[k])
+        covariances.append(phi @ covariances[-1] @ phi.T + Q)
+    whole = np.zeros((n * outputs, n * outputs))
+    for j in range(n):
+        forward = covariances[j]
+        for k in range(j, n):
+            rows, columns = slice(k * outputs, (k + 1) * outputs), slice(j * outputs, (j + 1) * outputs)
+            whole[rows, columns] = C @ forward @ C.T
+            whole[columns, rows] = whole[rows, columns].T
+            forward = phi @ forward
+    whole += np.kron(np.eye(n), np.diag(np.array(NOISE.measured[:outputs]) ** 2))
+    centre = np.concatenate([C @ x for x in mean])
+    density = multivariate_normal(centre, whole, allow_singular=False).logpdf(y.ravel())
+    return float(-2.0 * density - y.size * np.log(2.0 * np.pi))
+
+
+@pytest.mark.parametrize("outputs", [1, 2])
+def test_the_deviance_is_that_of_the_whole_record(outputs: int) -> None:
+    p = dt.parameters(alpha=0.0)
+    model = affine_model(p)
+    rng = np.random.default_rng(1)
+    exact = simulate(model, U, H, START)[: len(U), [0, 2][:outputs]]
+    y = exact + 1e-3 * rng.standard_normal(exact.shape)
+    found = innovations(model, U, y, H, START, NOISE)
+    assert found.deviance == pytest.approx(joint(y, p), rel=1e-9)
+
+
+def test_the_deviance_counts_variance_and_error_alike() -> None:
+    errors, variances = np.array([[1.0, 2.0]]), np.array([[4.0, 0.5]])
+    found = Innovations(errors, variances, np.empty((0, 5)), np.empty(0, dtype=np.int64))
+    assert found.deviance == pytest.approx(np.log(4.0) + np.log(0.5) + 1.0 / 4.0 + 4.0 / 0.5)
+
+
+def test_without_noise_in_the_torque_errors_are_those_of_the_exact_plant() -> None:
+    p = dt.parameters(alpha=0.004)
+    torque = np.repeat([60.0, -60.0, 60.0], 40)
+    x = contact.consistent_start((0.0,) * 8, p)
+    mode = drivetrain.initial_mode(x, p)
+    states, whole = [], drivetrain.prepare(p, H)
+    for u in torque:
+        states.append(x)
+        x, mode = drivetrain.advance(x, mode, p, float(u), 0.0, H, whole)
+    exact = np.array(states)
+    y = exact[:, [0, 2]] + [[1e-4, -2e-4]]
+    found = innovations(affine_model(p), torque, y, H, np.zeros(5), NoiseLevels((1e-3, 1e-3), (0.0, 0.0)), keep=True)
+    assert np.allclose(found.errors, [[1e-4, -2e-4]], atol=1e-9)
+    assert np.allclose(found.variances, 1e-6, atol=1e-15)
+    assert np.allclose(found.states, exact[:, :5], atol=1e-7)
+    twist = exact[:, 0] / p[dt.P_I] - exact[:, 2]
+    clear = np.abs(np.abs(twist) - 0.004) > 1e-6
+    flank = np.where(twist > 0.004, 1, np.where(twist < -0.004, -1, 0))
+    assert np.array_equal(found.contacts[clear], flank[clear])
+    assert {-1, 0, 1} <= set(found.contacts.tolist())
+    assert np.allclose(simulate(affine_model(p), torque, H, np.zeros(5))[: len(y)], exact[:, :5], atol=1e-9)
+
+
+def test_nothing_is_kept_unless_asked_for() -> None:
+    found = innovations(affine_model(dt.parameters()), U, np.zeros((30, 1)), H, START, NOISE)
+    assert found.states.shape == (0, 5)
+    assert found.contacts.shape == (0,)
+    assert found.errors.shape == (30, 1)
+
+
+def test_modes_by_hand() -> None:
+    p = dt.parameters(alpha=0.01, J_m=0.5, J_l=5.0, k=3000.0, c=2.0, b_m=0.1, b_l=1.0, i=4.0, tau=0.5)
+    model = affine_model(p)
+    assert np.allclose(model.matrices[2][1], [-3000 / (0.5 * 16), -(2 / 16 + 0.1) / 0.5, 3000 / (0.5 * 4), 1.0, 2.0])
+    assert np.allclose(model.matrices[2][3], [3000 / (5 * 4), 2 / (5 * 4), -600.0, -0.6, 0.0])
+    assert np.allclose(model.matrices[1][1], [0.0, -0.2, 0.0, 0.0, 2.0])
+    assert np.allclose(model.matrices[0], model.matrices[2])
+    assert np.allclose(model.constants[2], [0.0, 3000 * 0.01 / 4 / 0.5, 0.0, -3000 * 0.01 / 5, 0.0])
+    assert np.allclose(model.constants[0], -model.constants[2])
+    assert np.allclose(model.constants[1], 0.0)
+    assert np.allclose(model.inputs, [0, 0, 0, 0, 2.0])
+    assert np.allclose(model.normal, [0.25, 0, -1, 0, 0])
+    assert np.allclose(model.mobility, [2.0, 0.2])
+    assert model.alpha == 0.01
+
+
+def test_dry_friction_is_not_seen() -> None:
+    rough = dt.with_values(
+        dt.parameters(alpha=0.01), {f"effects.coulomb_friction.{s}.torque": 2.0 for s in ("motor", "load")}
+    )
+    smooth, seen = affine_model(dt.parameters(alpha=0.01)), affine_model(rough)
+    assert np.array_equal(seen.constants, smooth.constants)
+    assert np.array_equal(seen.matrices, smooth.matrices)
+
+
+def test_the_impulse_of_a_contact_fades_with_the_gap() -> None:
+    wide = affine_model(dt.parameters(alpha=1.0), 3.0).jump
+    assert wide == pytest.approx([0.0, 3.0 / 0.4 / 3.984, 0.0, -3.0 / 5.6, 0.0], rel=1e-5)
+    narrow = affine_model(dt.parameters(alpha=FADING), 3.0).jump
+    assert narrow == pytest.approx(wide / np.sqrt(2.0), rel=1e-5)
+    assert not affine_model(dt.parameters(alpha=0.0), 3.0).jump.any()
+
+
+def test_blurred_flanks_change_what_is_expected() -> None:
+    p, y = dt.parameters(alpha=0.004), np.zeros((30, 2))
+    sharp, soft = (innovations(affine_model(p), U, y, H, START, NOISE, soft=soft) for soft in (False, True))
+    assert not np.allclose(sharp.errors, soft.errors, atol=1e-6)

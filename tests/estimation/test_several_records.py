@@ -1,0 +1,83 @@
+"""Several records of one machine together, and records with missing samples."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.estimation import cramer_rao, maximum_likelihood
+from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.problem import make_problem
+from orchestrator.estimation.protocol import TimeLimitError
+from orchestrator.records.model_file import default_model
+from orchestrator.records.record import Record, record_from_columns
+from tests.support.independent_plant import make_record
+
+MODEL = default_model()
+ALPHA = 0.01
+
+
+@pytest.fixture(scope="module")
+def made() -> list[tuple[dict[str, np.ndarray], dict]]:
+    return [
+        make_record({"alpha": ALPHA}, 40 + k, 5.0, 200.0, 0.0, "multisine", (1e-4, 1e-4), None, "dead_zone")
+        for k in range(2)
+    ]
+
+
+@pytest.fixture(scope="module")
+def records(made) -> list[Record]:
+    return [record_from_columns(columns, f"record {k}") for k, (columns, _) in enumerate(made)]
+
+
+def test_two_records_give_the_standard_error_that_theory_promises(made, records) -> None:
+    result = maximum_likelihood.estimate(records[0], MODEL, more=records[1:])
+    values = cramer_rao.truth_values(made[0][1]["linear"], ALPHA, *(truth["states"][0, :5] for _, truth in made))
+    problems = [make_problem(record, MODEL) for record in records]
+    bound = cramer_rao.bound(problems, values, (1e-4, 1e-4))
+    alone = [cramer_rao.bound(problem, values, (1e-4, 1e-4)) for problem in problems]
+    assert bound < 1.001 / np.hypot(1.0 / alone[0], 1.0 / alone[1])
+    assert result.standard_error == pytest.approx(bound, rel=0.1)
+    assert result.interval[0] < ALPHA < result.interval[1]
+    assert [entry["source"] for entry in result.diagnostics["records"]] == ["record 0", "record 1"]
+    assert all(entry["traversals"] > 5 for entry in result.diagnostics["records"])
+    assert result.curves["states"].shape[0] == records[0].size
+
+
+def test_missing_samples_are_left_out_of_the_likelihood(made, records) -> None:
+    rng = np.random.default_rng(5)
+    columns = made[0][0]
+    keep = rng.random(records[0].size) > 0.05
+    keep[0] = keep[-1] = True
+    record = record_from_columns({name: values[keep] for name, values in columns.items()}, "gaps")
+    assert record.size == records[0].size
+    assert record.missing == int(np.count_nonzero(~keep))
+    result = maximum_likelihood.estimate(record, MODEL)
+    assert result.interval[0] < ALPHA < result.interval[1]
+    assert result.standard_error < 2e-5
+
+
+def test_a_missing_angle_changes_nothing_but_its_own_term(records) -> None:
+    problem = make_problem(records[0], MODEL)
+    theta = problem.start
+    whole = Likelihood(problem).run(theta)
+    outputs = problem.outputs.copy()
+    outputs[-1, :] = np.nan
+    holed = Likelihood(replace(problem, outputs=outputs)).run(theta)
+    np.testing.assert_array_equal(holed.errors[:-1], whole.errors[:-1])
+    last = np.log(whole.variances[-1]) + whole.errors[-1] ** 2 / whole.variances[-1]
+    assert whole.deviance - holed.deviance == pytest.approx(float(last.sum()), rel=1e-9)
+
+
+def test_an_uncertain_scale_of_the_torque_is_one_of_the_unknowns(records) -> None:
+    record = replace(records[0], u=records[0].u / 1.02, u_scale_uncertainty=0.05)
+    exact = replace(MODEL, parameters={k: replace(p, uncertainty=0.0) for k, p in MODEL.parameters.items()})
+    result = maximum_likelihood.estimate(record, exact)
+    scale = result.diagnostics["parameters"]["u_scale"]
+    assert scale["value"] == pytest.approx(1.02, abs=4.0 * scale["standard_error"])
+    assert scale["standard_error"] < 1e-3
+
+
+def test_a_time_limit_ends_the_fit(records) -> None:
+    with pytest.raises(TimeLimitError, match="`rate`"):
+        maximum_likelihood.estimate(records[0], MODEL, time_limit=0.2)

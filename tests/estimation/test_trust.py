@@ -1,0 +1,83 @@
+"""Levels of trust: one bad finding outweighs all good ones, and each check finds what it is for."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from orchestrator.estimation.protocol import Estimate
+from orchestrator.estimation.settings import TrustSettings
+from orchestrator.estimation.trust import trust_of_estimates
+from orchestrator.records.model_file import default_model
+from orchestrator.shared.trust import Level, Reason, Trust, trust_of
+
+GOOD = Estimate(
+    "maximum_likelihood",
+    0.02,
+    1e-5,
+    (0.01998, 0.02002),
+    True,
+    "",
+    {"converged": True, "traversals": 40, "lacking": "", "parameters": {}},
+)
+
+
+def level_of(estimate: Estimate, **settings: float) -> Level:
+    return trust_of_estimates([estimate], default_model(), TrustSettings(**settings))[estimate.method].level
+
+
+def with_diagnostics(**changed: object) -> Estimate:
+    return replace(GOOD, diagnostics={**GOOD.diagnostics, **changed})
+
+
+def fitted(name: str, factor: float, error: float = 0.0) -> Estimate:
+    nominal = default_model().parameters[name].value
+    entry = {"value": nominal * factor, "standard_error": error * nominal, "nominal": nominal}
+    return with_diagnostics(parameters={name: entry})
+
+
+def test_the_worst_reason_decides_and_comes_first() -> None:
+    found = trust_of([Reason(Level.AMBER, "a"), Reason(Level.GREEN, "b"), Reason(Level.RED, "c")])
+    assert found == Trust(Level.RED, ("c", "a"))
+    assert found.as_json() == {"level": "red", "reasons": ["c", "a"]}
+    assert str(found) == "red: c; a"
+    assert str(trust_of([])) == "green"
+
+
+def test_a_fit_with_nothing_against_it_is_green() -> None:
+    assert level_of(GOOD) is Level.GREEN
+
+
+@pytest.mark.parametrize(
+    ("estimate", "level"),
+    [
+        (with_diagnostics(lacking="the model does not explain the record"), Level.AMBER),
+        (with_diagnostics(converged=False), Level.AMBER),
+        (with_diagnostics(traversals=2), Level.AMBER),
+        (with_diagnostics(traversals=3), Level.GREEN),
+        (replace(GOOD, standard_error=0.0041), Level.AMBER),
+        (replace(GOOD, interval=(0.0, math.inf), visible=False), Level.AMBER),
+        (replace(GOOD, interval=(0.0, 1e-3), visible=False), Level.GREEN),
+        (fitted("J_l", 1.049), Level.GREEN),
+        (fitted("J_l", 1.078), Level.AMBER),
+        (fitted("J_l", 1.078, error=0.015), Level.GREEN),
+        (fitted("b_m", 0.782), Level.RED),
+    ],
+)
+def test_what_keeps_a_fit_from_green(estimate: Estimate, level: Level) -> None:
+    assert level_of(estimate) is level
+
+
+def test_a_value_outside_its_stated_range_is_named_with_both() -> None:
+    (reason,) = trust_of_estimates([fitted("J_l", 1.078)], default_model())["maximum_likelihood"].reasons
+    assert reason == "J_l is fitted as 6.037, but stated as 5.6 to within 0.28"
+
+
+def test_methods_without_a_check_of_their_own_are_held_against_the_fit() -> None:
+    near = Estimate("operating_data", 0.0201, 2e-4, (0.0197, 0.0205))
+    far = Estimate("torque_pulse", 0.03, 1e-4, (0.0298, 0.0302))
+    assert level_of(near) is Level.AMBER
+    found = trust_of_estimates([near, far, GOOD], default_model())
+    assert [found[name].level.word for name in ("operating_data", "torque_pulse")] == ["green", "red"]
+    doubtful = with_diagnostics(lacking="the model does not explain the record")
+    assert trust_of_estimates([near, doubtful], default_model())["operating_data"].level is Level.AMBER

@@ -1,0 +1,85 @@
+"""Extreme legal values: a step has an end, in bounded work, or is refused with the reason; it never hangs."""
+
+import math
+
+import pytest
+
+from pyfmu_sources import smooth_mode
+from pyfmu_sources.drivetrain_slave import MODEL, Drivetrain
+from pyfmu_sources.servo_axis_slave import ServoAxis
+from pyfmu_sources.slave_base import TOO_STIFF
+
+STEP, STEPS = 1e-3, 10
+EXTREMES = (
+    {"J_m": 1e-9},
+    {"c": 1e12},
+    {"J_m": 1e-9, "c": 1e12},
+    {"J_l": 1e-9, "k": 1e-9},
+    {"tau": 1e-6},
+    {"J_m": 1e-9, "effects.coulomb_friction.motor.torque": 1e12},
+    {"c": 1e12, "effects.hardening_stiffness.cubic": 1e12},
+    {"effects.gear_eccentricity.amplitude": 1e12},
+)
+AXIS = (
+    {"J": 1e-9},
+    {"b": 1e12},
+    {"J": 1e-9, "effects.coulomb_friction.motor.torque": 1e12},
+    {"effects.gravity_load.amplitude": 1e12},
+)
+
+
+def stepped(slave, values, inputs, model=None):
+    """Run some steps; return the messages of refusals, empty when there is none."""
+    said = []
+    slave.say = lambda status, message: said.append(message)
+    read = [n for n, v in enumerate(slave.table) if v.causality == "output" and v.type == "Real"]
+    references = {variable.name: n for n, variable in enumerate(slave.table)}
+    slave.setup_experiment(0.0, None, None)
+    slave.set_real([references[name] for name in values], list(values.values()))
+    if model is not None:
+        slave.set_integer([MODEL], [model])
+    slave.enter_initialization_mode()
+    slave.set_real([references[name] for name in inputs], list(inputs.values()))
+    slave.exit_initialization_mode()
+    for n in range(STEPS):
+        if not slave.do_step(n * STEP, STEP):
+            break
+        outputs = slave.get_real(read)
+        assert all(map(math.isfinite, outputs))
+    return said
+
+
+@pytest.fixture
+def work(monkeypatch):
+    """The number of integration steps that are taken."""
+    count = [0]
+    step = smooth_mode.runge_kutta
+
+    def counted(*arguments):
+        count[0] += 1
+        return step(*arguments)
+
+    monkeypatch.setattr(smooth_mode, "runge_kutta", counted)
+    return count
+
+
+@pytest.mark.parametrize("model", range(1, 7))
+@pytest.mark.parametrize("torque", [1.0, 1e300])
+@pytest.mark.parametrize("values", EXTREMES, ids="-".join)
+def test_a_drivetrain_of_extreme_values_ends_or_says_why_not(values, torque, model, work):
+    said = stepped(Drivetrain(instance_name="a"), values, {"u": torque, "T_l": 0.0}, model)
+    assert all("must be one that can be resolved" in text or "must stay finite" in text for text in said), said
+    assert work[0] <= STEPS * (smooth_mode.MAX_STEPS + STEP * smooth_mode.MAX_STEPS_PER_SECOND)
+
+
+@pytest.mark.parametrize("torque", [1.0, 1e300])
+@pytest.mark.parametrize("values", AXIS, ids="-".join)
+def test_so_does_an_axis(values, torque):
+    said = stepped(ServoAxis(instance_name="a"), values, {"u": torque})
+    assert all("must be one that can be resolved" in text or "must stay finite" in text for text in said), said
+
+
+def test_a_stiff_shaft_without_effects_is_exact_and_not_refused(work):
+    assert not stepped(Drivetrain(instance_name="a"), {"J_m": 1e-9, "c": 1e12}, {"u": 1.0, "T_l": 0.0}, 1)
+    assert work[0] == 0
+    assert "too many internal steps" in TOO_STIFF

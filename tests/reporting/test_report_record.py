@@ -1,0 +1,194 @@
+"""From the results of `diagnose` and `estimate`, which start from a record, to their pages."""
+
+import pytest
+
+from orchestrator.reporting import Bars, Facts, Picture, Plot, ReportTable, Text, report_from_directory, write_report
+from orchestrator.shared.output import write_result
+from tests.support.reports import sections
+
+
+def estimate(value):
+    return {"value": value, "standard_error": 0.01 * value, "unit": "N.m"}
+
+
+def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
+    effect = {
+        "name": "coulomb_friction",
+        "site": "motor",
+        "parameters": {"torque": estimate(1.5) | {"interval": [1.4, 1.6]}},
+        "score": 120.0,
+        "runner_up": "stribeck_friction (motor)",
+        "margin": 15.0,
+        "family": ["coulomb_friction", "stribeck_friction"],
+    }
+    stages = [{"model": "nominal", "rms": 0.1}, {"model": "+ coulomb_friction@motor", "rms": 0.001}]
+    results = {
+        "verdict": "effects",
+        "effects": [effect],
+        "suspects": [],
+        "parameters": {"J_m": {"nominal": 0.4, "value": 0.42, "standard_error": 0.001, "unit": "kg.m2"}},
+        "where": [
+            {"signal": "theta_m", "regime": "speed", "interval": [-0.1, 0.1], "unit": "rad/s", "share_of_misfit": 0.8}
+        ],
+        "misfit": {"theta_m": {"before": 0.1, "after": 0.001, "noise": 0.0009, "unit": "rad", "stages": stages}},
+        "model": "Corrected.fmu",
+        "warnings": ["the record is short"],
+        "validation": {
+            "theta_m": {
+                "before": 0.1,
+                "after": 0.01,
+                "noise": 0.0009,
+                "unit": "rad",
+                "r_squared": {"before": 0.5, "parameters": 0.6, "after": 0.99},
+            }
+        },
+        "torque_error": {"record": {"before": 0.2, "parameters": 0.1, "after": 0.04}},
+        "also_seen": [
+            {"name": "ripple", "period": 0.65, "period_unit": "rad", "size": 0.007, "unit": "N.m"}
+            | {"gain": 2.5, "level": 1.0, "sure": False},
+            {"name": "trend", "period": None, "period_unit": None, "size": 0.1, "unit": "N.m"}
+            | {"gain": 1.0, "level": 1.0, "sure": True},
+        ],
+        "remainder": {
+            "explained": 0.95,
+            "predictable": [{"site": "shaft", "kind": "speed", "gain": 12.0, "share": 0.02}],
+        },
+        "candidates": [
+            {"on_top_of": [], "accepted": True, "tried": [{"effect": "delay", "gain": -1.0, "decided": 0.0}]}
+        ],
+    }
+    write_result(tmp_path, "diagnose", {"data": "record.csv"}, None, results)
+    (tmp_path / "diagnose_missing_torque.png").write_bytes(b"png")
+    (tmp_path / "diagnose.csv").write_text("time,theta_m,theta_m_before,theta_m_after\n0,0,0,0\n1,1,1.1,1.001\n")
+    report = report_from_directory(tmp_path)
+    assert "The model lacks Coulomb friction at the motor." in report.summary
+    assert "of the motor angle falls from 0.1 to 0.001 rad (noise: 0.0009)" in report.summary
+    (left,) = sections(report, Facts)
+    assert left.items[0][1] == "95 %"
+    tables = {t.title: t for t in sections(report, ReportTable)}
+    lacking = tables["What the model lacks"].rows
+    assert lacking == (("Coulomb friction at the motor", "torque", "1.5 N.m (95 %: 1.4 to 1.6)"),)
+    assert tables["Why these effects"].rows[0][-1] == "stribeck friction"
+    assert tables["Misfit on the other record"].rows[0][-1] == pytest.approx(10.0)
+    assert tables["What the rest follows"].rows == (("shaft", "speed", 12.0, 2.0),)
+    assert tables["Parameters"].rows[0][6] == pytest.approx(5.0)
+    assert tables["R² of one free run over all of the other record"].rows == (("motor angle", 0.5, 0.6, 0.99),)
+    assert tables["Relative torque error of the inverse model"].rows == (("record", 20.0, 10.0, 4.0),)
+    assert tables["What else follows position or direction"].rows == (
+        ("ripple", "0.65 rad", "0.007 N.m", 2.5, 1.0, False),
+        ("trend", None, "0.1 N.m", 1.0, 1.0, True),
+    )
+    plots = {p.title: p for p in sections(report, Plot)}
+    (bars,) = sections(report, Bars)
+    assert [(b.name, b.length) for b in bars.items] == [
+        ("model as given", 1.0),
+        ("and Coulomb friction at the motor", pytest.approx(0.01)),
+    ]
+    assert bars.items[1].text == "1.11 times noise"
+    assert [p.path.name for p in sections(report, Picture)] == ["diagnose_missing_torque.png"]
+    assert "data:image/png;base64,cG5n" in write_report(tmp_path).read_text()
+    assert [s.name for s in plots["Motor angle"].series] == ["measured", "before", "after"]
+    before, after = plots["Motor angle: simulated minus measured"].series
+    assert before.y == [0.0, pytest.approx(0.1)]
+    assert after.y == [0.0, pytest.approx(0.001)]
+    assert ("corrected model", "Corrected.fmu") in report.origin
+
+
+@pytest.mark.parametrize("verdict", ["none", "parameters", "unknown"])
+def test_a_diagnosis_without_effects_is_a_page_too(tmp_path, verdict):
+    results = {"verdict": verdict, "effects": [], "parameters": {}, "where": [], "misfit": {}, "model": None}
+    write_result(tmp_path, "diagnose", {}, None, results)
+    assert report_from_directory(tmp_path).summary
+
+
+def half_gap(alpha, **more):
+    entry = {"alpha": alpha, "standard_error": 1e-5, "cramer_rao": 9e-6, "interval": [0.9 * alpha, 1.1 * alpha]}
+    return (
+        entry | {"level": 0.95, "unit": "rad", "visible": True, "message": "", "diagnostics": {"traversals": 9}} | more
+    )
+
+
+def test_the_page_of_an_estimate_compares_methods_and_shows_the_fit(tmp_path):
+    parameters = {"k": {"value": 3310.0, "standard_error": 2.0, "nominal": 3300.0}}
+    best = half_gap(0.002, diagnostics={"parameters": parameters, "profile_limit": 6.5})
+    estimates = {"maximum_likelihood": best, "ekf": half_gap(0.0021), "torque_pulse": {"not_applicable": "no pulses"}}
+    record = {"rows": 4, "step": 0.01, "source": "r.csv"}
+    design = [{"name": "pulses", "bound": 1e-6, "peak_torque": 10.0, "peak_motor_speed": 2.0}]
+    results = {"record": record, "estimates": estimates, "method": "maximum_likelihood", "design": design} | best
+    write_result(tmp_path, "estimate", {}, None, results)
+    (tmp_path / "profile.csv").write_text("alpha,drop\n0.0019,4\n0.00195,1\n0.002,0\n0.00205,1\n0.0021,4\n")
+    (tmp_path / "online.csv").write_text("time,alpha,low,high\n0,0.1,0,0.3\n1,0.002,0.0019,0.0021\n")
+    (tmp_path / "estimate.csv").write_text(
+        "time,u,theta_m,theta_m_fitted,contact,one_step_error_m\n0,0,0,0,1,0\n1,1,1,1.5,0,1e-4\n2,1,2,2,-1,0\n"
+    )
+    (tmp_path / "design.csv").write_text("time,u\n0,1\n1,-1\n")
+    report = report_from_directory(tmp_path)
+    assert report.badge == ("good", "the gap is seen")
+    assert "The half-gap is 0.002 rad, with 95 % confidence between 0.0018 and 0.0022 rad" in report.summary
+    plots = {p.title: p for p in sections(report, Plot)}
+    assert plots["Estimates by method"].series[0].y == [0.002, 0.0021]
+    profile = plots["Profile likelihood"].series[0]
+    assert len(profile.x) > 100
+    assert plots["Profile likelihood"].series[2].y == [6.5, 6.5]
+    assert profile.y == pytest.approx([((x - 0.002) / 5e-5) ** 2 for x in profile.x], abs=1e-9)
+    assert plots["Motor angle"].spans[0].start == 1.0
+    assert plots["Motor angle: simulated minus measured"].series[0].y == [0.0, 0.5, 0.0]
+    assert plots["One-step errors"].series[0].y == [0.0, 1e-4, 0.0]
+    assert plots["The best excitation"].series[0].kind == "steps"
+    tables = {t.title: t for t in sections(report, ReportTable)}
+    assert [row[0] for row in tables["Estimates"].rows] == ["maximum likelihood", "ekf"]
+    remarks = next(t for t in sections(report, Text) if t.title == "Remarks")
+    assert "Torque pulse does not apply: no pulses." in remarks.paragraphs
+    assert tables["Parameters fitted with the gap"].rows[0] == ("k", 3300.0, 3310.0, 2.0)
+
+
+def test_an_estimate_that_no_method_gives_says_so(tmp_path):
+    write_result(tmp_path, "estimate", {}, None, {"estimates": {"torque_pulse": {"not_applicable": "no pulses"}}})
+    report = report_from_directory(tmp_path)
+    assert report.badge == ("bad", "no estimate")
+
+
+def test_a_record_that_bounds_the_gap_on_one_side_only_is_a_page(tmp_path):
+    entry = half_gap(0.0, interval=[0.0, None], visible=False, message="the gap cannot be seen")
+    write_result(tmp_path, "estimate", {}, None, {"estimates": {"maximum_likelihood": entry}} | entry)
+    report = report_from_directory(tmp_path)
+    assert report.summary.startswith("No gap is seen: it is with 95 % confidence between 0 and any size rad.")
+    assert report.badge == ("neutral", "no gap is seen")
+
+
+def test_the_page_of_a_calibration_says_whether_the_parameters_suffice(tmp_path):
+    value = {"value": 1.05, "standard_error": 0.01, "interval": [1.03, 1.07], "unit": "kg.m2", "nominal": 1.0}
+    results = {
+        "explained": False,
+        "parameters": {"J": value | {"learned": 0.8}},
+        "not_told_apart": [],
+        "misfit": {"theta": {"nominal": 40.0, "calibrated": 5.0, "noise": 1e-4}},
+        "warnings": ["something else is missing"],
+        "seconds": 1.0,
+    }
+    for explained, badge in ((True, "good"), (False, "bad")):
+        write_result(tmp_path, "calibrate", {}, None, results | {"explained": explained})
+        report = report_from_directory(tmp_path)
+        assert report.badge[0] == badge
+    rows = {t.title: t.rows for t in sections(report, ReportTable)}
+    assert rows["Parameters"] == (("J", 1.0, 1.05, 0.01, 1.03, 1.07, "kg.m2", 80.0),)
+
+
+def test_the_page_of_an_ssp_file_says_what_ran(tmp_path):
+    signal = {"signal": "motor.speed", "unit": "rad/s", "first": "0", "last": "1", "smallest": "0", "largest": "1"}
+    results = {"schema_version": 1, "signals": [signal], "steps": 2, "events": {}}
+    (tmp_path / "ssp.csv").write_text("time,motor.speed\n0,0\n0.5,0.5\n1,1\n")
+    write_result(tmp_path, "ssp", {"action": "run", "file": "some/where/drive.ssp"}, None, results)
+    report = report_from_directory(tmp_path)
+    assert report.title == "SSP file drive.ssp"
+    assert report.summary.startswith(
+        "The system in drive.ssp was run from 0 to 1 s in steps of 0.5 s, with signals of motor."
+    )
+
+
+def test_the_page_of_an_ssp_file_that_was_written(tmp_path):
+    written = {"file": "paired.ssp", "components": ["plant", "controller"], "connections": 4, "stop": 2.0, "step": 1e-3}
+    write_result(tmp_path, "ssp", {"action": "export", "file": None}, None, written)
+    assert report_from_directory(tmp_path).summary == (
+        "paired.ssp was written: plant, controller; 4 connections. It was not run."
+    )

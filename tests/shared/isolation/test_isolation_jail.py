@@ -1,0 +1,157 @@
+"""The jail: a channel that nothing runs from, limits, walls of the kernel, and nothing left."""
+
+import os
+import select
+import socket
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.errors import ChildError, ScenarioError, SimulationError
+from orchestrator.shared.isolation.jail import Jail, Limits
+from orchestrator.shared.isolation.scratch import PREFIX, Scratch
+from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.processes import alive
+from tests.support.engine_process import wait_until_gone
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the limits are those of Linux")
+ENTRY = "tests.support.jail_programs:opened"
+QUICK = Limits(time=60.0, memory=256 << 20, output=2 << 20, disk=8 << 20, threads=8, total=600.0)
+enclosed = pytest.mark.skipif(bool(support().missing), reason="this kernel has no walls")
+
+
+@pytest.fixture(autouse=True)
+def nothing_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    place = tmp_path / "temporary"
+    place.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
+    yield
+    assert not list(place.iterdir())
+
+
+def test_answers_come_back_with_their_types() -> None:
+    with Jail(ENTRY, {"a": 1}, limits=QUICK) as jail:
+        assert jail.call(["echo", [1, 2.5, None, "é", b"\0", True]]) == [{"a": 1}, [1, 2.5, None, "é", b"\0", True]]
+        assert np.array_equal(jail.call(["array", 6]), [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]])
+
+
+def test_errors_come_back_as_they_are_and_the_child_lives() -> None:
+    with Jail(ENTRY, limits=QUICK) as jail:
+        with pytest.raises(ScenarioError, match=r"`it` must be right, but is wrong"):
+            jail.call(["refuse"])
+        with pytest.raises(SimulationError, match=r"KeyError: 'odd'"):
+            jail.call(["fail"])
+        assert jail.call(["echo", 1]) == [None, 1]
+
+
+@pytest.mark.parametrize(
+    ("request_", "reason", "text"),
+    [
+        (["leave", 0], "exit", "exit code 0"),
+        (["leave", 7], "exit", "exit code 7"),
+        (["abort"], "signal", "SIGABRT"),
+        (["sleep", 30.0], "time", "too long"),
+        (["eat"], "memory", "256 MiB"),
+        (["fill"], "disk", "8 MiB"),
+        (["threads"], "threads", "8 threads"),
+        (["forge", b"\0\0\0\0\0\0\0\5hello" * 2], "protocol", "protocol"),
+        (["flood"], "protocol", "at most"),
+        (["deep"], "exit", "exit code 0"),
+    ],
+)
+def test_every_other_ending_is_told_and_leaves_nothing(request_: list, reason: str, text: str) -> None:
+    with Jail(ENTRY, limits=QUICK) as jail:
+        jail.start()
+        with pytest.raises(ChildError, match=text) as raised:
+            jail.call(request_, 1.0 if reason == "time" else None)
+        assert raised.value.reason == reason
+        assert not Path(f"/proc/{jail.pid}").exists()
+
+
+def test_what_nobody_asked_for_ends_the_child() -> None:
+    with Jail(ENTRY, limits=QUICK) as jail:
+        assert jail.call(["early"]) == "first"
+        select.select([jail._link], [], [])  # what nobody asked for has arrived
+        with pytest.raises(ChildError, match="without being asked"):
+            jail.call(["echo", 1])
+
+
+def test_the_environment_has_no_secrets_and_its_own_folders(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MY_ACCESS_TOKEN", "secret")
+    monkeypatch.setenv("HARMLESS", "yes")
+    with Jail(ENTRY, limits=QUICK) as jail:
+        names, path, temporary, work, leads = jail.call(["environment"])
+        assert "HARMLESS" in names
+        assert "MY_ACCESS_TOKEN" not in names
+        assert "" not in path
+        assert (Path(temporary), Path(work)) == (jail.scratch / "tmp", jail.scratch)
+        assert leads
+
+
+REFUSED = "PermissionError"
+
+
+@enclosed
+@pytest.mark.parametrize("what", ["read", "write", "delete", "truncate", "chmod", "rename", "link", "symlink", "utime"])
+def test_files_of_the_user_are_out_of_reach(tmp_path: Path, what: str) -> None:
+    precious = tmp_path / "precious"
+    precious.write_text("mine")
+    before = precious.stat()
+    with Jail(ENTRY, limits=QUICK) as jail:
+        assert jail.call(["attempt", what, str(precious)]) in (REFUSED, "OSError")
+    after = precious.stat()
+    assert precious.read_text() == "mine"
+    assert (before.st_mode, before.st_mtime_ns, before.st_nlink) == (after.st_mode, after.st_mtime_ns, after.st_nlink)
+
+
+@enclosed
+def test_without_walls_the_same_calls_work(tmp_path: Path) -> None:
+    precious = tmp_path / "precious"
+    precious.write_text("mine")
+    with Jail(ENTRY, limits=QUICK, walls=False) as jail:
+        assert jail.call(["attempt", "read", str(precious)]) == "done"
+        assert jail.call(["attempt", "delete", str(precious)]) == "done"
+        assert jail.call(["attempt", "unix"]) == "done"
+
+
+@enclosed
+def test_network_processes_and_signals_are_refused(tmp_path: Path) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server, Jail(ENTRY, limits=QUICK, read=[tmp_path]) as jail:
+        port = str(server.getsockname()[1])
+        assert jail.call(["attempt", "tcp", port]) == REFUSED
+        for what in ("udp", "unix", "fork", "posix_spawn", "exec", "death", "shm"):
+            assert jail.call(["attempt", what]) == REFUSED, what
+        for what in ("signal", "ptrace"):
+            assert jail.call(["attempt", what, str(os.getpid())]) == REFUSED, what
+        assert jail.call(["attempt", "list", str(tmp_path)]) == "done"
+        assert jail.call(["attempt", "write", str(tmp_path / "new")]) == REFUSED
+        for what in ("thread", "scratch"):
+            assert jail.call(["attempt", what]) == "done", what
+        server.settimeout(0.0)
+        with pytest.raises(BlockingIOError):
+            server.accept()
+
+
+def test_a_child_dies_with_its_parent_and_the_next_run_cleans_up() -> None:
+    program = (
+        f"import tempfile, time; tempfile.tempdir = {tempfile.tempdir!r}\n"
+        f"from orchestrator.shared.isolation.jail import Jail\n"
+        f"jail = Jail({ENTRY!r}); jail.start(); print(jail.pid, flush=True); time.sleep(60)"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as parent:
+        assert parent.stdout is not None
+        child = int(parent.stdout.readline())
+        assert alive(child)
+        parent.kill()
+    wait_until_gone([child])  # where no process reaps orphans it stays as a zombie
+    place = Path(str(tempfile.tempdir))
+    assert list(place.glob(f"{PREFIX}*"))
+    from orchestrator.shared.isolation import scratch
+
+    scratch._swept.clear()
+    with Scratch() as fresh:
+        assert list(place.iterdir()) == [fresh.path]

@@ -1,0 +1,46 @@
+"""Libraries made of C: made once, made anew where the file in the cache was damaged."""
+
+import ctypes
+from pathlib import Path
+
+import pytest
+
+from orchestrator.shared import machine_code
+
+pytestmark = pytest.mark.skipif(machine_code.local_compiler() is None, reason="there is no C compiler")
+
+
+@pytest.mark.parametrize("damage", ["library", "hash", "no hash", "half"])
+def test_a_damaged_library_is_made_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: str) -> None:
+    monkeypatch.setattr(machine_code, "machine_code_folder", lambda: tmp_path)
+    source = tmp_path / "half.c"
+    source.write_text("double half(double x) { return 0.5 * x; }\n")
+    made = machine_code.compiled_library.__wrapped__
+    path = made(source)
+    intact = path.read_bytes()
+    noted = path.with_suffix(".sha256")
+    match damage:
+        case "library":
+            path.write_bytes(intact[:2000] + b"\xff" + intact[2001:])
+        case "half":
+            path.write_bytes(intact[: len(intact) // 2])
+        case "hash":
+            noted.write_text("0" * 64)
+        case _:
+            noted.unlink()
+    assert made(source) == path
+    assert path.read_bytes() == intact
+    function = ctypes.CDLL(str(path)).half
+    function.argtypes, function.restype = [ctypes.c_double], ctypes.c_double
+    assert function(3.0) == 1.5
+    monkeypatch.setattr(machine_code, "_command", lambda: None)
+    assert made(source) == path  # nothing is compiled when all is well
+    path.write_bytes(b"")
+    assert made(source) is None
+
+
+def test_no_room_means_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(machine_code, "machine_code_folder", lambda: tmp_path / "missing")
+    source = tmp_path / "half.c"
+    source.write_text("double half(double x) { return 0.5 * x; }\n")
+    assert machine_code.compiled_library.__wrapped__(source) is None

@@ -1,0 +1,69 @@
+"""Machine code on disk: used when it is intact, compiled anew when it is not, done without where there is no place."""
+
+import importlib.util
+import os
+from pathlib import Path
+
+import pytest
+
+from orchestrator.shared import numba_cache
+
+SOURCE = "def twice(x):\n    return 2.0 * x\n"
+
+
+def compiled(folder: Path):
+    """The function of a new process, as far as the cache is concerned."""
+    path = folder / "source.py"
+    if not path.exists():
+        path.write_text(SOURCE)
+    spec = importlib.util.spec_from_file_location("source", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return numba_cache.kept()(module.twice)
+
+
+def hits(folder: Path) -> int:
+    function = compiled(folder)
+    assert function(1.5) == 3.0
+    return sum(function.stats.cache_hits.values())
+
+
+def test_machine_code_is_used_by_the_next_process(tmp_path: Path) -> None:
+    assert hits(tmp_path) == 0
+    assert hits(tmp_path) == 1
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", ["empty", "half", "flipped", "random"])
+def test_what_is_damaged_is_compiled_anew_and_rewritten(tmp_path: Path, ending: str, damage: str) -> None:
+    assert hits(tmp_path) == 0
+    (path,) = tmp_path.rglob(f"*.{ending}")
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    half = bytes(content[: len(content) // 2])
+    path.write_bytes({"empty": b"", "half": half, "flipped": bytes(content), "random": os.urandom(500)}[damage])
+    assert hits(tmp_path) == 0
+    assert hits(tmp_path) == 1
+
+
+def test_machine_code_of_another_version_is_not_even_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert hits(tmp_path) == 0
+    monkeypatch.setattr("numba.__version__", "0.0")
+    assert hits(tmp_path) == 0
+
+
+def test_a_full_disk_or_no_place_at_all_is_no_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(numba_cache._Files, "_open_for_write", full)
+    assert hits(tmp_path) == 0
+    assert not list(tmp_path.rglob("*.nb?"))
+
+    def nowhere(*_: object) -> None:
+        raise RuntimeError("cannot cache function: no locator available")
+
+    monkeypatch.setattr(numba_cache._Cache, "__init__", nowhere)
+    assert hits(tmp_path) == 0

@@ -1,0 +1,157 @@
+"""Result directories: whole or not at all, whatever happens."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator import __version__
+from orchestrator.errors import OutputError
+from orchestrator.shared.output import staged, write_result, write_text
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_files_appear_together_at_the_end(tmp_path):
+    with staged(tmp_path / "out") as directory:
+        (directory / "a.txt").write_text("a")
+        assert not (tmp_path / "out" / "a.txt").exists()
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["a.txt"]
+
+
+def test_an_error_leaves_nothing(tmp_path):
+    def fail():
+        with staged(tmp_path / "x" / "out") as directory:
+            (directory / "a.txt").write_text("a")
+            raise ValueError("bad")
+
+    with pytest.raises(ValueError, match="bad"):
+        fail()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
+    def fill():
+        with staged(tmp_path / "out") as folder, (folder / "a").open("wb", buffering=0) as stream:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 12, hard))
+            while True:
+                stream.write(bytes(1 << 12))
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        with pytest.raises(OutputError, match=f"cannot write to {tmp_path / 'out'}: File too large"):
+            fill()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_elsewhere_is_not_blamed_on_the_results(tmp_path):
+    with pytest.raises(OSError, match="No space left on device"), staged(tmp_path / "out"):
+        raise OSError(28, "No space left on device")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_process_left_is_cleared_away(tmp_path):
+    code = (
+        "import os, signal, sys; from pathlib import Path; from orchestrator.shared.output import staged\n"
+        f"with staged(Path({str(tmp_path)!r})) as d: (d / 'a').write_text('a'); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False)
+    assert len(list(tmp_path.iterdir())) == 1
+    with staged(tmp_path) as mine, staged(tmp_path) as other:
+        assert sorted(tmp_path.iterdir()) == sorted([mine, other])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_text_is_replaced_at_once_and_never_seen_in_part(tmp_path, monkeypatch):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    replaced = []
+    replace = os.replace
+
+    def watched(source, target):
+        # Until the very last step the old text stands, and the new one is complete beside it.
+        replaced.append((Path(target), path.read_text(), Path(source).read_text(), Path(source).parent))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", watched)
+    write_text(path, "new" * 10_000)
+    assert replaced == [(path, "old", "new" * 10_000, tmp_path)]
+    assert path.read_text() == "new" * 10_000
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_text_that_cannot_be_written_leaves_the_old_one_and_nothing_else(tmp_path, monkeypatch):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with pytest.raises(UnicodeEncodeError):
+        write_text(path, "x\ud800")
+
+    def broken(source, target):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "replace", broken)
+    with pytest.raises(OSError, match="Input/output"):
+        write_text(path, "new")
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_results_are_published_with_their_folders_and_replace_old_ones(tmp_path):
+    out = tmp_path / "out"
+    (out / "deep").mkdir(parents=True)
+    (out / "deep" / "a.txt").write_text("old")
+    (out / "kept.txt").write_text("kept")
+    with staged(out) as directory:
+        (directory / "deep" / "er").mkdir(parents=True)
+        (directory / "deep" / "a.txt").write_text("new")
+        (directory / "deep" / "er" / "b.txt").write_text("b")
+        assert (out / "deep" / "a.txt").read_text() == "old"
+    assert (out / "deep" / "a.txt").read_text() == "new"
+    assert (out / "deep" / "er" / "b.txt").read_text() == "b"
+    assert sorted(p.name for p in out.iterdir()) == ["deep", "kept.txt"]
+
+
+def test_an_error_keeps_directories_that_were_there(tmp_path):
+    (tmp_path / "there").mkdir()
+    with pytest.raises(KeyError), staged(tmp_path / "there" / "a" / "b"):
+        raise KeyError
+    assert [p.name for p in tmp_path.iterdir()] == ["there"]
+    assert list((tmp_path / "there").iterdir()) == []
+
+
+def test_errors_of_other_files_are_not_said_to_be_of_the_output(tmp_path):
+    with pytest.raises(FileNotFoundError), staged(tmp_path / "out"):
+        raise FileNotFoundError(2, "No such file or directory", "/elsewhere/x")
+    with pytest.raises(OutputError, match="cannot write to"), staged(tmp_path / "out") as directory:
+        (directory / "missing" / "a.txt").write_text("a")
+
+
+def test_what_cannot_be_a_directory_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="must be a writable directory"), staged(tmp_path / "file" / "out"):
+        pass
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_results_are_plain_json(tmp_path):
+    values = {
+        "a": np.float64(1.5),
+        "b": np.array([1, 2]),
+        "c": float("nan"),
+        "d": (True, None, "x"),
+        "e": Path("p"),
+        3: 4,
+    }
+    path = write_result(tmp_path, "test", {"x": 1}, 7, values)
+    assert path == tmp_path / "test.json"
+    found = json.loads(path.read_text())
+    assert found["results"] == {"a": 1.5, "b": [1, 2], "c": None, "d": [True, None, "x"], "e": "p", "3": 4}
+    assert (found["command"], found["seed"], found["arguments"]) == ("test", 7, {"x": 1})
+    assert found["version"] == __version__

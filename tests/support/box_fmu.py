@@ -1,0 +1,299 @@
+"""Foreign FMUs of four domains in C, and records of them by independent equations with an effect hidden around them.
+
+The FMUs solve by Runge-Kutta steps of their own; a record is made here by SciPy's DOP853, or by small steps of
+another method where an effect is not smooth. Nothing is shared with the project.
+"""
+
+import functools
+import subprocess
+import tempfile
+import zipfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import fmpy
+import numba
+import numpy as np
+
+from tests.support.c_fmu import PLATFORM, SUFFIX
+
+HERE = Path(__file__).parent
+FINE = 40  # steps of the independent solution in a sample
+
+
+@dataclass(frozen=True)
+class Domain:
+    """One model: its number in C, variables with units, nominal parameters, sampling, drive and noise."""
+
+    number: int
+    name: str
+    parameters: dict
+    input: tuple
+    outputs: tuple  # (name, unit)
+    port: tuple  # input, position, velocity or None
+    h: float
+    drive: float
+    noise: tuple
+    units: dict = field(default_factory=dict)
+    effects: tuple = ()
+    offset: float = 0.0
+
+
+SERIES = ("input_delay", "input_saturation", "input_dead_zone", "input_lag")
+DOMAINS = (
+    Domain(0, "Spring", {"m": (1.0, "kg"), "k": (20.0, "N/m"), "c": (0.8, "N.s/m")}, ("F", "N"),
+           (("x", "m"),), ("F", "x", None), 0.01, 6.0, (2e-4,),
+           effects=(*SERIES, "coulomb_friction", "quadratic_drag", "hardening_spring")),
+    Domain(1, "TwoMass", {"J1": (0.02, "kg.m2"), "J2": (0.05, "kg.m2"), "k": (60.0, "N.m/rad"),
+                          "c": (0.05, "N.m.s/rad"), "b": (0.04, "N.m.s/rad")}, ("M", "N.m"),
+           (("phi1", "rad"), ("phi2", "rad")), ("M", "phi1", None), 0.005, 0.7, (3e-4, 3e-4),
+           effects=(*SERIES, "coulomb_friction", "quadratic_drag", "gravity", "load")),
+    Domain(2, "Circuit", {"L": (0.5, "H"), "R": (2.0, "Ohm"), "C": (0.02, "F")}, ("U", "V"),
+           (("q", "C"),), ("U", "q", None), 0.02, 10.0, (3e-4,),
+           effects=(*SERIES, "quadratic_drag")),
+    Domain(3, "Tanks", {"A1": (1.5, "m2"), "A2": (1.0, "m2"), "k1": (0.02, "m2.5/s"), "k2": (0.03, "m2.5/s")},
+           ("qin", "m3/s"), (("h1", "m"), ("h2", "m")), ("qin", "h1", None), 2.0, 0.02, (1e-3, 1e-3),
+           effects=("input_delay", "input_saturation", "input_lag"), offset=1.0),
+)  # fmt: skip
+ALL_OUTPUTS = {0: ("x", "v"), 1: ("phi1", "phi2"), 2: ("q", "i"), 3: ("h1", "h2")}
+
+
+@functools.cache
+def library(number: int, fault: str = "") -> bytes:
+    """Compile one model, broken where ``fault`` names how."""
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / f"Box{SUFFIX}"
+        flags = [f"-DMODEL={number}", *([f"-DFAULT_{fault}"] if fault else [])]
+        include = str(Path(fmpy.__file__).parent / "c-code")
+        command = ["cc", "-std=gnu11", "-O2", "-w", "-shared", "-fPIC", *flags, "-I", include]
+        subprocess.run([*command, str(HERE / "box_fmu.c"), "-lm", "-o", str(target)], check=True, capture_output=True)
+        return target.read_bytes()
+
+
+def write_fmu(path: Path, domain: Domain, fault: str = "") -> Path:
+    """Write an FMU of a domain."""
+    units = {u for _, u in domain.parameters.values()} | {domain.input[1]} | {u for _, u in domain.outputs}
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>']
+    lines.append(
+        f'<fmiModelDescription fmiVersion="2.0" modelName="{domain.name}" guid="{{{domain.name}}}" '
+        'generationTool="tests">'
+    )
+    lines.append('<CoSimulation modelIdentifier="Box" canHandleVariableCommunicationStepSize="true"/>')
+    base = {"rad": ' rad="1"', "m": ' m="1"', "N": ' kg="1" m="1" s="-2"', "N.m": ' kg="1" m="2" s="-2"'}
+    lines.append("<UnitDefinitions>")
+    lines += [f'<Unit name="{u}">' + (f"<BaseUnit{base[u]}/>" if u in base else "") + "</Unit>" for u in sorted(units)]
+    lines.append("</UnitDefinitions><ModelVariables>")
+    reference = 0
+    for name, (value, unit) in domain.parameters.items():
+        lines.append(
+            f'<ScalarVariable name="{name}" valueReference="{reference}" causality="parameter" variability="fixed" '
+            f'initial="exact"><Real unit="{unit}" start="{value}"/></ScalarVariable>'
+        )
+        reference += 1
+    name, unit = domain.input
+    lines.append(
+        f'<ScalarVariable name="{name}" valueReference="{reference}" causality="input"><Real unit="{unit}" start="0"/>'
+        "</ScalarVariable>"
+    )
+    shown = dict(domain.outputs)
+    for name in ALL_OUTPUTS[domain.number]:
+        reference += 1
+        unit = f' unit="{shown[name]}"' if name in shown else ""
+        lines.append(
+            f'<ScalarVariable name="{name}" valueReference="{reference}" causality="output"><Real{unit}/>'
+            "</ScalarVariable>"
+        )
+    count = len(domain.parameters) + 2
+    unknowns = "".join(f'<Unknown index="{count + k}"/>' for k in range(len(ALL_OUTPUTS[domain.number])))
+    lines.append(
+        f"</ModelVariables><ModelStructure><Outputs>{unknowns}</Outputs></ModelStructure></fmiModelDescription>"
+    )
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", "\n".join(lines))
+        archive.writestr(f"binaries/{PLATFORM}/Box{SUFFIX}", library(domain.number, fault))
+    return path
+
+
+def write_map(path: Path, domain: Domain, noise: bool = True) -> Path:
+    """Write the map that a user would."""
+    lines = ["[inputs]", f'{domain.input[0]} = {{ hold = "zero" }}', "[outputs]"]
+    for (name, _), sigma in zip(domain.outputs, domain.noise, strict=True):
+        lines.append(f"{name} = {{ noise = {sigma} }}" if noise else f"{name} = {{}}")
+    lines += ["[parameters]", *(f'{name} = {{ uncertainty = "5 %" }}' for name in domain.parameters)]
+    lines += ["[ports.port]", f'input = "{domain.port[0]}"', f'position = "{domain.port[1]}"']
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+@numba.njit(cache=True)
+def _rates(number, x, u, p):
+    d = np.zeros(4)
+    if number == 0:
+        d[0] = x[1]
+        d[1] = (u - p[1] * x[0] - p[2] * x[1]) / p[0]
+    elif number == 1:
+        t = p[2] * (x[0] - x[2]) + p[3] * (x[1] - x[3])
+        d[0], d[2] = x[1], x[3]
+        d[1] = (u - t - p[4] * x[1]) / p[0]
+        d[3] = t / p[1]
+    elif number == 2:
+        d[0] = x[1]
+        d[1] = (u - p[1] * x[1] - x[0] / p[2]) / p[0]
+    else:
+        gap = x[0] - x[1]
+        a = p[2] * np.sign(gap) * (np.sqrt(abs(gap)) if abs(gap) > 0.01 else abs(gap) * 10.0)
+        b = p[3] * (np.sqrt(x[1]) if x[1] > 0.01 else x[1] * 10.0)
+        d[0] = (u - a) / p[0]
+        d[1] = (a - b) / p[1]
+    return d
+
+
+@numba.njit(cache=True)
+def _force(kind, x, v, z, q, t):
+    """Resisting force at the port; LuGre for friction, with damping of the bristles."""
+    if kind == 1:
+        rate = v - abs(v) * z / q[1]
+        return q[0] * (z / q[1] + q[2] * rate)
+    if kind == 2:
+        return q[0] * v * abs(v)
+    if kind == 3:
+        return q[0] * x**3
+    if kind == 4:
+        return q[0] * np.sin(x + q[1])
+    if kind == 5:
+        return q[0]
+    if kind == 6:  # a load that comes
+        return q[0] if t > q[1] else 0.0
+    if kind == 7:  # drag that grows with time
+        return q[0] * v * (t / q[1]) ** 2
+    if kind == 8:  # drag that depends on the way
+        return q[0] * v * np.cos(q[1] * x) ** 2
+    return 0.0
+
+
+@numba.njit(cache=True)
+def _solved(number, states, p, fine, step, per, kind, q, rows):
+    """Midpoint steps; returns (rows, 4) states at the samples."""
+    x = states.copy()
+    out = np.zeros((rows, 4))
+    out[0] = x
+    z = 0.0
+    for k in range(len(fine)):
+        t = k * step
+        f1 = _force(kind, x[0], x[1], z, q, t)
+        a = _rates(number, x, fine[k] - f1, p)
+        z1 = z + 0.5 * step * (x[1] - abs(x[1]) * z / q[1]) if kind == 1 else z
+        w = x + 0.5 * step * a
+        f2 = _force(kind, w[0], w[1], z1, q, t + 0.5 * step)
+        x = x + step * _rates(number, w, fine[k] - f2, p)
+        if kind == 1:
+            z = z + step * (w[1] - abs(w[1]) * z1 / q[1])
+        if (k + 1) % per == 0:
+            out[(k + 1) // per] = x
+    return out
+
+
+KINDS = {"coulomb_friction": 1, "quadratic_drag": 2, "hardening_spring": 3, "gravity": 4, "load": 5,
+         "unknown_coming_load": 6, "unknown_growing_drag": 7, "unknown_patchy_drag": 8}  # fmt: skip
+UNKNOWN = ("unknown_coming_load", "unknown_growing_drag", "unknown_patchy_drag", "unknown_dropouts")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A record and what is hidden in it."""
+
+    domain: Domain
+    names: tuple
+    sizes: tuple
+    parameters: tuple
+    time: np.ndarray
+    u: np.ndarray
+    y: np.ndarray
+
+
+def excitation(domain: Domain, rng, n: int) -> np.ndarray:
+    """Steps and a few sines, held over the samples; positive for the tanks."""
+    u = np.zeros(n)
+    at = 0
+    while at < n:
+        length = int(rng.integers(8, 120))
+        u[at : at + length] = rng.uniform(-1.0, 1.0)
+        at += length
+    t = np.arange(n) * domain.h
+    for _ in range(3):
+        u += 0.3 * np.sin(2 * np.pi * rng.uniform(0.002, 0.06) / domain.h * t + rng.uniform(0, 6.28))
+    return domain.drive * (u + domain.offset)
+
+
+def _through(name: str, u, fine_step: float, size: float):
+    fine = np.repeat(u[:-1], FINE)
+    if name == "input_saturation":
+        return np.clip(fine, -size, size)
+    if name == "input_dead_zone":
+        return np.sign(fine) * np.maximum(np.abs(fine) - size, 0.0)
+    if name == "input_delay":
+        late = round(size / fine_step)
+        return np.concatenate([np.full(late, fine[0]), fine[: len(fine) - late]])
+    from scipy.signal import lfilter
+
+    share = -np.expm1(-fine_step / size)
+    ends = lfilter([share], [1.0, share - 1.0], fine, zi=[(1.0 - share) * fine[0]])[0]
+    return 0.5 * (ends + np.concatenate([fine[:1], ends[:-1]]))
+
+
+def record(domain: Domain, names: tuple, rng, n: int = 1200, scale: float = 1.0, disturbance: float = 0.0) -> Case:
+    """Make a record with effects hidden; ``disturbance``: coloured noise at the input as a share of the drive."""
+    p = np.array([v * (1.0 + rng.uniform(-0.05, 0.05)) for v, _ in domain.parameters.values()])
+    u = excitation(domain, rng, n)
+    plain = _run(domain, p, np.repeat(u[:-1], FINE), 0, np.zeros(3), n)
+    speed = float(np.std(np.gradient(plain[:, 0], domain.h)))
+    way, drive = float(np.std(plain[:, 0])), float(np.std(u))
+    fine_step = domain.h / FINE
+    kind, q, sizes, arriving = 0, np.zeros(3), [], np.repeat(u[:-1], FINE)
+    for name in names:
+        share = scale * float(np.exp(rng.uniform(np.log(0.05), np.log(0.25))))
+        if name == "input_saturation":
+            size = float(np.quantile(np.abs(u), 1.0 - 0.6 * share))
+        elif name == "input_dead_zone":
+            size = 0.3 * share * drive
+        elif name in ("input_delay", "input_lag"):
+            size = round(20.0 * share * FINE) * fine_step
+        elif name == "unknown_dropouts":
+            size = 0.0
+        else:
+            kind = KINDS[name]
+            size = share * drive / {2: speed**2, 3: way**3, 7: 0.15 * speed, 8: 0.3 * speed}.get(kind, 1.0)
+            q = np.array([size, 0.0, 0.0])
+            q[1] = {1: 0.02 * way, 4: rng.uniform(0, 6.28), 6: 0.4 * n * domain.h, 7: 0.7 * n * domain.h,
+                    8: 4.0 / way}.get(kind, 0.0)  # fmt: skip
+            q[2] = 0.1 * domain.h if kind == 1 else 0.0
+        sizes.append(size)
+        if name.startswith("input_"):
+            arriving = _through(name, u, fine_step, size) if len(arriving) and np.array_equal(
+                arriving, np.repeat(u[:-1], FINE)) else arriving  # fmt: skip
+        if name == "unknown_dropouts":
+            arriving = arriving.copy()
+            for at in rng.integers(0, n - 10, 12):
+                arriving[at * FINE : (at + int(rng.integers(2, 8))) * FINE] = 0.0
+    if disturbance:
+        from scipy.signal import lfilter
+
+        white = rng.standard_normal(n - 1)
+        colour = lfilter([np.sqrt(1 - 0.8**2)], [1.0, -0.8], white)
+        arriving = arriving + np.repeat(disturbance * drive * colour, FINE)
+    states = _run(domain, p, arriving, kind, q, n)
+    places = {0: (0,), 1: (0, 2), 2: (0,), 3: (0, 1)}[domain.number]
+    y = states[:, places] + rng.standard_normal((n, len(places))) * np.array(domain.noise)
+    return Case(domain, names, tuple(sizes), tuple(p), np.arange(n) * domain.h, u, y)
+
+
+def _run(domain, p, fine, kind, q, n):
+    return _solved(domain.number, np.zeros(4), p, fine, domain.h / FINE, FINE, kind, q, n)
+
+
+def write_record(path: Path, case: Case) -> Path:
+    """Write a record as CSV."""
+    header = ",".join(["time", case.domain.input[0], *(name for name, _ in case.domain.outputs)])
+    table = np.column_stack([case.time, case.u, case.y])
+    np.savetxt(path, table, fmt="%.10g", delimiter=",", header=header, comments="")
+    return path

@@ -1,0 +1,95 @@
+"""The recipes of CONTRIBUTING.md, carried out on a copy of the sources: at most three files each, and they work."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+MOST_FILES = 3
+PROGRAMS = {
+    "A backlash model": (
+        """
+import numpy as np
+import orchestrator as oc
+from pyfmu_sources.drivetrain_parameters import parameters
+from pyfmu_sources.equations import shaft_stiffness
+
+pair = oc.run_pair(alpha=0.02, backlash_model="series")
+print(pair.crossings > 0, pair.machine["contact"].min(), round(shaft_stiffness(parameters(backlash_model=6.0)), 6))
+twist = pair.machine["theta_m"] / 3.984 - pair.machine["theta_l"]
+free = pair.machine["contact"] == 0
+print(np.abs(twist[free]).max() <= 0.02 + 1e-9, np.abs(pair.machine["T_shaft"][free]).max())
+""",
+        ["True", "-1.0", "3000.0", "True", "0.0"],
+    ),
+    "An estimator": (
+        """
+import orchestrator as oc
+
+gap = oc.estimate("docs/examples/machine.csv", method="twist_range")
+print(gap.methods[0].method, 0.005 < gap.alpha < 0.05)
+""",
+        ["twist_range", "True"],
+    ),
+    "A command": (
+        """
+from orchestrator.cli import main
+
+print(main(["units"]))
+""",
+        ["0"],
+    ),
+}
+
+
+def recipe(title):
+    page = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    section = re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", page, re.MULTILINE | re.DOTALL)[1]
+    return re.findall(r"```python\n(.*?)```", section, re.DOTALL)
+
+
+def apply(edit, root):
+    """Make one edit: its first line says where, and what follows is inserted there, or is the file."""
+    head, _, text = edit.partition("\n")
+    match = re.fullmatch(r'# ([\w/.]+)(?:: (?:(at the end)|after "(.*)"))?', head)
+    assert match, head
+    path = root / match[1]
+    if match[2] is None and match[3] is None:
+        assert not path.exists(), path
+        path.write_text(text, encoding="utf-8")
+        return match[1]
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    after = [n for n, line in enumerate(lines) if match[3] is not None and match[3].lower() in line.lower()]
+    at = after[0] + 1 if after else len(lines)
+    assert after or match[2], f"{match[1]} has no line with {match[3]!r}"
+    if lines[at - 1].rstrip().endswith("import ("):  # an import over several lines: before it
+        at -= 1
+    lines.insert(at, text)
+    path.write_text("".join(lines), encoding="utf-8")
+    return match[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("title", PROGRAMS)
+def test_a_recipe_works_on_a_copy(tmp_path, title):
+    for package in ("orchestrator", "pyfmu_sources", "docs/examples"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    edits = recipe(title)
+    assert edits
+    touched = {apply(edit, tmp_path) for edit in edits}
+    assert len(touched) <= MOST_FILES
+    program, expected = PROGRAMS[title]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr[-2000:]
+    assert run.stdout.split()[-len(expected) :] == expected
+    if title == "A command":
+        assert "J_m" in run.stdout
+        assert "kg.m2" in run.stdout

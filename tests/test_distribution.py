@@ -1,0 +1,85 @@
+"""The wheel holds all that is needed and works in a fresh environment, from any folder."""
+
+import json
+import os
+import subprocess
+import sys
+import tomllib
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tools import release
+
+ROOT = Path(__file__).resolve().parents[1]
+PROGRAM = """
+import orchestrator as oc, sys
+assert "site-packages" in oc.__file__, oc.__file__
+pair = oc.run_pair(alpha=0.02)
+print(abs(pair.estimate.alpha - 0.02) < 1e-6, oc.__version__)
+"""
+
+
+def run(words, folder):
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+def test_the_oldest_versions_are_those_that_are_allowed():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = [text for name in ("dask", "hdf5", "mdf", "parquet") for text in project["optional-dependencies"][name]]
+    allowed = dict(text.split(">=") for text in (*project["dependencies"], *extras))
+    pinned = dict(line.split("==") for line in (ROOT / ".ci" / "oldest.txt").read_text().splitlines() if "==" in line)
+    assert {name: (v + ".0.0").split(".")[:3] for name, v in allowed.items()} == {
+        name: (v + ".0.0").split(".")[:3] for name, v in pinned.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """Source archive and wheel of what git knows of, as a release makes them."""
+    return made(tmp_path_factory.mktemp("built"))
+
+
+def made(folder):
+    source = folder / "source"
+    run(["git", "-C", str(ROOT), "checkout-index", "-a", f"--prefix={source}/"], folder)
+    return release.build(source, folder / "dist", 1_700_000_000)
+
+
+@pytest.mark.slow
+def test_the_same_sources_give_the_same_artefacts(tmp_path, built):
+    before = os.umask(0o077)
+    try:
+        again = made(tmp_path)
+    finally:
+        os.umask(before)
+    assert [p.name for p in again] == [p.name for p in built]
+    assert [p.read_bytes() for p in again] == [p.read_bytes() for p in built]
+
+
+@pytest.mark.slow
+def test_the_wheel_works_from_another_folder(tmp_path, built):
+    """No index is asked: the environment sees the libraries of this one, and the project from the wheel alone."""
+    _, wheel = built
+    names = zipfile.ZipFile(wheel).namelist()
+    for needed in ("orchestrator/py.typed", "orchestrator/__init__.pyi", "orchestrator/reporting/templates/plot.js"):
+        assert needed in names
+    assert not [name for name in names if name.startswith(("tests/", "tools/", "benchmarks/"))]
+    place = tmp_path / "venv"
+    venv.create(place, with_pip=False)
+    site = next((place / "lib").glob("python*")) / "site-packages"
+    zipfile.ZipFile(wheel).extractall(site)
+    here = next(p for p in sys.path if p.endswith("site-packages"))
+    (site / "libraries.pth").write_text(here + "\n")  # the editable project's own finder is in a .pth of that folder
+    python = str(place / "bin" / "python")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    assert run([python, "-c", PROGRAM], elsewhere).split()[0] == "True"
+    run([python, "-m", "orchestrator", "simulate", "--out", "out"], elsewhere)
+    assert json.loads((elsewhere / "out" / "simulate.json").read_text())["command"] == "simulate"
+    entry = next(n for n in names if n.endswith("entry_points.txt"))
+    assert "backlash-cosim = orchestrator.__main__:run" in zipfile.ZipFile(wheel).read(entry).decode()

@@ -1,0 +1,249 @@
+"""Change one thing at a time in the rooms that matter most and see whether their tests notice.
+
+    python -m tools.mutants --count 120 --slice 1/8 --out mutants.json
+
+Each mutant changes one operator, comparison, constant, branch or statement of one module in a copy of the project and
+runs the fast tests of its room there. A mutant that passes them all has survived. Slices of one seed share one sample
+of mutants; results are merged into the file, so that the slices may run at different times.
+"""
+
+import argparse
+import ast
+import copy
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+TIME_LIMIT = 180.0  # s, of one test run: a mutant that loops for ever is caught
+
+COMPARED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
+            ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is}  # fmt: skip
+REVERSED = {ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE}
+CALCULATED = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.FloorDiv: ast.Mult,
+              ast.Mod: ast.Mult, ast.Pow: ast.Mult}  # fmt: skip
+RENAMED = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "sin": "cos", "cos": "sin",
+           "any": "all", "all": "any", "floor": "ceil", "ceil": "floor"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Room:
+    """Modules whose mutants are made, and the tests that should notice."""
+
+    name: str
+    modules: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+ROOMS = (
+    Room("calibration", ("orchestrator/paired/calibration.py",), ("tests/paired/test_calibration_units.py",)),
+    Room("metric", ("orchestrator/paired/metric.py",), ("tests/paired/test_metric.py",)),
+    Room(
+        "search",
+        tuple(f"orchestrator/diagnosis/search/{name}.py" for name in ("candidate", "search", "screening", "periodic")),
+        ("tests/diagnosis/test_search_units.py", "tests/diagnosis/test_search_screening.py"),
+    ),
+    Room(
+        "verdict",
+        (
+            "orchestrator/diagnosis/passes.py",
+            *(f"orchestrator/diagnosis/verdict/{n}.py" for n in ("admission", "remainder", "where", "naming", "words")),
+        ),
+        ("tests/diagnosis/test_verdict_units.py", "tests/diagnosis/test_verdict_places.py"),
+    ),
+    Room(
+        "free run",
+        tuple(f"orchestrator/diagnosis/proof/{name}.py" for name in ("free_run", "misfit")),
+        ("tests/diagnosis/test_proof_units.py",),
+    ),
+    Room(
+        "likelihood",
+        (
+            "orchestrator/estimation/innovations.py",
+            "orchestrator/diagnosis/fit/record_likelihood.py",
+            "orchestrator/diagnosis/fit/fitting.py",
+        ),
+        ("tests/estimation/test_innovations_units.py", "tests/diagnosis/test_likelihood_units.py"),
+    ),
+    Room(
+        "contact",
+        ("pyfmu_sources/contact.py", "pyfmu_sources/equations.py"),
+        ("tests/plants/test_contact.py",),
+    ),
+    Room("journal", ("orchestrator/engine/journal.py",), ("tests/engine/test_engine_journal.py",)),
+    Room(
+        "extraction",
+        ("orchestrator/shared/isolation/archives.py", "orchestrator/shared/output.py"),
+        ("tests/shared/isolation/test_archives.py", "tests/shared/test_output.py"),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One change: where it is, what it does, and the text of the changed line."""
+
+    room: str
+    module: str
+    line: int
+    change: str
+    text: str
+
+
+def changes(tree: ast.Module) -> Iterator[tuple[int, str, ast.Module]]:
+    """Yield (line, change, changed tree) of every change that is made in a module's functions."""
+    nodes = list(_mutable(tree))
+    for place, node in enumerate(nodes):
+        for what, change in enumerate(_of(node)):
+            changed = copy.deepcopy(tree)
+            target = list(_mutable(changed))[place]
+            list(_of(target))[what][1](target)
+            yield node.lineno, change[0], changed
+
+
+def _mutable(tree: ast.Module) -> Iterator[ast.AST]:
+    """Yield the nodes of functions that may change: no docstrings, messages, annotations."""
+    for function in ast.walk(tree):
+        if isinstance(function, ast.FunctionDef):
+            yield from _inside(function.body[1:] if ast.get_docstring(function) else function.body)
+
+
+def _inside(body: list[ast.stmt]) -> Iterator[ast.AST]:
+    waiting: list[ast.AST] = list(reversed(body))
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, (ast.FunctionDef, ast.Raise, ast.JoinedStr, ast.Assert)):
+            continue  # inner functions come by themselves; texts and checks of types are no behaviour
+        yield node
+        skipped = {id(node.annotation)} if isinstance(node, ast.AnnAssign) else set()
+        waiting += [child for child in reversed(list(ast.iter_child_nodes(node))) if id(child) not in skipped]
+
+
+def _of(node: ast.AST) -> Iterator[tuple[str, object]]:
+    """Yield (description, function that makes the change in such a node)."""
+    if isinstance(node, ast.Compare) and len(node.ops) == 1:
+        kind = type(node.ops[0])
+        if kind in COMPARED:
+            yield f"{kind.__name__} -> {COMPARED[kind].__name__}", lambda n: n.ops.__setitem__(0, COMPARED[kind]())
+        if kind in REVERSED:
+            yield f"{kind.__name__} -> {REVERSED[kind].__name__}", lambda n: n.ops.__setitem__(0, REVERSED[kind]())
+    elif isinstance(node, (ast.BinOp, ast.AugAssign)) and type(node.op) in CALCULATED:
+        operator = type(node.op)
+        yield (
+            f"{operator.__name__} -> {CALCULATED[operator].__name__}",
+            lambda n: setattr(n, "op", CALCULATED[operator]()),
+        )
+    elif isinstance(node, ast.BoolOp):
+        other = ast.Or if isinstance(node.op, ast.And) else ast.And
+        yield f"{type(node.op).__name__} -> {other.__name__}", lambda n: setattr(n, "op", other())
+        yield (
+            "last condition left out",
+            lambda n: n.values.pop() if len(n.values) > 2 else n.values.__setitem__(1, n.values[0]),
+        )
+    elif isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.Not, ast.USub)):
+        plain = ast.UAdd if isinstance(node.op, ast.USub) else None
+        if plain is not None:
+            yield "sign changed", lambda n: setattr(n, "op", plain())
+    elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        value = node.value
+        yield f"{value} -> {value + 1}", lambda n: setattr(n, "value", value + 1)
+        if value not in (0, 1, 2, -1):
+            yield f"{value} -> {0.5 * value}", lambda n: setattr(n, "value", type(value)(0.5 * value))
+    elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
+        yield f"{node.value} -> {not node.value}", lambda n: setattr(n, "value", not n.value)
+    elif isinstance(node, (ast.If, ast.IfExp)):
+        yield "never taken", lambda n: setattr(n, "test", ast.Constant(False))
+        yield "always taken", lambda n: setattr(n, "test", ast.Constant(True))
+    elif isinstance(node, (ast.Attribute, ast.Name)):
+        name = node.attr if isinstance(node, ast.Attribute) else node.id
+        if name in RENAMED:
+            field = "attr" if isinstance(node, ast.Attribute) else "id"
+            yield f"{name} -> {RENAMED[name]}", lambda n: setattr(n, field, RENAMED[name])
+    elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+        yield "call left out", lambda n: setattr(n, "value", ast.Constant(None))
+
+
+def all_mutants(root: Path) -> Iterator[tuple[Mutant, str]]:
+    """Yield every mutant of every room with the changed source."""
+    for room in ROOMS:
+        for module in room.modules:
+            text = (root / module).read_text(encoding="utf-8")
+            lines = text.splitlines()
+            for line, change, tree in changes(ast.parse(text)):
+                yield Mutant(room.name, module, line, change, lines[line - 1].strip()), ast.unparse(tree)
+
+
+def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
+    """Return ``count`` mutants, shared out among the rooms evenly."""
+    found = list(all_mutants(root))
+    generator = random.Random(seed)
+    chosen: list[tuple[Mutant, str]] = []
+    for place, room in enumerate(ROOMS):
+        own = [entry for entry in found if entry[0].room == room.name]
+        share = count // len(ROOMS) + (place < count % len(ROOMS))
+        chosen += generator.sample(own, min(share, len(own)))
+    generator.shuffle(chosen)
+    return chosen
+
+
+def caught(root: Path, tests: tuple[str, ...]) -> bool:
+    """Tell whether the tests fail in a copy of the project (or never end)."""
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
+    try:
+        run = subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=TIME_LIMIT, check=False)
+    except subprocess.TimeoutExpired:
+        return True
+    return run.returncode != 0
+
+
+def main() -> int:
+    """Run a slice of the mutants and add what came out to the file."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=120)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--slice", default="1/1", help="which part of the sample: 3/8 is the third of eight")
+    parser.add_argument("--room", help="one room alone")
+    parser.add_argument("--out", type=Path, default=Path("mutants.json"))
+    parser.add_argument("--seconds", type=float, default=1e9, help="start no mutant after this time")
+    options = parser.parse_args()
+    part, parts = (int(word) for word in options.slice.split("/"))
+    results = json.loads(options.out.read_text()) if options.out.exists() else []
+    known = {(r["module"], r["line"], r["change"], r["text"]) for r in results}
+    tests = {room.name: room.tests for room in ROOMS}
+    begun = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder) / "copy"
+        shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".venv", ".git", "__pycache__", "fmus", "results"))
+        for room in ROOMS:
+            if options.room in (None, room.name) and caught(root, room.tests):
+                sys.exit(f"the tests of {room.name} fail without any change")
+        for mutant, source in sample(root, options.count, options.seed)[part - 1 :: parts]:
+            key = (mutant.module, mutant.line, mutant.change, mutant.text)
+            if key in known or (options.room and mutant.room != options.room):
+                continue
+            if time.monotonic() - begun > options.seconds:
+                break
+            original = (root / mutant.module).read_text(encoding="utf-8")
+            (root / mutant.module).write_text(source, encoding="utf-8")
+            found = caught(root, tests[mutant.room])
+            (root / mutant.module).write_text(original, encoding="utf-8")
+            results.append(asdict(mutant) | {"caught": found})
+            options.out.write_text(json.dumps(results, indent=1))
+            if not found:
+                print(f"survived: {mutant.module}:{mutant.line} {mutant.change}: {mutant.text}", flush=True)
+    total = len(results)
+    print(f"{sum(r['caught'] for r in results)} of {total} mutants caught")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

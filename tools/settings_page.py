@@ -1,0 +1,61 @@
+"""Write ``docs/settings.md``: every setting of every workflow, with its default and its reason.
+
+python -m tools.settings_page
+"""
+
+from pathlib import Path
+
+from orchestrator.diagnosis.blackbox.settings import BoxSettings
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.estimation.settings import EstimationSettings
+from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.shared.settings import Settings, described
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
+WORKFLOWS: tuple[tuple[str, str, type[Settings]], ...] = (
+    ("Diagnosis", "diagnose", DiagnosisSettings),
+    ("Diagnosis of any FMU", "diagnose --fmu", BoxSettings),
+    ("Estimation", "estimate", EstimationSettings),
+    ("Calibration", "sweep", CalibrationSettings),
+)
+HEAD = """# Settings
+
+Every threshold of a workflow is a setting. A TOML file changes those that it names, by group; the rest keeps its
+default (those of a calibration have no groups):
+
+```toml
+[search]
+penalty = 6.0
+
+[proof.free_run]
+iterations = 20
+```
+
+    python -m orchestrator diagnose DATA.csv --settings FILE.toml
+    python -m orchestrator sweep --settings FILE.toml
+
+From Python, `settings=` takes the same object. The result file holds all settings that were used, under `settings`.
+A name that does not exist, or a value out of its bounds, is refused. This page is written by
+`python -m tools.settings_page`.
+"""
+
+
+def page() -> str:
+    """Return the page."""
+    parts = [HEAD]
+    for title, command, kind in WORKFLOWS:
+        rows = [f"| `{name}` | {_shown(default)} | {why} |" for name, default, why in described(kind)]
+        parts.append(
+            "\n".join([f"\n## {title} (`{command}`)\n", "| setting | default | meaning |", "|---|---|---|", *rows, ""])
+        )
+    return "".join(parts)
+
+
+def _shown(default: object) -> str:
+    if isinstance(default, tuple):
+        return ", ".join(_shown(value) for value in default)
+    return f"{default:g}" if isinstance(default, float) else str(default)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
