@@ -35,7 +35,8 @@ def test_a_damaged_library_is_made_anew(tmp_path: Path, monkeypatch: pytest.Monk
     assert function(3.0) == 1.5
     monkeypatch.setattr(machine_code, "_command", lambda: None)
     assert made(source) == path  # nothing is compiled when all is well
-    path.write_bytes(b"")
+    path.unlink()  # the loaded file itself must not shrink: the linker touches its pages once more at exit
+    path.touch()
     assert made(source) is None
 
 
