@@ -33,7 +33,13 @@ RECORDED = {
 MACHINE, TWIN = "", "twin_"
 
 
-def loop_system(experiment: Experiment, fmus: Mapping[str, Path], prefixes: tuple[str, ...]) -> System:
+LoopValues = Mapping[str, Mapping[str, Any]]
+"""Parameters by name, for each of the three ``FMUS``."""
+
+
+def loop_system(
+    experiment: Experiment, fmus: Mapping[str, Path], prefixes: tuple[str, ...], values: LoopValues | None = None
+) -> System:
     """Return one loop for each of ``prefixes``, all on the same reference.
 
     Instances are called ``plant``, ``estimator`` and ``controller``, each after its loop's prefix. Without further
@@ -43,11 +49,13 @@ def loop_system(experiment: Experiment, fmus: Mapping[str, Path], prefixes: tupl
         experiment: what is run.
         fmus: paths of the three ``FMUS``.
         prefixes: ``(MACHINE,)``, ``(TWIN,)`` or both.
+        values: what ``loop_values`` returned for the experiment (default: it is asked).
 
     Returns:
         The system.
     """
-    values = loop_values(experiment)
+    if values is None:
+        values = loop_values(experiment)
     instances: list[Instance] = []
     connections: list[Connection] = []
     sources: list[SignalSource] = []
@@ -150,15 +158,20 @@ class LoopSession:
         experiment: what is run.
         fmus: paths of the three ``FMUS``.
         record: which of ``RECORDED``; fewer are quicker.
+        values: what ``loop_values`` returned for the experiment (default: it is asked).
     """
 
     def __init__(
-        self, experiment: Experiment, fmus: Mapping[str, Path], record: tuple[str, ...] = tuple(RECORDED)
+        self,
+        experiment: Experiment,
+        fmus: Mapping[str, Path],
+        record: tuple[str, ...] = tuple(RECORDED),
+        values: LoopValues | None = None,
     ) -> None:
         self._experiment = experiment
         self._record = record
         self._session = Session(
-            loop_system(experiment, fmus, (MACHINE,)),
+            loop_system(experiment, fmus, (MACHINE,), values),
             [RECORDED[name] for name in record],
             GaussSeidel(experiment.sample_time),
             experiment.duration,
