@@ -12,7 +12,7 @@ from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.protocol import Value
 from orchestrator.master.session import Session
-from orchestrator.master.signals import Samples
+from orchestrator.master.signals import Samples, Signal
 from orchestrator.master.system import Connection, Instance, SignalSource, System
 from orchestrator.paired.experiment import Experiment
 from orchestrator.plants.design import KalmanFilter
@@ -151,6 +151,20 @@ class LoopRun:
         return self.signals[name]
 
 
+@dataclass(frozen=True, slots=True)
+class _AtPoints(Signal):
+    """One value per communication point of a run: nothing is looked up."""
+
+    values: Array
+
+    def sample(self, times: Array) -> Array:
+        assert len(times) == len(self.values)
+        return self.values
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        return []
+
+
 class LoopSession:
     """One loop of three FMUs, instantiated once and run for any number of sizes. Use as a context manager.
 
@@ -204,10 +218,9 @@ class LoopSession:
             SlaveError: a slave refused or failed a call.
         """
         values = plant_values(self._experiment, alpha) | dict(start or {})
-        h = self._experiment.sample_time
         signals = None
         if errors is not None:
-            signals = {k: Samples(error, h) for k, error in zip(ERROR_SOURCES, errors, strict=True)}
+            signals = {k: _AtPoints(error) for k, error in zip(ERROR_SOURCES, errors, strict=True)}
         result = self._session.run(values, signals)
         return LoopRun(result.time, dict(zip(self._record, result.values, strict=True)))
 

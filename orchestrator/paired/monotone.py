@@ -28,7 +28,7 @@ class MonotoneCubic:
         bend = (rate[:-1] + rate[1:] - 2 * slope) / width
         self._coefficients = np.stack((values[:-1], rate[:-1], (slope - rate[:-1]) / width - bend, bend / width))
         self._inner = self._x[1:-1].tolist()
-        self._pieces = [(start, *piece) for start, *piece in zip(self._x[:-1].tolist(), *self._coefficients.tolist())]
+        self._pieces = np.vstack((self._x[:-1], self._coefficients)).T.tolist()
 
     def __call__(self, at: Array) -> Array:
         """Return the values at ``at``."""
