@@ -23,7 +23,7 @@ from .drivetrain_parameters import (
     Parameter,
 )
 from .effects import saturated
-from .fmu_variables import LARGEST, Variable
+from .fmu_variables import LARGEST, FmuVariable
 from .slave_base import TOO_STIFF, SlaveBase, StepRefusedError
 
 U, T_L, THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(9)
@@ -61,10 +61,10 @@ _GEAR = ("J_m", "J_l", "i", "alpha", "backlash_model", "theta_m_start", "theta_l
 _prepare = lru_cache(maxsize=256)(drivetrain.prepare)
 
 
-def _variable(parameter: Parameter) -> Variable:
+def _variable(parameter: Parameter) -> FmuVariable:
     name, unit, default, minimum, maximum, description = parameter
     if name == "backlash_model":
-        return Variable(
+        return FmuVariable(
             name,
             "parameter",
             "",
@@ -75,12 +75,12 @@ def _variable(parameter: Parameter) -> Variable:
             type="Enumeration",
             declared_type="BacklashModel",
         )
-    return Variable(name, "parameter", unit, default, description, minimum, maximum)
+    return FmuVariable(name, "parameter", unit, default, description, minimum, maximum)
 
 
-def _output(name: str, unit: str, description: str, nominal: float, starts_from: tuple[str, ...]) -> Variable:
+def _output(name: str, unit: str, description: str, nominal: float, starts_from: tuple[str, ...]) -> FmuVariable:
     depends_on = ("T_l",) if name == "T_shaft" else ()
-    return Variable(
+    return FmuVariable(
         name, "output", unit, None, description, nominal=nominal, depends_on=depends_on, starts_from=starts_from
     )
 
@@ -90,9 +90,9 @@ class Drivetrain(SlaveBase):
 
     title = "Geared drivetrain with backlash: motor with lag, gear with play, elastic shaft, load"
     feedthrough = True
-    table: ClassVar[tuple[Variable, ...]] = (
-        Variable("u", "input", "N.m", 0.0, "Requested motor torque", -BIG, BIG, nominal=100.0),
-        Variable("T_l", "input", "N.m", 0.0, "External torque against the load", -BIG, BIG, nominal=100.0),
+    table: ClassVar[tuple[FmuVariable, ...]] = (
+        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque", -BIG, BIG, nominal=100.0),
+        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the load", -BIG, BIG, nominal=100.0),
         _output(
             "theta_m", "rad", "Motor angle as measured", 1.0, ("theta_m_start", "effects.sensor_offset.motor.offset")
         ),
@@ -101,7 +101,7 @@ class Drivetrain(SlaveBase):
         _output("omega_l", "rad/s", "Load speed", 10.0, (*_GEAR, "omega_l_start")),
         _output("T_m", "N.m", "Motor torque", 100.0, ("T_m_start",)),
         _output("T_shaft", "N.m", "Torque of the shaft on the load", 100.0, (*_SHAFT, "T_l")),
-        Variable(
+        FmuVariable(
             "contact",
             "output",
             "",
@@ -113,7 +113,7 @@ class Drivetrain(SlaveBase):
             starts_from=_SHAFT,
         ),
         *(_variable(parameter) for parameter in PARAMETERS),
-        *(Variable(name, "parameter", unit, 0.0, text, -1e12, 1e12) for name, unit, text in _STARTS),
+        *(FmuVariable(name, "parameter", unit, 0.0, text, -1e12, 1e12) for name, unit, text in _STARTS),
     )
 
     _x: State
