@@ -105,7 +105,6 @@ class FmuSlave(Slave):
         loader = ctypes.PyDLL if self._description.python else ctypes.CDLL
         self._library: Any = loader(self._fmu.dll._name, handle=self._fmu.dll._handle)
         self._component = ctypes.c_void_p(self._fmu.component)
-        self._entries: dict[str, Any] = {}
         self._step = self._library.fmi2DoStep
         self._step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
         self._step.restype = ctypes.c_int
@@ -177,16 +176,9 @@ class FmuSlave(Slave):
     def _call(self, function: str, *arguments: Any) -> None:
         if self._closed or self._worst >= ERROR:
             self._alive(function)
-        status = self._entry(function)(self._component, *arguments)
+        status = getattr(self._library, function)(self._component, *arguments)
         if status:
             self._check(status, function)
-
-    def _entry(self, function: str) -> Any:
-        entry = self._entries.get(function)
-        if entry is None:
-            entry = self._entries[function] = self._library[function]
-            entry.restype = ctypes.c_int
-        return entry
 
     def _batches(self, names: Sequence[str], direction: str, buffer: Signals | None = None) -> list[_Batch]:
         groups: dict[str, list[int]] = {}
