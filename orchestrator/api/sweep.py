@@ -228,7 +228,7 @@ def sweep(
     plan = SweepPlan(chosen, text, levels, seeds, seed, words, count)
     cases = plan.cases()
     if tell is not None:
-        tell("preparing FMUs, compiled loop and calibration (the first time takes seconds, without a C compiler half a minute)")
+        tell("preparing FMUs, compiled loop and calibration (the first time: half a minute without a C compiler)")
     with ThreadPoolExecutor(1) as pool:  # figures take half a second to import: while the compiler runs
         pool.submit(import_module, "orchestrator.paired.figures")
         builds = ensure_fastest(FMUS)
