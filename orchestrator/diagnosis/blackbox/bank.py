@@ -13,7 +13,7 @@ INPUT, OUTPUT, PORT = "input", "output", "port"
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Surroundings:
     """Typical sizes of what happens where an effect would act; starting values depend on them.
 
     Attributes:
@@ -72,50 +72,50 @@ class Kind:
     where: str
     parameters: tuple[str, ...]
     units: tuple[str, ...]
-    scales: Callable[[Scene], Values]
-    starts: Callable[[Scene], tuple[Values, ...]]
+    scales: Callable[[Surroundings], Values]
+    starts: Callable[[Surroundings], tuple[Values, ...]]
     linear: bool = False
     law: int = 0
     lower: Values = ()
     nuisances: int = 0
     needs: str = ""
-    plausible: Callable[[Values, Scene], bool] = lambda values, scene: True
+    plausible: Callable[[Values, Surroundings], bool] = lambda values, scene: True
     angular: bool = False
     shrinks: bool = False
 
 
-def _delays(s: Scene) -> tuple[Values, ...]:
+def _delays(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.h,) for f in (0.15, 0.5, 1.0, 1.7, 2.5, 4.0, 6.0, 9.0, 14.0))
 
 
-def _lags(s: Scene) -> tuple[Values, ...]:
+def _lags(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.h,) for f in (0.3, 1.0, 3.0, 8.0, 20.0))
 
 
-def _limits(s: Scene) -> tuple[Values, ...]:
+def _limits(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.peak,) for f in (0.3, 0.5, 0.65, 0.75, 0.83, 0.89, 0.93, 0.96, 0.985, 0.996))
 
 
-def _widths(s: Scene) -> tuple[Values, ...]:
+def _widths(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.peak,) for f in (0.01, 0.03, 0.08, 0.16, 0.3))
 
 
-def _rates(s: Scene) -> tuple[Values, ...]:
+def _rates(s: Surroundings) -> tuple[Values, ...]:
     steps = np.abs(np.diff(s.signal))
     top = float(steps.max()) / s.h if len(steps) else 1.0
     return tuple((f * top,) for f in (0.02, 0.05, 0.12, 0.25, 0.5, 0.8))
 
 
-def _quanta(s: Scene) -> tuple[Values, ...]:
+def _quanta(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.peak,) for f in (0.05, 0.1, 0.2, 0.4))
 
 
-def _friction(s: Scene) -> tuple[Values, ...]:
+def _friction(s: Surroundings) -> tuple[Values, ...]:
     walk = s.speed * s.h
     return tuple((0.05 * s.size, f * walk) for f in (0.1, 0.6, 3.0, 12.0, 60.0))
 
 
-def _small(share: float) -> Callable[[Scene], Values]:
+def _small(share: float) -> Callable[[Surroundings], Values]:
     return lambda s: (share * s.size,)
 
 
@@ -123,11 +123,11 @@ ONCE = 0.03
 """How far from 1 a ripple's wavenumber over an angle is at least: gravity is what comes once a turn."""
 
 
-def _once_a_turn(values: Values, scene: Scene) -> bool:
+def _once_a_turn(values: Values, scene: Surroundings) -> bool:
     return scene.angular and abs(values[2] - 1.0) < ONCE
 
 
-def _positive(values: Values, scene: Scene) -> bool:
+def _positive(values: Values, scene: Surroundings) -> bool:
     del scene
     return values[0] > 0.0
 
@@ -184,7 +184,7 @@ BANK: Mapping[str, Kind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK)}
 
 
 @dataclass(frozen=True)
-class Effect:
+class BoxEffect:
     """An effect of the bank at a place: the name of an input, an output or a port of the map.
 
     ``at_rest``: a signal with memory was zero before the record, and not what it was at first.
@@ -192,7 +192,7 @@ class Effect:
 
     kind: Kind
     place: str
-    scene: Scene = field(compare=False, repr=False)
+    scene: Surroundings = field(compare=False, repr=False)
     at_rest: bool = False
 
     @property

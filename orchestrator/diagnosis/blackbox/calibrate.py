@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.diagnosis.blackbox.diagnose import fitters, prepared
-from orchestrator.diagnosis.blackbox.estimates import Estimate, Misfit, estimates_of, misfits
+from orchestrator.diagnosis.blackbox.estimates import OutputMisfit, ValueEstimate, estimates_of, misfits
 from orchestrator.diagnosis.blackbox.fitting import parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.problem import Data
@@ -23,7 +23,7 @@ LEARNED = 0.3
 
 
 @dataclass(frozen=True)
-class Calibration:
+class BoxCalibration:
     """Parameters that explain a record.
 
     Attributes:
@@ -36,10 +36,10 @@ class Calibration:
         seconds: wall time.
     """
 
-    parameters: tuple[Estimate, ...]
+    parameters: tuple[ValueEstimate, ...]
     learned: dict[str, float]
     confounded: tuple[tuple[str, str], ...]
-    misfit: tuple[Misfit, ...]
+    misfit: tuple[OutputMisfit, ...]
     explained: bool
     warnings: tuple[str, ...]
     seconds: float
@@ -47,7 +47,7 @@ class Calibration:
 
 def calibrate(
     path: Path, given: Map, data: Data, units: dict[str, str], progress: Callable[[str], None] = lambda what: None
-) -> Calibration:
+) -> BoxCalibration:
     """Return the parameters of the FMU at ``path`` that explain ``data``; arguments as of ``diagnose``.
 
     Args:
@@ -109,4 +109,4 @@ def calibrate(
     warnings += [f"`{a}` and `{b}` are hardly told apart: excite them at other frequencies" for a, b in pairs]
     if not explained:
         warnings.append("something else is missing: `diagnose` says what")
-    return Calibration(parameters, learned, pairs, found, explained, tuple(warnings), time.monotonic() - begun)
+    return BoxCalibration(parameters, learned, pairs, found, explained, tuple(warnings), time.monotonic() - begun)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.problem import Model, Problem
+from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem
 from orchestrator.diagnosis.blackbox.whitening import SHARES, Ladder
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ PIECES = 24
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class BoxParts:
     """Rows that are fitted, that decide, and that are held out."""
 
     fitted: Rows
@@ -52,7 +52,7 @@ class Parts:
         return int(self.fitted.stop if isinstance(self.fitted, slice) else self.fitted[-1] + 1)
 
 
-def parts_of(n: int) -> Parts:
+def parts_of(n: int) -> BoxParts:
     """Return half, a quarter and a quarter.
 
     Args:
@@ -61,10 +61,10 @@ def parts_of(n: int) -> Parts:
     Returns:
         The fitted, the deciding and the held-out part.
     """
-    return Parts(slice(0, n // 2), slice(n // 2, 3 * n // 4), slice(3 * n // 4, n))
+    return BoxParts(slice(0, n // 2), slice(n // 2, 3 * n // 4), slice(3 * n // 4, n))
 
 
-def interleaved(n: int) -> Parts:
+def interleaved(n: int) -> BoxParts:
     """Return parts of the first three quarters that take turns: for what acts in one half only.
 
     Args:
@@ -75,11 +75,11 @@ def interleaved(n: int) -> Parts:
     """
     seen = 3 * n // 4
     piece = np.arange(seen) * PIECES // seen
-    return Parts(np.flatnonzero(piece % 3 != 1), np.flatnonzero(piece % 3 == 1), slice(seen, n))
+    return BoxParts(np.flatnonzero(piece % 3 != 1), np.flatnonzero(piece % 3 == 1), slice(seen, n))
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class BoxFit:
     """A fitted model.
 
     Attributes:
@@ -90,7 +90,7 @@ class Fit:
         J: (rows, outputs, values) its Jacobian, in units of the noise, as last computed.
     """
 
-    model: Model
+    model: BoxModel
     level: int
     y: Array
     fitted: float
@@ -113,7 +113,7 @@ class Fitter:
         parts: of the record.
     """
 
-    def __init__(self, problem: Problem, ladder: Ladder, parts: Parts) -> None:
+    def __init__(self, problem: BoxProblem, ladder: Ladder, parts: BoxParts) -> None:
         self.problem, self.ladder, self.parts = problem, ladder, parts
         self.sd = np.array([u.standard_deviation for u in problem.map.uncertain])
         self.mean = problem.nominal.p
@@ -134,7 +134,7 @@ class Fitter:
         found = e[rows]
         return float(-0.5 * np.sum(found * found) - np.sum(self.ladder[k].half_log[rows]))
 
-    def prior(self, model: Model) -> float:
+    def prior(self, model: BoxModel) -> float:
         """Return the logarithm of the prior.
 
         Args:
@@ -186,7 +186,7 @@ class Fitter:
         out[:n] = np.clip(out[:n], self.lower, self.upper)
         return out
 
-    def scales(self, model: Model) -> Array:
+    def scales(self, model: BoxModel) -> Array:
         """Return the step of each value for differences.
 
         Args:
@@ -197,7 +197,7 @@ class Fitter:
         """
         return np.concatenate([self.sd * SMALL, *(np.array(e.scales) for e in model.effects)])
 
-    def jacobian(self, model: Model, y: Array, only: slice | None = None) -> Array | None:
+    def jacobian(self, model: BoxModel, y: Array, only: slice | None = None) -> Array | None:
         """Return differences (rows, outputs, values) of the free run, in units of the noise; None where a run fails.
 
         Args:
@@ -226,7 +226,7 @@ class Fitter:
     def _high(self, k: int) -> float:
         return float(self.upper[k]) if k < len(self.upper) else np.inf
 
-    def step(self, model: Model, y: Array, J: Array, k: int, rows: Rows, damping: float) -> Array:
+    def step(self, model: BoxModel, y: Array, J: Array, k: int, rows: Rows, damping: float) -> Array:
         """Return the damped Gauss-Newton step of all values.
 
         Args:
@@ -254,7 +254,7 @@ class Fitter:
 
     def fit(
         self,
-        model: Model,
+        model: BoxModel,
         k: int,
         J: Array | None = None,
         rows: Rows | None = None,
@@ -262,7 +262,7 @@ class Fitter:
         until: int | None = None,
         y: Array | None = None,
         held: int = 0,
-    ) -> Fit | None:
+    ) -> BoxFit | None:
         """Return the fit from a start; None where the FMU fails.
 
         Args:
@@ -330,7 +330,7 @@ class Fitter:
         far = np.any(np.abs(self.problem.residual(y)) > np.maximum(scale, 10.0), axis=1)
         return int(np.argmax(far)) if far.any() else len(y)
 
-    def grown(self, model: Model, k: int, J: Array | None = None, held: int = 0) -> Fit | None:
+    def grown(self, model: BoxModel, k: int, J: Array | None = None, held: int = 0) -> BoxFit | None:
         """Return the fit from a start, over a growing part of the record while the free run goes astray.
 
         A free run that has left the record says nothing about how to come back: the part over which it keeps close is
@@ -367,7 +367,7 @@ class Fitter:
         lost = stop < LOST * reach and self.ladder.share(k) >= SHARES[-2]
         return self.fit(model, k, J, held=held, y=y, iterations=0 if lost else ITERATIONS)
 
-    def settled(self, fit: Fit, rows: Rows | None = None, until: int | None = None) -> Fit:
+    def settled(self, fit: BoxFit, rows: Rows | None = None, until: int | None = None) -> BoxFit:
         """Return a fit, or one from there without port noise, whichever is likelier.
 
         Where much noise is allowed it explains what the parameters should, and the way down is flat.
@@ -390,7 +390,7 @@ class Fitter:
             fit = again if again is not None and again.total > fit.total else fit
         return fit
 
-    def annealed(self, fit: Fit) -> Fit | None:
+    def annealed(self, fit: BoxFit) -> BoxFit | None:
         """Return the fit at ever less port noise, each from the one before.
 
         With much of it the start is found, and little of the values; without it a run far off says nothing.
@@ -401,7 +401,7 @@ class Fitter:
         Returns:
             The fit; None where the FMU fails.
         """
-        again: Fit | None = fit
+        again: BoxFit | None = fit
         for k in range(len(SHARES) - 1, -1, -1):
             if k < self.ladder.size and self.ladder.share(k) < self.ladder.share(fit.level) and again is not None:
                 again = self.fit(again.model, k, y=again.y, held=ANNEALED, iterations=ANNEALED)
@@ -412,7 +412,7 @@ class Fitter:
         """Return a level of little noise."""
         return min(3, self.ladder.size - 1)
 
-    def _completed(self, model: Model, y: Array, J: Array | None) -> Array | None:
+    def _completed(self, model: BoxModel, y: Array, J: Array | None) -> Array | None:
         known = 0 if J is None else J.shape[2]
         if J is not None and known == len(model.vector):
             return J
@@ -422,8 +422,8 @@ class Fitter:
         return rest if J is None else np.concatenate([J[: len(y)], rest], axis=2)
 
     def _moved(
-        self, model: Model, y: Array, J: Array, k: int, rows: Rows, damping: float, value: float, until: int
-    ) -> tuple[Model, Array, float] | None:
+        self, model: BoxModel, y: Array, J: Array, k: int, rows: Rows, damping: float, value: float, until: int
+    ) -> tuple[BoxModel, Array, float] | None:
         """Return the best of a whole step and parts of it that gains, with its run and likelihood."""
         step = self.step(model, y, J, k, rows, damping)
         shares = (1.0, 0.4)
@@ -432,7 +432,7 @@ class Fitter:
         e0 = self.whitened(y, k)
         change = self.ladder[k].whiten((J @ step)[:, :, None])[:, :, 0]
         self._expected = self.likelihood(e0 - change, k, rows) - self.likelihood(e0, k, rows)
-        best: tuple[Model, Array, float] | None = None
+        best: tuple[BoxModel, Array, float] | None = None
         for trial, run in zip(models, found, strict=True):
             if run is None:
                 continue
@@ -441,7 +441,7 @@ class Fitter:
                 best = (trial, run, reached)
         return best
 
-    def _result(self, model: Model, k: int, y: Array, J: Array, rows: Rows) -> Fit:
+    def _result(self, model: BoxModel, k: int, y: Array, J: Array, rows: Rows) -> BoxFit:
         e = self.whitened(y, k)
         decided = 0.0
         if rows is self.parts.fitted:
@@ -450,13 +450,13 @@ class Fitter:
             if best != k:
                 e, k = self.whitened(y, best), best
             decided = self.likelihood(e, k, self.parts.decides)
-        return Fit(model, k, y, self.likelihood(e, k, rows), decided, self.prior(model), J)
+        return BoxFit(model, k, y, self.likelihood(e, k, rows), decided, self.prior(model), J)
 
     def _both(self, y: Array, k: int) -> float:
         e = self.whitened(y, k)
         return self.likelihood(e, k, self.parts.fitted) + self.likelihood(e, k, self.parts.decides)
 
-    def covariance(self, fit: Fit, rows: Rows) -> Array:
+    def covariance(self, fit: BoxFit, rows: Rows) -> Array:
         """Return the covariance of all values.
 
         Args:

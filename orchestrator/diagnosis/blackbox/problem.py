@@ -7,7 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox import series
-from orchestrator.diagnosis.blackbox.bank import BANK, INPUT, OUTPUT, PORT, REMEMBERS, STARTS_OFF, Effect, Scene
+from orchestrator.diagnosis.blackbox.bank import (
+    BANK,
+    INPUT,
+    OUTPUT,
+    PORT,
+    REMEMBERS,
+    STARTS_OFF,
+    BoxEffect,
+    Surroundings,
+)
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
 from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
@@ -46,11 +55,11 @@ class Data:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class BoxModel:
     """A model: values of the uncertain parameters, effects, and their values."""
 
     p: Array
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[BoxEffect, ...] = ()
     values: tuple[Array, ...] = ()
 
     @property
@@ -58,7 +67,7 @@ class Model:
         """Return all values in one row."""
         return np.concatenate([self.p, *self.values])
 
-    def moved(self, vector: Array) -> "Model":
+    def moved(self, vector: Array) -> "BoxModel":
         """Return the same structure with other values, kept within what the laws allow.
 
         Args:
@@ -71,9 +80,9 @@ class Model:
         for effect, old in zip(self.effects, self.values, strict=True):
             values.append(effect.bounded(vector[at : at + len(old)]))
             at += len(old)
-        return Model(vector[: len(self.p)], self.effects, tuple(values))
+        return BoxModel(vector[: len(self.p)], self.effects, tuple(values))
 
-    def extended(self, effect: Effect, values: Array) -> "Model":
+    def extended(self, effect: BoxEffect, values: Array) -> "BoxModel":
         """Return this model with one more effect.
 
         Args:
@@ -83,9 +92,9 @@ class Model:
         Returns:
             The model.
         """
-        return Model(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))
+        return BoxModel(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))
 
-    def without(self, label: str) -> "Model":
+    def without(self, label: str) -> "BoxModel":
         """Return this model with one effect less.
 
         Args:
@@ -95,11 +104,11 @@ class Model:
             The model.
         """
         kept = [k for k, effect in enumerate(self.effects) if effect.label != label]
-        return Model(self.p, tuple(self.effects[k] for k in kept), tuple(self.values[k] for k in kept))
+        return BoxModel(self.p, tuple(self.effects[k] for k in kept), tuple(self.values[k] for k in kept))
 
 
 @dataclass
-class Problem:
+class BoxProblem:
     """Simulates models of one record.
 
     Attributes:
@@ -129,9 +138,9 @@ class Problem:
         return self.data.step
 
     @property
-    def nominal(self) -> Model:
+    def nominal(self) -> BoxModel:
         """Return the model as the user gave it."""
-        return Model(np.array([u.value for u in self.map.uncertain]))
+        return BoxModel(np.array([u.value for u in self.map.uncertain]))
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -143,7 +152,7 @@ class Problem:
         """Return the names of the measured outputs."""
         return tuple(self.map.outputs)
 
-    def simulate(self, models: Sequence[Model], rows: int | None = None) -> list[Array | None]:
+    def simulate(self, models: Sequence[BoxModel], rows: int | None = None) -> list[Array | None]:
         """Return outputs (rows, outputs) of each model; None where the FMU failed.
 
         Args:
@@ -156,7 +165,7 @@ class Problem:
         found = self.read(models, rows)
         return [None if y is None else self._measured(y, model) for y, model in zip(found, models, strict=True)]
 
-    def read(self, models: Sequence[Model], rows: int | None = None) -> list[Array | None]:
+    def read(self, models: Sequence[BoxModel], rows: int | None = None) -> list[Array | None]:
         """Return all that is read (rows, reads) of each model, before effects at outputs.
 
         Args:
@@ -171,7 +180,7 @@ class Problem:
         plans = [Plan(self.starts(model), self._table(model, plain, rows), self._feedback(model)) for model in models]
         return self.runner.run(plans, float(self.data.time[0]), self.h / self.m, self.m)
 
-    def must_simulate(self, model: Model) -> Array:
+    def must_simulate(self, model: BoxModel) -> Array:
         """Return outputs (rows, outputs) of a model.
 
         Args:
@@ -185,7 +194,7 @@ class Problem:
         """
         return self._measured(self.must_read(model), model)
 
-    def must_read(self, model: Model) -> Array:
+    def must_read(self, model: BoxModel) -> Array:
         """Return all that is read (rows, reads) of a model, before effects at outputs.
 
         Args:
@@ -221,7 +230,7 @@ class Problem:
         """
         return np.asarray((self.data.outputs[: len(y)] - y) / self.noise)
 
-    def pushed(self, model: Model, pushes: Sequence[tuple[int, int, float]]) -> list[Array | None]:
+    def pushed(self, model: BoxModel, pushes: Sequence[tuple[int, int, float]]) -> list[Array | None]:
         """Return outputs where an effort (input, first sample, size) is added until the end, one after the other.
 
         Args:
@@ -240,7 +249,7 @@ class Problem:
         found = self.runner.run(plans, float(self.data.time[0]), self.h / self.m, self.m)
         return [None if y is None else self._measured(y, model) for y in found]
 
-    def starts(self, model: Model) -> dict[str, float]:
+    def starts(self, model: BoxModel) -> dict[str, float]:
         """Return what is set before a run, by name.
 
         Args:
@@ -253,7 +262,7 @@ class Problem:
         values |= {u.name: float(v) for u, v in zip(self.map.uncertain, model.p, strict=True)}
         return values
 
-    def _table(self, model: Model, plain: Array, rows: int) -> Array:
+    def _table(self, model: BoxModel, plain: Array, rows: int) -> Array:
         table = plain
         step = self.h / self.m
         for effect, values in zip(model.effects, model.values, strict=True):
@@ -265,7 +274,7 @@ class Problem:
             table[:, column] = at_input(effect, table[:, column], step, float(values[0]))
         return table
 
-    def _feedback(self, model: Model) -> tuple[Feedback, ...]:
+    def _feedback(self, model: BoxModel) -> tuple[Feedback, ...]:
         found = []
         for effect, values in zip(model.effects, model.values, strict=True):
             if effect.kind.where != PORT:
@@ -279,7 +288,7 @@ class Problem:
             found.append(Feedback(place, effect.kind.law, reads.index(port.position), velocity, sign, q))
         return tuple(found)
 
-    def _measured(self, rows: Array, model: Model) -> Array:
+    def _measured(self, rows: Array, model: BoxModel) -> Array:
         y = rows[:, : len(self.outputs)]
         for effect, values in zip(model.effects, model.values, strict=True):
             if effect.kind.where != OUTPUT:
@@ -290,7 +299,7 @@ class Problem:
             y[:, column] = _at_output(effect.kind.name, y[:, column], self.h, float(values[0]))
         return y
 
-    def impulses(self, model: Model, length: int) -> tuple[Surrogate, Array]:
+    def impulses(self, model: BoxModel, length: int) -> tuple[Surrogate, Array]:
         """Return the surrogate at the ports, and the size (ports,) that a share of noise stands for.
 
         Responses are measured within the record, where the FMU works, unless they grow there.
@@ -311,7 +320,7 @@ class Problem:
         chosen = within if float(np.max(np.abs(within))) < GROWS * float(np.max(np.abs(first))) else first
         return realised(chosen), np.ones(len(self.noise_places))
 
-    def _responses(self, model: Model, at: int, length: int) -> Array:
+    def _responses(self, model: BoxModel, at: int, length: int) -> Array:
         """Return responses (length - 1, outputs, ports) to pulses in sample ``at``, in units of noise and drive."""
         plain = series_of(self, at + length)
         places = self.noise_places
@@ -360,7 +369,7 @@ class Problem:
     units: dict[str, str] = field(default_factory=dict)
 
 
-def series_of(problem: Problem, rows: int) -> Array:
+def series_of(problem: BoxProblem, rows: int) -> Array:
     """Return the recorded inputs over every communication step up to ``rows`` samples; other inputs are 0.
 
     Args:
@@ -377,7 +386,7 @@ def series_of(problem: Problem, rows: int) -> Array:
     return table
 
 
-def at_input(effect: Effect, fine: Array, step: float, value: float) -> Array:
+def at_input(effect: BoxEffect, fine: Array, step: float, value: float) -> Array:
     """Return an input behind an effect in series with it; before the record it had its first value, or was zero.
 
     Args:
@@ -420,7 +429,7 @@ def _at_output(name: str, rows: Array, h: float, value: float) -> Array:
     return series.quantised(rows, value)
 
 
-def effects_of(problem: Problem, nominal: Array) -> list[Effect]:
+def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
     """Return every effect that could act, given all that is read of the nominal run (n, reads).
 
     Args:
@@ -436,14 +445,14 @@ def effects_of(problem: Problem, nominal: Array) -> list[Effect]:
         u = problem.data.inputs[:, k]
         if float(np.ptp(u)) == 0.0:
             continue
-        scene = Scene(h, _rms(u), float(np.max(np.abs(u))), u)
-        found += [Effect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
+        scene = Surroundings(h, _rms(u), float(np.max(np.abs(u))), u)
+        found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
         if abs(u[0]) > STARTS_OFF * scene.size:
-            found += [Effect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
+            found += [BoxEffect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
     for k, name in enumerate(problem.outputs):
         y = problem.data.outputs[:, k]
-        scene = Scene(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
-        found += [Effect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
+        scene = Surroundings(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
+        found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
     for name, port in problem.map.ports.items():
         x = nominal[:, runner.reads.index(port.position)]
         v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]
@@ -459,9 +468,9 @@ def effects_of(problem: Problem, nominal: Array) -> list[Effect]:
         if angular:
             whole = tuple(float(c) for c in range(2, 13) if low < c < top)
             cycles = tuple(sorted({*cycles, *whole}))
-        scene = Scene(h, effort, effort, x, 0.0, _rms(x) or 1.0, span, _rms(v) or 1.0, a or 1.0, angular, cycles)
+        scene = Surroundings(h, effort, effort, x, 0.0, _rms(x) or 1.0, span, _rms(v) or 1.0, a or 1.0, angular, cycles)
         kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
-        found += [Effect(kind, name, scene) for kind in kinds]
+        found += [BoxEffect(kind, name, scene) for kind in kinds]
     return found
 
 

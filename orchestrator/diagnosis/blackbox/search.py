@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import Effect
-from orchestrator.diagnosis.blackbox.fitting import Fit, Fitter
-from orchestrator.diagnosis.blackbox.problem import Model
-from orchestrator.diagnosis.blackbox.settings import SearchSettings
+from orchestrator.diagnosis.blackbox.bank import BoxEffect
+from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
+from orchestrator.diagnosis.blackbox.problem import BoxModel
+from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings
 
 Array = NDArray[np.float64]
 
@@ -23,23 +23,23 @@ SMALLEST = 0.01
 class Promise:
     """A start of an effect, and what linearisation says that it would gain."""
 
-    effect: Effect
+    effect: BoxEffect
     values: Array
     gain: float
     level: int
 
 
 @dataclass(frozen=True)
-class Step:
+class SearchStep:
     """One step: the model before, and every model that was fitted, best first."""
 
-    before: Fit
-    tried: tuple[Fit, ...]
+    before: BoxFit
+    tried: tuple[BoxFit, ...]
     accepted: bool
 
 
 @dataclass
-class Search:
+class BoxSearch:
     """A search over one problem; :meth:`run` carries it out.
 
     Attributes:
@@ -50,10 +50,10 @@ class Search:
     """
 
     fitter: Fitter
-    effects: Sequence[Effect]
-    settings: SearchSettings = field(default_factory=SearchSettings)
+    effects: Sequence[BoxEffect]
+    settings: BoxSearchSettings = field(default_factory=BoxSearchSettings)
     progress: Callable[[str], None] = lambda what: None
-    steps: list[Step] = field(default_factory=list)
+    steps: list[SearchStep] = field(default_factory=list)
     until: float = float("inf")
     """Monotonic time [s] from which no further effect is fitted."""
 
@@ -62,7 +62,7 @@ class Search:
         """Tell whether the time that was granted is over."""
         return time.monotonic() > self.until
 
-    def base(self) -> Fit | None:
+    def base(self) -> BoxFit | None:
         """Return the model without effects, its parameters re-fitted; None where the FMU fails.
 
         Returns:
@@ -73,7 +73,7 @@ class Search:
         found = self.fitter.grown(nominal, 0)
         return None if found is None else self.fitter.settled(found)
 
-    def run(self, start: Fit, base: Fit | None = None) -> Fit:
+    def run(self, start: BoxFit, base: BoxFit | None = None) -> BoxFit:
         """Return the best model found.
 
         Args:
@@ -101,8 +101,8 @@ class Search:
             beam = self._distinct(found)
         return best
 
-    def _distinct(self, found: Sequence[Fit]) -> list[Fit]:
-        kept: list[Fit] = []
+    def _distinct(self, found: Sequence[BoxFit]) -> list[BoxFit]:
+        kept: list[BoxFit] = []
         for fit in found:
             if all(labels(fit) != labels(other) for other in kept):
                 kept.append(fit)
@@ -113,7 +113,7 @@ class Search:
             if best - self.score(k) < 0.3 * abs(best - self.score(self.steps[0].before))
         ]
 
-    def score(self, fit: Fit) -> float:
+    def score(self, fit: BoxFit) -> float:
         """Return the penalised log-likelihood.
 
         Args:
@@ -124,7 +124,7 @@ class Search:
         """
         return fit.total - self.settings.penalty * counted(fit.model)
 
-    def pays(self, fit: Fit, before: Fit, base: Fit) -> bool:
+    def pays(self, fit: BoxFit, before: BoxFit, base: BoxFit) -> bool:
         """Tell whether what ``fit`` has more than ``before`` earns its place.
 
         Args:
@@ -143,7 +143,7 @@ class Search:
         gain = self.score(fit) - self.score(before)
         return gain > least and decided > max(s.decided, s.decided_share * fitted) and fitted > s.penalty
 
-    def step(self, before: Fit, base: Fit) -> Step:
+    def step(self, before: BoxFit, base: BoxFit) -> SearchStep:
         """Fit the most promising effects on top of ``before``.
 
         Args:
@@ -171,11 +171,11 @@ class Search:
             if paying:
                 tried = [*paying, *(fit for fit in tried if fit not in paying)]
                 accepted = True
-        return Step(before, tuple(tried), accepted)
+        return SearchStep(before, tuple(tried), accepted)
 
-    def _tried(self, before: Fit, short: dict[str, list[Promise]]) -> list[Fit]:
+    def _tried(self, before: BoxFit, short: dict[str, list[Promise]]) -> list[BoxFit]:
         """Return a fit of each effect: all of them quickly, the best ones to the end."""
-        quick: list[Fit] = []
+        quick: list[BoxFit] = []
         for label, mine in short.items():
             if quick and self.explained(max(quick, key=self.score)):
                 promised = max(p.gain for p in mine)
@@ -190,7 +190,7 @@ class Search:
         quick.sort(key=self.score, reverse=True)
         return [self.fitter.settled(f) if n < self.settings.settled else f for n, f in enumerate(quick)]
 
-    def explained(self, fit: Fit) -> bool:
+    def explained(self, fit: BoxFit) -> bool:
         """Tell whether a model leaves no more than measurement noise.
 
         Args:
@@ -202,7 +202,7 @@ class Search:
         seen = self.fitter.parts.seen * len(self.fitter.problem.outputs)
         return fit.fitted + fit.decided > -0.5 * seen - self.settings.noise_margin * np.sqrt(0.5 * seen)
 
-    def _extended(self, before: Fit, promise: Promise) -> list[Fit]:
+    def _extended(self, before: BoxFit, promise: Promise) -> list[BoxFit]:
         model = before.model.extended(promise.effect, promise.effect.bounded(promise.values))
         found = self.fitter.grown(model, promise.level, before.J, held=1)
         if found is None:
@@ -212,7 +212,7 @@ class Search:
         simple = self._simpler(found)
         return [] if simple is None else [simple]
 
-    def _simpler(self, fit: Fit) -> Fit | None:
+    def _simpler(self, fit: BoxFit) -> BoxFit | None:
         """Return the fit of gravity from that of a ripple that comes once a turn; None for what has no simpler kin."""
         last = fit.model.effects[-1]
         kin = [e for e in self.effects if e.kind.name == "gravity" and e.place == last.place]
@@ -221,7 +221,7 @@ class Search:
         model = fit.model.without(last.label).extended(kin[0], fit.model.values[-1][:2])
         return self.fitter.fit(model, fit.level, None, y=None)
 
-    def _refined(self, tried: Sequence[Fit], before: Fit, base: Fit) -> list[Fit]:
+    def _refined(self, tried: Sequence[BoxFit], before: BoxFit, base: BoxFit) -> list[BoxFit]:
         """Return fits of effects that contain one that pays (Stribeck's friction contains Coulomb's)."""
         found = []
         for fit in tried:
@@ -241,7 +241,7 @@ class Search:
                         found.append(again)
         return found
 
-    def pruned(self, fit: Fit, base: Fit) -> Fit:
+    def pruned(self, fit: BoxFit, base: BoxFit) -> BoxFit:
         """Take out earlier effects that the last one has made superfluous.
 
         Args:
@@ -263,7 +263,7 @@ class Search:
             fit = max(reduced, key=self.score)
         return fit
 
-    def screen(self, before: Fit) -> list[Promise]:
+    def screen(self, before: BoxFit) -> list[Promise]:
         """Return what every start of every effect promises on top of a fit, best first.
 
         Args:
@@ -274,8 +274,8 @@ class Search:
         """
         present = {effect.label for effect in before.model.effects}
         replaced = {f"{effect.kind.needs}@{effect.place}" for effect in before.model.effects}
-        trials: list[tuple[Effect, Array, int]] = []
-        models: list[Model] = []
+        trials: list[tuple[BoxEffect, Array, int]] = []
+        models: list[BoxModel] = []
         for effect in self.effects:
             if effect.label in present | replaced or effect.kind.needs:
                 continue
@@ -302,7 +302,7 @@ class Search:
         return found
 
     def _promises(
-        self, before: Fit, trials: Sequence[tuple[Effect, Array, int]], columns: Sequence[Array | None], rows: int
+        self, before: BoxFit, trials: Sequence[tuple[BoxEffect, Array, int]], columns: Sequence[Array | None], rows: int
     ) -> list[Promise]:
         """Return what each trial promises over the first ``rows``, best first."""
         fitter = self.fitter
@@ -357,7 +357,7 @@ class Search:
         return sorted({now, 0, *lower[1::3], *lower[-1:]})
 
 
-def _amplitude_count(effect: Effect) -> int:
+def _amplitude_count(effect: BoxEffect) -> int:
     """Return in how many of its leading values the response to an effect is linear."""
     if effect.kind.linear:
         return len(effect.kind.parameters)
@@ -377,7 +377,7 @@ def _regressed(e: Array, D: Array, free: bool, least: float) -> tuple[float, Arr
     return float(found @ g), found / scale
 
 
-def counted(model: Model) -> int:
+def counted(model: BoxModel) -> int:
     """Return the number of values of the effects of a model that count as parameters.
 
     Args:
@@ -389,7 +389,7 @@ def counted(model: Model) -> int:
     return sum(len(effect.kind.parameters) for effect in model.effects)
 
 
-def labels(fit: Fit) -> frozenset[str]:
+def labels(fit: BoxFit) -> frozenset[str]:
     """Return the names of its effects.
 
     Args:

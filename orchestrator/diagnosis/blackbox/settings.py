@@ -8,7 +8,7 @@ from typing import Annotated
 from orchestrator.shared.settings import Settings, note, setting, share
 
 
-class SearchSettings(Settings, frozen=True):
+class BoxSearchSettings(Settings, frozen=True):
     """Which effects are tried, and what one must earn to be named."""
 
     penalty: Annotated[float, setting("log-likelihood that each further value must earn")] = 5.0
@@ -72,7 +72,7 @@ class RestSettings(Settings, frozen=True):
 class BoxSettings(Settings, frozen=True):
     """All thresholds of a diagnosis of any FMU."""
 
-    search: Annotated[SearchSettings, note("the search")] = SearchSettings()
+    search: Annotated[BoxSearchSettings, note("the search")] = BoxSearchSettings()
     start: Annotated[StartSettings, note("the start")] = StartSettings()
     rest: Annotated[RestSettings, note("what is left")] = RestSettings()
 

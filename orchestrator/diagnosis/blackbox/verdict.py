@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.fitting import Fit, Fitter
-from orchestrator.diagnosis.blackbox.search import Search, labels
+from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
+from orchestrator.diagnosis.blackbox.search import BoxSearch, labels
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Rest:
     blocks: Array
 
 
-def rest_of(fitter: Fitter, fit: Fit, rows: slice, settings: RestSettings = DEFAULT.rest) -> Rest:
+def rest_of(fitter: Fitter, fit: BoxFit, rows: slice, settings: RestSettings = DEFAULT.rest) -> Rest:
     """Return what a model leaves over ``rows``; ``fit.y`` must reach so far.
 
     Args:
@@ -78,7 +78,7 @@ def _reasons(e: Array, s: RestSettings) -> list[str]:
     return found
 
 
-def beginning_of(fitter: Fitter, fit: Fit, count: int = DEFAULT.rest.beginnings) -> tuple[float, str, float]:
+def beginning_of(fitter: Fitter, fit: BoxFit, count: int = DEFAULT.rest.beginnings) -> tuple[float, str, float]:
     """Return the gain, the input and the time of the effort that begins there and explains most of what is left.
 
     A disturbance that is noise begins nowhere. Each effort's response is measured on the FMU.
@@ -118,7 +118,7 @@ PLACES = 12
 """Stretches of an output's range in each of which what is left may act in a way of its own."""
 
 
-def predicted(fitter: Fitter, fit: Fit, lags: int = DEFAULT.rest.driven_lags) -> float:
+def predicted(fitter: Fitter, fit: BoxFit, lags: int = DEFAULT.rest.driven_lags) -> float:
     """Return by how many standard deviations of chance what is left can be predicted from what went before.
 
     By all signals together, or by one alone.
@@ -157,7 +157,7 @@ def predicted(fitter: Fitter, fit: Fit, lags: int = DEFAULT.rest.driven_lags) ->
     return max(together, float(np.max(alone)))
 
 
-def family_of(search: Search, best: Fit) -> tuple[str, ...]:
+def family_of(search: BoxSearch, best: BoxFit) -> tuple[str, ...]:
     """Return labels of effects that the record does not tell from the last one of the best model.
 
     Args:
@@ -184,7 +184,7 @@ def family_of(search: Search, best: Fit) -> tuple[str, ...]:
     return tuple(dict.fromkeys(others))
 
 
-def recovered(base: Fit, best: Fit, outputs: int, rows: int) -> float:
+def recovered(base: BoxFit, best: BoxFit, outputs: int, rows: int) -> float:
     """Return the share of what the re-fitted model lacks of pure noise that the effects bring.
 
     Args:
