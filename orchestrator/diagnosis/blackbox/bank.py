@@ -25,6 +25,7 @@ class Surroundings:
         position: rms of the position about zero; span: from the smallest to the largest.
         speed: rms of the speed.
         angular: the position is an angle.
+        cycles: wavenumbers of ripples over the position, in order, told apart within its span.
     """
 
     h: float
@@ -66,6 +67,9 @@ class Kind:
         plausible: values -> False where the fit has left what the effect means.
         angular: only for angles.
         shrinks: the response to a small value is proportional to it: what is smaller than the least start is found.
+        scan: scene -> values of the last parameter, in order and so close that the best of them leads a fit to the
+            right one: more than the FMU is run for, looked through with its surrogate.
+        finer: values, scene -> small changes where they depend on the values themselves (default: ``scales``).
     """
 
     name: str
@@ -82,6 +86,8 @@ class Kind:
     plausible: Callable[[Values, Surroundings], bool] = lambda values, scene: True
     angular: bool = False
     shrinks: bool = False
+    scan: Callable[[Surroundings], tuple[float, ...]] = lambda scene: ()
+    finer: Callable[[Values, Surroundings], Values] | None = None
 
 
 def _delays(s: Surroundings) -> tuple[Values, ...]:
@@ -108,6 +114,28 @@ def _rates(s: Surroundings) -> tuple[Values, ...]:
 
 def _quanta(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.peak,) for f in (0.05, 0.1, 0.2, 0.4))
+
+
+def _all_limits(s: Surroundings) -> tuple[float, ...]:
+    return tuple(float(s.peak * (1.0 - f)) for f in np.geomspace(0.9, 0.001, 48))
+
+
+def _all_widths(s: Surroundings) -> tuple[float, ...]:
+    return tuple(float(s.peak * f) for f in np.geomspace(0.0003, 0.8, 48))
+
+
+def _all_rates(s: Surroundings) -> tuple[float, ...]:
+    return tuple(float(f * _rates(s)[-1][0]) for f in np.geomspace(0.003, 1.25, 48))
+
+
+def _all_quanta(s: Surroundings) -> tuple[float, ...]:
+    """Return quanta of which the peak holds 60 to a half, a quarter more or less each time: no threshold is passed."""
+    return tuple(float(s.peak / count) for count in np.arange(60.0, 0.5, -0.25))
+
+
+def _within_a_quantum(values: Values, s: Surroundings) -> Values:
+    """Return a change of a quantum that moves the peak by a small share of one."""
+    return (0.01 * values[0] ** 2 / s.peak,)
 
 
 def _friction(s: Surroundings) -> tuple[Values, ...]:
@@ -137,11 +165,14 @@ _SERIES = (
     Kind("input_offset", INPUT, ("offset",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True),
     Kind("input_delay", INPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),
     Kind("input_lag", INPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,), shrinks=True),
-    Kind("input_saturation", INPUT, ("limit",), ("effort",), lambda s: (0.003 * s.peak,), _limits, lower=(0.0,)),
-    Kind("input_dead_zone", INPUT, ("width",), ("effort",), lambda s: (0.003 * s.peak,), _widths, lower=(0.0,)),
+    Kind("input_saturation", INPUT, ("limit",), ("effort",), lambda s: (0.003 * s.peak,), _limits, lower=(0.0,),
+         scan=_all_limits),
+    Kind("input_dead_zone", INPUT, ("width",), ("effort",), lambda s: (0.003 * s.peak,), _widths, lower=(0.0,),
+         shrinks=True, scan=_all_widths),
     Kind("input_rate_limit", INPUT, ("rate",), ("effort/s",), lambda s: (0.01 * _rates(s)[2][0],), _rates,
-         lower=(1e-30,)),
-    Kind("input_quantisation", INPUT, ("step",), ("effort",), lambda s: (0.01 * s.peak,), _quanta, lower=(0.0,)),
+         lower=(1e-30,), scan=_all_rates),
+    Kind("input_quantisation", INPUT, ("step",), ("effort",), lambda s: (0.01 * s.peak,), _quanta, lower=(0.0,),
+         scan=_all_quanta, finer=_within_a_quantum),
     Kind("output_gain", OUTPUT, ("gain",), ("1",), lambda s: (0.003,), lambda s: ((0.01,),), True),
     Kind("output_offset", OUTPUT, ("offset",), ("flow",), lambda s: (s.noise,), lambda s: ((s.noise,),), True),
     Kind("output_delay", OUTPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),
@@ -171,7 +202,8 @@ _FEEDBACK = (
          lambda s: ((0.01 * s.size, 0.01 * s.size),), True, laws.GRAVITY, angular=True),
     Kind("ripple", PORT, ("sine", "cosine", "wavenumber"), ("effort", "effort", "1/flow"),
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 / s.span),
-         lambda s: tuple((0.01 * s.size, 0.01 * s.size, n) for n in s.cycles), law=laws.RIPPLE,
+         lambda s: tuple((0.01 * s.size, 0.01 * s.size, n) for n in s.cycles[:: max(len(s.cycles) // 24, 1)]),
+         law=laws.RIPPLE, scan=lambda s: s.cycles,
          plausible=lambda v, s: not _once_a_turn(v, s)),
     Kind("load", PORT, ("effort",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True, laws.LOAD),
     Kind("directional_friction", PORT, ("difference",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
@@ -200,10 +232,17 @@ class BoxEffect:
         """Return name and place."""
         return f"{self.kind.name}@{self.place}"
 
-    @property
-    def scales(self) -> Values:
-        """Return what counts as a small change of each value."""
-        return self.kind.scales(self.scene)
+    def scales(self, values: Array) -> Values:
+        """Return what counts as a small change of each value.
+
+        Args:
+            values: of the effect's parameters.
+
+        Returns:
+            As many changes.
+        """
+        finer = self.kind.finer
+        return self.kind.scales(self.scene) if finer is None else finer(tuple(values), self.scene)
 
     def bounded(self, values: Array) -> Array:
         """Return values no smaller than what the law allows.

@@ -16,11 +16,6 @@ from orchestrator.diagnosis.blackbox.settings import DEFAULT
 from orchestrator.diagnosis.blackbox.verdict import rest_of
 from orchestrator.errors import ScenarioError
 
-CONFOUNDED = 0.95
-"""Correlation from which two parameters count as not told apart."""
-LEARNED = 0.3
-"""Share of its uncertainty below which a record has said little of a parameter."""
-
 
 @dataclass(frozen=True)
 class BoxCalibration:
@@ -99,12 +94,17 @@ def calibrate(
     correlation = covariance / sd / sd[:, None]
     names = [e.name for e in parameters]
     pairs = tuple(
-        (names[i], names[j]) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > CONFOUNDED
+        (names[i], names[j])
+        for i in range(len(names))
+        for j in range(i)
+        if abs(correlation[i, j]) > DEFAULT.calibration.confounded
     )
     explained = rest.explained or rest.disturbed
     warnings = [*probe.notes]
     warnings += [
-        f"`{n}` is hardly determined: excite what it acts on" for n, share in learned.items() if share < LEARNED
+        f"`{n}` is hardly determined: excite what it acts on"
+        for n, share in learned.items()
+        if share < DEFAULT.calibration.learned
     ]
     warnings += [f"`{a}` and `{b}` are hardly told apart: excite them at other frequencies" for a, b in pairs]
     if not explained:

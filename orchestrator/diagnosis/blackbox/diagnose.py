@@ -101,19 +101,22 @@ def prepared(
     return problem, probe
 
 
-def fitters(problem: BoxProblem, parts: BoxParts, spread: float = DEFAULT.start.spread) -> list[Fitter]:
+def fitters(problem: BoxProblem, parts: BoxParts, settings: BoxSettings = DEFAULT) -> list[Fitter]:
     """Return fitters that take the FMU's start as exact, and as somewhat off.
 
     Args:
         problem: the FMU and the record.
         parts: of the record: fitted, deciding, held out.
-        spread: how far the state that the FMU starts from may be off, as seen at the outputs, in units of their noise.
+        settings: thresholds.
 
     Returns:
         Two fitters.
     """
     surrogate, drive = problem.impulses(problem.nominal, max(problem.n // 2, 16))
-    return [Fitter(problem, Ladder(surrogate, drive, problem.n, off), parts) for off in (0.0, spread)]
+    return [
+        Fitter(problem, Ladder(surrogate, drive, problem.n, off), parts, settings)
+        for off in (0.0, settings.start.spread)
+    ]
 
 
 def diagnose(
@@ -161,7 +164,7 @@ def _diagnosed(
     nominal_reads = problem.must_read(problem.nominal)
     effects = effects_of(problem, nominal_reads)
     tried: list[tuple[BoxSearch, BoxFit, BoxFit]] = []
-    for n, fitter in enumerate(fitters(problem, parts, settings.start.spread)):
+    for n, fitter in enumerate(fitters(problem, parts, settings)):
         search = BoxSearch(fitter, effects, settings.search, progress, until=begun + problem.map.options.budget)
         base = search.base()
         if base is None:
@@ -188,7 +191,7 @@ def _diagnosed(
     search, base, best = _interleaved(search, base, best)
     # What a start that is off explains by itself needs no effect.
     if len(tried) == 1 and best.model.effects:
-        offset = fitters(problem, parts, settings.start.spread)[1]
+        offset = fitters(problem, parts, settings)[1]
         plain = BoxSearch(offset, effects, settings.search, progress)
         found = plain.base()
         if found is not None:
@@ -207,8 +210,9 @@ def _interleaved(search: BoxSearch, base: BoxFit, best: BoxFit) -> tuple[BoxSear
     if search.explained(best) or search.late:
         return search, base, best
     fitter = search.fitter
+    parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces)
     turns = BoxSearch(
-        Fitter(fitter.problem, fitter.ladder, interleaved(fitter.problem.n)),
+        Fitter(fitter.problem, fitter.ladder, parts, fitter.settings),
         search.effects, search.settings, search.progress, until=search.until,
     )  # fmt: skip
     plain = turns.fitter.fit(base.model, base.level)
@@ -265,9 +269,10 @@ def _judged(
     if suspects:
         suspects += family_of(search, best)
     model = last.model if verdict != "unknown" else base.model
+    where = _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else ()
     return BoxOutcome(
         verdict, named, suspects, parameters, misfits(problem, stages, parts.held_out), model, rest, probe,
-        _where_of(problem, rest) if verdict == "unknown" else (), _warned(probe, search, rest, verdict, best, share),
+        where, _warned(probe, search, rest, verdict, best, share),
         base.model, problem, stages, search,
         time.monotonic() - begun, problem.runner.runs,
     )  # fmt: skip
@@ -303,21 +308,21 @@ def _doubted(fitter: Fitter, fit: BoxFit, rest: Rest, named: bool, settings: Res
         return replace(
             rest, disturbed=False, reasons=(f"{100.0 * rest.share:.2g} % of the drive is left at the ports",)
         )
-    if predicted(fitter, fit, settings.driven_lags) > settings.driven:
+    if predicted(fitter, fit, settings) > settings.driven:
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
-    gain, name, time = beginning_of(fitter, fit, settings.beginnings)
+    gain, name, time = beginning_of(fitter, fit, settings)
     if gain > settings.begins:
         return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))
     return rest
 
 
-def _where_of(problem: BoxProblem, rest: Rest) -> tuple[str, ...]:
+def _where_of(problem: BoxProblem, rest: Rest, least: float) -> tuple[str, ...]:
     """Return where and when what is left exceeds noise, worst first."""
     found = []
     bounds = np.linspace(0, problem.n - 1, len(rest.blocks) + 1).astype(int)
     for b, block in enumerate(rest.blocks):
         for k, power in enumerate(block):
-            if power > 1.3:
+            if power > least:
                 a, z = problem.data.time[bounds[b]], problem.data.time[bounds[b + 1]]
                 found.append(
                     (

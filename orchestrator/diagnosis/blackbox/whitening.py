@@ -38,6 +38,23 @@ class Surrogate:
         """Return the number of states."""
         return len(self.A)
 
+    def response(self, pushes: Array, place: int) -> Array:
+        """Return the outputs under efforts at one of its inputs, from rest.
+
+        Args:
+            pushes: (n - 1, columns) efforts, each held over a sample.
+            place: of the input.
+
+        Returns:
+            Shape (n, outputs, columns).
+        """
+        x = np.zeros((self.order, pushes.shape[1]))
+        found = np.zeros((len(pushes) + 1, len(self.C), pushes.shape[1]))
+        for k, push in enumerate(pushes):
+            x = self.A @ x + self.B[:, place : place + 1] * push
+            found[k + 1] = self.C @ x
+        return found
+
 
 def realised(impulses: Array) -> Surrogate:
     """Return a surrogate of impulse responses.
