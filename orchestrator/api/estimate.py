@@ -19,13 +19,14 @@ from orchestrator.api.shown import Block, Result, table
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation import cramer_rao, maximum_likelihood
 from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
-from orchestrator.estimation.repeats import Repeats, repeats_of
+from orchestrator.estimation.repeats import in_words, repeats_of
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.estimation.tables import write_tables
 from orchestrator.estimation.trust import FITTED, trust_of_estimates
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
+from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Level, Trust
@@ -159,7 +160,7 @@ class EstimateResult(Result):
         rows = [method_row(m) for m in self.methods if m.estimate is not None]
         unfit = [f"{m.method} does not apply: {m.reason}" for m in self.methods if m.estimate is None]
         sizes = [f"{self.best.method}: {self._play()}"] if self.estimates and self.best.visible else []
-        floor = [] if self.repeats is None else [f"{self.repeats}{_beside(self.estimates)}"]
+        floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_beside(self.estimates)}"]
         return [table(title, HEAD, rows), *sizes, *floor, *messages, *doubts, *unfit, *missing]
 
     def results(self, place: Path | None = None) -> dict[str, Any]:
