@@ -43,5 +43,5 @@ def trust_section(trust: Mapping[str, Any] | None) -> list[Section]:
     if not reasons:
         return []
     level = str((trust or {}).get("level"))
-    lines = tuple(text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".") for text in reasons)
+    lines = tuple(text if text.endswith(".") else f"{text}." for text in reasons)
     return [Text("How far this can be trusted", (MEANINGS.get(level, level), *lines))]
