@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.sizes import with_model_error
 from orchestrator.diagnosis.fit.together import at_one_rate, series
 from orchestrator.diagnosis.outcome import Diagnosis, Workings
 from orchestrator.diagnosis.passes import Progress, passes
@@ -16,7 +17,7 @@ from orchestrator.diagnosis.proof.by_record import by_record, repeats
 from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
-from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, ladder
 from orchestrator.diagnosis.search.search import in_metres
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.admission import check_comparable, check_diagnosable, check_resolved
@@ -70,13 +71,20 @@ def diagnose(
     likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
     base_fit, final = found.base, found.final
     units = METRIC if in_metres(model) else {}
+    position = units.get("rad", "rad")
+    chosen = base_fit if unknown else final
+    stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
+    misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
+    if any(one.after > settings.verdict.notable_misfit * one.noise for one in misfit):
+        levels = ladder(settings.levels, () if unknown else best.effects, chosen.q)
+        chosen = with_model_error(likelihood, chosen, parts.seen, levels)
+        final = final if unknown else chosen
     everything = [
         (named(plant, effect, final, search.steps, units, settings.verdict), effect.measurement)
         for effect in best.effects
     ]
     effects = tuple(one for one, of_the_log in everything if not of_the_log)
     nuisances = tuple(one for one, of_the_log in everything if of_the_log)
-    chosen = base_fit if unknown else final
     if unknown or effects or nuisances:
         verdict = "unknown" if unknown else "effects" if effects else "parameters"
     else:
@@ -85,14 +93,12 @@ def diagnose(
     untouched = replace(base_fit, p=nominal)
     before = missing_torque(likelihood, untouched if verdict in ("none", "parameters") else base_fit)
     after = missing_torque(likelihood, chosen)
-    stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
     where = places(before, signals.h, settings.places)
     far = far_off(model, chosen.p, settings.verdict)
     unnamed = replace(found.proof, final=found.proof.base) if unknown else found.proof
-    position = units.get("rad", "rad")
     ends = (stages[0], stages[-1])
     named_stages = ("parameters", "final")[: 1 if unknown or not best.effects else 2]
-    misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
+    learning = unknown and not search.stopped and not found.hopeless
     warnings = warnings_of(found, effects, signals.channels, len(plant.bodies))
     return Diagnosis(
         verdict=verdict,
@@ -112,7 +118,7 @@ def diagnose(
         workings=Workings(likelihood, parts, base_fit, chosen, best, tuple(search.steps), before, after),
         records=by_record(likelihood, chosen.q, ends, parts.held_out, position),
         repeats=repeats(likelihood.signals, plant.encoders, settings.proof),
-        learned=learned_law(likelihood, chosen, parts, position) if unknown and not search.stopped else None,
+        learned=learned_law(likelihood, chosen, parts, position) if learning else None,
     )
 
 
