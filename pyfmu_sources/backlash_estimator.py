@@ -38,7 +38,7 @@ DEAD = -1e9  # log weight of such a filter
 LONGEST_PART = 0.06  # of the shaft's oscillation, in radians of its phase
 
 
-class Settings(NamedTuple):
+class NoiseSettings(NamedTuple):
     """What the estimator is told about noise; each is a standard deviation."""
 
     noise_m: float = 3.5e-4  # of the motor's angle, rounding included [rad]
@@ -141,7 +141,7 @@ def predict(f: Filter, m: Model, u: float, h: float, s: SettingValues) -> None:
         m: model.
         u: requested torque [N.m].
         h: step [s], short beside the shaft's oscillation.
-        s: settings, in the order of :class:`Settings`.
+        s: settings, in the order of :class:`NoiseSettings`.
     """
     J_m, J_l, k, c, b_m, b_l, i, tau = m
     mean = 1.0 / i
@@ -336,7 +336,7 @@ def advance(filters: Filters, m: Model, s: SettingValues, u: float, h: float) ->
     Args:
         filters: ``FILTERS`` filters, changed in place.
         m: model.
-        s: settings, in the order of :class:`Settings`.
+        s: settings, in the order of :class:`NoiseSettings`.
         u: torque request held over the sample [N.m].
         h: sample time [s].
     """

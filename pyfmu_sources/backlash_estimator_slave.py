@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from . import backlash_estimator as source
 from .backlash_estimator import Filters, Model, SettingValues
-from .fmu_variables import Variable
+from .fmu_variables import FmuVariable
 from .sampled_slave import SampledSlave
 
 U, THETA_M, THETA_L, ALPHA_HAT, ALPHA_DEVIATION, CONTACT_HAT, FIRST_ESTIMATE = range(7)
@@ -33,7 +33,7 @@ _MODEL = (
     ("i", "1", 3.984, "Gear ratio: motor angle over load angle"),
     ("tau", "s", 1.0, "Time constant of the motor's torque"),
 )
-_DEFAULT = source.Settings()
+_DEFAULT = source.NoiseSettings()
 _SETTINGS = (
     ("noise_m", "rad", "Standard deviation of the measured motor angle, rounding included", 1e-9),
     ("noise_l", "rad", "Standard deviation of the measured load angle; 1e6: no load encoder", 1e-9),
@@ -53,12 +53,12 @@ class BacklashEstimator(SampledSlave):
 
     title = "Online estimator of the half-gap, its standard deviation, the flank and the state"
     sample_time_reference = SAMPLE_TIME
-    table: ClassVar[tuple[Variable, ...]] = (
-        Variable("u", "input", "N.m", 0.0, "Requested motor torque, held since the last sample", nominal=100.0),
-        Variable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
-        Variable("theta_l", "input", "rad", 0.0, "Measured load angle"),
+    table: ClassVar[tuple[FmuVariable, ...]] = (
+        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque, held since the last sample", nominal=100.0),
+        FmuVariable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
+        FmuVariable("theta_l", "input", "rad", 0.0, "Measured load angle"),
         *(
-            Variable(name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED)
+            FmuVariable(name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED)
             for name, unit, text in (
                 ("alpha_hat", "rad", "Estimated half-gap"),
                 ("alpha_deviation", "rad", "Standard deviation of the estimated half-gap"),
@@ -67,14 +67,14 @@ class BacklashEstimator(SampledSlave):
             )
         ),
         *(
-            Variable(name, "parameter", unit, start, text, 0.0 if name in _ZERO_ALLOWED else 1e-9, 1e12)
+            FmuVariable(name, "parameter", unit, start, text, 0.0 if name in _ZERO_ALLOWED else 1e-9, 1e12)
             for name, unit, start, text in _MODEL
         ),
         *(
-            Variable(name, "parameter", unit, getattr(_DEFAULT, name), text, least, 1e6)
+            FmuVariable(name, "parameter", unit, getattr(_DEFAULT, name), text, least, 1e6)
             for name, unit, text, least in _SETTINGS
         ),
-        Variable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1.0),
+        FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1.0),
     )
 
     _model: Model

@@ -23,7 +23,7 @@ from .drivetrain_parameters import (
     Parameter,
 )
 from .effects import saturated
-from .fmu_variables import LARGEST, Variable
+from .fmu_variables import LARGEST, FmuVariable
 from .slave_base import TOO_STIFF, SlaveBase, StepRefusedError
 
 U, T_L, THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(9)
@@ -33,6 +33,12 @@ MODEL = FIRST_PARAMETER + P_MODEL
 KNOWN_STEPS = 16
 # The work of a step grows with its length; a host that asks for more than this has mistaken the unit.
 LONGEST_STEP = 100.0
+# Angles [rad] beyond which neighbouring numbers are over 2 mrad apart: a gap and most motion are lost in rounding.
+FARTHEST = 1e13
+TOO_FAR = (
+    "must stay within 1e13 rad, beyond which rounding leaves nothing of a gap: make the torques `u` and `T_l` "
+    "or the initial speed smaller, the inertias larger or the run shorter"
+)
 
 Values = Annotated[tuple[float, ...], COUNT]
 KnownStep = tuple[float, Table]
@@ -55,10 +61,10 @@ _GEAR = ("J_m", "J_l", "i", "alpha", "backlash_model", "theta_m_start", "theta_l
 _prepare = lru_cache(maxsize=256)(drivetrain.prepare)
 
 
-def _variable(parameter: Parameter) -> Variable:
+def _variable(parameter: Parameter) -> FmuVariable:
     name, unit, default, minimum, maximum, description = parameter
     if name == "backlash_model":
-        return Variable(
+        return FmuVariable(
             name,
             "parameter",
             "",
@@ -69,12 +75,12 @@ def _variable(parameter: Parameter) -> Variable:
             type="Enumeration",
             declared_type="BacklashModel",
         )
-    return Variable(name, "parameter", unit, default, description, minimum, maximum)
+    return FmuVariable(name, "parameter", unit, default, description, minimum, maximum)
 
 
-def _output(name: str, unit: str, description: str, nominal: float, starts_from: tuple[str, ...]) -> Variable:
+def _output(name: str, unit: str, description: str, nominal: float, starts_from: tuple[str, ...]) -> FmuVariable:
     depends_on = ("T_l",) if name == "T_shaft" else ()
-    return Variable(
+    return FmuVariable(
         name, "output", unit, None, description, nominal=nominal, depends_on=depends_on, starts_from=starts_from
     )
 
@@ -84,9 +90,9 @@ class Drivetrain(SlaveBase):
 
     title = "Geared drivetrain with backlash: motor with lag, gear with play, elastic shaft, load"
     feedthrough = True
-    table: ClassVar[tuple[Variable, ...]] = (
-        Variable("u", "input", "N.m", 0.0, "Requested motor torque", nominal=100.0),
-        Variable("T_l", "input", "N.m", 0.0, "External torque against the load", nominal=100.0),
+    table: ClassVar[tuple[FmuVariable, ...]] = (
+        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque", -BIG, BIG, nominal=100.0),
+        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the load", -BIG, BIG, nominal=100.0),
         _output(
             "theta_m", "rad", "Motor angle as measured", 1.0, ("theta_m_start", "effects.sensor_offset.motor.offset")
         ),
@@ -95,7 +101,7 @@ class Drivetrain(SlaveBase):
         _output("omega_l", "rad/s", "Load speed", 10.0, (*_GEAR, "omega_l_start")),
         _output("T_m", "N.m", "Motor torque", 100.0, ("T_m_start",)),
         _output("T_shaft", "N.m", "Torque of the shaft on the load", 100.0, (*_SHAFT, "T_l")),
-        Variable(
+        FmuVariable(
             "contact",
             "output",
             "",
@@ -107,7 +113,7 @@ class Drivetrain(SlaveBase):
             starts_from=_SHAFT,
         ),
         *(_variable(parameter) for parameter in PARAMETERS),
-        *(Variable(name, "parameter", unit, 0.0, text, -1e12, 1e12) for name, unit, text in _STARTS),
+        *(FmuVariable(name, "parameter", unit, 0.0, text, -1e12, 1e12) for name, unit, text in _STARTS),
     )
 
     _x: State
@@ -204,10 +210,12 @@ class Drivetrain(SlaveBase):
         return drivetrain.advance(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
 
     def _take(self, x: State, mode: Mode, step: float) -> None:
-        """Take over a state that is finite, or refuse the step."""
+        """Take over a state that is finite and not too far away to be told from its neighbours, or refuse the step."""
         if x[0] != x[0]:
             raise StepRefusedError(f"the step of {step!r} s {TOO_STIFF}")
-        if not -LARGEST <= x[0] + x[1] + x[2] + x[3] + x[4] <= LARGEST:
+        if not (-FARTHEST <= x[0] <= FARTHEST and -FARTHEST <= x[2] <= FARTHEST):
+            raise StepRefusedError(f"`theta_m` and `theta_l`, {x[0]!r} and {x[2]!r} after this step, {TOO_FAR}")
+        if not -LARGEST <= x[1] + x[3] + x[4] <= LARGEST:
             raise StepRefusedError(f"the state must stay finite, but is {x!r} after a step of {step!r} s")
         self._x = x
         self._mode = mode

@@ -19,7 +19,7 @@ SYMBOLS: dict[str, Exponents] = {
 }
 
 
-class Variable(NamedTuple):
+class FmuVariable(NamedTuple):
     """One scalar variable; its place in the table is its value reference.
 
     ``minimum`` and ``maximum`` are closed bounds, and finiteness is demanded where there are none. ``depends_on``
@@ -50,7 +50,7 @@ class Variable(NamedTuple):
         return (low, largest if self.maximum is None else self.maximum)
 
 
-def with_starts(variables: tuple[Variable, ...], starts: dict[str, float]) -> tuple[Variable, ...]:
+def with_starts(variables: tuple[FmuVariable, ...], starts: dict[str, float]) -> tuple[FmuVariable, ...]:
     """Return the table with other start values.
 
     Args:

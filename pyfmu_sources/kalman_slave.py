@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from . import kalman
-from .fmu_variables import Variable
+from .fmu_variables import FmuVariable
 from .kalman import Gain, Matrix6, Vector6, Weight
 from .sampled_slave import SampledSlave
 
@@ -40,7 +40,7 @@ def _quotient(above: str, below: str) -> str:
     return "1" if above == below else _QUOTIENTS[(above, below)]
 
 
-def _matrices() -> list[Variable]:
+def _matrices() -> list[FmuVariable]:
     rows = range(6)
     units = [unit for _, unit, _ in _STATES]
     entries = [
@@ -49,7 +49,7 @@ def _matrices() -> list[Variable]:
     entries += [(f"B_d[{r + 1}]", _quotient(units[r], "N.m"), "Discrete input vector of u") for r in rows]
     entries += [(f"K_f[{r + 1},{c + 1}]", _quotient(units[r], "rad"), "Estimator gain") for r in rows for c in (0, 1)]
     entries += [(f"S_inv[{rc}]", "1/rad2", "Inverse covariance of the innovation") for rc in ("1,1", "1,2", "2,2")]
-    return [Variable(name, "parameter", unit, 0.0, text) for name, unit, text in entries]
+    return [FmuVariable(name, "parameter", unit, 0.0, text) for name, unit, text in entries]
 
 
 class KalmanEstimator(SampledSlave):
@@ -57,12 +57,12 @@ class KalmanEstimator(SampledSlave):
 
     title = "Sampled-data Kalman filter of the drivetrain's state and of its load torque"
     sample_time_reference = SAMPLE_TIME
-    table: ClassVar[tuple[Variable, ...]] = (
-        Variable("u", "input", "N.m", 0.0, "Requested motor torque, held since the last sample", nominal=100.0),
-        Variable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
-        Variable("theta_l", "input", "rad", 0.0, "Measured load angle"),
+    table: ClassVar[tuple[FmuVariable, ...]] = (
+        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque, held since the last sample", nominal=100.0),
+        FmuVariable("theta_m", "input", "rad", 0.0, "Measured motor angle"),
+        FmuVariable("theta_l", "input", "rad", 0.0, "Measured load angle"),
         *(
-            Variable(
+            FmuVariable(
                 name,
                 "output",
                 unit,
@@ -75,16 +75,16 @@ class KalmanEstimator(SampledSlave):
             for name, unit, text in _STATES
         ),
         *(
-            Variable(name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED)
+            FmuVariable(name, "output", unit, None, text, variability="discrete", depends_on=_MEASURED)
             for name, unit, text in (
                 ("innovation_m", "rad", "Motor angle measured minus predicted"),
                 ("innovation_l", "rad", "Load angle measured minus predicted"),
                 ("innovation_squared", "1", "Normalised innovation squared"),
             )
         ),
-        Variable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
+        FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
         *(
-            Variable(f"{name}_start", "parameter", unit, 0.0, f"Initially estimated {text}")
+            FmuVariable(f"{name}_start", "parameter", unit, 0.0, f"Initially estimated {text}")
             for name, unit, text in _STATES
         ),
         *_matrices(),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from .fmu_variables import Variable
+from .fmu_variables import FmuVariable
 from .lqr import Gains, control
 from .sampled_slave import SampledSlave
 
@@ -39,9 +39,9 @@ class LqrController(SampledSlave):
 
     title = "Sampled-data linear-quadratic regulator of the drivetrain, load torque fed forward"
     sample_time_reference = SAMPLE_TIME
-    table: ClassVar[tuple[Variable, ...]] = (
-        *(Variable(name, "input", unit, 0.0, text) for name, unit, text in _INPUTS),
-        Variable(
+    table: ClassVar[tuple[FmuVariable, ...]] = (
+        *(FmuVariable(name, "input", unit, 0.0, text) for name, unit, text in _INPUTS),
+        FmuVariable(
             "u",
             "output",
             "N.m",
@@ -52,11 +52,11 @@ class LqrController(SampledSlave):
             depends_on=_INPUT_NAMES,
             starts_from=(*_INPUT_NAMES, *_PARAMETER_NAMES),
         ),
-        *(Variable(name, "parameter", unit, 0.0, text) for name, unit, text in _GAINS),
-        Variable("i", "parameter", "1", 3.984, "Gear ratio: motor angle over load angle", 1e-9, 1e12),
-        Variable("compliance", "parameter", "rad/(N.m)", 1.0 / 3300.0, "Compliance of the shaft", 0.0, 1e12),
-        Variable("u_max", "parameter", "N.m", 1e4, "Torque limit", 0.0, 1e12),
-        Variable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
+        *(FmuVariable(name, "parameter", unit, 0.0, text) for name, unit, text in _GAINS),
+        FmuVariable("i", "parameter", "1", 3.984, "Gear ratio: motor angle over load angle", 1e-9, 1e12),
+        FmuVariable("compliance", "parameter", "rad/(N.m)", 1.0 / 3300.0, "Compliance of the shaft", 0.0, 1e12),
+        FmuVariable("u_max", "parameter", "N.m", 1e4, "Torque limit", 0.0, 1e12),
+        FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1e6),
     )
 
     _gains: Gains

@@ -6,7 +6,7 @@ from typing import Protocol
 from xml.etree.ElementTree import Element, SubElement
 
 from .backlash_models import MODELS
-from .fmu_variables import Variable, unit_exponents
+from .fmu_variables import FmuVariable, unit_exponents
 
 AUTHOR = "backlash-cosim project"
 LICENSE = "MIT"
@@ -27,7 +27,7 @@ class Described(Protocol):
     """What the description says of a class of slaves."""
 
     title: str
-    table: tuple[Variable, ...]
+    table: tuple[FmuVariable, ...]
     stop_time: float
     step_size: float
     variable_step: bool
@@ -90,14 +90,14 @@ def _capabilities(slave: Described, name: str) -> dict[str, str]:
     return {"modelIdentifier": name, "maxOutputDerivativeOrder": "0", **texts}
 
 
-def _units(root: Element, table: tuple[Variable, ...]) -> None:
+def _units(root: Element, table: tuple[FmuVariable, ...]) -> None:
     units = SubElement(root, "UnitDefinitions")
     for unit in sorted({variable.unit for variable in table if variable.unit}):
         exponents = unit_exponents(unit)
         SubElement(SubElement(units, "Unit", {"name": unit}), "BaseUnit", {b: str(e) for b, e in exponents.items()})
 
 
-def _types(root: Element, table: tuple[Variable, ...]) -> None:
+def _types(root: Element, table: tuple[FmuVariable, ...]) -> None:
     names = sorted({variable.declared_type for variable in table if variable.declared_type})
     if not names:
         return
@@ -108,7 +108,7 @@ def _types(root: Element, table: tuple[Variable, ...]) -> None:
             SubElement(enumeration, "Item", {"name": item, "value": str(value), "description": description})
 
 
-def _scalar_variable(reference: int, variable: Variable) -> Element:
+def _scalar_variable(reference: int, variable: FmuVariable) -> Element:
     default = {"parameter": "fixed", "input": "continuous", "output": "continuous", "local": "continuous"}[
         variable.causality
     ]
@@ -144,7 +144,7 @@ def _scalar_variable(reference: int, variable: Variable) -> Element:
     return element
 
 
-def _structure(root: Element, table: tuple[Variable, ...]) -> None:
+def _structure(root: Element, table: tuple[FmuVariable, ...]) -> None:
     index = {variable.name: str(position) for position, variable in enumerate(table, start=1)}
     structure = SubElement(root, "ModelStructure")
     outputs = [variable for variable in table if variable.causality == "output"]

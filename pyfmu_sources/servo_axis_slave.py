@@ -6,8 +6,9 @@ from typing import Annotated, ClassVar
 
 from . import servo_axis
 from .dead_time import MOST_REQUESTS, ROUNDING, Requests, is_new, request_at
+from .drivetrain_parameters import BIG
 from .effects import saturated
-from .fmu_variables import LARGEST, Variable
+from .fmu_variables import LARGEST, FmuVariable
 from .servo_axis import State
 from .servo_axis_parameters import COUNT, P_DELAY, P_LIMIT, P_OFFSET, PARAMETERS
 from .slave_base import TOO_STIFF, SlaveBase, StepRefusedError
@@ -26,16 +27,16 @@ class ServoAxis(SlaveBase):
     """One inertia behind the lag of its drive; the inputs are held over a communication step."""
 
     title = "Single axis: one inertia behind the torque lag of its drive"
-    table: ClassVar[tuple[Variable, ...]] = (
-        Variable("u", "input", "N.m", 0.0, "Requested torque", nominal=100.0),
-        Variable("T_l", "input", "N.m", 0.0, "External torque against the axis", nominal=100.0),
-        Variable("theta_m", "output", "rad", None, "Position as measured", starts_from=("theta_m_start", _OFFSET)),
-        Variable("omega_m", "output", "rad/s", None, "Speed", starts_from=("omega_m_start",)),
-        Variable("T_m", "output", "N.m", None, "Torque of the drive", starts_from=("T_m_start",)),
-        *(Variable(p.name, "parameter", p.unit, p.default, p.description, p.minimum, p.maximum) for p in PARAMETERS),
-        Variable("theta_m_start", "parameter", "rad", 0.0, "Initial position", -1e12, 1e12),
-        Variable("omega_m_start", "parameter", "rad/s", 0.0, "Initial speed", -1e12, 1e12),
-        Variable("T_m_start", "parameter", "N.m", 0.0, "Initial torque of the drive", -1e12, 1e12),
+    table: ClassVar[tuple[FmuVariable, ...]] = (
+        FmuVariable("u", "input", "N.m", 0.0, "Requested torque", -BIG, BIG, nominal=100.0),
+        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the axis", -BIG, BIG, nominal=100.0),
+        FmuVariable("theta_m", "output", "rad", None, "Position as measured", starts_from=("theta_m_start", _OFFSET)),
+        FmuVariable("omega_m", "output", "rad/s", None, "Speed", starts_from=("omega_m_start",)),
+        FmuVariable("T_m", "output", "N.m", None, "Torque of the drive", starts_from=("T_m_start",)),
+        *(FmuVariable(p.name, "parameter", p.unit, p.default, p.description, p.minimum, p.maximum) for p in PARAMETERS),
+        FmuVariable("theta_m_start", "parameter", "rad", 0.0, "Initial position", -1e12, 1e12),
+        FmuVariable("omega_m_start", "parameter", "rad/s", 0.0, "Initial speed", -1e12, 1e12),
+        FmuVariable("T_m_start", "parameter", "N.m", 0.0, "Initial torque of the drive", -1e12, 1e12),
     )
 
     _x: State

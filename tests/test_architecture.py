@@ -176,6 +176,18 @@ def test_public_names_are_documented(path):
             assert ast.get_docstring(node), f"{node.name} has no docstring"
 
 
+def test_no_class_name_means_two_things():
+    """Names within `diagnosis.blackbox` are still to be told from others."""
+    places = {}
+    for path in SOURCES:
+        if "blackbox" in path.parts:
+            continue
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
+    assert not {name: found for name, found in places.items() if len(found) > 1}
+
+
 def test_rooms_keep_their_private_names():
     """No name with an underscore leaves its room; the command line's front is of the room of the commands."""
 

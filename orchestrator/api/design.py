@@ -14,7 +14,7 @@ from orchestrator.api.estimate import UNSEEN, require_linear
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.estimation import design as designing
-from orchestrator.estimation.design import LONGEST, SHORTEST, Candidate, Limits
+from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, MachineLimits
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import LONGEST_STEP, own_frequency
 from orchestrator.records.record import MINIMUM_ROWS
@@ -44,11 +44,11 @@ class DesignResult(Result):
     command: ClassVar[str] = "estimate"
     size: float
     time: NDArray[np.float64]
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[Excitation, ...]
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def best(self) -> Candidate:
+    def best(self) -> Excitation:
         """The excitation with the smallest bound."""
         return self.candidates[0]
 
@@ -187,7 +187,7 @@ def design(
     model = read_model(None) if model is None else model
     require_linear(model)
     check_design(model, size, torque_limit, speed_limit, duration, rate)
-    limits = Limits(torque_limit, speed_limit)
+    limits = MachineLimits(torque_limit, speed_limit)
     time, candidates = designing.design(model, size, limits, duration, rate, motor_only, progress)
     given = {"size": size, "torque_limit": torque_limit, "speed_limit": speed_limit, "duration": duration}
     given |= {"rate": rate, "motor_only": motor_only}

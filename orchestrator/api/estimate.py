@@ -16,16 +16,17 @@ from orchestrator.api.methods import HEAD, MethodResult, described, method_entry
 from orchestrator.api.numerics import fitting
 from orchestrator.api.records import as_record
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation import cramer_rao, maximum_likelihood
 from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
-from orchestrator.estimation.repeats import Repeats, repeats_of
+from orchestrator.estimation.repeats import in_words, repeats_of
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.estimation.tables import write_tables
 from orchestrator.estimation.trust import FITTED, trust_of_estimates
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
+from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Level, Trust
@@ -49,6 +50,7 @@ class EstimateResult(Result):
         more: further records of the same machine, fitted together with the first.
         repeats: what records with the same torque differ by, or None.
         settings: the thresholds that were used.
+        undiagnosed: why no diagnosis followed although the model does not explain the record; else empty.
     """
 
     command: ClassVar[str] = "estimate"
@@ -60,6 +62,7 @@ class EstimateResult(Result):
     more: tuple[Record, ...] = ()
     repeats: Repeats | None = None
     settings: EstimationSettings = DEFAULT_SETTINGS
+    undiagnosed: str = ""
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -129,6 +132,11 @@ class EstimateResult(Result):
             estimate.diagnostics.get("parameters", {}).get("i", {}).get("value", self.model.parameters["i"].value)
         )
 
+    def _play(self) -> Play:
+        """Return the best half-gap with the gear ratio that was fitted beside it."""
+        corrected = None if self.diagnosis is None else self.diagnosis.diagnosis.play
+        return corrected or Play(self.alpha, self._ratio(self.best))
+
     def blocks(self) -> Sequence[Block]:
         """Return the table of the methods and their messages."""
         r = self.record
@@ -143,13 +151,16 @@ class EstimateResult(Result):
             for reason in m.trust.reasons
             if reason not in m.estimate.message
         ]
-        missing = [] if self.diagnosis is None else ["The model does not explain the record; what it lacks:"]
-        missing += [] if self.diagnosis is None else self.diagnosis.summary()
+        those = "records" if self.more else "record"
+        missing: list[str] = []
+        if self.diagnosis is not None:
+            missing = [f"The model does not explain the {those}; what it lacks:", *self.diagnosis.summary()]
+        elif self.undiagnosed:
+            missing = [f"The model does not explain the {those}; no diagnosis: {self.undiagnosed}"]
         rows = [method_row(m) for m in self.methods if m.estimate is not None]
         unfit = [f"{m.method} does not apply: {m.reason}" for m in self.methods if m.estimate is None]
-        shown = self.estimates[:1] if self.estimates and self.best.visible else ()
-        sizes = [f"{e.method}: {Play(e.alpha, self._ratio(e))}" for e in shown]
-        floor = [] if self.repeats is None else [f"{self.repeats}{_beside(self.estimates)}"]
+        sizes = [f"{self.best.method}: {self._play()}"] if self.estimates and self.best.visible else []
+        floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_beside(self.estimates)}"]
         return [table(title, HEAD, rows), *sizes, *floor, *messages, *doubts, *unfit, *missing]
 
     def results(self, place: Path | None = None) -> dict[str, Any]:
@@ -163,12 +174,14 @@ class EstimateResult(Result):
             found["repeats"] = {"sources": list(self.repeats.sources), "floor": self.repeats.floor, "unit": "rad"}
         if self.estimates:
             found |= entries[self.best.method] | {"method": self.best.method}
-            found["play"] = Play(self.alpha, self._ratio(self.best)).as_json()
+            found["play"] = self._play().as_json()
         fit = next((e for e in self.estimates if e.method == "maximum_likelihood"), None)
         if fit is not None and not r.missing:
             found["live"] = fitted_live(r, fit)
         if self.diagnosis is not None:
             found["diagnosis"] = self.diagnosis.results((place or Path()) / DIAGNOSIS)
+        if self.undiagnosed:
+            found["undiagnosed"] = self.undiagnosed
         return found | {"trust": self.trust.as_json(), "settings": as_tables(self.settings)}
 
     def write_diagnosis(self, folder: Path, place: Path) -> None:
@@ -227,8 +240,8 @@ def estimate(
         method: a key of ``METHODS``, such as "maximum_likelihood" or "ekf", or "all".
         motor_only: leave the load encoder out.
         time_limit: [s], after which ``maximum_likelihood`` gives up (default: never).
-        diagnose: where ``maximum_likelihood`` shows that the model does not explain the record, find what it misses
-            and give the half-gap of the corrected model. This takes some ten seconds more.
+        diagnose: where ``maximum_likelihood`` shows that the model does not explain the records, find what it misses
+            and give the half-gap of the corrected model, one for all records. This takes some ten seconds more.
         settings: thresholds, or the path of a TOML file with those that differ from the default.
         progress: called with the piece of work (a method, or "diagnosis"), its stage, and the share that is behind.
 
@@ -271,18 +284,13 @@ def estimate(
     trust = trust_of_estimates([m.estimate for m in found if m.estimate is not None], model, chosen.trust)
     judged = tuple(replace(m, trust=trust.get(m.method)) for m in found)
     given = {"record": measured.source, "model": model.source, "method": method, "motor_only": motor_only}
-    whole = not more and not measured.missing  # a diagnosis takes one record with all its samples
-    missing = None
-    if whole and diagnose and _unexplained(judged):
+    missing, why = None, ""
+    if diagnose and _unexplained(judged):
         progress(DIAGNOSIS, "diagnosing", 0.0)
-        missing = find_missing(
-            measured,
-            model,
-            progress=lambda done, most, what: progress(DIAGNOSIS, f"fitted {what}", done / max(most, 1)),
-        )
+        missing, why = _diagnosed([measured, *more], model, partial(progress, DIAGNOSIS))
     first = () if missing is None else _of_diagnosis(missing)
     repeats = repeats_of([measured, *more])
-    return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen)
+    return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen, why)
 
 
 def _beside(estimates: Sequence[Estimate]) -> str:
@@ -297,6 +305,20 @@ def _unexplained(methods: Sequence[MethodResult]) -> bool:
     if fit is None or fit.estimate is None or fit.trust is None:
         return False
     return bool(fit.estimate.diagnostics["lacking"]) or fit.trust.level is Level.RED
+
+
+def _diagnosed(
+    records: Sequence[Record], model: Model, report: Callable[[str, float], None]
+) -> tuple[DiagnosisResult | None, str]:
+    """Return what the model misses; or None, and why these records cannot be diagnosed."""
+
+    def progress(done: int, most: int, what: str) -> None:
+        report(f"fitted {what}", done / max(most, 1))
+
+    try:
+        return find_missing(records, model, progress=progress), ""
+    except (InputError, ConvergenceError) as error:
+        return None, str(error)
 
 
 def _of_diagnosis(found: DiagnosisResult) -> tuple[MethodResult, ...]:

@@ -124,7 +124,11 @@ class SweepResult(AnySweepResult):
             "intervals that hold the size [%]",
         )
         tables = [table(title, ("actual [rad]", "noise [rad]", *extra, *found), shown), table(errors, head, rows)]
-        sizes = [f"{word.capitalize()} size: {play}" for word, play in self._plays().items()]
+        plays = self._plays()
+        if len(set(plays.values())) == 1:
+            sizes = [f"Size: {plays['smallest']}"]
+        else:
+            sizes = [f"{word.capitalize()} size: {play}" for word, play in plays.items()]
         return [*tables, *sizes, f"FMUs: {self.fmu_kind}", f"Trust: {self.trust}"]
 
     def _plays(self) -> dict[str, Play]:

@@ -1,9 +1,11 @@
 """Every published number of the thesis beside the recomputed one."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
+
+import msgspec
 
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.paired.calibration import estimate_gap, load_or_calibrate
@@ -11,8 +13,9 @@ from orchestrator.paired.compiled_loop import compiled_loop
 from orchestrator.paired.experiment import thesis_experiment
 from orchestrator.paired.metric import difference_sum
 from orchestrator.paired.thesis import published
-from orchestrator.paired.thesis.errata import Erratum, errata
-from orchestrator.paired.thesis.recompute import Comparison, TableComparison, gain_comparisons, table_comparison
+from orchestrator.paired.thesis.errata import errata
+from orchestrator.paired.thesis.recompute import gain_comparisons, table_comparison
+from orchestrator.shared.results.thesis import Comparison, Erratum, TableComparison, ThesisFound, ThesisTable
 
 TABLE_HEAD = (
     "alpha [rad]",
@@ -100,15 +103,11 @@ class ThesisResult(Result):
         ]
         return table("Table 4.1", TABLE_HEAD, rows)
 
-    def results(self, place: Path | None = None) -> dict[str, Any]:
+    def results(self, place: Path | None = None) -> ThesisFound:
         """Return what ``thesis.json`` says."""
-        rows = [asdict(r) for r in published.TABLE_4_1]
-        return {
-            "gains": [asdict(c) for c in self.gains],
-            "table": asdict(self.table) | {"rows": rows, "our_estimates": list(self.estimates)},
-            "errata": [asdict(e) for e in self.errata],
-            "others": [asdict(o) for o in published.OTHERS],
-        }
+        measured = msgspec.structs.asdict(self.table)
+        whole = ThesisTable(**measured, rows=published.TABLE_4_1, our_estimates=self.estimates)
+        return ThesisFound(gains=self.gains, table=whole, errata=self.errata, others=published.OTHERS)
 
 
 def thesis() -> ThesisResult:

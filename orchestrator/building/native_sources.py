@@ -14,7 +14,7 @@ from orchestrator.building.sources import Recipe, closure
 from orchestrator.building.starts import default_starts
 from orchestrator.building.translation.slave import translate_slave
 from orchestrator.errors import FmuError
-from pyfmu_sources.fmu_variables import Variable
+from pyfmu_sources.fmu_variables import FmuVariable
 
 RUNTIME = Path(__file__).parent / "native_fmu"
 _HEADERS = ("translated.h", "fmi2_types.h", "fmi2_slave.h", "fmi2_model_exchange.h", "fmi2_states.h", "pairs.h")
@@ -70,14 +70,14 @@ def slave_class(recipe: Recipe) -> Any:
     return cls
 
 
-def _state_variables(cls: Any) -> Iterator[Variable]:
+def _state_variables(cls: Any) -> Iterator[FmuVariable]:
     """Yield the variables by which model exchange names states and derivatives."""
     states = getattr(cls, "continuous_states", ())
     for name, unit, nominal, text in states:
-        yield Variable(name, "local", unit, None, text, nominal=nominal)
+        yield FmuVariable(name, "local", unit, None, text, nominal=nominal)
     for name, unit, _, text in states:
         rate = {"rad": "rad/s", "rad/s": "rad/s2", "N.m": "N.m/s", "1": "1/s"}.get(unit, f"{unit}/s")
-        yield Variable(f"der({name})", "local", rate, None, f"Rate of: {text}", derivative_of=name)
+        yield FmuVariable(f"der({name})", "local", rate, None, f"Rate of: {text}", derivative_of=name)
 
 
 def c_sources(recipe: Recipe, cls: Any, guid: str) -> dict[str, bytes]:

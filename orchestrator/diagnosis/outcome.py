@@ -13,6 +13,7 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.remainder import Remainder
 from orchestrator.diagnosis.verdict.where import Missing, Place
 from orchestrator.plants.description import Plant
+from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Trust
@@ -81,14 +82,6 @@ class RecordEvidence:
     source: str
     rows: int
     misfit: tuple[Misfit, ...]
-
-
-@dataclass(frozen=True)
-class Repeats:
-    """Records with the same input, and what they differ by: rms by signal, what no model can do better than."""
-
-    sources: tuple[str, ...]
-    floor: dict[str, float]
 
 
 @dataclass(frozen=True)

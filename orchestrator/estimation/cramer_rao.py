@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.joint import JointLikelihood
-from orchestrator.estimation.likelihood import Fit, Likelihood, inverse
-from orchestrator.estimation.problem import ALPHA, STATE_NAMES, Problem, make_problem
+from orchestrator.estimation.likelihood import GapFit, Likelihood, inverse
+from orchestrator.estimation.problem import ALPHA, STATE_NAMES, GapProblem, make_problem
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
@@ -17,7 +17,7 @@ MODEST_TORQUE_NOISE = 1e-2  # N.m.s^0.5, where no fit has told
 NOISE_PREFIXES = ("log_noise_", "log_torque_")
 
 
-def bound_of_fit(likelihood: Likelihood, fit: Fit) -> float:
+def bound_of_fit(likelihood: Likelihood, fit: GapFit) -> float:
     """Return the bound [rad] on alpha at a fit, noise levels and process noise as fitted.
 
     The Fisher information of the innovations form: for Gaussian one-step errors e with variance s,
@@ -36,7 +36,7 @@ def bound_of_fit(likelihood: Likelihood, fit: Fit) -> float:
 
 
 def bound(
-    problem: Problem | Sequence[Problem],
+    problem: GapProblem | Sequence[GapProblem],
     values: Mapping[str, float],
     noise: tuple[float, float],
     torque: float = 1e-8,
@@ -55,7 +55,7 @@ def bound(
     Returns:
         The bound.
     """
-    likelihood = Likelihood(problem, threads) if isinstance(problem, Problem) else JointLikelihood(problem, threads)
+    likelihood = Likelihood(problem, threads) if isinstance(problem, GapProblem) else JointLikelihood(problem, threads)
     problem = likelihood.problem
     theta = problem.start
     for name, value in values.items():

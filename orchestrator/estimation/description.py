@@ -8,15 +8,15 @@ from scipy.stats import chi2
 
 from orchestrator.estimation.cramer_rao import bound_of_fit
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import Fit, Likelihood
+from orchestrator.estimation.likelihood import GapFit, Likelihood
 from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
 from orchestrator.estimation.profile import profile
 from orchestrator.estimation.protocol import LEVEL, Estimate
-from orchestrator.estimation.settings import VerdictSettings
+from orchestrator.estimation.settings import GapVerdictSettings
 from pyfmu_sources.drivetrain_parameters import P_I
 
 
-def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
+def describe(likelihood: Likelihood, fit: GapFit) -> Estimate:
     """Return the estimate of a fit: interval, visibility, and what else the fit says.
 
     Args:
@@ -70,7 +70,7 @@ def describe(likelihood: Likelihood, fit: Fit) -> Estimate:
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
 
 
-def _value(likelihood: Likelihood, fit: Fit, name: str) -> float:
+def _value(likelihood: Likelihood, fit: GapFit, name: str) -> float:
     names = likelihood.problem.names
     return float(fit.point.theta[names.index(name)]) if name in names else 0.0
 
@@ -93,7 +93,7 @@ def _verdict(alpha: float, low: float, high: float, traversals: int) -> tuple[bo
     return False, "the gap cannot be seen: every size fits the record; `design` proposes an excitation"
 
 
-def _standing_still(outputs: Array, noise: tuple[float, float], settings: VerdictSettings) -> str:
+def _standing_still(outputs: Array, noise: tuple[float, float], settings: GapVerdictSettings) -> str:
     """Return the sentence that says which side does not move beyond its noise, or nothing."""
     sides = (("motor", settings.least_travel_motor), ("load", settings.least_travel_load))
     for n, (name, least) in enumerate(sides[: outputs.shape[1]]):
@@ -106,7 +106,7 @@ def _standing_still(outputs: Array, noise: tuple[float, float], settings: Verdic
     return ""
 
 
-def _lacking(diagnostics: dict[str, Any], drive: float, ratio: float, rows: int, settings: VerdictSettings) -> str:
+def _lacking(diagnostics: dict[str, Any], drive: float, ratio: float, rows: int, settings: GapVerdictSettings) -> str:
     """Return the warning that the model lacks something, or nothing.
 
     Args:
@@ -134,7 +134,7 @@ def _autocorrelation(white: Array) -> float:
     return float(np.sum(centred[1:] * centred[:-1]) / max(float(np.sum(centred**2)), 1e-300))
 
 
-def _parameters(likelihood: Likelihood, fit: Fit) -> dict[str, dict[str, float]]:
+def _parameters(likelihood: Likelihood, fit: GapFit) -> dict[str, dict[str, float]]:
     """Return value, standard error and nominal of each fitted unknown."""
     errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     table = {}

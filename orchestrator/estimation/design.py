@@ -36,7 +36,7 @@ LONGEST = 200_000  # samples
 
 
 @dataclass(frozen=True)
-class Limits:
+class MachineLimits:
     """What the machine may be asked for: requested torque [N.m] and motor speed [rad/s]."""
 
     torque: float = 250.0
@@ -44,7 +44,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Excitation:
     """One excitation: its name, torque request (n,) [N.m], bound on alpha [rad], peak torque and motor speed.
 
     The bound is infinite where no scale keeps the limits.
@@ -60,12 +60,12 @@ class Candidate:
 def design(
     model: Model,
     alpha: float,
-    limits: Limits,
+    limits: MachineLimits,
     duration: float = 10.0,
     rate: float = 200.0,
     motor_only: bool = False,
     tell: Callable[[int, int], None] | None = None,
-) -> tuple[Array, list[Candidate]]:
+) -> tuple[Array, list[Excitation]]:
     """Return the time grid (n,) [s] and all candidates, the best first.
 
     Args:
@@ -110,8 +110,8 @@ def design(
 
 
 def simple_candidates(
-    model: Model, alpha: float, limits: Limits, duration: float, rate: float, motor_only: bool = False
-) -> list[Candidate]:
+    model: Model, alpha: float, limits: MachineLimits, duration: float, rate: float, motor_only: bool = False
+) -> list[Excitation]:
     """Return square pulses and multisines alone, without a search; the best first. See ``design``.
 
     Args:
@@ -143,7 +143,7 @@ class _Task:
     time: Array
     model: Model
     alpha: float
-    limits: Limits
+    limits: MachineLimits
     motor_only: bool
 
 
@@ -168,7 +168,7 @@ class _Spectrum:
         return _Spectrum(self.levels + step * rng.standard_normal(self.levels.size), self.phases)
 
 
-def _search(task: _Task, tell: Callable[[int], None]) -> Candidate:
+def _search(task: _Task, tell: Callable[[int], None]) -> Excitation:
     """Return the best clipped multisine that ``SEARCH`` evaluations find."""
     rng = np.random.default_rng(SEED)
     lines = task.time.size // 2 + 1
@@ -206,7 +206,7 @@ def _multisine(time: Array, top: float) -> Array:
     return np.asarray(wave / np.max(np.abs(wave)))
 
 
-def _judge(name: str, shape: Array, task: _Task) -> Candidate:
+def _judge(name: str, shape: Array, task: _Task) -> Excitation:
     values = list(task.model.values)
     values[P_ALPHA] = task.alpha
     plant = affine_model(tuple(values))
@@ -221,10 +221,10 @@ def _judge(name: str, shape: Array, task: _Task) -> Candidate:
         states = simulate(plant, scale * shape, step, np.zeros(5))
     u, fastest = scale * shape, float(np.max(np.abs(states[:, 1])))
     if fastest > task.limits.speed:
-        return Candidate(name, u, math.inf, float(np.max(np.abs(u))), fastest)
+        return Excitation(name, u, math.inf, float(np.max(np.abs(u))), fastest)
     noise = (_noise(task.model, "theta_m", 0), _noise(task.model, "theta_l", 1))
     bound = bound_of_excitation(task.model, task.time, u, task.alpha, noise, task.motor_only)
-    return Candidate(name, u, bound, float(np.max(np.abs(u))), fastest)
+    return Excitation(name, u, bound, float(np.max(np.abs(u))), fastest)
 
 
 def bound_of_excitation(

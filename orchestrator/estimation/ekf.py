@@ -15,7 +15,7 @@ from orchestrator.plants.compiled import compiled
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
-from pyfmu_sources.backlash_estimator import FILTERS, SIZE, Settings
+from pyfmu_sources.backlash_estimator import FILTERS, SIZE, NoiseSettings
 
 UNMEASURED = 1e6  # rad, standard deviation that stands for an encoder that is absent
 
@@ -53,7 +53,7 @@ def _runner() -> Callable[..., None]:
     return loop
 
 
-def trace(record: Record, model: Model, settings: Settings | None = None) -> OnlineTrace:
+def trace(record: Record, model: Model, settings: NoiseSettings | None = None) -> OnlineTrace:
     """Return the online estimate over a record; ``settings`` default to what the record and the model say.
 
     Args:
@@ -78,7 +78,7 @@ def trace(record: Record, model: Model, settings: Settings | None = None) -> Onl
     return OnlineTrace(alpha, deviation, contact)
 
 
-def default_settings(record: Record, model: Model) -> Settings:
+def default_settings(record: Record, model: Model) -> NoiseSettings:
     """Return the settings for a record: encoder noise as measured, stiffness as uncertain as the model says.
 
     Args:
@@ -93,7 +93,7 @@ def default_settings(record: Record, model: Model) -> Settings:
     stiffness = model.parameters["k"]
     spread = stiffness.standard_deviation / stiffness.value
     lag = model.parameters["tau"]
-    return Settings(
+    return NoiseSettings(
         noise_m=noise_m,
         noise_l=noise_l,
         stiffness_spread=max(spread, 1e-6),

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from orchestrator.estimation.design import Candidate
+from orchestrator.estimation.design import Excitation
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.profile import Profile
 from orchestrator.estimation.protocol import Estimate
@@ -129,7 +129,7 @@ def draw_online(path: Path, record: Record, estimate: Estimate) -> None:
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
-def draw_design(path: Path, time: Array, best: Candidate) -> None:
+def draw_design(path: Path, time: Array, best: Excitation) -> None:
     """Draw the proposed torque record.
 
     Args:

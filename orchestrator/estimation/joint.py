@@ -11,7 +11,7 @@ import numpy as np
 
 from orchestrator.estimation.innovations import Array, Innovations
 from orchestrator.estimation.likelihood import Likelihood
-from orchestrator.estimation.problem import OFFSET, STATE_NAMES, Problem
+from orchestrator.estimation.problem import OFFSET, STATE_NAMES, GapProblem
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from orchestrator.records.record import Record
@@ -19,7 +19,7 @@ from orchestrator.records.record import Record
 OWN = (*STATE_NAMES, OFFSET)  # the unknowns that each record has for itself
 
 
-def _joint_problem(problems: Sequence[Problem]) -> Problem:
+def _joint_problem(problems: Sequence[GapProblem]) -> GapProblem:
     """Return the problem of several records; its record is the first, its outputs are all, each about its mean.
 
     Unknowns of the later records carry their number: ``theta_m_start@2``. A noise level's prior is that of the records'
@@ -44,7 +44,7 @@ class JointLikelihood(Likelihood):
     """The likelihood of several records: their innovations one after the other."""
 
     def __init__(
-        self, problems: Sequence[Problem], threads: int = 1, settings: EstimationSettings = DEFAULT_SETTINGS
+        self, problems: Sequence[GapProblem], threads: int = 1, settings: EstimationSettings = DEFAULT_SETTINGS
     ) -> None:
         super().__init__(_joint_problem(problems), threads, settings)
         names = self.problem.names

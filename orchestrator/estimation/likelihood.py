@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels, affine_model, innovations
-from orchestrator.estimation.problem import IMPULSE, OFFSET, SCALE, STATE_NAMES, Problem
+from orchestrator.estimation.problem import IMPULSE, OFFSET, SCALE, STATE_NAMES, GapProblem
 from orchestrator.estimation.protocol import TimeLimitError
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
 from pyfmu_sources.drivetrain_parameters import NAMES
@@ -40,7 +40,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Fit:
+class GapFit:
     """A maximum of the likelihood.
 
     Attributes:
@@ -67,7 +67,7 @@ class Likelihood:
     ``information`` is the last Fisher information of each unknown; the difference quotients are scaled by it.
     """
 
-    def __init__(self, problem: Problem, threads: int = 1, settings: EstimationSettings = DEFAULT_SETTINGS) -> None:
+    def __init__(self, problem: GapProblem, threads: int = 1, settings: EstimationSettings = DEFAULT_SETTINGS) -> None:
         self.problem = problem
         self.settings = settings
         self.soft = False
@@ -234,7 +234,7 @@ def maximise(
     free: Sequence[int],
     iterations: int = 30,
     tolerance: float = 1e-2,
-) -> Fit:
+) -> GapFit:
     """Return the maximum of the likelihood reached from ``start`` over the ``free`` unknowns.
 
     Steps are damped until the objective falls; an unknown at its bound stays there while the score points outward.
@@ -270,7 +270,7 @@ def maximise(
                 continue
             converged = True
             break
-    return Fit(point, places, information, inverse(information), done, converged)
+    return GapFit(point, places, information, inverse(information), done, converged)
 
 
 def _step(

@@ -18,7 +18,7 @@ from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.description import describe
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.joint import JointLikelihood, by_record
-from orchestrator.estimation.likelihood import Fit, Likelihood, maximise
+from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
 from orchestrator.estimation.problem import (
     IMPULSE,
     LEAST_WHERE_INEXACT,
@@ -110,7 +110,7 @@ def _likelihood(
     return likelihood
 
 
-def _refined(likelihood: Likelihood, short: Likelihood, report: Report) -> Fit | None:
+def _refined(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit | None:
     """Return the fit that starts from that of the beginning; None where the beginning does not show the gap."""
     first = fit_record(short)
     flanks = short.run(first.point.theta, keep=True).contacts
@@ -128,7 +128,7 @@ def _refined(likelihood: Likelihood, short: Likelihood, report: Report) -> Fit |
     return _with_contact(likelihood, best, torque, others) if likelihood.problem.outputs.shape[1] == 2 else best
 
 
-def fit_record(likelihood: Likelihood, report: Report = _quiet) -> Fit:
+def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
     """Return the fit of all unknowns, by grid and continuation in the torque noise.
 
     Args:
@@ -155,7 +155,7 @@ def fit_record(likelihood: Likelihood, report: Report = _quiet) -> Fit:
     return _free_fit(likelihood, best, torque, others)
 
 
-def _with_contact(likelihood: Likelihood, best: Fit, torque: list[int], others: list[int]) -> Fit:
+def _with_contact(likelihood: Likelihood, best: GapFit, torque: list[int], others: list[int]) -> GapFit:
     """Return the fit, with a least torque noise where the machine's contact law is not the model's."""
     if not _has_other_contact(likelihood, best):
         return best
@@ -168,7 +168,7 @@ def _with_contact(likelihood: Likelihood, best: Fit, torque: list[int], others: 
     return _free_fit(likelihood, best, torque, others)
 
 
-def _has_other_contact(likelihood: Likelihood, fit: Fit) -> bool:
+def _has_other_contact(likelihood: Likelihood, fit: GapFit) -> bool:
     """Return whether the machine's contact law is clearly another than the model's."""
     place = likelihood.problem.index(IMPULSE)
     column = list(fit.free).index(place)
@@ -176,7 +176,7 @@ def _has_other_contact(likelihood: Likelihood, fit: Fit) -> bool:
     return abs(float(fit.point.theta[place])) > likelihood.settings.fit.clear_impulse * deviation
 
 
-def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, float]]) -> Fit:
+def _continue(likelihood: Likelihood, best: GapFit, levels: Sequence[tuple[float, float]]) -> GapFit:
     """Return the last fit that paid while the torque noise goes through ``levels``."""
     torque, others = _split(likelihood)
     failures, least = 0, best.point.objective
@@ -196,14 +196,14 @@ def _continue(likelihood: Likelihood, best: Fit, levels: Sequence[tuple[float, f
     return best
 
 
-def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int]) -> Fit:
+def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int]) -> GapFit:
     """Return the best fit with little torque noise, and leave ``likelihood`` with its flanks as that fit took them.
 
     The flanks are blurred at first and sharpened then. The second start of the grid is tried where the first one does
     not get down to little noise. Where no fit with sharp flanks comes up to a blurred one, that one stays, with the
     wide interval that it deserves.
     """
-    found: list[tuple[Fit, bool, Array]] = []
+    found: list[tuple[GapFit, bool, Array]] = []
     likelihood.soft = True
     for first in _first_fits(likelihood, torque, others, np.log(BLURRED[0]))[:2]:
         likelihood.soft = True
@@ -219,13 +219,13 @@ def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int
     return best
 
 
-def _sharpen(likelihood: Likelihood, blurred: Fit, torque: list[int], others: list[int]) -> Fit:
+def _sharpen(likelihood: Likelihood, blurred: GapFit, torque: list[int], others: list[int]) -> GapFit:
     """Return the fit with sharp flanks that starts from one with ``blurred`` flanks.
 
     Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it.
     """
     known = likelihood.information.copy()
-    fits: list[Fit] = []
+    fits: list[GapFit] = []
     for place in SHARP_STARTS:
         likelihood.information = known.copy()
         start = blurred.point.theta.copy()
@@ -244,7 +244,7 @@ def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
     return torque, [n for n in range(len(names)) if n not in torque]
 
 
-def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], level: Array) -> list[Fit]:
+def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], level: Array) -> list[GapFit]:
     """Return fits at high torque noise (its logarithm ``level``), the best first.
 
     They start from the two best places of a grid of alpha and from the smallest size that is about as good: where the
@@ -269,9 +269,9 @@ def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], le
     return sorted(fits, key=lambda fit: fit.point.objective)
 
 
-def _different(fits: list[Fit], place: int, ratio: float) -> list[Fit]:
+def _different(fits: list[GapFit], place: int, ratio: float) -> list[GapFit]:
     """Return the fits of which no better one has about the same size; ``place`` is that of alpha."""
-    chosen: list[Fit] = []
+    chosen: list[GapFit] = []
     for fit in fits:
         size = float(fit.point.theta[place])
         known = [float(other.point.theta[place]) for other in chosen]
@@ -280,7 +280,7 @@ def _different(fits: list[Fit], place: int, ratio: float) -> list[Fit]:
     return chosen
 
 
-def _free_fit(likelihood: Likelihood, best: Fit, torque: list[int], others: list[int]) -> Fit:
+def _free_fit(likelihood: Likelihood, best: GapFit, torque: list[int], others: list[int]) -> GapFit:
     """Return the fit with the torque noise free, except where the record cannot tell it from none."""
     _, information = likelihood.derivatives(best.point, np.array(torque))
     flat = likelihood.settings.fit.flat_information

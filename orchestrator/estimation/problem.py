@@ -38,7 +38,7 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Problem:
+class GapProblem:
     """A record and what is unknown about it.
 
     Attributes:
@@ -77,7 +77,7 @@ class Problem:
         return self.names.index(name)
 
 
-def make_problem(record: Record, model: Model) -> Problem:
+def make_problem(record: Record, model: Model) -> GapProblem:
     """Return the estimation problem of a record under a model.
 
     With the motor encoder alone only alpha times the gear ratio can be seen, so the ratio then counts as exact.
@@ -123,7 +123,7 @@ def make_problem(record: Record, model: Model) -> Problem:
         noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(LARGEST_TORQUE_NOISE)))
     if not both:
         levels.append(levels[0])
-    return Problem(
+    return GapProblem(
         record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0))
     )
 
@@ -175,7 +175,7 @@ def measurement_noise(record: Record, model: Model, column: str) -> float:
     return max(level, 1e-9)
 
 
-def with_least_torque_noise(problem: Problem, least: tuple[float, float]) -> Problem:
+def with_least_torque_noise(problem: GapProblem, least: tuple[float, float]) -> GapProblem:
     """Return the problem with at least this much torque noise [N.m.s^0.5] at motor and load.
 
     Args:

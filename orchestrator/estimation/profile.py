@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import Fit, Likelihood, Point, maximise
+from orchestrator.estimation.likelihood import GapFit, Likelihood, Point, maximise
 from orchestrator.estimation.protocol import LEVEL
 
 
@@ -35,7 +35,7 @@ class Profile:
         return low, high
 
 
-def profile(likelihood: Likelihood, fit: Fit, level: float = LEVEL) -> Profile:
+def profile(likelihood: Likelihood, fit: GapFit, level: float = LEVEL) -> Profile:
     """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0).
 
     Args:
@@ -69,7 +69,7 @@ def profile(likelihood: Likelihood, fit: Fit, level: float = LEVEL) -> Profile:
     return Profile(np.array([e[0] for e in entries]), np.array([e[1] for e in entries]))
 
 
-def _constrained(likelihood: Likelihood, fit: Fit, place: int, alpha: float, slope: Array) -> Point:
+def _constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> Point:
     """Return the best point found with alpha held: the linear prediction, then some scoring steps."""
     unknowns = likelihood.problem.unknowns
     theta = fit.point.theta.copy()

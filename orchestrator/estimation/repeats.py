@@ -2,37 +2,31 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from orchestrator.records.record import Record
-from orchestrator.shared.inference.repeats import repeat_variance
+from orchestrator.shared.inference.repeats import Repeats, repeat_variance
 
 SAME_INPUT = 0.01  # rms difference of the torques over their rms: rounding and the drive's own noise stay below
 SEGMENT = 2.0  # s, over which runs are compared
 
 
-@dataclass(frozen=True)
-class Repeats:
-    """What repeats differ by.
+def in_words(repeats: Repeats) -> str:
+    """Return the floor in words.
 
-    Attributes:
-        sources: the records that have one torque.
-        floor: rms of one run about what the runs have in common [rad], by column.
+    Args:
+        repeats: what they differ by.
+
+    Returns:
+        One sentence and the floor.
     """
-
-    sources: tuple[str, ...]
-    floor: dict[str, float]
-
-    def __str__(self) -> str:
-        """Return the floor in words."""
-        sides = {"theta_m": "motor", "theta_l": "load"}
-        sizes = " and ".join(f"{value:.3g} rad at the {sides[name]}" for name, value in self.floor.items())
-        return (
-            f"{', '.join(self.sources)} have the same torque. What does not repeat over {SEGMENT:g} s, whatever the "
-            f"model: {sizes} (rms)"
-        )
+    sides = {"theta_m": "motor", "theta_l": "load"}
+    sizes = " and ".join(f"{value:.3g} rad at the {sides[name]}" for name, value in repeats.floor.items())
+    return (
+        f"{', '.join(repeats.sources)} have the same torque. What does not repeat over {SEGMENT:g} s, whatever the "
+        f"model: {sizes} (rms)"
+    )
 
 
 def repeats_of(records: Sequence[Record]) -> Repeats | None:

@@ -9,7 +9,7 @@ from typing import Annotated
 from orchestrator.shared.settings import Settings, setting, share
 
 
-class FitSettings(Settings, frozen=True):
+class MaximisationSettings(Settings, frozen=True):
     """The maximisation of the likelihood: which fits are started, and when they end."""
 
     allowed_rise: Annotated[
@@ -35,7 +35,7 @@ class FitSettings(Settings, frozen=True):
     enough_traversals: Annotated[int, setting("traversals that the beginning must hold to start from it", ge=0)] = 6
 
 
-class VerdictSettings(Settings, frozen=True):
+class GapVerdictSettings(Settings, frozen=True):
     """Whether a gap is seen, and whether the model explains the record."""
 
     notable_torque_noise: Annotated[
@@ -69,8 +69,8 @@ class TrustSettings(Settings, frozen=True):
 class EstimationSettings(Settings, frozen=True):
     """All thresholds of an estimate."""
 
-    fit: FitSettings = FitSettings()
-    verdict: VerdictSettings = VerdictSettings()
+    fit: MaximisationSettings = MaximisationSettings()
+    verdict: GapVerdictSettings = GapVerdictSettings()
     trust: TrustSettings = TrustSettings()
 
 

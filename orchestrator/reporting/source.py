@@ -10,6 +10,7 @@ from typing import Any
 
 from orchestrator.errors import ScenarioError
 from orchestrator.reporting.model import Cell, ReportTable, TableColumn
+from orchestrator.shared.results import as_plain
 
 DATA_SUFFIXES = (".csv", ".json", ".parquet", ".toml", ".fmu", ".ssp", ".ssd", ".xml")
 
@@ -211,9 +212,9 @@ def numbers(values: Sequence[Any]) -> list[float | None]:
 
 
 def table_of(
-    title: str, items: Sequence[Mapping[str, Any]], *, units: Mapping[str, str] | None = None, note: str = ""
+    title: str, items: Sequence[Any], *, units: Mapping[str, str] | None = None, note: str = ""
 ) -> ReportTable:
-    """Return a table of equally shaped JSON objects, one column per key in order of first appearance.
+    """Return a table of equally shaped structs or JSON objects, one column per name in order of first appearance.
 
     Args:
         title: of the table.
@@ -224,6 +225,7 @@ def table_of(
     Returns:
         The table.
     """
-    names = list(dict.fromkeys(name for item in items for name in item))
+    rows: list[Mapping[str, Any]] = [as_plain(item) for item in items]
+    names = list(dict.fromkeys(name for row in rows for name in row))
     columns = tuple(TableColumn(words(name), (units or {}).get(name, "")) for name in names)
-    return ReportTable(title, columns, tuple(tuple(plain(item.get(name)) for name in names) for item in items), note)
+    return ReportTable(title, columns, tuple(tuple(plain(row.get(name)) for name in names) for row in rows), note)

@@ -10,7 +10,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao, ekf
-from orchestrator.estimation.design import SEARCHED, Limits, design
+from orchestrator.estimation.design import SEARCHED, MachineLimits, design
 from orchestrator.estimation.innovations import NoiseLevels, affine_model, innovations, simulate
 from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.paired_sum import twin
@@ -189,7 +189,7 @@ def test_the_online_estimator_follows_the_motor_encoder_alone() -> None:
 
 
 def test_design_keeps_the_limits_and_beats_a_bad_excitation() -> None:
-    time, candidates = design(MODEL, 0.01, Limits(150.0, 20.0), duration=2.0)
+    time, candidates = design(MODEL, 0.01, MachineLimits(150.0, 20.0), duration=2.0)
     assert time.size == 400
     for candidate in candidates:
         assert candidate.torque <= 150.0
@@ -198,12 +198,12 @@ def test_design_keeps_the_limits_and_beats_a_bad_excitation() -> None:
     assert candidates[0].bound < 0.9 * candidates[1].bound
     assert candidates[0].bound < 0.5 * candidates[-1].bound
     with pytest.raises(DesignError, match="`torque` must be a positive finite number"):
-        design(MODEL, 0.01, Limits(-1.0, 20.0))
+        design(MODEL, 0.01, MachineLimits(-1.0, 20.0))
 
 
 @pytest.mark.slow
 def test_a_designed_record_measures_better_on_other_machines() -> None:
-    _, candidates = design(MODEL, 0.01, Limits(250.0, 50.0), duration=3.0)
+    _, candidates = design(MODEL, 0.01, MachineLimits(250.0, 50.0), duration=3.0)
     errors: dict[str, list[float]] = {"designed": [], "default": []}
     for seed in (43, 44):
         for name, u in (("designed", candidates[0].u), ("default", None)):

@@ -10,7 +10,7 @@ from orchestrator.estimation import ekf
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import Record, record_from_columns
 from orchestrator.scenarios.scenario import run_scenario
-from pyfmu_sources.backlash_estimator import FILTERS, SIZE, Settings, covariance
+from pyfmu_sources.backlash_estimator import FILTERS, SIZE, NoiseSettings, covariance
 from pyfmu_sources.backlash_estimator_slave import (
     ALPHA_DEVIATION,
     ALPHA_HAT,
@@ -108,10 +108,10 @@ def test_a_filter_that_diverges_is_dropped() -> None:
     from pyfmu_sources import backlash_estimator as source
 
     filters = [[0.0] * SIZE for _ in range(FILTERS)]
-    source.begin(filters, 0.0, 0.0, Settings())
+    source.begin(filters, 0.0, 0.0, NoiseSettings())
     filters[0][0] = float("nan")
     filters[3][covariance(0, 0)] = -1.0
-    source.measure(filters, Settings(), 0.0, 0.0)
+    source.measure(filters, NoiseSettings(), 0.0, 0.0)
     alpha, deviation, best = source.combine(filters, FILTERS)
     assert best not in (0, 3)
     assert np.isfinite(alpha)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.estimation.repeats import repeats_of
+from orchestrator.estimation.repeats import in_words, repeats_of
 from orchestrator.records.record import Record, record_from_columns
 
 
@@ -29,7 +29,7 @@ def test_the_floor_is_the_noise_of_one_run_whatever_the_motion_and_its_start() -
     assert found.sources == ("run 1", "run 2", "run 3")
     assert found.floor["theta_m"] == pytest.approx(1e-3, rel=0.05)
     assert found.floor["theta_l"] == pytest.approx(2e-4, rel=0.05)
-    assert "run 1, run 2, run 3 have the same torque" in str(found)
+    assert "run 1, run 2, run 3 have the same torque" in in_words(found)
 
 
 def test_what_does_not_repeat_beyond_the_encoder_counts() -> None:

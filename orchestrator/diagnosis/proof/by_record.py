@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals
 from orchestrator.diagnosis.fit.runs import stretches
-from orchestrator.diagnosis.outcome import RecordEvidence, Repeats
+from orchestrator.diagnosis.outcome import RecordEvidence
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.settings import ProofSettings
-from orchestrator.shared.inference.repeats import repeat_variance
+from orchestrator.shared.inference.repeats import Repeats, repeat_variance
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.estimation.design import Candidate, Limits, bound_of_excitation, simple_candidates
+from orchestrator.estimation.design import Excitation, MachineLimits, bound_of_excitation, simple_candidates
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -33,7 +33,7 @@ class Sufficiency:
     bounds: Sequence[tuple[float, float]]
     smallest: float
     rows: int
-    better: Sequence[Candidate]
+    better: Sequence[Excitation]
     own: float
     design_size: float
 
@@ -64,11 +64,11 @@ def sufficiency(record: Record, model: Model) -> Sufficiency:
     seen = [size for size, bound in bounds if bound < SEEN * size]
     smallest = _between(bounds) if seen else math.inf
     size = min((s for s in SIZES if s >= smallest), default=SIZES[-1])
-    limits = Limits(float(np.abs(part.u).max()), _fastest(part))
+    limits = MachineLimits(float(np.abs(part.u).max()), _fastest(part))
     duration = min(part.duration, LONGEST_DESIGN)
     better = simple_candidates(model, size, limits, duration, 1.0 / part.step, not both)
     scaled = [
-        Candidate(c.name, c.u, c.bound * math.sqrt(duration / record.duration), c.torque, c.speed)
+        Excitation(c.name, c.u, c.bound * math.sqrt(duration / record.duration), c.torque, c.speed)
         for c in better
         if math.isfinite(c.bound)
     ]

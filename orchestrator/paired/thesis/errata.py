@@ -1,7 +1,5 @@
 """The thesis's errata, each with the computation that shows it."""
 
-from dataclasses import dataclass
-
 import control
 import numpy as np
 
@@ -24,17 +22,7 @@ from orchestrator.plants.design import (
     rank_report,
     six_state_model,
 )
-
-
-@dataclass(frozen=True)
-class Erratum:
-    """What is printed, what is right, and the numbers that show it."""
-
-    number: int
-    where: str
-    printed: str
-    right: str
-    shown_by: str
+from orchestrator.shared.results.thesis import Erratum
 
 
 def errata() -> list[Erratum]:

@@ -1,6 +1,6 @@
 """What the thesis printed."""
 
-from dataclasses import dataclass
+from orchestrator.shared.results.thesis import OtherResult, TableRow
 
 # Rows 2 and 4 of A in Fig. A.1.
 A_ROW_2 = (-519.8, -5.73, 2071.0, 0.6275, 0.0, 2.5)
@@ -24,16 +24,6 @@ MSE_TABLE = 7.443e-3
 MAP_COEFFICIENTS = (1.0106, -0.3855, 1.1906)
 
 
-@dataclass(frozen=True)
-class TableRow:
-    """One row of Table 4.1: actual and estimated half-gap [rad], S [rad], error [%]."""
-
-    alpha: float
-    S: float
-    estimate: float
-    error_percent: float
-
-
 TABLE_4_1 = (
     TableRow(1.2234, 3.624e-4, 1.183, 3.30),
     TableRow(1.7309, 8.781e-4, 1.636, 5.48),
@@ -44,15 +34,6 @@ TABLE_4_1 = (
     TableRow(4.2952, 1.926e-3, 4.196, 2.31),
     TableRow(4.7684, 2.059e-3, 4.679, 1.87),
 )
-
-
-@dataclass(frozen=True)
-class OtherResult:
-    """A result of others that the thesis compares itself with."""
-
-    who: str
-    method: str
-    figure: str
 
 
 OTHERS = (

@@ -1,7 +1,5 @@
 """Recomputes the thesis's matrices, gains and table with python-control, on its own terms."""
 
-from dataclasses import dataclass
-
 import control
 import numpy as np
 from numpy.typing import NDArray
@@ -9,27 +7,11 @@ from scipy.optimize import minimize_scalar
 
 from orchestrator.paired.thesis import published
 from orchestrator.plants.design import DrivetrainValues, six_state_model
+from orchestrator.shared.results.thesis import Comparison, TableComparison
 
 Array = NDArray[np.float64]
 C = np.array([[1.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
 C_L = np.array([[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]])
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """A published number or vector beside the recomputed one.
-
-    ``deviation`` is the largest difference relative to the largest published value; ``agrees`` tells whether it lies
-    within the rounding of the printed figures.
-    """
-
-    what: str
-    where: str
-    published: tuple[float, ...]
-    recomputed: tuple[float, ...]
-    deviation: float
-    agrees: bool
-    note: str = ""
 
 
 def _compare(
@@ -112,17 +94,6 @@ def size_hidden_in_the_filter() -> float:
 
     best = minimize_scalar(misfit, bounds=(np.log(0.5), np.log(20.0)), method="bounded", options={"xatol": 1e-9})
     return float(np.exp(best.x))
-
-
-@dataclass(frozen=True)
-class TableComparison:
-    """Table 4.1 by the quadratic map through it: estimates [rad], errors [%], and their statistics."""
-
-    estimates: tuple[float, ...]
-    errors_percent: tuple[float, ...]
-    largest_deviation: float
-    mean_error_percent: float
-    mse: float
 
 
 def table_comparison() -> TableComparison:

@@ -111,8 +111,8 @@ def _growth(sweeps: Sequence[SweepCost], records: Sequence[RecordCost]) -> list[
     sections: list[Section] = []
     if sweeps:
         units = {"total": "s", "per_case": "s", "peak": "MiB"}
-        sections.append(table_of("Sweeps", [as_plain(s) for s in sweeps], units=units))
+        sections.append(table_of("Sweeps", sweeps, units=units))
     if records:
         units = {"growth": "MiB", "expected": "MiB"}
-        sections.append(table_of("Memory of records", [as_plain(r) for r in records], units=units))
+        sections.append(table_of("Memory of records", records, units=units))
     return sections

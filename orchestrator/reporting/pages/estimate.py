@@ -27,6 +27,7 @@ Json = Mapping[str, Any]
 CURVE_POINTS = 121
 CHI_SQUARE_95 = 3.841458820694124  # of one degree of freedom
 OFFERED = ("effects.coulomb_friction.motor.torque", "effects.coulomb_friction.load.torque")  # live, beside the gap
+UNEXPLAINED = "The model does not explain what was measured"
 ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder"}
 
 
@@ -43,7 +44,7 @@ def build(source: ResultDocument) -> Report:
     estimates: Json = results.get("estimates") or {}
     found = {name: e for name, e in estimates.items() if e.get("alpha") is not None}
     sections: list[Section] = trust_section(results.get("trust"))
-    sections += [*_missing(results.get("diagnosis")), *_repeats(results)]
+    sections += [*_missing(results), *_repeats(results)]
     if estimates:
         sections += [_methods(estimates), *_remarks(estimates), *_comparison(found)]
     sections += [*_profile(source), *_online(source), *record_plots(source, "estimate.csv"), *_errors(source)]
@@ -57,14 +58,16 @@ def build(source: ResultDocument) -> Report:
     return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads())
 
 
-def _missing(diagnosis: Json | None) -> list[Section]:
-    """Return what the model lacks, where a diagnosis followed the estimate."""
+def _missing(results: Json) -> list[Section]:
+    """Return what the model lacks, or why no diagnosis tells, where it does not explain the records."""
+    diagnosis: Json = results.get("diagnosis") or {}
     if not diagnosis:
-        return []
+        why = results.get("undiagnosed")
+        return [Text(UNEXPLAINED, (f"No diagnosis says what it lacks: {why}.",))] if why else []
     named = [f"{words(e['name'])} ({e['site']})" for e in diagnosis.get("effects") or ()]
     said = f"It lacks {', '.join(named)}." if named else f"The diagnosis says: {diagnosis['verdict']}."
     place = "The folder diagnosis beside this page has its report and the corrected FMU."
-    return [Text("The model does not explain the record", (said, place))]
+    return [Text(UNEXPLAINED, (said, place))]
 
 
 def _repeats(results: Json) -> list[Section]:

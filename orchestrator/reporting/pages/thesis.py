@@ -1,10 +1,11 @@
 """The page of ``thesis``: every published number beside the recomputed one."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
 
 from orchestrator.reporting.model import Plot, Report, ReportTable, Section, Series, TableColumn
-from orchestrator.reporting.source import ResultDocument, plain, table_of
+from orchestrator.reporting.source import ResultDocument, table_of
+from orchestrator.shared.results import read
+from orchestrator.shared.results.thesis import TableRow, ThesisFound
 
 
 def build(source: ResultDocument) -> Report:
@@ -16,32 +17,30 @@ def build(source: ResultDocument) -> Report:
     Returns:
         The report.
     """
-    results = source.results
-    gains: list[Mapping[str, Any]] = list(results["gains"])
-    agree = sum(bool(g["agrees"]) for g in gains)
-    published: list[Mapping[str, Any]] = list(results["table"]["rows"])
-    ours = [float(v) for v in results["table"]["our_estimates"]]
+    results = read(source.results, ThesisFound)
+    agree, compared = sum(one.agrees for one in results.gains), len(results.gains)
+    table = results.table
     sections: list[Section] = [
-        table_of("Model and gains", gains),
-        _table_4_1(published, ours),
-        _errors(published, ours),
-        table_of("Errata", list(results["errata"])),
-        table_of("Results of others, as the thesis quotes them", list(results.get("others", []))),
+        table_of("Model and gains", results.gains),
+        _table_4_1(table.rows, table.our_estimates),
+        _errors(table.rows, table.our_estimates),
+        table_of("Errata", results.errata),
+        table_of("Results of others, as the thesis quotes them", results.others),
     ]
     return Report(
         title="The thesis, recomputed",
         summary=(
-            f"{agree} of {len(gains)} published models and gains agree with the recomputed ones to all printed digits; "
-            f"{len(results['errata'])} errata are shown by computation."
+            f"{agree} of {compared} published models and gains agree with the recomputed ones to all printed digits; "
+            f"{len(results.errata)} errata are shown by computation."
         ),
-        badge=("neutral", f"{agree} of {len(gains)} agree"),
+        badge=("neutral", f"{agree} of {compared} agree"),
         sections=tuple(sections),
         origin=source.origin(),
         downloads=source.downloads(),
     )
 
 
-def _table_4_1(published: list[Mapping[str, Any]], ours: list[float]) -> ReportTable:
+def _table_4_1(published: Sequence[TableRow], ours: Sequence[float]) -> ReportTable:
     columns = (
         TableColumn("alpha", "rad", 5),
         TableColumn("S", "", 5),
@@ -52,20 +51,20 @@ def _table_4_1(published: list[Mapping[str, Any]], ours: list[float]) -> ReportT
     )
     rows = tuple(
         (
-            *(plain(row[name]) for name in ("alpha", "S", "estimate", "error_percent")),
+            *(row.alpha, row.S, row.estimate, row.error_percent),
             own,
-            100.0 * abs(own - row["alpha"]) / row["alpha"],
+            100.0 * abs(own - row.alpha) / row.alpha,
         )
         for row, own in zip(published, ours, strict=True)
     )
     return ReportTable("Table 4.1", columns, rows)
 
 
-def _errors(published: list[Mapping[str, Any]], ours: list[float]) -> Plot:
-    alpha = [float(row["alpha"]) for row in published]
+def _errors(published: Sequence[TableRow], ours: Sequence[float]) -> Plot:
+    alpha = [row.alpha for row in published]
     own = [100.0 * abs(o - a) / a for o, a in zip(ours, alpha, strict=True)]
     series = (
-        Series("published", alpha, [float(row["error_percent"]) for row in published], "points"),
+        Series("published", alpha, [row.error_percent for row in published], "points"),
         Series("ours", alpha, own, "points"),
     )
     return Plot("Errors of Table 4.1", "alpha [rad]", "error [%]", series, log_y=all(v > 0.0 for v in own))

@@ -1,9 +1,24 @@
 """What repeats of one experiment differ by: a floor of noise that needs no model."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """What repeats differ by: no model does better, and none need.
+
+    Attributes:
+        sources: the records that have one input.
+        floor: rms of one run about what the runs have in common, by signal.
+    """
+
+    sources: tuple[str, ...]
+    floor: dict[str, float]
 
 
 def repeat_variance(first: Array, second: Array, width: int) -> Array:
