@@ -4,10 +4,12 @@
 
     python -m benchmarks.trust 25             # records of each of the four families
     python -m benchmarks.trust 25 --first 500 # other seeds
+    python -m benchmarks.trust 25 --no-diagnose
 
 Families: ``right`` (values off by up to the stated 5 %), ``wrong_model`` (an effect that the model lacks, beside the
 gap), ``wrong_twin`` (values off by up to 25 %, stated as 5 %), ``little_motion`` (a hundredth of the torque). Every
-method estimates every record; the table counts, per method and level, the results and how many intervals hold the size.
+method estimates every record, and where the model does not explain it, the diagnosis follows, as in ``estimate``; the
+table counts, per method and level, the results and how many intervals hold the size.
 """
 
 import argparse
@@ -16,11 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+import orchestrator as oc
 from orchestrator.errors import OrchestratorError
-from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
-from orchestrator.estimation.trust import trust_of_estimates
-from orchestrator.records.model_file import default_model
-from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record, record_from_columns
 from tests.support.hidden_effects import SINGLE
 from tests.support.independent_plant import make_record
@@ -59,47 +58,38 @@ def record_of(family: str, number: int) -> tuple[Record, float]:
     return record_from_columns(columns, f"{family} {number}"), alpha
 
 
-def estimates_of(record: Record) -> list[Estimate]:
-    """Return what each method that applies says of a record."""
-    model, found = default_model(), []
-    check_plausible(record, model)
-    for name in METHODS:
-        try:
-            with np.errstate(all="ignore"):
-                found.append(estimator(name)(record, model))
-        except NotApplicableError:
-            continue
-    return found
-
-
 def main() -> None:
     """Estimate all records and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("count", type=int)
     parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--no-diagnose", action="store_true")
     arguments = parser.parse_args()
     counts: dict[tuple[str, str], Count] = defaultdict(Count)
     for family in FAMILIES:
         for number in range(arguments.first, arguments.first + arguments.count):
             record, alpha = record_of(family, number)
             try:
-                estimates = estimates_of(record)
+                with np.errstate(all="ignore"):
+                    found = oc.estimate(record, method="all", diagnose=not arguments.no_diagnose)
             except OrchestratorError as error:
                 print(f"{record.source}: refused: {error}", flush=True)
                 continue
-            trust = trust_of_estimates(estimates, default_model())
-            for estimate in estimates:
+            for method in found.methods:
+                estimate = method.estimate
+                if estimate is None or method.trust is None:
+                    continue
                 low, high = estimate.interval
                 held = low <= alpha <= high
                 far = abs(alpha - estimate.alpha) > 3.0 * max(high - estimate.alpha, estimate.alpha - low)
-                level = trust[estimate.method].level.word
-                for key in ((estimate.method, level), (f"{family}: {estimate.method}", level)):
+                level = method.trust.level.word
+                for key in ((method.method, level), (f"{family}: {method.method}", level)):
                     counts[key].results += 1
                     counts[key].held += held
                     counts[key].far += far
                 if level == "green" and not held:
                     said = f"{estimate.alpha:.6g} ({low:.6g} to {high:.6g})"
-                    print(f"{record.source}: green {estimate.method} {said}, is {alpha:.6g}")
+                    print(f"{record.source}: green {method.method} {said}, is {alpha:.6g}", flush=True)
     print(f"{'':44}{'results':>8}{'held':>6}{'far':>5}")
     for (name, level), c in sorted(counts.items()):
         print(f"{name:36}{level:>8}{c.results:8d}{c.held:6d}{c.far:5d}")

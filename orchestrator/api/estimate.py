@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
+import msgspec
+
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.diagnose import DiagnosisResult
 from orchestrator.api.diagnose import diagnose as find_missing
@@ -16,7 +18,7 @@ from orchestrator.api.methods import HEAD, MethodResult, described, method_entry
 from orchestrator.api.numerics import fitting
 from orchestrator.api.records import as_record
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.errors import ScenarioError
+from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation import cramer_rao, maximum_likelihood
 from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
 from orchestrator.estimation.repeats import in_words, repeats_of
@@ -28,6 +30,7 @@ from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
+from orchestrator.shared.results.estimate import EstimateFound, MethodFound, RepeatsFound
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Level, Trust
 
@@ -50,6 +53,7 @@ class EstimateResult(Result):
         more: further records of the same machine, fitted together with the first.
         repeats: what records with the same torque differ by, or None.
         settings: the thresholds that were used.
+        undiagnosed: why no diagnosis followed although the model does not explain the record; else empty.
     """
 
     command: ClassVar[str] = "estimate"
@@ -61,6 +65,7 @@ class EstimateResult(Result):
     more: tuple[Record, ...] = ()
     repeats: Repeats | None = None
     settings: EstimationSettings = DEFAULT_SETTINGS
+    undiagnosed: str = ""
 
     @property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -130,6 +135,11 @@ class EstimateResult(Result):
             estimate.diagnostics.get("parameters", {}).get("i", {}).get("value", self.model.parameters["i"].value)
         )
 
+    def _play(self) -> Play:
+        """Return the best half-gap with the gear ratio that was fitted beside it."""
+        corrected = None if self.diagnosis is None else self.diagnosis.diagnosis.play
+        return corrected or Play(self.alpha, self._ratio(self.best))
+
     def blocks(self) -> Sequence[Block]:
         """Return the table of the methods and their messages."""
         r = self.record
@@ -144,33 +154,38 @@ class EstimateResult(Result):
             for reason in m.trust.reasons
             if reason not in m.estimate.message
         ]
-        missing = [] if self.diagnosis is None else ["The model does not explain the record; what it lacks:"]
-        missing += [] if self.diagnosis is None else self.diagnosis.summary()
+        those = "records" if self.more else "record"
+        missing: list[str] = []
+        if self.diagnosis is not None:
+            missing = [f"The model does not explain the {those}; what it lacks:", *self.diagnosis.summary()]
+        elif self.undiagnosed:
+            missing = [f"The model does not explain the {those}; no diagnosis: {self.undiagnosed}"]
         rows = [method_row(m) for m in self.methods if m.estimate is not None]
         unfit = [f"{m.method} does not apply: {m.reason}" for m in self.methods if m.estimate is None]
-        shown = self.estimates[:1] if self.estimates and self.best.visible else ()
-        sizes = [f"{e.method}: {Play(e.alpha, self._ratio(e))}" for e in shown]
+        sizes = [f"{self.best.method}: {self._play()}"] if self.estimates and self.best.visible else []
         floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_beside(self.estimates)}"]
         return [table(title, HEAD, rows), *sizes, *floor, *messages, *doubts, *unfit, *missing]
 
-    def results(self, place: Path | None = None) -> dict[str, Any]:
+    def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says."""
         entries = {m.method: method_entry(m) for m in self.methods}
-        r = self.record
-        found: dict[str, Any] = {"record": described(r), "estimates": entries}
-        if self.more:
-            found["more_records"] = [described(other) for other in self.more]
-        if self.repeats is not None:
-            found["repeats"] = {"sources": list(self.repeats.sources), "floor": self.repeats.floor, "unit": "rad"}
-        if self.estimates:
-            found |= entries[self.best.method] | {"method": self.best.method}
-            found["play"] = Play(self.alpha, self._ratio(self.best)).as_json()
+        r, repeats = self.record, self.repeats
         fit = next((e for e in self.estimates if e.method == "maximum_likelihood"), None)
-        if fit is not None and not r.missing:
-            found["live"] = fitted_live(r, fit)
-        if self.diagnosis is not None:
-            found["diagnosis"] = self.diagnosis.results((place or Path()) / DIAGNOSIS)
-        return found | {"trust": self.trust.as_json(), "settings": as_tables(self.settings)}
+        best = entries[self.best.method] if self.estimates else MethodFound()
+        answer = msgspec.structs.asdict(best) | {"trust": self.trust.found()}
+        return EstimateFound(
+            **answer,
+            record=described(r),
+            estimates=entries,
+            more_records=tuple(described(other) for other in self.more) or None,
+            repeats=None if repeats is None else RepeatsFound(repeats.sources, repeats.floor),
+            method=self.best.method if self.estimates else None,
+            play=self._play().found() if self.estimates else None,
+            live=None if fit is None or r.missing else fitted_live(r, fit),
+            diagnosis=None if self.diagnosis is None else self.diagnosis.results((place or Path()) / DIAGNOSIS),
+            undiagnosed=self.undiagnosed or None,
+            settings=as_tables(self.settings),
+        )
 
     def write_diagnosis(self, folder: Path, place: Path) -> None:
         """Write the diagnosis, if there is one, as a folder of its own.
@@ -228,8 +243,8 @@ def estimate(
         method: a key of ``METHODS``, such as "maximum_likelihood" or "ekf", or "all".
         motor_only: leave the load encoder out.
         time_limit: [s], after which ``maximum_likelihood`` gives up (default: never).
-        diagnose: where ``maximum_likelihood`` shows that the model does not explain the record, find what it misses
-            and give the half-gap of the corrected model. This takes some ten seconds more.
+        diagnose: where ``maximum_likelihood`` shows that the model does not explain the records, find what it misses
+            and give the half-gap of the corrected model, one for all records. This takes some ten seconds more.
         settings: thresholds, or the path of a TOML file with those that differ from the default.
         progress: called with the piece of work (a method, or "diagnosis"), its stage, and the share that is behind.
 
@@ -272,18 +287,13 @@ def estimate(
     trust = trust_of_estimates([m.estimate for m in found if m.estimate is not None], model, chosen.trust)
     judged = tuple(replace(m, trust=trust.get(m.method)) for m in found)
     given = {"record": measured.source, "model": model.source, "method": method, "motor_only": motor_only}
-    whole = not more and not measured.missing  # a diagnosis takes one record with all its samples
-    missing = None
-    if whole and diagnose and _unexplained(judged):
+    missing, why = None, ""
+    if diagnose and _unexplained(judged):
         progress(DIAGNOSIS, "diagnosing", 0.0)
-        missing = find_missing(
-            measured,
-            model,
-            progress=lambda done, most, what: progress(DIAGNOSIS, f"fitted {what}", done / max(most, 1)),
-        )
+        missing, why = _diagnosed([measured, *more], model, partial(progress, DIAGNOSIS))
     first = () if missing is None else _of_diagnosis(missing)
     repeats = repeats_of([measured, *more])
-    return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen)
+    return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen, why)
 
 
 def _beside(estimates: Sequence[Estimate]) -> str:
@@ -298,6 +308,20 @@ def _unexplained(methods: Sequence[MethodResult]) -> bool:
     if fit is None or fit.estimate is None or fit.trust is None:
         return False
     return bool(fit.estimate.diagnostics["lacking"]) or fit.trust.level is Level.RED
+
+
+def _diagnosed(
+    records: Sequence[Record], model: Model, report: Callable[[str, float], None]
+) -> tuple[DiagnosisResult | None, str]:
+    """Return what the model misses; or None, and why these records cannot be diagnosed."""
+
+    def progress(done: int, most: int, what: str) -> None:
+        report(f"fitted {what}", done / max(most, 1))
+
+    try:
+        return find_missing(records, model, progress=progress), ""
+    except (InputError, ConvergenceError) as error:
+        return None, str(error)
 
 
 def _of_diagnosis(found: DiagnosisResult) -> tuple[MethodResult, ...]:

@@ -124,7 +124,11 @@ class SweepResult(AnySweepResult):
             "intervals that hold the size [%]",
         )
         tables = [table(title, ("actual [rad]", "noise [rad]", *extra, *found), shown), table(errors, head, rows)]
-        sizes = [f"{word.capitalize()} size: {play}" for word, play in self._plays().items()]
+        plays = self._plays()
+        if len(set(plays.values())) == 1:
+            sizes = [f"Size: {plays['smallest']}"]
+        else:
+            sizes = [f"{word.capitalize()} size: {play}" for word, play in plays.items()]
         return [*tables, *sizes, f"FMUs: {self.fmu_kind}", f"Trust: {self.trust}"]
 
     def _plays(self) -> dict[str, Play]:
@@ -140,9 +144,9 @@ class SweepResult(AnySweepResult):
             cases=len(self.cases),
             failed=self.failed,
             columns=self.columns(),
-            play={word: play.as_json() for word, play in self._plays().items()},
+            play={word: play.found() for word, play in self._plays().items()},
             statistics=[ErrorsFound(noise=level, **asdict(s)) for level, s in self.statistics.items()],
-            trust=self.trust.as_json(),
+            trust=self.trust.found(),
             experiment=asdict(self.plan.experiment),
             calibrations={f"{level:g}": _provenance(c) for level, c in self.calibrations.items()},
             fmus={name: file_hash(path) for name, path in self.fmus.items()},

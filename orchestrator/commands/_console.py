@@ -33,11 +33,13 @@ def _folded(text: str) -> str:
     if not sys.stdout.isatty():
         return text
     width = min(shutil.get_terminal_size().columns, PIPE_WIDTH)
-    lines = (
-        textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False, subsequent_indent="  ")
-        for line in text.split("\n")
-    )
-    return "\n".join(lines)
+    return "\n".join(_fill(line, width) for line in text.split("\n"))
+
+
+def _fill(line: str, width: int) -> str:
+    """Return a line folded between words, what follows two columns further in than it begins."""
+    indent = line[: len(line) - len(line.lstrip())] + "  "
+    return textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False, subsequent_indent=indent)
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -51,26 +53,41 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
         rows: one text for each column.
     """
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
-    words = [max((len(w) for text in (name, *cells) for w in text.split()), default=0) for name, *cells in
-             zip(columns, *rows, strict=True)]  # fmt: skip
-    if sum(words) + 3 * len(columns) + 1 > width:
+    widths = _widths(columns, rows, width - 3 * len(columns) - 1)
+    if not widths:
         sys.stdout.write(_as_list(title, columns, rows, width))
         return
     table = Table(title=title, title_justify="left", title_style="bold")
-    for name in columns:
-        table.add_column(name, overflow="fold")
+    for name, most in zip(columns, widths, strict=True):
+        table.add_column(name, overflow="fold", width=most)
     for row in rows:
         table.add_row(*row)
     console = Console(file=sys.stdout, width=width, highlight=False, markup=False)
     console.print(table)
 
 
+def _widths(columns: Sequence[str], rows: Sequence[Sequence[str]], room: int) -> list[int]:
+    """Return the width of each column so that no word is broken; none where ``room`` is too narrow for that."""
+    cells = [(name, *of_it) for name, *of_it in zip(columns, *rows, strict=True)]
+    whole = [max(len(text) for text in column) for column in cells]
+    widths = [max((len(w) for text in column for w in text.split()), default=0) for column in cells]
+    if sum(widths) > room:
+        return []
+    for _ in range(room - sum(widths)):
+        short = [n for n, width in enumerate(widths) if width < whole[n]]
+        if not short:
+            break
+        widths[min(short, key=lambda n: widths[n] / whole[n])] += 1
+    return widths
+
+
 def _as_list(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> str:
     """Return a table's rows below each other: the first cell, then heading and value of the others that hold any."""
+    first = f"{columns[0]} " if columns[0] else ""
     side = max((len(name) for name in columns[1:]), default=0) + 4
     lines = [title]
     for row in rows:
-        lines.append(row[0])
+        lines.append(first + row[0])
         for name, text in zip(columns[1:], row[1:], strict=True):
             head = f"  {name}".ljust(side)
             lines += textwrap.wrap(text, width, initial_indent=head, subsequent_indent=" " * side) if text else []

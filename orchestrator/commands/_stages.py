@@ -10,6 +10,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+BAR, LEFT = 20, "about {}:{:02d} left"
 DIAGNOSIS_START, DIAGNOSIS_PER_ROW, DIAGNOSED_ROWS = 5.0, 0.01, 9000  # s, s for each row, of so many at most
 
 
@@ -81,6 +82,9 @@ class Stages:
         left = self.left()
         done = 1.0 - left / self._expected if self._expected > 0.0 else 0.0
         minutes, seconds = divmod(round(left), 60)
-        line = Table.grid(padding=(0, 1))
-        line.add_row(self._stage, ProgressBar(1.0, done, width=30), f"about {minutes}:{seconds:02d} left")
+        line = Table.grid(padding=(0, 1), expand=True)
+        line.add_column(no_wrap=True, overflow="ellipsis", ratio=1)
+        line.add_column(width=BAR)
+        line.add_column(no_wrap=True, width=len(LEFT.format(99, 0)))
+        line.add_row(self._stage, ProgressBar(1.0, done, width=BAR), LEFT.format(minutes, seconds))
         return line

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +28,7 @@ from orchestrator.diagnosis.verdict.words import warnings_of
 from orchestrator.plants.description import Plant
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.results.diagnose import ParameterFound
 
 Array = NDArray[np.float64]
 DEFAULT_SETTINGS = DiagnosisSettings()
@@ -107,7 +107,7 @@ def diagnose(
         corrected={name: float(chosen.p[plant.index(name)]) for name in _changed(plant, nominal, chosen.p)},
         trust=doubts(verdict, found.left, found.floor_off, unnamed, far, misfit, warnings, settings.verdict),
         horizons=table(named_stages, (found.proof.base, found.proof.final)[: len(named_stages)]),
-        analysis=analysis.as_json(),
+        analysis=analysis.found(),
         settings=settings,
         workings=Workings(likelihood, parts, base_fit, chosen, best, tuple(search.steps), before, after),
         records=by_record(likelihood, chosen.q, ends, parts.held_out, position),
@@ -138,15 +138,15 @@ def _plain_verdict(likelihood: RecordLikelihood, nominal: Array, base: Fit, part
     return "none" if gained < most else "parameters"
 
 
-def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, dict[str, Any]]:
+def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, ParameterFound]:
     return {
-        u.name: {
-            "nominal": u.value,
-            "value": float(final.p[plant.index(u.name)]),
-            "standard_error": final.standard_error(plant.index(u.name)),
-            "interval": [*final.interval(plant.index(u.name))],
-            "unit": METRIC.get(u.unit, u.unit) if in_metres(model) else u.unit,
-        }
+        u.name: ParameterFound(
+            nominal=u.value,
+            value=float(final.p[plant.index(u.name)]),
+            standard_error=final.standard_error(plant.index(u.name)),
+            interval=final.interval(plant.index(u.name)),
+            unit=METRIC.get(u.unit, u.unit) if in_metres(model) else u.unit,
+        )
         for u in model.uncertain
         if any(entry.place == plant.index(u.name) for entry in final.free)
     }

@@ -32,10 +32,29 @@ def test_one_that_does_not_is_a_list_of_named_values(terminal, capsys: pytest.Ca
     terminal(50)
     print_table("Tools", COLUMNS, ROWS)
     lines = capsys.readouterr().out.splitlines()
-    assert lines[:4] == ["Tools", "ours", "  version     0.2.0", "  wall [s]    1.25"]
-    assert "another-tool-of-others" in lines
+    assert lines[:4] == ["Tools", "tool ours", "  version     0.2.0", "  wall [s]    1.25"]
+    assert "tool another-tool-of-others" in lines
     assert "  note        needs an own Python" in lines
     assert max(len(line) for line in lines) <= 50
+
+
+def test_no_number_is_broken_where_all_fit(terminal, capsys: pytest.CaptureFixture[str]) -> None:
+    terminal(80)
+    columns = ("actual [rad]", "noise [rad]", "S [rad]", "estimate [rad]", "interval [rad]", "error [rad]", "error [%]")
+    row = ["0.02", "0.0001", "97.9593", "0.020004066", "0.019998006 .. 0.020010074", "4.07e-06", "0.0203"]
+    print_table("Sweep", columns, [row])
+    told = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out)
+    assert all(word in told for cell in row for word in cell.split())
+    assert "┃" in told
+    assert max(len(line.rstrip()) for line in told.splitlines()) <= 80
+
+
+def test_what_is_folded_stays_below_its_own_beginning(terminal, capsys: pytest.CaptureFixture[str]) -> None:
+    terminal(30)
+    print_blocks(["    how sure: " + "very " * 10])
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) > 2
+    assert all(line.startswith("      very") for line in lines[1:])
 
 
 def test_lines_end_between_words_on_a_terminal_only(terminal, capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 import io
 
 import pytest
+from rich.console import Console
 
 from orchestrator.commands import _stages
 from orchestrator.commands._stages import Stages, diagnosis_seconds
@@ -50,3 +51,13 @@ def test_nothing_is_written_where_nobody_looks() -> None:
 def test_a_diagnosis_is_expected_to_take_no_longer_beyond_the_rows_that_it_looks_at() -> None:
     assert diagnosis_seconds(2000) < diagnosis_seconds(4000)
     assert diagnosis_seconds(10_000) == diagnosis_seconds(1_000_000)
+
+
+def test_a_long_stage_stays_on_one_line_of_a_narrow_terminal() -> None:
+    stages = Stages(io.StringIO())
+    stages.begin("fitted without coulomb_friction@motor, directional_friction@motor and others", 61.0)
+    console = Console(file=io.StringIO(), width=80)
+    assert len(console.render_lines(stages._line())) == 1
+    console.print(stages._line())
+    assert "…" in console.file.getvalue()
+    assert "left" in console.file.getvalue()

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import orchestrator as oc
+from orchestrator.errors import RecordError
 from orchestrator.estimation import cramer_rao, maximum_likelihood
 from orchestrator.estimation.likelihood import Likelihood
 from orchestrator.estimation.problem import make_problem
-from orchestrator.estimation.protocol import TimeLimitError
+from orchestrator.estimation.protocol import Estimate, TimeLimitError
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import Record, record_from_columns
 from tests.support.independent_plant import make_record
@@ -81,3 +83,55 @@ def test_an_uncertain_scale_of_the_torque_is_one_of_the_unknowns(records) -> Non
 def test_a_time_limit_ends_the_fit(records) -> None:
     with pytest.raises(TimeLimitError, match="`rate`"):
         maximum_likelihood.estimate(records[0], MODEL, time_limit=0.2)
+
+
+@pytest.fixture
+def rubbing() -> list[dict[str, np.ndarray]]:
+    """Two short records of a machine with dry friction, which the model lacks."""
+    made = [make_record({"alpha": 0.02, "Fc_m": 1.5}, 50 + k, 3.0, 100.0, excitation="multisine") for k in range(2)]
+    return [columns for columns, _ in made]
+
+
+@pytest.fixture
+def unexplained(monkeypatch) -> None:
+    """A fit, in no time, that finds that the model does not explain the records."""
+    diagnostics = {"lacking": "the model lacks something", "cramer_rao": 1e-5}
+    fit = Estimate("maximum_likelihood", 0.02, 1e-5, (0.01998, 0.02002), True, "", diagnostics)
+    monkeypatch.setattr(maximum_likelihood, "estimate", lambda *given, **options: fit)
+
+
+@pytest.mark.usefixtures("unexplained")
+def test_records_that_the_model_does_not_explain_are_diagnosed_together(rubbing, monkeypatch) -> None:
+    seen = []
+
+    def refused(records, model, progress):
+        seen.append([record.source for record in records])
+        raise RecordError("it is a test")
+
+    monkeypatch.setattr("orchestrator.api.estimate.find_missing", refused)
+    records = [record_from_columns(columns, f"rubbing {k}") for k, columns in enumerate(rubbing)]
+    found = oc.estimate(records)
+    assert seen == [["rubbing 0", "rubbing 1"]]
+    assert found.diagnosis is None
+    assert "The model does not explain the records; no diagnosis: it is a test" in found.blocks()
+    assert oc.estimate(records, diagnose=False).undiagnosed == ""
+    assert len(seen) == 1
+
+
+@pytest.mark.usefixtures("unexplained")
+def test_records_that_cannot_be_diagnosed_keep_their_estimate_and_say_why(rubbing) -> None:
+    kept = np.arange(rubbing[1]["time"].size) != 7
+    holed = {name: values[kept] for name, values in rubbing[1].items()}
+    found = oc.estimate([record_from_columns(rubbing[0], "whole"), record_from_columns(holed, "holed")])
+    assert found.diagnosis is None
+    assert "holed: row 8 must have all samples" in found.undiagnosed
+    assert found.best.method == "maximum_likelihood"
+
+
+@pytest.mark.slow
+def test_one_diagnosis_of_two_records_gives_the_half_gap_of_the_corrected_model(rubbing) -> None:
+    found = oc.estimate([record_from_columns(columns, f"rubbing {k}") for k, columns in enumerate(rubbing)])
+    assert found.diagnosis is not None
+    assert [record.source for record in (found.diagnosis.record, *found.diagnosis.more)] == ["rubbing 0", "rubbing 1"]
+    assert found.best.method == "diagnosis"
+    assert found.interval[0] < 0.02 < found.interval[1]
