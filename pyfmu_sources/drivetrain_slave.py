@@ -33,6 +33,12 @@ MODEL = FIRST_PARAMETER + P_MODEL
 KNOWN_STEPS = 16
 # The work of a step grows with its length; a host that asks for more than this has mistaken the unit.
 LONGEST_STEP = 100.0
+# Angles [rad] beyond which neighbouring numbers are over 2 mrad apart: a gap and most motion are lost in rounding.
+FARTHEST = 1e13
+TOO_FAR = (
+    "must stay within 1e13 rad, beyond which rounding leaves nothing of a gap: make the torques `u` and `T_l` "
+    "or the initial speed smaller, the inertias larger or the run shorter"
+)
 
 Values = Annotated[tuple[float, ...], COUNT]
 KnownStep = tuple[float, Table]
@@ -85,8 +91,8 @@ class Drivetrain(SlaveBase):
     title = "Geared drivetrain with backlash: motor with lag, gear with play, elastic shaft, load"
     feedthrough = True
     table: ClassVar[tuple[FmuVariable, ...]] = (
-        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque", nominal=100.0),
-        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the load", nominal=100.0),
+        FmuVariable("u", "input", "N.m", 0.0, "Requested motor torque", -BIG, BIG, nominal=100.0),
+        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the load", -BIG, BIG, nominal=100.0),
         _output(
             "theta_m", "rad", "Motor angle as measured", 1.0, ("theta_m_start", "effects.sensor_offset.motor.offset")
         ),
@@ -204,10 +210,12 @@ class Drivetrain(SlaveBase):
         return drivetrain.advance(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
 
     def _take(self, x: State, mode: Mode, step: float) -> None:
-        """Take over a state that is finite, or refuse the step."""
+        """Take over a state that is finite and not too far away to be told from its neighbours, or refuse the step."""
         if x[0] != x[0]:
             raise StepRefusedError(f"the step of {step!r} s {TOO_STIFF}")
-        if not -LARGEST <= x[0] + x[1] + x[2] + x[3] + x[4] <= LARGEST:
+        if not (-FARTHEST <= x[0] <= FARTHEST and -FARTHEST <= x[2] <= FARTHEST):
+            raise StepRefusedError(f"`theta_m` and `theta_l`, {x[0]!r} and {x[2]!r} after this step, {TOO_FAR}")
+        if not -LARGEST <= x[1] + x[3] + x[4] <= LARGEST:
             raise StepRefusedError(f"the state must stay finite, but is {x!r} after a step of {step!r} s")
         self._x = x
         self._mode = mode

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 from . import servo_axis
 from .dead_time import MOST_REQUESTS, ROUNDING, Requests, is_new, request_at
+from .drivetrain_parameters import BIG
 from .effects import saturated
 from .fmu_variables import LARGEST, FmuVariable
 from .servo_axis import State
@@ -27,8 +28,8 @@ class ServoAxis(SlaveBase):
 
     title = "Single axis: one inertia behind the torque lag of its drive"
     table: ClassVar[tuple[FmuVariable, ...]] = (
-        FmuVariable("u", "input", "N.m", 0.0, "Requested torque", nominal=100.0),
-        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the axis", nominal=100.0),
+        FmuVariable("u", "input", "N.m", 0.0, "Requested torque", -BIG, BIG, nominal=100.0),
+        FmuVariable("T_l", "input", "N.m", 0.0, "External torque against the axis", -BIG, BIG, nominal=100.0),
         FmuVariable("theta_m", "output", "rad", None, "Position as measured", starts_from=("theta_m_start", _OFFSET)),
         FmuVariable("omega_m", "output", "rad/s", None, "Speed", starts_from=("omega_m_start",)),
         FmuVariable("T_m", "output", "N.m", None, "Torque of the drive", starts_from=("T_m_start",)),

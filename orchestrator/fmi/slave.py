@@ -90,6 +90,7 @@ class FmuSlave(Slave):
         self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
         self._worst = OK
         self._closed = False
+        self._reached: float | None = None  # s, in a run
         self._once = ""
         self._sets: dict[tuple[str, ...], tuple[list[_Batch], list[Value]]] = {}
         self._reserve()
@@ -162,7 +163,8 @@ class FmuSlave(Slave):
         if "KeyboardInterrupt" in self._said():  # Ctrl-C reached the Python inside the FMU
             raise KeyboardInterrupt
         label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-        text = f"{self.name}: {what} returned {label}{self._said()}"
+        moment = "" if self._reached is None else f" at t = {self._reached:g} s"
+        text = f"{self.name}: {what}{moment} returned {label}{self._said()}"
         if status == DISCARD:
             raise StepDiscardedError(text)
         raise SlaveError(text)
@@ -295,6 +297,7 @@ class FmuSlave(Slave):
             ctypes.c_double(stop or 0.0),
         )
         self._call("fmi2EnterInitializationMode")
+        self._reached = start
 
     def start(self) -> None:
         """Exit initialisation mode."""
@@ -305,8 +308,9 @@ class FmuSlave(Slave):
         if self._worst >= ERROR:
             self._alive("fmi2DoStep")
         status = self._step(self._component, time, step, 1)
+        self._reached = time if status else time + step
         if status:
-            self._check(status, f"fmi2DoStep at t = {time:g} s")
+            self._check(status, "fmi2DoStep")
 
     def get_state(self) -> Any:
         """Return a handle of a copy of the whole state."""
@@ -330,6 +334,7 @@ class FmuSlave(Slave):
     def reset(self) -> None:
         """Return to the condition of a new instance."""
         self._call("fmi2Reset")
+        self._reached = None
 
     def close(self) -> None:
         """Free the instance, unless it failed fatally; its library stays loaded when it runs Python."""
@@ -385,13 +390,15 @@ class FmuSlave(Slave):
         """Return the place of a variable's type in ``KINDS``; behind the last for Strings."""
         return (*KINDS, "String").index(_FUNCTIONS[self.model.variables[name].type])
 
-    def failed(self, status: int, function: str) -> None:
+    def failed(self, status: int, function: str, time: float) -> None:
         """Raise for a status that the compiled loop met.
 
         Args:
             status: an ``fmi2Status``.
             function: name of the FMI function that returned it.
+            time: when [s].
         """
+        self._reached = time
         self._check(status, function)
 
 

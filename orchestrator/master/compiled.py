@@ -166,9 +166,8 @@ class CompiledWiring:
             end, clock = min(begin + chunk, steps), time.perf_counter()
             status = self._run_steps(ctypes.byref(job), begin, end, ctypes.byref(failure))
             if status:
-                what = f"{FUNCTIONS[failure.call]} at t = {start + failure.step * step:g} s"
                 failed: Any = self._wiring.stages[failure.slave].slave
-                failed.failed(status, what)
+                failed.failed(status, FUNCTIONS[failure.call], start + failure.step * step)
             taken = time.perf_counter() - clock
             chunk = (
                 min(2 * chunk, MOST_STEPS) if taken < 0.5 * CHUNK_TIME else max(1, round(chunk * CHUNK_TIME / taken))

@@ -77,7 +77,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Span:
-    """A shaded range of x."""
+    """A shaded range of x; a moment, drawn as a line, where it ends as it starts."""
 
     start: float
     end: float

@@ -72,8 +72,9 @@ def test_the_page_of_a_check_lists_what_was_found(tmp_path):
     assert report.summary.startswith("1 of 2 FMUs have no error.")
     (findings,) = sections(report, Findings)
     assert (findings.title, findings.items[0].text) == ("bad.fmu", "A unit must be defined.")
-    (table,) = sections(report, ReportTable)
+    table, facts = sections(report, ReportTable)
     assert [row[0] for row in table.rows] == ["bad.fmu", "good.fmu"]
+    assert facts.rows == (("bad.fmu", None), ("good.fmu", "2.0"))
 
 
 def test_the_page_of_a_check_puts_findings_of_one_rule_together(tmp_path):

@@ -11,6 +11,32 @@ def estimate(value):
     return {"value": value, "standard_error": 0.01 * value, "unit": "N.m"}
 
 
+def test_predictions_restarts_and_what_the_log_adds_have_their_places_on_the_page_of_a_diagnosis(tmp_path):
+    delay = {"name": "load_stamp", "site": "log", "parameters": {"delay": estimate(0.005) | {"unit": "s"}}}
+    errors = [{"model": "parameters", "theta_m": 0.01}, {"model": "final", "theta_m": 0.001}]
+    results = {
+        "verdict": "parameters",
+        "misfit": {"theta_m": {"before": 0.1, "after": 0.001, "noise": 0.0009, "unit": "rad"}},
+        "nuisances": [delay],
+        "horizons": [{"horizon": "2 s", "errors": errors}],
+        "analysis": {"rate": 200.0, "rows": 400, "rows_of_the_file": 5, "notes": []},
+        "live": {"fmu": "Drivetrain", "step": 0.5, "values": {}, "rows": [0, 1], "starts": [{}, {}]},
+        "settings": {"fit": {"fitted": 0.5}},
+    }
+    write_result(tmp_path, "diagnose", {}, None, results)
+    (tmp_path / "diagnose.csv").write_text("time,theta_m,theta_m_after\n0,0,0\n0.5,1,1\n1,2,2\n")
+    report = report_from_directory(tmp_path)
+    tables = {table.title: table.rows for table in sections(report, ReportTable)}
+    assert tables["Predictions"] == (("2 s", "re-fitted", 0.01), ("2 s", "corrected", 0.001))
+    assert tables["What the log has, and the machine has not"][0][1] == "delay"
+    difference, angle = sections(report, Plot)
+    assert [(span.start, span.end) for span in difference.spans] == [(0.0, 0.0), (0.5, 0.5)]
+    assert angle.spans == difference.spans
+    (analysed,) = (facts for facts in sections(report, Facts) if facts.title == "What was analysed")
+    assert dict(analysed.items)["rows of the file for each"] == 5
+    assert "Fit" not in [section.title for section in report.sections]
+
+
 def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
     effect = {
         "name": "coulomb_friction",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.building.build import ensure_built
-from orchestrator.errors import ConnectionMismatchError, FmuError, InputError, ScenarioError
+from orchestrator.errors import ConnectionMismatchError, FmuError, InputError, ScenarioError, SimulationError
 from orchestrator.scenarios.scenario import load_scenario, run_scenario
 
 GOOD = """
@@ -30,6 +30,13 @@ kind = "square"
 to = "plant.u"
 amplitude = 20.0
 period = 0.02
+"""
+LATE = """
+[[sources]]
+kind = "step"
+to = "plant.T_l"
+time = 0.02
+after = 1e300
 """
 
 
@@ -54,6 +61,13 @@ def test_scenario_runs_and_reports_units(tmp_path: Path) -> None:
     held = result["plant.u"]
     assert list(held[1:11]) == [20.0] * 10
     assert list(held[11:21]) == [-20.0] * 10
+
+
+@pytest.mark.parametrize("compiled", ["true", "false"])
+def test_a_torque_without_meaning_is_refused_with_its_name_and_time(tmp_path: Path, compiled: str) -> None:
+    text = GOOD.replace("step = 1e-3\n", f"step = 1e-3\ncompiled = {compiled}\n") + LATE
+    with pytest.raises(SimulationError, match=r"^plant: \w+ at t = 0.019 s returned Discard: `T_l` must be within"):
+        run_scenario(write(tmp_path, text))
 
 
 def test_units_of_parameters_are_converted(tmp_path: Path) -> None:

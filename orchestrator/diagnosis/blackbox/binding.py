@@ -130,6 +130,6 @@ class Box:
             self._calls, self._counts, self._where, self._sent, self._read, values, grid, ports, sign, q, lead, out
         )
         if status > 1:
-            slave.failed(int(status), f"{CALLS[call]} at t = {start + k * step:g} s")
+            slave.failed(int(status), CALLS[call], start + k * step)
         self._broken = False
         return out

@@ -17,8 +17,7 @@ def build(source: ResultDocument) -> Report:
     results = read(source.results, CheckFound)
     fmus, counts = results.fmus, results.counts
     good = sum(fmu.ok for fmu in fmus)
-    sections: list[Section] = [_overview(fmus)]
-    sections += [_findings(fmu) for fmu in fmus if fmu.findings]
+    sections: list[Section] = [_overview(fmus), *(_findings(fmu) for fmu in fmus if fmu.findings), *_facts(fmus)]
     return Report(
         title="FMI compliance check",
         summary=(
@@ -33,19 +32,25 @@ def build(source: ResultDocument) -> Report:
 
 
 def _overview(fmus: list[CheckedFmu]) -> ReportTable:
-    facts = list(dict.fromkeys(name for fmu in fmus for name in fmu.facts))
-    columns = ("FMU", "result", "errors", "warnings", "remarks", "executed", *facts)
+    columns = ("FMU", "result", "errors", "warnings", "remarks", "executed")
     rows = tuple(
         (
             _name(fmu),
             "no error" if fmu.ok else "errors",
             *(fmu.counts[s] for s in ("error", "warning", "info")),
             fmu.executed,
-            *(plain(fmu.facts.get(name)) for name in facts),
         )
         for fmu in fmus
     )
-    return ReportTable("FMUs", tuple(TableColumn(words(c)) for c in columns), rows)
+    return ReportTable("FMUs", tuple(TableColumn(c) for c in columns), rows)
+
+
+def _facts(fmus: list[CheckedFmu]) -> list[Section]:
+    """Return what the FMUs say of themselves, and the walls that they ran behind."""
+    facts = list(dict.fromkeys(name for fmu in fmus for name in fmu.facts))
+    rows = tuple((_name(fmu), *(plain(fmu.facts.get(name)) for name in facts)) for fmu in fmus)
+    columns = (TableColumn("FMU"), *(TableColumn(words(name)) for name in facts))
+    return [ReportTable("What they are", columns, rows)] if facts else []
 
 
 def _findings(fmu: CheckedFmu) -> Findings:

@@ -18,6 +18,7 @@ from orchestrator.reporting.model import (
 from orchestrator.reporting.pages import any_fmu
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.live import plant_section
+from orchestrator.reporting.pages.predictions import SIGNALS, analysed, free_runs, horizons, torque_errors
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument, words
 from orchestrator.reporting.trust import trust_badge, trust_section
@@ -51,6 +52,12 @@ SHOWN_ELSEWHERE = frozenset(
         "told",
         "records",
         "repeats",
+        "play",
+        "learned_law",
+        "nuisances",
+        "horizons",
+        "analysis",
+        "settings",  # in diagnose.json; they are what was asked for, not what was found
     )
 )
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
@@ -64,9 +71,7 @@ VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "unknown": ("bad", "unexplained", "A misfit is left that nothing in the library explains."),
 }
 SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the actuator"}
-SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
 STAGES = {"nominal": "model as given", "parameters": "with re-fitted parameters"}
-COMPARED = {"before": "as given", "parameters": "re-fitted", "after": "with effects"}
 MISSING = (
     "For each effect: the torque that the model misses without it, and how much of that the fitted law accounts for."
 )
@@ -90,24 +95,28 @@ def build(source: ResultDocument) -> Report:
     sections: list[Section] = _in_short(results)
     sections += trust_section(results.trust)
     if effects:
-        sections.append(_lacking(effects))
+        sections.append(_lacking("What the model lacks", effects))
+    if results.nuisances:
+        sections.append(_lacking("What the log has, and the machine has not", results.nuisances))
     if results.warnings:
         sections.append(Text("Take note", tuple(_sentence(w) for w in results.warnings)))
     sections += [*_shrinking(misfit), *_misfit_table("Misfit before and after", misfit, HELD_OUT)]
     sections += _each_record(results)
     note = "Root mean square of simulated minus measured, over the whole of the other record."
     sections += _misfit_table("Misfit on the other record", results.validation or {}, note)
-    sections += _free_runs(results.validation or {})
+    sections += free_runs(results.validation or {})
+    sections += horizons(results.horizons, misfit)
     sections += _picture(source, "missing_torque", "Missing torque", MISSING)
     sections += _learned(source, results.learned_law)
-    sections += record_plots(source, "diagnose.csv")
+    sections += record_plots(source, "diagnose.csv", results.live.rows if results.live else ())
     sections += plant_section(source, "diagnose.csv", results.live)
     sections += _where(results.where)
     sections += [_evidence("Why these effects", effects)] if effects else []
     sections += [_evidence("What came nearest, too little to be named", results.suspects)] if results.suspects else []
     sections.append(_parameters(results.parameters))
     sections += [*_candidates(results.candidates), *_remainder(results)]
-    sections += _torque_errors(results.torque_error or {})
+    sections += torque_errors(results.torque_error or {})
+    sections += analysed(results.analysis)
     sections += _also_seen(source, results.also_seen)
     sections += sections_of("More", {n: v for n, v in source.results.items() if n not in SHOWN_ELSEWHERE})
     return Report(
@@ -166,13 +175,11 @@ def _closed(misfit: Mapping[str, MisfitFound]) -> str:
     return f"On data that no fit has seen, the rms misfit {'; that '.join(parts)}." if parts else ""
 
 
-def _lacking(effects: Sequence[EffectFound]) -> ReportTable:
+def _lacking(title: str, effects: Sequence[EffectFound]) -> ReportTable:
     rows = tuple(
         (_place(e.name, e.site), words(name), _quantity(p)) for e in effects for name, p in e.parameters.items()
     )
-    return ReportTable(
-        "What the model lacks", (TableColumn("effect"), TableColumn("quantity"), TableColumn("value")), rows
-    )
+    return ReportTable(title, (TableColumn("effect"), TableColumn("quantity"), TableColumn("value")), rows)
 
 
 def _quantity(p: ValueFound) -> str:
@@ -236,28 +243,6 @@ def _misfit_table(title: str, misfit: Mapping[str, MisfitFound | ValidatedFound]
 
 def _quotient(before: float | None, after: float | None) -> float | None:
     return before / after if before is not None and after else None
-
-
-def _free_runs(validation: Mapping[str, ValidatedFound]) -> list[Section]:
-    """Return how much of the other record one free run over all of it explains."""
-    rows = tuple(
-        (SIGNALS.get(signal, signal), *(g.r_squared.get(n) for n in COMPARED))
-        for signal, g in validation.items()
-        if g.r_squared
-    )
-    columns = tuple(TableColumn(n, "", 6) for n in ("signal", *COMPARED.values()))
-    return [ReportTable("R² of one free run over all of the other record", columns, rows)] if rows else []
-
-
-def _torque_errors(errors: Mapping[str, Mapping[str, float | None]]) -> list[Section]:
-    """Return the relative error of the torque that the inverse model computes from the motion."""
-    rows = tuple((words(record), *(_percent(e.get(n)) for n in COMPARED)) for record, e in errors.items())
-    columns = tuple(TableColumn(n) for n in ("on", *(f"{name} [%]" for name in COMPARED.values())))
-    return [ReportTable("Relative torque error of the inverse model", columns, rows)] if rows else []
-
-
-def _percent(share: float | None) -> float | None:
-    return None if share is None else 100.0 * share
 
 
 def _also_seen(source: ResultDocument, terms: Sequence[TermFound]) -> list[Section]:

@@ -20,7 +20,7 @@ Table = Mapping[str, list[Cell]]
 Numbers = Sequence[float | None]
 
 
-def record_plots(source: ResultDocument, name: str) -> list[Section]:
+def record_plots(source: ResultDocument, name: str, restarts: Sequence[int] = ()) -> list[Section]:
     """Return plots against ``time`` of a file with measured columns (``theta_m``) and simulated (``theta_m_after``).
 
     For each signal with simulated columns a plot of simulated minus measured comes first. Empty where there is no
@@ -29,16 +29,18 @@ def record_plots(source: ResultDocument, name: str) -> list[Section]:
     Args:
         source: results of a command.
         name: of the CSV file.
+        restarts: rows at which simulated signals start anew from measured ones.
 
     Returns:
         The plots.
     """
     table = source.columns(name)
-    return list(_plots(table)) if "time" in table else []
+    return list(_plots(table, restarts)) if "time" in table else []
 
 
-def _plots(table: Table) -> Iterator[Plot]:
+def _plots(table: Table, restarts: Sequence[int]) -> Iterator[Plot]:
     time = numbers(table["time"])
+    moments = tuple(Span(t, t, "free run starts anew") for t in (time[row] for row in restarts) if t is not None)
     spans = out_of_contact(time, numbers(table["contact"])) if "contact" in table else ()
     note = "Shaded: the teeth are not in contact." if spans else ""
     for signal, (title, unit) in SIGNALS.items():
@@ -47,10 +49,12 @@ def _plots(table: Table) -> Iterator[Plot]:
         found = ({GIVEN.get(signal, "measured"): measured} if measured is not None else {}) | simulated
         if measured is not None and simulated:
             gaps = tuple(Series(name, time, _difference(values, measured)) for name, values in simulated.items())
-            yield Plot(f"{title}: simulated minus measured", "time [s]", f"difference [{unit}]", gaps)
+            yield Plot(f"{title}: simulated minus measured", "time [s]", f"difference [{unit}]", gaps, moments)
         if found:
             curves = tuple(Series(name, time, values) for name, values in found.items())
-            yield Plot(title, "time [s]", f"{signal} [{unit}]", curves, spans, note=note)
+            yield Plot(
+                title, "time [s]", f"{signal} [{unit}]", curves, (*spans, *(moments if simulated else ())), note=note
+            )
 
 
 def _words(column: str, signal: str) -> str:

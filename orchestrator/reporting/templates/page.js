@@ -32,6 +32,19 @@ function sortRows(body, column, sign) {
   body.append(...[...body.rows].sort(compare));
 }
 
+// On a phone each row of a table that is wide, or does not fit, is a card of named values.
+function fitted(table) {
+  const box = table.parentElement;
+  const phone = matchMedia("screen and (max-width: 36rem)");
+  const fit = () => {
+    table.classList.remove("cards");
+    const wide = table.tHead.rows[0].cells.length > 3 || box.scrollWidth > box.clientWidth;
+    table.classList.toggle("cards", phone.matches && wide);
+  };
+  phone.addEventListener("change", fit);
+  fit();
+}
+
 // Light, dark, or as the system says; remembered where the browser lets us.
 function themeButton(button) {
   const root = document.documentElement;
@@ -70,5 +83,6 @@ function remember(mode) {
 
 themeButton(document.getElementById("theme"));
 document.querySelectorAll("table.sortable").forEach(sortable);
+document.querySelectorAll("table.sortable").forEach(fitted);
 document.querySelectorAll("figure.plot:not(.simulated)").forEach((figure) => new Plot(figure));
 document.querySelectorAll(".live").forEach((host) => new Live(host));

@@ -1,3 +1,6 @@
+// Width of a digit of a tick, in pixels.
+const DIGIT = 7;
+
 // A plot in its figure: drawn as SVG, with a cursor that reads values, and zoom by mouse, buttons and keys.
 class Plot {
   static count = 0;
@@ -17,8 +20,8 @@ class Plot {
     const tools = element("div", { class: "tools" });
     const legend = element("div", { class: "legend" });
     this.data.series.forEach((series, n) => legend.append(this.legendButton(series, n)));
-    for (const name of new Set(this.data.spans.map((span) => span.name))) {
-      legend.append(element("span", {}, swatch("var(--span)"), name));
+    for (const [name, span] of new Map(this.data.spans.map((span) => [span.name, span]))) {
+      legend.append(element("span", {}, swatch(span.start === span.end ? "var(--soft)" : "var(--span)"), name));
     }
     if (this.data.diagonal) legend.append(element("span", {}, swatch("var(--soft)"), "equal"));
     tools.append(legend, element("div", { class: "buttons" },
@@ -93,12 +96,13 @@ class Plot {
   draw() {
     const width = this.svg.clientWidth || 640;
     const height = Math.round(Math.min(420, Math.max(260, width * 0.5)));
-    const left = 66;
+    this.slanted = this.data.categories.some((name) => name.length * 7.5 * this.data.categories.length > width - 66);
+    this.y = new Scale(...this.range.y, height - (this.slanted ? 118 : 44), 10, this.data.logY);
+    const longest = Math.max(0, ...this.y.ticks(6).map(({ text }) => text.length));
+    const left = Math.max(66, 30 + DIGIT * longest);  // the axis's name stands left of its ticks
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.svg.style.height = `${height}px`;
     this.x = new Scale(...this.range.x, left, width - 10, this.data.logX);
-    this.slanted = this.data.categories.some((name) => name.length * 7.5 * this.data.categories.length > width - left);
-    this.y = new Scale(...this.range.y, height - (this.slanted ? 118 : 44), 10, this.data.logY);
     const inside = shape("g", { "clip-path": `url(#${this.id}-clip)` });
     inside.append(...this.spans(), ...this.visible().flatMap(({ series, n }) => this.marks(series, colour(n))));
     if (this.data.diagonal) inside.append(this.diagonal());
@@ -119,7 +123,7 @@ class Plot {
     const made = [];
     for (const { value, text } of this.data.categories.length ? this.names() : x.ticks(Math.max(3, width / 110))) {
       const at = x.pixel(value);
-      made.push(line(at, y.from, at, y.to, "grid"), this.under(at, text));
+      made.push(line(at, y.from, at, y.to, "grid"), this.under(at, text, width));
     }
     for (const { value, text } of y.ticks(6)) {
       const at = y.pixel(value);
@@ -137,8 +141,9 @@ class Plot {
     return shown.filter(({ value }) => value >= this.x.low && value <= this.x.high);
   }
 
-  under(at, text) {
-    if (!this.slanted) return label(at, this.y.from + 17, text, "middle");
+  // What stands below the axis, whole also at its right end.
+  under(at, text, width) {
+    if (!this.slanted) return label(Math.min(at, width - (DIGIT * text.length) / 2), this.y.from + 17, text, "middle");
     const made = label(0, 0, text.length > 18 ? `${text.slice(0, 17)}…` : text, "end");
     made.setAttribute("transform", `translate(${at + 4} ${this.y.from + 14}) rotate(-40)`);
     return made;
@@ -147,6 +152,7 @@ class Plot {
   spans() {
     return this.data.spans.map((span) => {
       const [a, b] = [this.x.pixel(span.start), this.x.pixel(span.end)];
+      if (a === b) return line(a, this.y.from, a, this.y.to, "moment");
       return shape("rect", { class: "span", x: a, y: this.y.to, width: Math.max(b - a, 0.5), height: this.y.from - this.y.to });
     });
   }
