@@ -232,9 +232,12 @@ def arrives(kind, u, size, held, buffer, at, step, drop):
 @numba.njit(cache=True)
 def solved(number, p, start, given, loop, h, fine, series, size, port, q, place, speed, inside, added, noise,
            sensed, drops):  # fmt: skip
-    """Return inputs (n, inputs) and states (n, 4); in closed loop the first input follows the noisy first output."""
+    """Return inputs (n, inputs), states (n, 4), and the state ``sensed`` between the samples too (n * fine).
+
+    In closed loop the first input follows the noisy first output.
+    """
     n = len(given)
-    u, out = given.copy(), np.zeros((n, 4))
+    u, out, between = given.copy(), np.zeros((n, 4)), np.zeros(n * fine)
     x, z, step = start.copy(), 0.0, h / fine
     held, buffer = np.zeros(1), np.zeros(64 * fine)
     turn = -1.0 if number == 11 else 1.0  # the input pushes against the position
@@ -251,6 +254,7 @@ def solved(number, p, start, given, loop, h, fine, series, size, port, q, place,
         now[:] = u[k]
         for j in range(fine):
             t = k * h + j * step
+            between[k * fine + j] = x[sensed]
             now[0] = u[k, 0]
             if series >= 0:
                 now[0] = arrives(series, u[k, 0], size, held, buffer, k * fine + j, step, drops[k])
@@ -262,7 +266,7 @@ def solved(number, p, start, given, loop, h, fine, series, size, port, q, place,
             g, rate2 = force(port, w[place], v, z + 0.5 * step * rate1, q, t + 0.5 * step) if port >= 0 else (0.0, 0.0)
             x = x + step * rates(number, w, now, -g, p, inside)
             z += step * rate2
-    return u, out
+    return u, out, between
 
 
 SPEEDS = {0: 1, 1: 1, 2: 1, 4: 1, 5: 1, 6: 2, 11: 1}
@@ -399,7 +403,7 @@ class Maker:
             elif name == INSIDE:
                 inside = share * {1: 0.05, 3: 0.5, 6: 1.0, 7: 0.2}[plant.number]
         noise = self.noise[:, 0] if noisy else np.zeros(self.n)
-        u, x = solved(
+        u, x, between = solved(
             plant.number, self.p if p is None else p, np.array(plant.start), self.given, self.loop, plant.h, FINE,
             series, size, port, q, plant.port[3], SPEEDS.get(plant.number, -1), inside,
             self.added if noisy else np.zeros(self.n), noise, self.places[0], self.drops,
@@ -407,26 +411,22 @@ class Maker:
         y = x[:, self.places]
         for name, share in zip(names, shares, strict=True):
             if name in OUTPUTS:
-                y = self.behind(name, x, share)
+                y = self.behind(name, x, between, share)
         return u, (x if not names and not noisy and p is None else y)
 
-    def behind(self, name: str, x: np.ndarray, share: float) -> np.ndarray:
-        """Return outputs, the first behind an effect in series: its samples interpolated by splines."""
-        from scipy.interpolate import CubicSpline
-
-        y, h = x[:, self.places], self.plant.h
-        time = np.arange(self.n) * h
-        line = CubicSpline(time, y[:, 0])
+    def behind(self, name: str, x: np.ndarray, between: np.ndarray, share: float) -> np.ndarray:
+        """Return outputs, the first behind an effect in series; ``between``: its state in every fine step."""
+        y, step = x[:, self.places], self.plant.h / FINE
         found = y.copy()
         if name == "output_delay":
-            found[:, 0] = line(np.maximum(time - 4.0 * share * h, 0.0))
+            time = step * np.arange(len(between))
+            found[:, 0] = np.interp(time - self.size(name, share), time, between)[::FINE]
         elif name == "output_lag":
-            fine = np.arange(self.n * FINE) * h / FINE
-            held, decay, late = y[0, 0], np.exp(-h / FINE / (8.0 * share * h)), line(fine)
-            for k in range(self.n * FINE):
-                if k % FINE == 0:
-                    found[k // FINE, 0] = held
-                held = late[k] + (held - late[k]) * decay
+            late, decay = between.copy(), np.exp(-step / self.size(name, share))
+            for k in range(1, len(late)):
+                middle = 0.5 * (between[k - 1] + between[k])
+                late[k] = middle + (late[k - 1] - middle) * decay
+            found[:, 0] = late[::FINE]
         else:
             found[:, 0] = y[:, 0] * (1.0 + share) if name == "output_gain" else y[:, 0] + share * self.sigma[0]
         return found

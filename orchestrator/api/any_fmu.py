@@ -11,13 +11,13 @@ import numpy as np
 
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.diagnosis.blackbox.calibrate import Calibration
+from orchestrator.diagnosis.blackbox.calibrate import BoxCalibration
 from orchestrator.diagnosis.blackbox.calibrate import calibrate as calibrating
 from orchestrator.diagnosis.blackbox.deliver import Delivered, deliver
-from orchestrator.diagnosis.blackbox.diagnose import Outcome
+from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
 from orchestrator.diagnosis.blackbox.diagnose import diagnose as diagnosing
 from orchestrator.diagnosis.blackbox.draft import drafted
-from orchestrator.diagnosis.blackbox.estimates import Estimate, Found, Misfit, validated
+from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, validated
 from orchestrator.diagnosis.blackbox.figures import draw_signals
 from orchestrator.diagnosis.blackbox.mapping import Map, read_map
 from orchestrator.diagnosis.blackbox.problem import Data
@@ -37,12 +37,12 @@ MEANING = {
 Progress = Callable[[str], None]
 
 
-def _estimate(e: Estimate) -> dict[str, Any]:
+def _estimate(e: ValueEstimate) -> dict[str, Any]:
     found: dict[str, Any] = {"value": e.value, "standard_error": e.standard_error, "interval": list(e.interval)}
     return found | {"unit": e.unit} | ({} if e.nominal is None else {"nominal": e.nominal})
 
 
-def _found(f: Found) -> dict[str, Any]:
+def _found(f: FoundEffect) -> dict[str, Any]:
     return {
         "name": f.effect.kind.name,
         "site": f.effect.place,
@@ -52,7 +52,7 @@ def _found(f: Found) -> dict[str, Any]:
     }
 
 
-def _misfits(misfit: Sequence[Misfit]) -> dict[str, Any]:
+def _misfits(misfit: Sequence[OutputMisfit]) -> dict[str, Any]:
     return {
         m.output: {
             "nominal": m.nominal,
@@ -80,12 +80,12 @@ class FmuDiagnosisResult(Result):
     """
 
     command: ClassVar[str] = "diagnose"
-    outcome: Outcome
+    outcome: BoxOutcome
     data: Data
     fmu: Path
     arguments: Mapping[str, Any] = field(default_factory=dict)
     delivered: list[Delivered] = field(default_factory=list)
-    validation: tuple[Misfit, ...] = ()
+    validation: tuple[OutputMisfit, ...] = ()
     settings: BoxSettings = DEFAULT
 
     @property
@@ -94,7 +94,7 @@ class FmuDiagnosisResult(Result):
         return self.outcome.verdict
 
     @property
-    def effects(self) -> tuple[Found, ...]:
+    def effects(self) -> tuple[FoundEffect, ...]:
         """The effects that are missing: where, how large, and what cannot be told from them."""
         return self.outcome.effects
 
@@ -201,7 +201,7 @@ class FmuDiagnosisResult(Result):
         self.outcome.problem.runner.close()
 
 
-def write_signals(path: Path, outcome: Outcome, data: Data) -> None:
+def write_signals(path: Path, outcome: BoxOutcome, data: Data) -> None:
     """Write measured and simulated outputs of all rows.
 
     Args:
@@ -315,7 +315,7 @@ class CalibrationResult(Result):
     """
 
     command: ClassVar[str] = "calibrate"
-    calibration: Calibration
+    calibration: BoxCalibration
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     def blocks(self) -> Sequence[Block]:

@@ -42,7 +42,10 @@ def test_no_threshold_lies_about_in_the_room() -> None:
     shown = {"figures.py", "settings.py"}  # looks, and the settings themselves
     arithmetic = {"STEADY", "SHORTEST_ONSET", "SMOOTHED"}  # of arithmetic, no thresholds
     room = ROOT / "orchestrator" / "diagnosis"
-    for path in sorted(set(room.rglob("*.py")) - set((room / "blackbox").glob("*.py"))):  # a room with its own settings
+    # Tables of starts; what a process of others may cost; how an FMU and its surrogate are measured.
+    measures = {"bank", "binding", "draft", "mapping", "probing", "problem", "reading", "runner", "whitening"}
+    measuring = {room / "blackbox" / f"{name}.py" for name in measures}
+    for path in sorted(set(room.rglob("*.py")) - measuring):
         if path.name in shown:
             continue
         text = re.sub(r'""".*?"""|#.*', "", path.read_text(), flags=re.DOTALL)

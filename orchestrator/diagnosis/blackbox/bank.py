@@ -13,7 +13,7 @@ INPUT, OUTPUT, PORT = "input", "output", "port"
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Surroundings:
     """Typical sizes of what happens where an effect would act; starting values depend on them.
 
     Attributes:
@@ -25,6 +25,7 @@ class Scene:
         position: rms of the position about zero; span: from the smallest to the largest.
         speed: rms of the speed.
         angular: the position is an angle.
+        cycles: wavenumbers of ripples over the position, in order, told apart within its span.
     """
 
     h: float
@@ -66,56 +67,83 @@ class Kind:
         plausible: values -> False where the fit has left what the effect means.
         angular: only for angles.
         shrinks: the response to a small value is proportional to it: what is smaller than the least start is found.
+        scan: scene -> values of the last parameter, in order and so close that the best of them leads a fit to the
+            right one: more than the FMU is run for, looked through with its surrogate.
+        finer: values, scene -> small changes where they depend on the values themselves (default: ``scales``).
     """
 
     name: str
     where: str
     parameters: tuple[str, ...]
     units: tuple[str, ...]
-    scales: Callable[[Scene], Values]
-    starts: Callable[[Scene], tuple[Values, ...]]
+    scales: Callable[[Surroundings], Values]
+    starts: Callable[[Surroundings], tuple[Values, ...]]
     linear: bool = False
     law: int = 0
     lower: Values = ()
     nuisances: int = 0
     needs: str = ""
-    plausible: Callable[[Values, Scene], bool] = lambda values, scene: True
+    plausible: Callable[[Values, Surroundings], bool] = lambda values, scene: True
     angular: bool = False
     shrinks: bool = False
+    scan: Callable[[Surroundings], tuple[float, ...]] = lambda scene: ()
+    finer: Callable[[Values, Surroundings], Values] | None = None
 
 
-def _delays(s: Scene) -> tuple[Values, ...]:
+def _delays(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.h,) for f in (0.15, 0.5, 1.0, 1.7, 2.5, 4.0, 6.0, 9.0, 14.0))
 
 
-def _lags(s: Scene) -> tuple[Values, ...]:
+def _lags(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.h,) for f in (0.3, 1.0, 3.0, 8.0, 20.0))
 
 
-def _limits(s: Scene) -> tuple[Values, ...]:
+def _limits(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.peak,) for f in (0.3, 0.5, 0.65, 0.75, 0.83, 0.89, 0.93, 0.96, 0.985, 0.996))
 
 
-def _widths(s: Scene) -> tuple[Values, ...]:
+def _widths(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.peak,) for f in (0.01, 0.03, 0.08, 0.16, 0.3))
 
 
-def _rates(s: Scene) -> tuple[Values, ...]:
+def _rates(s: Surroundings) -> tuple[Values, ...]:
     steps = np.abs(np.diff(s.signal))
     top = float(steps.max()) / s.h if len(steps) else 1.0
     return tuple((f * top,) for f in (0.02, 0.05, 0.12, 0.25, 0.5, 0.8))
 
 
-def _quanta(s: Scene) -> tuple[Values, ...]:
+def _quanta(s: Surroundings) -> tuple[Values, ...]:
     return tuple((f * s.peak,) for f in (0.05, 0.1, 0.2, 0.4))
 
 
-def _friction(s: Scene) -> tuple[Values, ...]:
+def _all_limits(s: Surroundings) -> tuple[float, ...]:
+    return tuple(float(s.peak * (1.0 - f)) for f in np.geomspace(0.9, 0.001, 48))
+
+
+def _all_widths(s: Surroundings) -> tuple[float, ...]:
+    return tuple(float(s.peak * f) for f in np.geomspace(0.0003, 0.8, 48))
+
+
+def _all_rates(s: Surroundings) -> tuple[float, ...]:
+    return tuple(float(f * _rates(s)[-1][0]) for f in np.geomspace(0.003, 1.25, 48))
+
+
+def _all_quanta(s: Surroundings) -> tuple[float, ...]:
+    """Return quanta of which the peak holds 60 to a half, a quarter more or less each time: no threshold is passed."""
+    return tuple(float(s.peak / count) for count in np.arange(60.0, 0.5, -0.25))
+
+
+def _within_a_quantum(values: Values, s: Surroundings) -> Values:
+    """Return a change of a quantum that moves the peak by a small share of one."""
+    return (0.01 * values[0] ** 2 / s.peak,)
+
+
+def _friction(s: Surroundings) -> tuple[Values, ...]:
     walk = s.speed * s.h
     return tuple((0.05 * s.size, f * walk) for f in (0.1, 0.6, 3.0, 12.0, 60.0))
 
 
-def _small(share: float) -> Callable[[Scene], Values]:
+def _small(share: float) -> Callable[[Surroundings], Values]:
     return lambda s: (share * s.size,)
 
 
@@ -123,11 +151,11 @@ ONCE = 0.03
 """How far from 1 a ripple's wavenumber over an angle is at least: gravity is what comes once a turn."""
 
 
-def _once_a_turn(values: Values, scene: Scene) -> bool:
+def _once_a_turn(values: Values, scene: Surroundings) -> bool:
     return scene.angular and abs(values[2] - 1.0) < ONCE
 
 
-def _positive(values: Values, scene: Scene) -> bool:
+def _positive(values: Values, scene: Surroundings) -> bool:
     del scene
     return values[0] > 0.0
 
@@ -137,11 +165,14 @@ _SERIES = (
     Kind("input_offset", INPUT, ("offset",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True),
     Kind("input_delay", INPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),
     Kind("input_lag", INPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,), shrinks=True),
-    Kind("input_saturation", INPUT, ("limit",), ("effort",), lambda s: (0.003 * s.peak,), _limits, lower=(0.0,)),
-    Kind("input_dead_zone", INPUT, ("width",), ("effort",), lambda s: (0.003 * s.peak,), _widths, lower=(0.0,)),
+    Kind("input_saturation", INPUT, ("limit",), ("effort",), lambda s: (0.003 * s.peak,), _limits, lower=(0.0,),
+         scan=_all_limits),
+    Kind("input_dead_zone", INPUT, ("width",), ("effort",), lambda s: (0.003 * s.peak,), _widths, lower=(0.0,),
+         shrinks=True, scan=_all_widths),
     Kind("input_rate_limit", INPUT, ("rate",), ("effort/s",), lambda s: (0.01 * _rates(s)[2][0],), _rates,
-         lower=(1e-30,)),
-    Kind("input_quantisation", INPUT, ("step",), ("effort",), lambda s: (0.01 * s.peak,), _quanta, lower=(0.0,)),
+         lower=(1e-30,), scan=_all_rates),
+    Kind("input_quantisation", INPUT, ("step",), ("effort",), lambda s: (0.01 * s.peak,), _quanta, lower=(0.0,),
+         scan=_all_quanta, finer=_within_a_quantum),
     Kind("output_gain", OUTPUT, ("gain",), ("1",), lambda s: (0.003,), lambda s: ((0.01,),), True),
     Kind("output_offset", OUTPUT, ("offset",), ("flow",), lambda s: (s.noise,), lambda s: ((s.noise,),), True),
     Kind("output_delay", OUTPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),
@@ -171,7 +202,8 @@ _FEEDBACK = (
          lambda s: ((0.01 * s.size, 0.01 * s.size),), True, laws.GRAVITY, angular=True),
     Kind("ripple", PORT, ("sine", "cosine", "wavenumber"), ("effort", "effort", "1/flow"),
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 / s.span),
-         lambda s: tuple((0.01 * s.size, 0.01 * s.size, n) for n in s.cycles), law=laws.RIPPLE,
+         lambda s: tuple((0.01 * s.size, 0.01 * s.size, n) for n in s.cycles[:: max(len(s.cycles) // 24, 1)]),
+         law=laws.RIPPLE, scan=lambda s: s.cycles,
          plausible=lambda v, s: not _once_a_turn(v, s)),
     Kind("load", PORT, ("effort",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True, laws.LOAD),
     Kind("directional_friction", PORT, ("difference",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
@@ -184,7 +216,7 @@ BANK: Mapping[str, Kind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK)}
 
 
 @dataclass(frozen=True)
-class Effect:
+class BoxEffect:
     """An effect of the bank at a place: the name of an input, an output or a port of the map.
 
     ``at_rest``: a signal with memory was zero before the record, and not what it was at first.
@@ -192,7 +224,7 @@ class Effect:
 
     kind: Kind
     place: str
-    scene: Scene = field(compare=False, repr=False)
+    scene: Surroundings = field(compare=False, repr=False)
     at_rest: bool = False
 
     @property
@@ -200,10 +232,17 @@ class Effect:
         """Return name and place."""
         return f"{self.kind.name}@{self.place}"
 
-    @property
-    def scales(self) -> Values:
-        """Return what counts as a small change of each value."""
-        return self.kind.scales(self.scene)
+    def scales(self, values: Array) -> Values:
+        """Return what counts as a small change of each value.
+
+        Args:
+            values: of the effect's parameters.
+
+        Returns:
+            As many changes.
+        """
+        finer = self.kind.finer
+        return self.kind.scales(self.scene) if finer is None else finer(tuple(values), self.scene)
 
     def bounded(self, values: Array) -> Array:
         """Return values no smaller than what the law allows.

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.diagnosis.blackbox.diagnose import fitters, prepared
-from orchestrator.diagnosis.blackbox.estimates import Estimate, Misfit, estimates_of, misfits
+from orchestrator.diagnosis.blackbox.estimates import OutputMisfit, ValueEstimate, estimates_of, misfits
 from orchestrator.diagnosis.blackbox.fitting import parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.problem import Data
@@ -16,14 +16,9 @@ from orchestrator.diagnosis.blackbox.settings import DEFAULT
 from orchestrator.diagnosis.blackbox.verdict import rest_of
 from orchestrator.errors import ScenarioError
 
-CONFOUNDED = 0.95
-"""Correlation from which two parameters count as not told apart."""
-LEARNED = 0.3
-"""Share of its uncertainty below which a record has said little of a parameter."""
-
 
 @dataclass(frozen=True)
-class Calibration:
+class BoxCalibration:
     """Parameters that explain a record.
 
     Attributes:
@@ -36,10 +31,10 @@ class Calibration:
         seconds: wall time.
     """
 
-    parameters: tuple[Estimate, ...]
+    parameters: tuple[ValueEstimate, ...]
     learned: dict[str, float]
     confounded: tuple[tuple[str, str], ...]
-    misfit: tuple[Misfit, ...]
+    misfit: tuple[OutputMisfit, ...]
     explained: bool
     warnings: tuple[str, ...]
     seconds: float
@@ -47,7 +42,7 @@ class Calibration:
 
 def calibrate(
     path: Path, given: Map, data: Data, units: dict[str, str], progress: Callable[[str], None] = lambda what: None
-) -> Calibration:
+) -> BoxCalibration:
     """Return the parameters of the FMU at ``path`` that explain ``data``; arguments as of ``diagnose``.
 
     Args:
@@ -99,14 +94,19 @@ def calibrate(
     correlation = covariance / sd / sd[:, None]
     names = [e.name for e in parameters]
     pairs = tuple(
-        (names[i], names[j]) for i in range(len(names)) for j in range(i) if abs(correlation[i, j]) > CONFOUNDED
+        (names[i], names[j])
+        for i in range(len(names))
+        for j in range(i)
+        if abs(correlation[i, j]) > DEFAULT.calibration.confounded
     )
     explained = rest.explained or rest.disturbed
     warnings = [*probe.notes]
     warnings += [
-        f"`{n}` is hardly determined: excite what it acts on" for n, share in learned.items() if share < LEARNED
+        f"`{n}` is hardly determined: excite what it acts on"
+        for n, share in learned.items()
+        if share < DEFAULT.calibration.learned
     ]
     warnings += [f"`{a}` and `{b}` are hardly told apart: excite them at other frequencies" for a, b in pairs]
     if not explained:
         warnings.append("something else is missing: `diagnose` says what")
-    return Calibration(parameters, learned, pairs, found, explained, tuple(warnings), time.monotonic() - begun)
+    return BoxCalibration(parameters, learned, pairs, found, explained, tuple(warnings), time.monotonic() - begun)

@@ -13,8 +13,8 @@ from lxml import etree
 
 import pyfmu_sources
 from orchestrator.building.archive import write_archive
-from orchestrator.diagnosis.blackbox.bank import INPUT, OUTPUT, PORT, Effect
-from orchestrator.diagnosis.blackbox.diagnose import Outcome
+from orchestrator.diagnosis.blackbox.bank import INPUT, OUTPUT, PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
 from orchestrator.diagnosis.blackbox.problem import series_of
 from orchestrator.errors import FmuError, OrchestratorError
 from orchestrator.master.signals import Samples
@@ -37,7 +37,7 @@ class Part:
     """One effect FMU of the system: its name, the effect, and the values it is given."""
 
     name: str
-    effect: Effect
+    effect: BoxEffect
     values: dict[str, float | int | bool]
 
 
@@ -92,7 +92,7 @@ def _effect_fmu(folder: Path) -> Path:
     return found[0]
 
 
-def parts_of(outcome: Outcome) -> tuple[Part, ...]:
+def parts_of(outcome: BoxOutcome) -> tuple[Part, ...]:
     """Return the effect FMUs of a corrected model.
 
     Args:
@@ -114,7 +114,7 @@ def parts_of(outcome: Outcome) -> tuple[Part, ...]:
     return tuple(found)
 
 
-def deliver(path: Path, fmu: Path, outcome: Outcome) -> Delivered:
+def deliver(path: Path, fmu: Path, outcome: BoxOutcome) -> Delivered:
     """Write the corrected system as SSP 1.0, and compare its run with the fit.
 
     Args:
@@ -147,7 +147,7 @@ def deliver(path: Path, fmu: Path, outcome: Outcome) -> Delivered:
         return Delivered(path, parts, float("nan"), str(error))
 
 
-def difference(path: Path, outcome: Outcome, jacobi: bool = False) -> float:
+def difference(path: Path, outcome: BoxOutcome, jacobi: bool = False) -> float:
     """Return the largest rms difference between a run of the system and the fit, over the noise.
 
     Args:
@@ -180,7 +180,7 @@ def difference(path: Path, outcome: Outcome, jacobi: bool = False) -> float:
     return worst
 
 
-def _plant_values(outcome: Outcome) -> dict[str, float | int | bool]:
+def _plant_values(outcome: BoxOutcome) -> dict[str, float | int | bool]:
     problem = outcome.problem
     values: dict[str, float | int | bool] = dict(problem.map.fixed)
     values |= {u.name: float(v) for u, v in zip(problem.map.uncertain, outcome.model.p, strict=True)}
@@ -203,7 +203,7 @@ def _values(values: dict[str, float | int | bool]) -> bytes:
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 
 
-def _structure(outcome: Outcome, parts: tuple[Part, ...], fmu: str, attachment: str) -> bytes:
+def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], fmu: str, attachment: str) -> bytes:
     problem = outcome.problem
     spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp")}
     root = etree.Element(tag("ssd", "SystemStructureDescription"), nsmap=spaces, version="1.0", name="corrected")
@@ -255,7 +255,9 @@ def _fed(part: Part) -> bool:
     return part.effect.kind.where == PORT
 
 
-def _wires(outcome: Outcome, parts: tuple[Part, ...], fed: list[str]) -> list[tuple[tuple[str, str], tuple[str, str]]]:
+def _wires(
+    outcome: BoxOutcome, parts: tuple[Part, ...], fed: list[str]
+) -> list[tuple[tuple[str, str], tuple[str, str]]]:
     """Return the connections; an empty element is the system itself."""
     problem = outcome.problem
     found = []

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.estimates import Estimate, Found, Misfit, estimates_of, misfits
-from orchestrator.diagnosis.blackbox.fitting import Fit, Fitter, Ladder, Parts, interleaved, parts_of
+from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, estimates_of, misfits
+from orchestrator.diagnosis.blackbox.fitting import BoxFit, BoxParts, Fitter, Ladder, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
-from orchestrator.diagnosis.blackbox.problem import Data, Model, Problem, effects_of
-from orchestrator.diagnosis.blackbox.search import Search
+from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data, effects_of
+from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
 from orchestrator.diagnosis.blackbox.verdict import (
     Rest,
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Outcome:
+class BoxOutcome:
     """What a record says of an FMU.
 
     Attributes:
@@ -48,19 +48,19 @@ class Outcome:
     """
 
     verdict: str
-    effects: tuple[Found, ...]
+    effects: tuple[FoundEffect, ...]
     suspects: tuple[str, ...]
-    parameters: tuple[Estimate, ...]
-    misfit: tuple[Misfit, ...]
-    model: Model
+    parameters: tuple[ValueEstimate, ...]
+    misfit: tuple[OutputMisfit, ...]
+    model: BoxModel
     rest: Rest
     probe: Probe
     where: tuple[str, ...]
     warnings: tuple[str, ...]
-    refitted: Model
-    problem: Problem = field(repr=False)
+    refitted: BoxModel
+    problem: BoxProblem = field(repr=False)
     stages: tuple[Array, Array, Array] = field(repr=False)
-    search: Search | None = field(repr=False, default=None)
+    search: BoxSearch | None = field(repr=False, default=None)
     seconds: float = 0.0
     runs: int = 0
 
@@ -75,7 +75,7 @@ def prepared(
     units: dict[str, str],
     workers: int | None = None,
     progress: Progress = lambda what: None,
-) -> tuple[Problem, Probe]:
+) -> tuple[BoxProblem, Probe]:
     """Return a probed problem without what does nothing, its noise known.
 
     Args:
@@ -101,19 +101,22 @@ def prepared(
     return problem, probe
 
 
-def fitters(problem: Problem, parts: Parts, spread: float = DEFAULT.start.spread) -> list[Fitter]:
+def fitters(problem: BoxProblem, parts: BoxParts, settings: BoxSettings = DEFAULT) -> list[Fitter]:
     """Return fitters that take the FMU's start as exact, and as somewhat off.
 
     Args:
         problem: the FMU and the record.
         parts: of the record: fitted, deciding, held out.
-        spread: how far the state that the FMU starts from may be off, as seen at the outputs, in units of their noise.
+        settings: thresholds.
 
     Returns:
         Two fitters.
     """
     surrogate, drive = problem.impulses(problem.nominal, max(problem.n // 2, 16))
-    return [Fitter(problem, Ladder(surrogate, drive, problem.n, off), parts) for off in (0.0, spread)]
+    return [
+        Fitter(problem, Ladder(surrogate, drive, problem.n, off), parts, settings)
+        for off in (0.0, settings.start.spread)
+    ]
 
 
 def diagnose(
@@ -124,7 +127,7 @@ def diagnose(
     settings: BoxSettings = DEFAULT,
     progress: Progress = lambda what: None,
     workers: int | None = None,
-) -> Outcome:
+) -> BoxOutcome:
     """Return what ``data`` says of the FMU at ``path``.
 
     Args:
@@ -154,13 +157,15 @@ def diagnose(
         raise
 
 
-def _diagnosed(problem: Problem, probe: Probe, settings: BoxSettings, progress: Progress, begun: float) -> Outcome:
+def _diagnosed(
+    problem: BoxProblem, probe: Probe, settings: BoxSettings, progress: Progress, begun: float
+) -> BoxOutcome:
     parts = parts_of(problem.n)
     nominal_reads = problem.must_read(problem.nominal)
     effects = effects_of(problem, nominal_reads)
-    tried: list[tuple[Search, Fit, Fit]] = []
-    for n, fitter in enumerate(fitters(problem, parts, settings.start.spread)):
-        search = Search(fitter, effects, settings.search, progress, until=begun + problem.map.options.budget)
+    tried: list[tuple[BoxSearch, BoxFit, BoxFit]] = []
+    for n, fitter in enumerate(fitters(problem, parts, settings)):
+        search = BoxSearch(fitter, effects, settings.search, progress, until=begun + problem.map.options.budget)
         base = search.base()
         if base is None:
             raise problem.does_not_run()
@@ -186,8 +191,8 @@ def _diagnosed(problem: Problem, probe: Probe, settings: BoxSettings, progress: 
     search, base, best = _interleaved(search, base, best)
     # What a start that is off explains by itself needs no effect.
     if len(tried) == 1 and best.model.effects:
-        offset = fitters(problem, parts, settings.start.spread)[1]
-        plain = Search(offset, effects, settings.search, progress)
+        offset = fitters(problem, parts, settings)[1]
+        plain = BoxSearch(offset, effects, settings.search, progress)
         found = plain.base()
         if found is not None:
             tried.append((plain, found, found))
@@ -197,7 +202,7 @@ def _diagnosed(problem: Problem, probe: Probe, settings: BoxSettings, progress: 
     return _judged(problem, probe, search, base, best, begun, settings.rest)
 
 
-def _interleaved(search: Search, base: Fit, best: Fit) -> tuple[Search, Fit, Fit]:
+def _interleaved(search: BoxSearch, base: BoxFit, best: BoxFit) -> tuple[BoxSearch, BoxFit, BoxFit]:
     """Return a search whose parts take turns, where that explains what the one before does not.
 
     An effect that acts in one half of the record only (a limit that is seldom reached) is not found in the other.
@@ -205,8 +210,9 @@ def _interleaved(search: Search, base: Fit, best: Fit) -> tuple[Search, Fit, Fit
     if search.explained(best) or search.late:
         return search, base, best
     fitter = search.fitter
-    turns = Search(
-        Fitter(fitter.problem, fitter.ladder, interleaved(fitter.problem.n)),
+    parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces)
+    turns = BoxSearch(
+        Fitter(fitter.problem, fitter.ladder, parts, fitter.settings),
         search.effects, search.settings, search.progress, until=search.until,
     )  # fmt: skip
     plain = turns.fitter.fit(base.model, base.level)
@@ -219,8 +225,14 @@ def _interleaved(search: Search, base: Fit, best: Fit) -> tuple[Search, Fit, Fit
 
 
 def _judged(
-    problem: Problem, probe: Probe, search: Search, base: Fit, best: Fit, begun: float, settings: RestSettings
-) -> Outcome:
+    problem: BoxProblem,
+    probe: Probe,
+    search: BoxSearch,
+    base: BoxFit,
+    best: BoxFit,
+    begun: float,
+    settings: RestSettings,
+) -> BoxOutcome:
     fitter, parts = search.fitter, search.fitter.parts
     seen = slice(0, parts.seen)
     last = fitter.fit(best.model, best.level, None, seen, iterations=4) or best
@@ -237,7 +249,7 @@ def _judged(
         rest = _doubted(fitter, last, rest, bool(best.model.effects), settings)
     fine = rest.explained or rest.disturbed
     share = recovered(base, best, len(problem.outputs), parts.seen)
-    nominal = Fit(problem.nominal, last.level, stages[0], 0.0, 0.0, 0.0, last.J)
+    nominal = BoxFit(problem.nominal, last.level, stages[0], 0.0, 0.0, 0.0, last.J)
     if best.model.effects:
         verdict = "effects" if fine else "unknown"
     else:
@@ -245,27 +257,28 @@ def _judged(
         verdict = ("none" if as_given else "parameters") if fine else "unknown"
     covariance = fitter.covariance(last, seen)
     parameters, values = estimates_of(problem, last.model, covariance)
-    named: tuple[Found, ...] = ()
+    named: tuple[FoundEffect, ...] = ()
     if verdict == "effects":
         family = family_of(search, best)
         n = len(best.model.effects)
         named = tuple(
-            Found(e, values[k], best.total - base.total, family if k == n - 1 else ())
+            FoundEffect(e, values[k], best.total - base.total, family if k == n - 1 else ())
             for k, e in enumerate(last.model.effects)
         )
     suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
     if suspects:
         suspects += family_of(search, best)
     model = last.model if verdict != "unknown" else base.model
-    return Outcome(
+    where = _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else ()
+    return BoxOutcome(
         verdict, named, suspects, parameters, misfits(problem, stages, parts.held_out), model, rest, probe,
-        _where_of(problem, rest) if verdict == "unknown" else (), _warned(probe, search, rest, verdict, best, share),
+        where, _warned(probe, search, rest, verdict, best, share),
         base.model, problem, stages, search,
         time.monotonic() - begun, problem.runner.runs,
     )  # fmt: skip
 
 
-def _warned(probe: Probe, search: Search, rest: Rest, verdict: str, best: Fit, share: float) -> tuple[str, ...]:
+def _warned(probe: Probe, search: BoxSearch, rest: Rest, verdict: str, best: BoxFit, share: float) -> tuple[str, ...]:
     """Return sentences for the user; ``share``: of what is missing, how much the effects explain."""
     problem = search.fitter.problem
     warnings = list(probe.notes)
@@ -289,27 +302,27 @@ def _warned(probe: Probe, search: Search, rest: Rest, verdict: str, best: Fit, s
     return tuple(warnings)
 
 
-def _doubted(fitter: Fitter, fit: Fit, rest: Rest, named: bool, settings: RestSettings) -> Rest:
+def _doubted(fitter: Fitter, fit: BoxFit, rest: Rest, named: bool, settings: RestSettings) -> Rest:
     """Return what is left, no disturbance where it begins at some time or is large beside effects that are named."""
     if named and rest.share > settings.most_with_effects:
         return replace(
             rest, disturbed=False, reasons=(f"{100.0 * rest.share:.2g} % of the drive is left at the ports",)
         )
-    if predicted(fitter, fit, settings.driven_lags) > settings.driven:
+    if predicted(fitter, fit, settings) > settings.driven:
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
-    gain, name, time = beginning_of(fitter, fit, settings.beginnings)
+    gain, name, time = beginning_of(fitter, fit, settings)
     if gain > settings.begins:
         return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))
     return rest
 
 
-def _where_of(problem: Problem, rest: Rest) -> tuple[str, ...]:
+def _where_of(problem: BoxProblem, rest: Rest, least: float) -> tuple[str, ...]:
     """Return where and when what is left exceeds noise, worst first."""
     found = []
     bounds = np.linspace(0, problem.n - 1, len(rest.blocks) + 1).astype(int)
     for b, block in enumerate(rest.blocks):
         for k, power in enumerate(block):
-            if power > 1.3:
+            if power > least:
                 a, z = problem.data.time[bounds[b]], problem.data.time[bounds[b + 1]]
                 found.append(
                     (

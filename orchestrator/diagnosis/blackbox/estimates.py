@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import PORT, Effect
-from orchestrator.diagnosis.blackbox.problem import Data, Model, Problem
+from orchestrator.diagnosis.blackbox.bank import PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
 from orchestrator.errors import FmuError
 from orchestrator.shared.inference.normal import interval_95
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Estimate:
+class ValueEstimate:
     """A value with its standard error and 95 % interval."""
 
     name: str
@@ -27,11 +27,11 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundEffect:
     """An effect that is missing: name, where it is attached, its values, and what cannot be told from it."""
 
-    effect: Effect
-    estimates: tuple[Estimate, ...]
+    effect: BoxEffect
+    estimates: tuple[ValueEstimate, ...]
     gain: float
     family: tuple[str, ...]
 
@@ -42,7 +42,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Misfit:
+class OutputMisfit:
     """Rms of simulated minus measured on held-out data, over the noise, of one output."""
 
     output: str
@@ -53,7 +53,7 @@ class Misfit:
     unit: str
 
 
-def misfits(problem: Problem, stages: Sequence[Array], rows: slice) -> tuple[Misfit, ...]:
+def misfits(problem: BoxProblem, stages: Sequence[Array], rows: slice) -> tuple[OutputMisfit, ...]:
     """Return rms over noise of nominal, re-fitted and corrected model over ``rows`` that no fit has seen.
 
     Args:
@@ -66,7 +66,7 @@ def misfits(problem: Problem, stages: Sequence[Array], rows: slice) -> tuple[Mis
     """
     rms = [np.sqrt(np.mean(problem.residual(y)[rows] ** 2, axis=0)) for y in stages]
     return tuple(
-        Misfit(
+        OutputMisfit(
             name,
             float(problem.noise[k]),
             float(rms[0][k]),
@@ -79,8 +79,8 @@ def misfits(problem: Problem, stages: Sequence[Array], rows: slice) -> tuple[Mis
 
 
 def estimates_of(
-    problem: Problem, model: Model, covariance: Array
-) -> tuple[tuple[Estimate, ...], list[tuple[Estimate, ...]]]:
+    problem: BoxProblem, model: BoxModel, covariance: Array
+) -> tuple[tuple[ValueEstimate, ...], list[tuple[ValueEstimate, ...]]]:
     """Return estimates of the parameters, and of the values of each effect.
 
     Args:
@@ -93,8 +93,8 @@ def estimates_of(
     """
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
-    def one(name: str, value: float, error: float, unit: str, nominal: float | None = None) -> Estimate:
-        return Estimate(name, value, error, interval_95(value, error), unit, nominal)
+    def one(name: str, value: float, error: float, unit: str, nominal: float | None = None) -> ValueEstimate:
+        return ValueEstimate(name, value, error, interval_95(value, error), unit, nominal)
 
     parameters = tuple(
         one(u.name, float(model.p[k]), float(errors[k]), u.unit, u.value) for k, u in enumerate(problem.map.uncertain)
@@ -112,7 +112,7 @@ def estimates_of(
     return parameters, values
 
 
-def _units_at(problem: Problem, effect: Effect) -> tuple[str, ...]:
+def _units_at(problem: BoxProblem, effect: BoxEffect) -> tuple[str, ...]:
     """Return the units of an effect's values, at the place where it acts."""
     if effect.kind.where == PORT:
         port = problem.map.ports[effect.place]
@@ -129,7 +129,7 @@ def _units_at(problem: Problem, effect: Effect) -> tuple[str, ...]:
     return tuple(found)
 
 
-def validated(problem: Problem, models: Sequence[Model], data: Data) -> tuple[Misfit, ...]:
+def validated(problem: BoxProblem, models: Sequence[BoxModel], data: Data) -> tuple[OutputMisfit, ...]:
     """Return the misfit of nominal, re-fitted and corrected model on a second record of the same columns.
 
     Args:

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.diagnosis.blackbox.diagnose import Outcome
+from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
 from orchestrator.diagnosis.blackbox.problem import Data
 
 
-def draw_signals(path: Path, outcome: Outcome, data: Data) -> None:
+def draw_signals(path: Path, outcome: BoxOutcome, data: Data) -> None:
     """Draw outputs, and the residuals of each model in units of the noise at a scale of its own; shaded: held out.
 
     Args:

@@ -6,35 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.problem import Model, Problem
+from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import SHARES, Ladder
 
 Array = NDArray[np.float64]
 
-ITERATIONS = 6
-ASTRAY = 0.2
-"""Share of an output's standard deviation beyond which a free run has gone astray."""
-LOST = 0.7
-"""Share of the fitted part that a free run must keep close for, to be fitted over all of it."""
-STAGES = 8
-"""Growing parts of the record at most."""
-ENOUGH = 0.05
-"""Gain in log-likelihood below which an iteration is the last."""
-QUIET = 3
-"""Place of the port noise from which a fit is tried with ever less of it."""
-ANNEALED = 3
-"""Iterations at each."""
-SMALL = 0.1
-"""Step of a difference, in scales (of a prior: standard deviations)."""
-
-
 Rows = slice | NDArray[np.int64]
-PIECES = 24
-"""Pieces of a record whose parts interleave: every third one decides."""
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
+class BoxParts:
     """Rows that are fitted, that decide, and that are held out."""
 
     fitted: Rows
@@ -52,7 +34,7 @@ class Parts:
         return int(self.fitted.stop if isinstance(self.fitted, slice) else self.fitted[-1] + 1)
 
 
-def parts_of(n: int) -> Parts:
+def parts_of(n: int) -> BoxParts:
     """Return half, a quarter and a quarter.
 
     Args:
@@ -61,25 +43,26 @@ def parts_of(n: int) -> Parts:
     Returns:
         The fitted, the deciding and the held-out part.
     """
-    return Parts(slice(0, n // 2), slice(n // 2, 3 * n // 4), slice(3 * n // 4, n))
+    return BoxParts(slice(0, n // 2), slice(n // 2, 3 * n // 4), slice(3 * n // 4, n))
 
 
-def interleaved(n: int) -> Parts:
+def interleaved(n: int, pieces: int) -> BoxParts:
     """Return parts of the first three quarters that take turns: for what acts in one half only.
 
     Args:
         n: samples of the record.
+        pieces: that it is cut into.
 
     Returns:
         The parts, the held-out one last.
     """
     seen = 3 * n // 4
-    piece = np.arange(seen) * PIECES // seen
-    return Parts(np.flatnonzero(piece % 3 != 1), np.flatnonzero(piece % 3 == 1), slice(seen, n))
+    piece = np.arange(seen) * pieces // seen
+    return BoxParts(np.flatnonzero(piece % 3 != 1), np.flatnonzero(piece % 3 == 1), slice(seen, n))
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class BoxFit:
     """A fitted model.
 
     Attributes:
@@ -90,7 +73,7 @@ class Fit:
         J: (rows, outputs, values) its Jacobian, in units of the noise, as last computed.
     """
 
-    model: Model
+    model: BoxModel
     level: int
     y: Array
     fitted: float
@@ -111,10 +94,11 @@ class Fitter:
         problem: what is fitted.
         ladder: filters.
         parts: of the record.
+        settings: thresholds.
     """
 
-    def __init__(self, problem: Problem, ladder: Ladder, parts: Parts) -> None:
-        self.problem, self.ladder, self.parts = problem, ladder, parts
+    def __init__(self, problem: BoxProblem, ladder: Ladder, parts: BoxParts, settings: BoxSettings = DEFAULT) -> None:
+        self.problem, self.ladder, self.parts, self.settings = problem, ladder, parts, settings
         self.sd = np.array([u.standard_deviation for u in problem.map.uncertain])
         self.mean = problem.nominal.p
         self.lower = np.array([u.minimum for u in problem.map.uncertain])
@@ -134,7 +118,7 @@ class Fitter:
         found = e[rows]
         return float(-0.5 * np.sum(found * found) - np.sum(self.ladder[k].half_log[rows]))
 
-    def prior(self, model: Model) -> float:
+    def prior(self, model: BoxModel) -> float:
         """Return the logarithm of the prior.
 
         Args:
@@ -186,7 +170,7 @@ class Fitter:
         out[:n] = np.clip(out[:n], self.lower, self.upper)
         return out
 
-    def scales(self, model: Model) -> Array:
+    def scales(self, model: BoxModel) -> Array:
         """Return the step of each value for differences.
 
         Args:
@@ -195,9 +179,14 @@ class Fitter:
         Returns:
             Shape (values,).
         """
-        return np.concatenate([self.sd * SMALL, *(np.array(e.scales) for e in model.effects)])
+        return np.concatenate(
+            [
+                self.sd * self.settings.fit.difference,
+                *(np.array(e.scales(v)) for e, v in zip(model.effects, model.values, strict=True)),
+            ]
+        )
 
-    def jacobian(self, model: Model, y: Array, only: slice | None = None) -> Array | None:
+    def jacobian(self, model: BoxModel, y: Array, only: slice | None = None) -> Array | None:
         """Return differences (rows, outputs, values) of the free run, in units of the noise; None where a run fails.
 
         Args:
@@ -226,7 +215,7 @@ class Fitter:
     def _high(self, k: int) -> float:
         return float(self.upper[k]) if k < len(self.upper) else np.inf
 
-    def step(self, model: Model, y: Array, J: Array, k: int, rows: Rows, damping: float) -> Array:
+    def step(self, model: BoxModel, y: Array, J: Array, k: int, rows: Rows, damping: float) -> Array:
         """Return the damped Gauss-Newton step of all values.
 
         Args:
@@ -254,15 +243,15 @@ class Fitter:
 
     def fit(
         self,
-        model: Model,
+        model: BoxModel,
         k: int,
         J: Array | None = None,
         rows: Rows | None = None,
-        iterations: int = ITERATIONS,
+        iterations: int | None = None,
         until: int | None = None,
         y: Array | None = None,
         held: int = 0,
-    ) -> Fit | None:
+    ) -> BoxFit | None:
         """Return the fit from a start; None where the FMU fails.
 
         Args:
@@ -270,7 +259,7 @@ class Fitter:
             k: level of port noise that it starts at.
             J: Jacobian of the leading values, if known already.
             rows: what is fitted (default: the fitted part).
-            iterations: at most.
+            iterations: at most (default: of the settings).
             until: rows that are simulated (default: what the search may see).
             y: its free run, if known already.
             held: iterations for which the level stays what it is.
@@ -288,27 +277,28 @@ class Fitter:
         if J is None:
             return None
         value = self.likelihood(self.whitened(y, k), k, rows) + self.prior(model)
+        own = self.settings.fit
         damping, fresh = 1e-6, False
-        for turn in range(iterations):
+        for turn in range(own.iterations if iterations is None else iterations):
             moved = self._moved(model, y, J, k, rows, damping, value, until)
             if moved is None:
                 if fresh and damping > 1.0:
                     break
-                damping = max(30.0 * damping, 1e-3)
+                damping = max(30 * damping, 1e-3)
             else:
                 gained = moved[2] - value
                 expected = self._expected
                 J = _updated(J, model.vector, moved[0].vector, y, moved[1], self.problem.noise)
                 model, y, value = moved
-                damping = max(damping / 10.0, 1e-6)
+                damping = max(damping / 10, 1e-6)
                 better = k if turn < held else self.best_level(y, rows, self.ladder.near(k))
                 if better != k:
                     k = better
                     value = self.likelihood(self.whitened(y, k), k, rows) + self.prior(model)
-                elif gained < ENOUGH and fresh:
+                elif gained < own.enough and fresh:
                     break
                 fresh = False
-                if gained > 0.9 * expected > 5.0:
+                if gained > own.as_expected * expected > self.settings.search.penalty:
                     continue
             if not fresh:
                 again = self.jacobian(model, y)
@@ -326,11 +316,13 @@ class Fitter:
         Returns:
             The row; the run's length when it never leaves.
         """
-        scale = ASTRAY * np.std(self.problem.data.outputs[: self.parts.seen], axis=0) / self.problem.noise
-        far = np.any(np.abs(self.problem.residual(y)) > np.maximum(scale, 10.0), axis=1)
+        scale = (
+            self.settings.fit.astray * np.std(self.problem.data.outputs[: self.parts.seen], axis=0) / self.problem.noise
+        )
+        far = np.any(np.abs(self.problem.residual(y)) > np.maximum(scale, self.settings.fit.astray_noise), axis=1)
         return int(np.argmax(far)) if far.any() else len(y)
 
-    def grown(self, model: Model, k: int, J: Array | None = None, held: int = 0) -> Fit | None:
+    def grown(self, model: BoxModel, k: int, J: Array | None = None, held: int = 0) -> BoxFit | None:
         """Return the fit from a start, over a growing part of the record while the free run goes astray.
 
         A free run that has left the record says nothing about how to come back: the part over which it keeps close is
@@ -350,10 +342,10 @@ class Fitter:
         if y is None:
             return None
         stop = self.horizon(y)
-        for _ in range(STAGES):
+        for _ in range(self.settings.fit.stages):
             if stop >= reach:
                 break
-            part = slice(0, min(max(int(1.3 * stop), reach // 16), reach))
+            part = slice(0, min(max(int(self.settings.fit.further * stop), reach // 16), reach))
             short = self.fit(model, self.best_level(y[: part.stop], part), None, part, 6, part.stop, y[: part.stop])
             if short is None:
                 return None
@@ -364,10 +356,10 @@ class Fitter:
         if J is None:
             k = self.best_level(y, rows)
         # What cannot be led to the end is left where it keeps close the longest: others start from there.
-        lost = stop < LOST * reach and self.ladder.share(k) >= SHARES[-2]
-        return self.fit(model, k, J, held=held, y=y, iterations=0 if lost else ITERATIONS)
+        lost = stop < self.settings.fit.lost * reach and self.ladder.share(k) >= SHARES[-2]
+        return self.fit(model, k, J, held=held, y=y, iterations=0 if lost else None)
 
-    def settled(self, fit: Fit, rows: Rows | None = None, until: int | None = None) -> Fit:
+    def settled(self, fit: BoxFit, rows: Rows | None = None, until: int | None = None) -> BoxFit:
         """Return a fit, or one from there without port noise, whichever is likelier.
 
         Where much noise is allowed it explains what the parameters should, and the way down is flat.
@@ -385,12 +377,52 @@ class Fitter:
                 again = self.fit(fit.model, k, fit.J, rows, y=fit.y, held=3, until=until)
                 if again is not None and again.total > fit.total:
                     fit = again
-        if self.ladder.share(fit.level) > SHARES[QUIET] and rows is None:
+        if self.ladder.share(fit.level) > self.settings.fit.annealed_from and rows is None:
             again = self.annealed(fit)
             fit = again if again is not None and again.total > fit.total else fit
         return fit
 
-    def annealed(self, fit: Fit) -> Fit | None:
+    def combed(self, fit: BoxFit) -> BoxFit:
+        """Return a fit whose last effect's value has been looked for by runs, where no derivative leads to it.
+
+        What comes in steps (a quantum) is right or wrong sample by sample: its likelihood is a comb with a long tooth.
+
+        Args:
+            fit: of a model whose last effect has one value, nearly right.
+
+        Returns:
+            The fit, with the parameters fitted again.
+        """
+        own = self.settings.fit
+        width = own.comb * float(self.scales(fit.model)[-1])
+        for _ in range(own.combs):
+            vectors = np.repeat(fit.model.vector[None], own.teeth, axis=0)
+            vectors[:, -1] += np.linspace(-width, width, own.teeth)
+            models = [fit.model.moved(vector) for vector in vectors]
+            runs = self.problem.simulate(models, self.parts.seen)
+            teeth = [(model, y) for model, y in zip(models, runs, strict=True) if y is not None]
+            if teeth:
+                place, k = self._longest([y for _, y in teeth], fit.J[: self.parts.seen, :, :-1])
+                again = self.fit(teeth[place][0], k, y=teeth[place][1], held=2)
+                fit = again if again is not None and again.total > fit.total else fit
+            width *= own.finer
+        return fit
+
+    def _longest(self, runs: Sequence[Array], J: Array) -> tuple[int, int]:
+        """Return the free run that is likeliest once all other values follow, and the level at which it is."""
+        rows, found = self.parts.fitted, []
+        block = np.concatenate([J, *(self.problem.residual(y)[:, :, None] for y in runs)], axis=2)
+        for k in range(min(len(SHARES), self.ladder.size)):
+            white = self.ladder[k].whiten(block)[rows].reshape(-1, block.shape[2])
+            columns, e = white[:, : J.shape[2]], white[:, J.shape[2] :]
+            Q, _ = np.linalg.qr(columns / np.maximum(np.sqrt(np.sum(columns * columns, axis=0)), 1e-300))
+            left = np.sum(e * e, axis=0) - np.sum((Q.T @ e) ** 2, axis=0)
+            values = -0.5 * left - np.sum(self.ladder[k].half_log[rows])
+            found.append((float(np.max(values)), int(np.argmax(values)), k))
+        _, place, k = max(found)
+        return place, k
+
+    def annealed(self, fit: BoxFit) -> BoxFit | None:
         """Return the fit at ever less port noise, each from the one before.
 
         With much of it the start is found, and little of the values; without it a run far off says nothing.
@@ -401,10 +433,11 @@ class Fitter:
         Returns:
             The fit; None where the FMU fails.
         """
-        again: Fit | None = fit
+        again: BoxFit | None = fit
+        often = self.settings.fit.annealed
         for k in range(len(SHARES) - 1, -1, -1):
             if k < self.ladder.size and self.ladder.share(k) < self.ladder.share(fit.level) and again is not None:
-                again = self.fit(again.model, k, y=again.y, held=ANNEALED, iterations=ANNEALED)
+                again = self.fit(again.model, k, y=again.y, held=often, iterations=often)
         return None if again is None else self.fit(again.model, again.level, again.J, y=again.y)
 
     @property
@@ -412,7 +445,7 @@ class Fitter:
         """Return a level of little noise."""
         return min(3, self.ladder.size - 1)
 
-    def _completed(self, model: Model, y: Array, J: Array | None) -> Array | None:
+    def _completed(self, model: BoxModel, y: Array, J: Array | None) -> Array | None:
         known = 0 if J is None else J.shape[2]
         if J is not None and known == len(model.vector):
             return J
@@ -422,8 +455,8 @@ class Fitter:
         return rest if J is None else np.concatenate([J[: len(y)], rest], axis=2)
 
     def _moved(
-        self, model: Model, y: Array, J: Array, k: int, rows: Rows, damping: float, value: float, until: int
-    ) -> tuple[Model, Array, float] | None:
+        self, model: BoxModel, y: Array, J: Array, k: int, rows: Rows, damping: float, value: float, until: int
+    ) -> tuple[BoxModel, Array, float] | None:
         """Return the best of a whole step and parts of it that gains, with its run and likelihood."""
         step = self.step(model, y, J, k, rows, damping)
         shares = (1.0, 0.4)
@@ -432,7 +465,7 @@ class Fitter:
         e0 = self.whitened(y, k)
         change = self.ladder[k].whiten((J @ step)[:, :, None])[:, :, 0]
         self._expected = self.likelihood(e0 - change, k, rows) - self.likelihood(e0, k, rows)
-        best: tuple[Model, Array, float] | None = None
+        best: tuple[BoxModel, Array, float] | None = None
         for trial, run in zip(models, found, strict=True):
             if run is None:
                 continue
@@ -441,7 +474,7 @@ class Fitter:
                 best = (trial, run, reached)
         return best
 
-    def _result(self, model: Model, k: int, y: Array, J: Array, rows: Rows) -> Fit:
+    def _result(self, model: BoxModel, k: int, y: Array, J: Array, rows: Rows) -> BoxFit:
         e = self.whitened(y, k)
         decided = 0.0
         if rows is self.parts.fitted:
@@ -450,13 +483,13 @@ class Fitter:
             if best != k:
                 e, k = self.whitened(y, best), best
             decided = self.likelihood(e, k, self.parts.decides)
-        return Fit(model, k, y, self.likelihood(e, k, rows), decided, self.prior(model), J)
+        return BoxFit(model, k, y, self.likelihood(e, k, rows), decided, self.prior(model), J)
 
     def _both(self, y: Array, k: int) -> float:
         e = self.whitened(y, k)
         return self.likelihood(e, k, self.parts.fitted) + self.likelihood(e, k, self.parts.decides)
 
-    def covariance(self, fit: Fit, rows: Rows) -> Array:
+    def covariance(self, fit: BoxFit, rows: Rows) -> Array:
         """Return the covariance of all values.
 
         Args:

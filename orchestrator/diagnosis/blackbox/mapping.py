@@ -27,6 +27,7 @@ import msgspec
 from orchestrator.errors import ScenarioError
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.master.protocol import Variable
+from orchestrator.records.model_file import ModelParameter
 
 MAXIMUM_BYTES = 1 << 24
 
@@ -84,22 +85,6 @@ class MapFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     options: Options = Options()
 
 
-class Uncertain(msgspec.Struct, frozen=True):
-    """A parameter that is re-fitted: its nominal value and the largest error that the user grants it."""
-
-    name: str
-    value: float
-    uncertainty: float
-    unit: str
-    minimum: float
-    maximum: float
-
-    @property
-    def standard_deviation(self) -> float:
-        """Return that of the uniform distribution over the granted interval."""
-        return self.uncertainty / math.sqrt(3.0)
-
-
 class Map(msgspec.Struct, frozen=True):
     """A map that has been checked against its FMU.
 
@@ -113,7 +98,7 @@ class Map(msgspec.Struct, frozen=True):
     inputs: dict[str, InputEntry]
     outputs: dict[str, OutputEntry]
     ports: dict[str, PortEntry]
-    uncertain: tuple[Uncertain, ...]
+    uncertain: tuple[ModelParameter, ...]
     fixed: dict[str, float]
     options: Options
     source: str
@@ -227,7 +212,7 @@ class _Look:
         if not (math.isfinite(factor) and factor != 0.0):
             raise ScenarioError(f"{self._source}: {where} must be finite and not 0, but is {factor!r}")
 
-    def uncertain(self, where: str, name: str, entry: ParameterEntry) -> Uncertain:
+    def uncertain(self, where: str, name: str, entry: ParameterEntry) -> ModelParameter:
         """Return a parameter with its uncertainty as a number."""
         variable = self.up(where, name, ("parameter", "local", "output", "input"))
         value = entry.value if entry.value is not None else variable.start
@@ -238,7 +223,7 @@ class _Look:
         high = math.inf if variable.maximum is None else float(variable.maximum)
         if not low <= value <= high:
             raise ScenarioError(f"{self._source}: {where}.value must be {low:g} to {high:g}, but is {value:g}")
-        return Uncertain(name, float(value), spread, variable.unit or "", low, high)
+        return ModelParameter(name, float(value), spread, variable.unit or "", low, high)
 
 
 def _spread(where: str, given: str | float, value: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.problem import IMPULSE, Data, Model, Problem, series_of
+from orchestrator.diagnosis.blackbox.problem import IMPULSE, BoxModel, BoxProblem, Data, series_of
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
 from orchestrator.errors import FmuError
 
@@ -61,7 +61,7 @@ def _names_of(given: Map) -> tuple[list[str], list[str]]:
 
 def opened(
     path: Path, given: Map, data: Data, workers: int | None = None, progress: Progress = lambda what: None
-) -> tuple[Problem, Probe]:
+) -> tuple[BoxProblem, Probe]:
     """Return a problem ready to be fitted, and what its FMU was found to be.
 
     Args:
@@ -80,7 +80,7 @@ def opened(
     runner = Runner(path, inputs, reads, given.options.tolerance, workers=workers)
     try:
         rough = noise_of(given, data.outputs, data.outputs)
-        problem = Problem(data, given, runner, _affordable(runner, given, data, progress), rough)
+        problem = BoxProblem(data, given, runner, _affordable(runner, given, data, progress), rough)
         fresh = _repeats(problem)
         if fresh:
             runner.close()
@@ -124,7 +124,7 @@ def _affordable(runner: Runner, given: Map, data: Data, progress: Progress) -> i
         FmuError: it does not run, or even the fewest runs take longer than the budget of the map.
     """
     m, budget = _steps_in_a_sample(runner, given, data), given.options.budget
-    short = Problem(data, given, runner, m, np.ones(len(given.outputs)))
+    short = BoxProblem(data, given, runner, m, np.ones(len(given.outputs)))
     plan = Plan(short.starts(short.nominal), series_of(short, min(len(data.time), 100)))
     for _ in range(3):  # the first answer of a child is not timed
         if runner.step_cost == 0.0:
@@ -154,7 +154,7 @@ def _steps_in_a_sample(runner: Runner, given: Map, data: Data) -> int:
     rows = min(len(data.time), 200)
     m = given.options.substeps
     while m > 1:
-        problem = Problem(data, given, runner, m, np.ones(len(given.outputs)))
+        problem = BoxProblem(data, given, runner, m, np.ones(len(given.outputs)))
         plan = Plan(problem.starts(problem.nominal), series_of(problem, rows))
         y = runner.run([plan], float(data.time[0]), data.step / m, 1)[0]
         if y is None:
@@ -168,12 +168,12 @@ def _steps_in_a_sample(runner: Runner, given: Map, data: Data) -> int:
     return m
 
 
-def _repeats(problem: Problem) -> bool:
+def _repeats(problem: BoxProblem) -> bool:
     """Tell whether a run after a reset differs from the first, with another run in between."""
     other = problem.nominal.p + np.array([0.5 * u.standard_deviation for u in problem.map.uncertain])
     plain = series_of(problem, problem.n)
     mine = Plan(problem.starts(problem.nominal), plain)
-    between = Plan(problem.starts(Model(other)), plain * 1.1)
+    between = Plan(problem.starts(BoxModel(other)), plain * 1.1)
     start, step = float(problem.data.time[0]), problem.h / problem.m
     first, _, again = problem.runner.run([mine, between, mine], start, step, problem.m, together=True)
     if first is None or again is None:
@@ -182,7 +182,7 @@ def _repeats(problem: Problem) -> bool:
     return bool(np.max(np.abs(again - first)[:, :count] / problem.noise) > REPEATS)
 
 
-def _pushed(problem: Problem, fresh: bool) -> Probe:
+def _pushed(problem: BoxProblem, fresh: bool) -> Probe:
     """Return what ports and parameters do."""
     base = problem.must_read(problem.nominal)
     size = np.maximum(np.max(np.abs(base), axis=0), 1e-300)
@@ -224,12 +224,12 @@ def _pushed(problem: Problem, fresh: bool) -> Probe:
     return Probe(fresh, sign, tuple(dead), tuple(blind), error, problem.runner.step_cost, tuple(notes))
 
 
-def _dead(problem: Problem, base: Array, size: Array) -> list[str]:
+def _dead(problem: BoxProblem, base: Array, size: Array) -> list[str]:
     models = []
     for k, u in enumerate(problem.map.uncertain):
         p = problem.nominal.p.copy()
         p[k] += u.standard_deviation if p[k] + u.standard_deviation <= u.maximum else -u.standard_deviation
-        models.append(Model(p))
+        models.append(BoxModel(p))
     runs = problem.read(models)
     return [
         u.name

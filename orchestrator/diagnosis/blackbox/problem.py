@@ -7,7 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox import series
-from orchestrator.diagnosis.blackbox.bank import BANK, INPUT, OUTPUT, PORT, REMEMBERS, STARTS_OFF, Effect, Scene
+from orchestrator.diagnosis.blackbox.bank import (
+    BANK,
+    INPUT,
+    OUTPUT,
+    PORT,
+    REMEMBERS,
+    STARTS_OFF,
+    BoxEffect,
+    Surroundings,
+)
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
 from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
@@ -19,6 +28,10 @@ Array = NDArray[np.float64]
 ANGLES = ("rad", "deg", "")
 GROWS = 2.5
 """How much larger than at the start a response within the record may be: beyond, its motion is not stable."""
+LEAST_PHASE = 4.0
+"""Radians of a ripple within the span of the motion, from which it is no spring."""
+MOST_CYCLES = 500
+"""Wavenumbers that are looked through."""
 IMPULSE = 0.5
 """Size of the pulse that measures a response, as a share of the drive."""
 
@@ -46,11 +59,11 @@ class Data:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class BoxModel:
     """A model: values of the uncertain parameters, effects, and their values."""
 
     p: Array
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[BoxEffect, ...] = ()
     values: tuple[Array, ...] = ()
 
     @property
@@ -58,7 +71,7 @@ class Model:
         """Return all values in one row."""
         return np.concatenate([self.p, *self.values])
 
-    def moved(self, vector: Array) -> "Model":
+    def moved(self, vector: Array) -> "BoxModel":
         """Return the same structure with other values, kept within what the laws allow.
 
         Args:
@@ -71,9 +84,9 @@ class Model:
         for effect, old in zip(self.effects, self.values, strict=True):
             values.append(effect.bounded(vector[at : at + len(old)]))
             at += len(old)
-        return Model(vector[: len(self.p)], self.effects, tuple(values))
+        return BoxModel(vector[: len(self.p)], self.effects, tuple(values))
 
-    def extended(self, effect: Effect, values: Array) -> "Model":
+    def extended(self, effect: BoxEffect, values: Array) -> "BoxModel":
         """Return this model with one more effect.
 
         Args:
@@ -83,9 +96,9 @@ class Model:
         Returns:
             The model.
         """
-        return Model(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))
+        return BoxModel(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))
 
-    def without(self, label: str) -> "Model":
+    def without(self, label: str) -> "BoxModel":
         """Return this model with one effect less.
 
         Args:
@@ -95,11 +108,11 @@ class Model:
             The model.
         """
         kept = [k for k, effect in enumerate(self.effects) if effect.label != label]
-        return Model(self.p, tuple(self.effects[k] for k in kept), tuple(self.values[k] for k in kept))
+        return BoxModel(self.p, tuple(self.effects[k] for k in kept), tuple(self.values[k] for k in kept))
 
 
 @dataclass
-class Problem:
+class BoxProblem:
     """Simulates models of one record.
 
     Attributes:
@@ -116,7 +129,8 @@ class Problem:
     m: int
     noise: Array
     sign: dict[str, float] = field(default_factory=dict)
-    nominal_rows: Array | None = None
+    _from_inputs: Surrogate | None = field(init=False, default=None, repr=False)
+    _tables: dict[tuple[int, int], Array] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def n(self) -> int:
@@ -129,9 +143,9 @@ class Problem:
         return self.data.step
 
     @property
-    def nominal(self) -> Model:
+    def nominal(self) -> BoxModel:
         """Return the model as the user gave it."""
-        return Model(np.array([u.value for u in self.map.uncertain]))
+        return BoxModel(np.array([u.value for u in self.map.uncertain]))
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -143,7 +157,7 @@ class Problem:
         """Return the names of the measured outputs."""
         return tuple(self.map.outputs)
 
-    def simulate(self, models: Sequence[Model], rows: int | None = None) -> list[Array | None]:
+    def simulate(self, models: Sequence[BoxModel], rows: int | None = None) -> list[Array | None]:
         """Return outputs (rows, outputs) of each model; None where the FMU failed.
 
         Args:
@@ -153,10 +167,10 @@ class Problem:
         Returns:
             The outputs, in their own units.
         """
-        found = self.read(models, rows)
+        found = self._runs([self._plan(model, rows) for model in models])
         return [None if y is None else self._measured(y, model) for y, model in zip(found, models, strict=True)]
 
-    def read(self, models: Sequence[Model], rows: int | None = None) -> list[Array | None]:
+    def read(self, models: Sequence[BoxModel], rows: int | None = None) -> list[Array | None]:
         """Return all that is read (rows, reads) of each model, before effects at outputs.
 
         Args:
@@ -166,12 +180,42 @@ class Problem:
         Returns:
             The values, in their own units.
         """
-        rows = self.n if rows is None else rows
-        plain = series_of(self, rows)
-        plans = [Plan(self.starts(model), self._table(model, plain, rows), self._feedback(model)) for model in models]
-        return self.runner.run(plans, float(self.data.time[0]), self.h / self.m, self.m)
+        found = self._runs([self._plan(model, rows) for model in models])
+        return [None if y is None else y[:: self.m] for y in found]
 
-    def must_simulate(self, model: Model) -> Array:
+    def read_finely(self, model: BoxModel, rows: int) -> Array | None:
+        """Return all that is read of a model after every communication step; None where the FMU failed.
+
+        Args:
+            model: parameters, effects and their values.
+            rows: samples to simulate.
+
+        Returns:
+            The values, (steps + 1, reads), in their own units.
+        """
+        return self._runs([self._plan(model, rows)])[0]
+
+    def _plan(self, model: BoxModel, rows: int | None) -> Plan:
+        plain = self._plain(self.n if rows is None else rows)
+        return Plan(self.starts(model), self.table(model, plain), self._feedback(model))
+
+    def _plain(self, rows: int) -> Array:
+        """Return the recorded inputs up to ``rows`` samples, the same array each time."""
+        key = (rows, self.m)
+        if key not in self._tables:
+            self._tables[key] = series_of(self, rows)
+        return self._tables[key]
+
+    def _runs(self, plans: Sequence[Plan]) -> list[Array | None]:
+        """Return what is read after every communication step; plans that are the same for the FMU are run once."""
+        keys = [(tuple(p.starts.items()), id(p.table), repr(p.effects)) for p in plans]
+        places = {key: k for k, key in reversed(list(enumerate(keys)))}
+        order = list(places)
+        found = self.runner.run([plans[places[key]] for key in order], float(self.data.time[0]), self.h / self.m, 1)
+        by_key = dict(zip(order, found, strict=True))
+        return [by_key[key] for key in keys]
+
+    def must_simulate(self, model: BoxModel) -> Array:
         """Return outputs (rows, outputs) of a model.
 
         Args:
@@ -183,9 +227,12 @@ class Problem:
         Raises:
             SlaveError: the FMU does not run over the record.
         """
-        return self._measured(self.must_read(model), model)
+        y = self.simulate([model])[0]
+        if y is None:
+            raise self.does_not_run()
+        return y
 
-    def must_read(self, model: Model) -> Array:
+    def must_read(self, model: BoxModel) -> Array:
         """Return all that is read (rows, reads) of a model, before effects at outputs.
 
         Args:
@@ -221,7 +268,7 @@ class Problem:
         """
         return np.asarray((self.data.outputs[: len(y)] - y) / self.noise)
 
-    def pushed(self, model: Model, pushes: Sequence[tuple[int, int, float]]) -> list[Array | None]:
+    def pushed(self, model: BoxModel, pushes: Sequence[tuple[int, int, float]]) -> list[Array | None]:
         """Return outputs where an effort (input, first sample, size) is added until the end, one after the other.
 
         Args:
@@ -231,16 +278,15 @@ class Problem:
         Returns:
             The outputs, (n, outputs) each.
         """
-        plain = self._table(model, series_of(self, self.n), self.n)
+        plain = self.table(model, self._plain(self.n))
         plans = []
         for place, first, size in pushes:
             table = plain.copy()
             table[first * self.m :, place] += size
             plans.append(Plan(self.starts(model), table, self._feedback(model)))
-        found = self.runner.run(plans, float(self.data.time[0]), self.h / self.m, self.m)
-        return [None if y is None else self._measured(y, model) for y in found]
+        return [None if y is None else self._measured(y, model) for y in self._runs(plans)]
 
-    def starts(self, model: Model) -> dict[str, float]:
+    def starts(self, model: BoxModel) -> dict[str, float]:
         """Return what is set before a run, by name.
 
         Args:
@@ -253,7 +299,16 @@ class Problem:
         values |= {u.name: float(v) for u, v in zip(self.map.uncertain, model.p, strict=True)}
         return values
 
-    def _table(self, model: Model, plain: Array, rows: int) -> Array:
+    def table(self, model: BoxModel, plain: Array) -> Array:
+        """Return what the FMU's inputs get: the recorded ones behind the effects in series with them.
+
+        Args:
+            model: parameters, effects and their values.
+            plain: (steps, inputs) recorded inputs over every communication step.
+
+        Returns:
+            Shape (steps, inputs); ``plain`` itself where no effect acts on an input.
+        """
         table = plain
         step = self.h / self.m
         for effect, values in zip(model.effects, model.values, strict=True):
@@ -265,7 +320,7 @@ class Problem:
             table[:, column] = at_input(effect, table[:, column], step, float(values[0]))
         return table
 
-    def _feedback(self, model: Model) -> tuple[Feedback, ...]:
+    def _feedback(self, model: BoxModel) -> tuple[Feedback, ...]:
         found = []
         for effect, values in zip(model.effects, model.values, strict=True):
             if effect.kind.where != PORT:
@@ -279,18 +334,22 @@ class Problem:
             found.append(Feedback(place, effect.kind.law, reads.index(port.position), velocity, sign, q))
         return tuple(found)
 
-    def _measured(self, rows: Array, model: Model) -> Array:
-        y = rows[:, : len(self.outputs)]
+    def _measured(self, fine: Array, model: BoxModel) -> Array:
+        """Return the outputs at the samples, from what is read after every communication step.
+
+        Effects behind an output act between the samples too: an output need not be smooth from one to the next.
+        """
+        y = fine[:, : len(self.outputs)]
         for effect, values in zip(model.effects, model.values, strict=True):
             if effect.kind.where != OUTPUT:
                 continue
             if y.base is not None:
                 y = y.copy()
             column = self.outputs.index(effect.place)
-            y[:, column] = _at_output(effect.kind.name, y[:, column], self.h, float(values[0]))
-        return y
+            y[:, column] = _at_output(effect.kind.name, y[:, column], self.h / self.m, float(values[0]))
+        return y[:: self.m]
 
-    def impulses(self, model: Model, length: int) -> tuple[Surrogate, Array]:
+    def impulses(self, model: BoxModel, length: int, places: Sequence[int] | None = None) -> tuple[Surrogate, Array]:
         """Return the surrogate at the ports, and the size (ports,) that a share of noise stands for.
 
         Responses are measured within the record, where the FMU works, unless they grow there.
@@ -298,6 +357,7 @@ class Problem:
         Args:
             model: parameters, effects and their values.
             length: of the responses, in samples.
+            places: of the inputs (default: those of the ports).
 
         Returns:
             The surrogate, and the sizes in the units of the ports.
@@ -305,24 +365,34 @@ class Problem:
         Raises:
             SlaveError: the FMU does not run over the record.
         """
+        places = self.noise_places if places is None else places
         later = min(self.n // 4, self.n - length)
-        within = self._responses(model, later, length)
-        first = self._responses(model, 0, length)
+        within = self._responses(model, later, length, places)
+        first = self._responses(model, 0, length, places)
         chosen = within if float(np.max(np.abs(within))) < GROWS * float(np.max(np.abs(first))) else first
-        return realised(chosen), np.ones(len(self.noise_places))
+        return realised(chosen), np.ones(len(places))
 
-    def _responses(self, model: Model, at: int, length: int) -> Array:
+    def input_surrogate(self) -> Surrogate:
+        """Return the surrogate from the recorded inputs to the outputs, measured when first asked for.
+
+        Returns:
+            The surrogate; an input is in units of its drive.
+        """
+        if self._from_inputs is None:
+            places = [self.runner.inputs.index(name) for name in self.inputs]
+            self._from_inputs = self.impulses(self.nominal, max(self.n // 2, 16), places)[0]
+        return self._from_inputs
+
+    def _responses(self, model: BoxModel, at: int, length: int, places: Sequence[int]) -> Array:
         """Return responses (length - 1, outputs, ports) to pulses in sample ``at``, in units of noise and drive."""
         plain = series_of(self, at + length)
-        places = self.noise_places
         tables = [plain]
         for place, size in zip(places, self.drive(places), strict=True):
             pulsed = plain.copy()
             pulsed[at * self.m : (at + 1) * self.m, place] += IMPULSE * size
             tables.append(pulsed)
         plans = [Plan(self.starts(model), t, self._feedback(model)) for t in tables]
-        found = self.runner.run(plans, float(self.data.time[0]), self.h / self.m, self.m)
-        rows = [None if y is None else self._measured(y, model) for y in found]
+        rows = [None if y is None else self._measured(y, model) for y in self._runs(plans)]
         base = rows[0]
         if base is None or any(y is None for y in rows):
             raise self.does_not_run()
@@ -360,7 +430,7 @@ class Problem:
     units: dict[str, str] = field(default_factory=dict)
 
 
-def series_of(problem: Problem, rows: int) -> Array:
+def series_of(problem: BoxProblem, rows: int) -> Array:
     """Return the recorded inputs over every communication step up to ``rows`` samples; other inputs are 0.
 
     Args:
@@ -377,7 +447,7 @@ def series_of(problem: Problem, rows: int) -> Array:
     return table
 
 
-def at_input(effect: Effect, fine: Array, step: float, value: float) -> Array:
+def at_input(effect: BoxEffect, fine: Array, step: float, value: float) -> Array:
     """Return an input behind an effect in series with it; before the record it had its first value, or was zero.
 
     Args:
@@ -420,7 +490,7 @@ def _at_output(name: str, rows: Array, h: float, value: float) -> Array:
     return series.quantised(rows, value)
 
 
-def effects_of(problem: Problem, nominal: Array) -> list[Effect]:
+def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
     """Return every effect that could act, given all that is read of the nominal run (n, reads).
 
     Args:
@@ -436,14 +506,14 @@ def effects_of(problem: Problem, nominal: Array) -> list[Effect]:
         u = problem.data.inputs[:, k]
         if float(np.ptp(u)) == 0.0:
             continue
-        scene = Scene(h, _rms(u), float(np.max(np.abs(u))), u)
-        found += [Effect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
+        scene = Surroundings(h, _rms(u), float(np.max(np.abs(u))), u)
+        found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
         if abs(u[0]) > STARTS_OFF * scene.size:
-            found += [Effect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
+            found += [BoxEffect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
     for k, name in enumerate(problem.outputs):
         y = problem.data.outputs[:, k]
-        scene = Scene(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
-        found += [Effect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
+        scene = Surroundings(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
+        found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
     for name, port in problem.map.ports.items():
         x = nominal[:, runner.reads.index(port.position)]
         v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]
@@ -451,17 +521,12 @@ def effects_of(problem: Problem, nominal: Array) -> list[Effect]:
         angular = problem.units.get(port.position, "") in ANGLES
         a = _rms(np.gradient(v, h))
         span = float(np.ptp(x)) or 1.0
+        # From two thirds of a cycle within the span to what the samples still follow, half a radian of it apart.
         top = 0.5 * np.pi / max(float(np.quantile(np.abs(v), 0.8)) * h, 1e-300)
-        low = 1.5 * 2.0 * np.pi / span
-        cycles = (
-            tuple(float(c) for c in np.geomspace(low, max(min(top, 40.0 * low), 2.0 * low), 24)) if top > low else ()
-        )
-        if angular:
-            whole = tuple(float(c) for c in range(2, 13) if low < c < top)
-            cycles = tuple(sorted({*cycles, *whole}))
-        scene = Scene(h, effort, effort, x, 0.0, _rms(x) or 1.0, span, _rms(v) or 1.0, a or 1.0, angular, cycles)
+        cycles = tuple((LEAST_PHASE + 0.5 * k) / span for k in range(MOST_CYCLES) if LEAST_PHASE + 0.5 * k < top * span)
+        scene = Surroundings(h, effort, effort, x, 0.0, _rms(x) or 1.0, span, _rms(v) or 1.0, a or 1.0, angular, cycles)
         kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
-        found += [Effect(kind, name, scene) for kind in kinds]
+        found += [BoxEffect(kind, name, scene) for kind in kinds]
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from orchestrator.shared.settings import Settings, note, setting, share
 
 
-class SearchSettings(Settings, frozen=True):
+class BoxSearchSettings(Settings, frozen=True):
     """Which effects are tried, and what one must earn to be named."""
 
     penalty: Annotated[float, setting("log-likelihood that each further value must earn")] = 5.0
@@ -29,10 +29,55 @@ class SearchSettings(Settings, frozen=True):
     rest: Annotated[float, share("of its gain, what others must promise once one explains the record")] = 0.3
     most: Annotated[int, setting("effects that are named at most", ge=0)] = 4
     beam: Annotated[int, setting("models that are carried on", ge=1)] = 2
+    near: Annotated[float, share("of what the best model gains, by which another may be behind to be carried on")] = 0.3
     family: Annotated[float, setting("log-likelihood within which a record does not tell two effects apart")] = 6.0
     noise_margin: Annotated[
         float, setting("standard deviations of pure noise's log-likelihood within which a record is explained")
     ] = 4.0
+
+
+class ScreenSettings(Settings, frozen=True):
+    """How far linearisation is trusted before anything is fitted."""
+
+    smallest: Annotated[
+        float, share("of a start down to which the response to it is scaled, where it is proportional")
+    ] = 0.01
+    least: Annotated[float, share("the same for an effect of a finite size: beyond, another start is nearer")] = 0.3
+    most: Annotated[float, setting("times its own response that a start may stand for", ge=1)] = 2.0
+    exact: Annotated[float, share("by which a scanned value's response may be off: a surrogate is not exact")] = 0.2
+    scanned: Annotated[int, setting("values of one effect that its scan hands on to the FMU", ge=1)] = 3
+    apart: Annotated[int, setting("places in a scan by which they are apart: neighbours lead to one fit", ge=1)] = 3
+    parts: Annotated[int, setting("parts into which the scan's step is cut around the best value", ge=1)] = 8
+    straight: Annotated[float, share("of the record up to which a run that goes astray earlier is screened apart")] = (
+        0.9
+    )
+
+
+class FitterSettings(Settings, frozen=True):
+    """How a model is fitted by free runs."""
+
+    iterations: Annotated[int, setting("Gauss-Newton iterations at most", ge=1)] = 6
+    difference: Annotated[float, setting("step of a difference, in standard deviations of a parameter's prior")] = 0.1
+    enough: Annotated[float, setting("gain in log-likelihood below which an iteration is the last")] = 0.05
+    as_expected: Annotated[float, share("of what an iteration promised, from which its Jacobian serves once more")] = (
+        0.9
+    )
+    astray: Annotated[float, share("of an output's standard deviation beyond which a free run has gone astray")] = 0.2
+    astray_noise: Annotated[float, setting("the same in noise deviations, whichever is more")] = 10.0
+    lost: Annotated[float, share("of the fitted part that a free run must keep close, to be fitted over all of it")] = (
+        0.7
+    )
+    stages: Annotated[int, setting("growing parts of the record at most", ge=0)] = 8
+    further: Annotated[float, setting("times its reach that a run is fitted over next", ge=1)] = 1.3
+    annealed_from: Annotated[float, share("port noise, of the drive, from which a fit is tried with ever less")] = 3e-4
+    annealed: Annotated[int, setting("iterations at each of these levels", ge=1)] = 3
+    pieces: Annotated[int, setting("pieces of a record whose parts take turns: every third one decides", ge=3)] = 24
+    comb: Annotated[
+        float, setting("half width of the first comb over a value that acts in steps, in small changes of it")
+    ] = 4.0
+    combs: Annotated[int, setting("combs, one within the other", ge=0)] = 3
+    teeth: Annotated[int, setting("values of each: their distance is that of the next comb's width", ge=3)] = 25
+    finer: Annotated[float, share("width of a comb over that of the one before")] = 0.1
 
 
 class StartSettings(Settings, frozen=True):
@@ -59,22 +104,37 @@ class RestSettings(Settings, frozen=True):
         float, share("the same where effects are named: beside more of it, what a law leaves could be anything")
     ] = 0.015
     beginnings: Annotated[int, setting("times at which an effort that begins is tried", ge=1)] = 12
+    push: Annotated[float, share("of the drive, by which its response is measured")] = 0.02
     begins: Annotated[float, setting("gain from which an effort that begins at some time is no chance")] = 12.0
     driven: Annotated[
         float, setting("standard deviations of chance from which what is left follows from the drive: no disturbance")
     ] = 5.5
     driven_lags: Annotated[int, setting("samples of the inputs that it may follow from", ge=1)] = 24
+    stretches: Annotated[
+        int, setting("parts of an output's range in each of which what is left may act in a way of its own", ge=2)
+    ] = 12
+    stands_out: Annotated[float, setting("times the expected power from which a stretch of time is pointed at")] = 1.3
     worse: Annotated[
         float, setting("times the misfit without effects from which effects do harm on data not fitted", ge=1)
     ] = 1.1
 
 
+class CalibrationSettings(Settings, frozen=True):
+    """What is said of parameters that are fitted alone."""
+
+    confounded: Annotated[float, share("correlation from which two parameters count as not told apart")] = 0.95
+    learned: Annotated[float, share("of its uncertainty, below which a record has said little of a parameter")] = 0.3
+
+
 class BoxSettings(Settings, frozen=True):
     """All thresholds of a diagnosis of any FMU."""
 
-    search: Annotated[SearchSettings, note("the search")] = SearchSettings()
+    search: Annotated[BoxSearchSettings, note("the search")] = BoxSearchSettings()
+    screen: Annotated[ScreenSettings, note("the screening before it")] = ScreenSettings()
+    fit: Annotated[FitterSettings, note("each fit")] = FitterSettings()
     start: Annotated[StartSettings, note("the start")] = StartSettings()
     rest: Annotated[RestSettings, note("what is left")] = RestSettings()
+    calibration: Annotated[CalibrationSettings, note("parameters alone")] = CalibrationSettings()
 
 
 DEFAULT = BoxSettings()

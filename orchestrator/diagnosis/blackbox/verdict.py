@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.fitting import Fit, Fitter
-from orchestrator.diagnosis.blackbox.search import Search, labels
+from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
+from orchestrator.diagnosis.blackbox.search import BoxSearch, labels
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Rest:
     blocks: Array
 
 
-def rest_of(fitter: Fitter, fit: Fit, rows: slice, settings: RestSettings = DEFAULT.rest) -> Rest:
+def rest_of(fitter: Fitter, fit: BoxFit, rows: slice, settings: RestSettings = DEFAULT.rest) -> Rest:
     """Return what a model leaves over ``rows``; ``fit.y`` must reach so far.
 
     Args:
@@ -70,7 +70,7 @@ def _reasons(e: Array, s: RestSettings) -> list[str]:
         lags = [float(np.mean(x[lag:] * x[:-lag])) for lag in range(1, s.lags + 1)]
         if float(np.sum(np.square(lags))) * n > s.lags + s.most_correlated * np.sqrt(2.0 * s.lags):
             found.append(f"output {k + 1}: correlated from sample to sample")
-        if float(np.mean(x**4)) - 3.0 > s.most_kurtosis:
+        if float(np.mean(x**4)) - 3 > s.most_kurtosis:
             found.append(f"output {k + 1}: comes in bursts")
         parts = np.array([np.mean(p * p) for p in np.array_split(e[:, k], s.blocks)])
         if float(parts.max()) / mean_square - 1.0 > s.deviations * np.sqrt(2.0 * s.blocks / n):
@@ -78,7 +78,7 @@ def _reasons(e: Array, s: RestSettings) -> list[str]:
     return found
 
 
-def beginning_of(fitter: Fitter, fit: Fit, count: int = DEFAULT.rest.beginnings) -> tuple[float, str, float]:
+def beginning_of(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> tuple[float, str, float]:
     """Return the gain, the input and the time of the effort that begins there and explains most of what is left.
 
     A disturbance that is noise begins nowhere. Each effort's response is measured on the FMU.
@@ -86,15 +86,15 @@ def beginning_of(fitter: Fitter, fit: Fit, count: int = DEFAULT.rest.beginnings)
     Args:
         fitter: gives the filters and the record.
         fit: of a model.
-        count: of moments at which an effort may begin.
+        settings: at how many moments an effort may begin, and of what size it is.
 
     Returns:
         Gain in log-likelihood, name of the input, time [s]; 0.0 and nothing where none explains any.
     """
     problem, n = fitter.problem, fitter.problem.n
-    starts = [int(s) for s in np.linspace(0, n, count + 2)[1:-1]]
+    starts = [int(s) for s in np.linspace(0, n, settings.beginnings + 2)[1:-1]]
     places = problem.noise_places
-    sizes = 0.02 * problem.drive(places)
+    sizes = settings.push * problem.drive(places)
     runs = problem.pushed(fit.model, [(p, s, size) for p, size in zip(places, sizes, strict=True) for s in starts])
     base = problem.simulate([fit.model])[0]
     if base is None or len(fit.J) < n:
@@ -114,11 +114,7 @@ def beginning_of(fitter: Fitter, fit: Fit, count: int = DEFAULT.rest.beginnings)
     return float(gains[best]), name, float(problem.data.time[starts[best % len(starts)]])
 
 
-PLACES = 12
-"""Stretches of an output's range in each of which what is left may act in a way of its own."""
-
-
-def predicted(fitter: Fitter, fit: Fit, lags: int = DEFAULT.rest.driven_lags) -> float:
+def predicted(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> float:
     """Return by how many standard deviations of chance what is left can be predicted from what went before.
 
     By all signals together, or by one alone.
@@ -129,21 +125,21 @@ def predicted(fitter: Fitter, fit: Fit, lags: int = DEFAULT.rest.driven_lags) ->
     Args:
         fitter: gives the filters and the record.
         fit: of a model.
-        lags: samples that are looked back.
+        settings: how far is looked back, and in how many parts of an output's range.
 
     Returns:
         The number of standard deviations.
     """
-    problem, n = fitter.problem, fitter.problem.n
+    problem, n, lags, stretches = fitter.problem, fitter.problem.n, settings.driven_lags, settings.stretches
     e = fitter.whitened(fit.y, fit.level)[lags:]
     columns = [problem.data.inputs[lags - k : n - k] for k in range(1, lags + 1)]
     for y in fit.y.T:
         v = np.gradient(y)
         size = max(float(v.std()), 1e-300)
-        for shape in (np.tanh(10.0 * v / size), np.abs(v), v * np.abs(v), y - y.mean(), (y - y.mean()) ** 3):
+        for shape in (np.tanh(10 * v / size), np.abs(v), v * np.abs(v), y - y.mean(), (y - y.mean()) ** 3):
             columns += [shape[lags - k : n - k, None] for k in (1, 2)]
-        place = np.searchsorted(np.quantile(y, np.linspace(0.0, 1.0, PLACES + 1)[1:-1]), y)
-        here = place[:, None] == np.arange(PLACES)
+        place = np.searchsorted(np.quantile(y, np.linspace(0.0, 1.0, stretches + 1)[1:-1]), y)
+        here = place[:, None] == np.arange(stretches)
         columns += [(here * shape[:, None])[lags - 1 : n - 1] for shape in (v, np.ones(n))]
     block = np.hstack([np.ones((n - lags, 1)), *columns])
     block = block / np.maximum(np.sqrt(np.mean(block * block, axis=0)), 1e-300)
@@ -157,7 +153,7 @@ def predicted(fitter: Fitter, fit: Fit, lags: int = DEFAULT.rest.driven_lags) ->
     return max(together, float(np.max(alone)))
 
 
-def family_of(search: Search, best: Fit) -> tuple[str, ...]:
+def family_of(search: BoxSearch, best: BoxFit) -> tuple[str, ...]:
     """Return labels of effects that the record does not tell from the last one of the best model.
 
     Args:
@@ -184,7 +180,7 @@ def family_of(search: Search, best: Fit) -> tuple[str, ...]:
     return tuple(dict.fromkeys(others))
 
 
-def recovered(base: Fit, best: Fit, outputs: int, rows: int) -> float:
+def recovered(base: BoxFit, best: BoxFit, outputs: int, rows: int) -> float:
     """Return the share of what the re-fitted model lacks of pure noise that the effects bring.
 
     Args:

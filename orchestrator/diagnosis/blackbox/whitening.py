@@ -38,6 +38,23 @@ class Surrogate:
         """Return the number of states."""
         return len(self.A)
 
+    def response(self, pushes: Array, place: int) -> Array:
+        """Return the outputs under efforts at one of its inputs, from rest.
+
+        Args:
+            pushes: (n - 1, columns) efforts, each held over a sample.
+            place: of the input.
+
+        Returns:
+            Shape (n, outputs, columns).
+        """
+        x = np.zeros((self.order, pushes.shape[1]))
+        found = np.zeros((len(pushes) + 1, len(self.C), pushes.shape[1]))
+        for k, push in enumerate(pushes):
+            x = self.A @ x + self.B[:, place : place + 1] * push
+            found[k + 1] = self.C @ x
+        return found
+
 
 def realised(impulses: Array) -> Surrogate:
     """Return a surrogate of impulse responses.
@@ -72,7 +89,7 @@ def realised(impulses: Array) -> Surrogate:
 
 
 @dataclass(frozen=True)
-class Level:
+class NoiseLevel:
     """One level of noise at the ports, ready to whiten: gains and inverse roots of every sample.
 
     Attributes:
@@ -103,7 +120,7 @@ class Level:
         return np.asarray(_filtered(self.A, self.C, self.K, self.R, np.ascontiguousarray(columns)))
 
 
-def level(surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, spread: float = 0.0) -> Level:
+def level(surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, spread: float = 0.0) -> NoiseLevel:
     """Return the filter for port noise over ``n`` samples.
 
     Args:
@@ -119,7 +136,7 @@ def level(surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, s
     outputs = surrogate.C.shape[0]
     if (q == 0.0 and spread == 0.0) or surrogate.order == 0:
         R = np.repeat(np.eye(outputs)[None], n, axis=0)
-        return Level(0.0, 0.0, np.zeros((0, 0)), np.zeros((outputs, 0)), np.zeros((n, 0, outputs)), R, np.zeros(n))
+        return NoiseLevel(0.0, 0.0, np.zeros((0, 0)), np.zeros((outputs, 0)), np.zeros((n, 0, outputs)), R, np.zeros(n))
     order, ports = surrogate.B.shape
     sd = q * drive
     if colour == 0.0:
@@ -136,7 +153,7 @@ def level(surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, s
         start[order:, order:] = np.diag(sd**2)
     A, C, Q, start = (np.ascontiguousarray(a) for a in (A, C, Q, start))
     K, R, half_log = _gains(A, C, Q, start, n)
-    return Level(q, colour, A, C, K, R, half_log)
+    return NoiseLevel(q, colour, A, C, K, R, half_log)
 
 
 REACH = 400
@@ -164,7 +181,7 @@ class Ladder:
     drive: Array
     n: int
     spread: float = 0.0
-    made: dict[int, Level] = field(default_factory=dict)
+    made: dict[int, NoiseLevel] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -209,7 +226,7 @@ class Ladder:
         around = [j for j in range(place - 3, place + 4) if 0 <= j < count]
         return [0, *(1 + j + c * count for c in range(len(COLOURS)) for j in around)]
 
-    def __getitem__(self, k: int) -> Level:
+    def __getitem__(self, k: int) -> NoiseLevel:
         if k not in self.made:
             self.made[k] = level(self.surrogate, self.share(k), self.colour(k), self.drive, self.n, self.spread)
         return self.made[k]

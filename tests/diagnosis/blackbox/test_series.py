@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.blackbox import series
-from orchestrator.diagnosis.blackbox.bank import BANK, Effect, Scene
+from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.problem import at_input
 from pyfmu_sources.attachment import SERIES, AttachedEffect
 
@@ -67,6 +67,6 @@ def compare(signal, kind, value, at_rest):
         effect.signal = float(u)
         assert effect.do_step(k * STEP, STEP)
         found.append(effect.result)
-    scene = Scene(STEP, 1.0, 1.0, signal)
-    fitted = at_input(Effect(BANK[f"input_{kind}"], "u", scene, at_rest), signal, STEP, value)
+    scene = Surroundings(STEP, 1.0, 1.0, signal)
+    fitted = at_input(BoxEffect(BANK[f"input_{kind}"], "u", scene, at_rest), signal, STEP, value)
     assert found == pytest.approx(fitted, abs=1e-9)

@@ -24,6 +24,15 @@ def test_a_linear_system_is_realised_from_its_impulse_response():
     assert np.sort_complex(np.linalg.eigvals(found.A)) == pytest.approx(np.sort_complex(np.linalg.eigvals(A)), abs=1e-6)
 
 
+def test_the_surrogate_answers_a_push_as_the_system_does():
+    pushes = np.random.default_rng(1).standard_normal((300, 2))
+    x, rows = np.zeros((2, 2)), []
+    for push in [*pushes, np.zeros(2)]:
+        rows.append(C @ x)
+        x = A @ x + B * push
+    assert realised(impulses(400)).response(pushes, 0) == pytest.approx(np.stack(rows), abs=1e-7)
+
+
 def test_no_response_gives_no_surrogate():
     assert realised(np.zeros((100, 1, 1))).order == 0
 

@@ -1,0 +1,221 @@
+"""The screening: what every start of every effect promises, by linearisation, before any is fitted."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.bank import INPUT, BoxEffect
+from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
+from orchestrator.diagnosis.blackbox.problem import BoxModel, at_input, series_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Promise:
+    """A start of an effect, and what linearisation says that it would gain."""
+
+    effect: BoxEffect
+    values: Array
+    gain: float
+    level: int
+
+
+Trial = tuple[BoxEffect, Array, int]
+"""An effect, its values, and how many of the leading ones are amplitudes."""
+
+
+def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> list[Promise]:
+    """Return what every start of every effect promises on top of a fit, best first.
+
+    Args:
+        fitter: gives the filters and the FMU.
+        effects: all that may act.
+        before: fit of the model before.
+
+    Returns:
+        The promises.
+    """
+    present = {effect.label for effect in before.model.effects}
+    replaced = {f"{effect.kind.needs}@{effect.place}" for effect in before.model.effects}
+    free = [e for e in effects if e.label not in present | replaced and not e.kind.needs]
+    trials: list[Trial] = []
+    models: list[BoxModel] = []
+    found = scanned(fitter, free, before)
+    for effect in free:
+        for start in found.get(effect) or effect.kind.starts(effect.scene):
+            values = np.array(start)
+            amplitudes = _amplitude_count(effect)
+            trials.append((effect, values, amplitudes))
+            for a in range(max(amplitudes, 1)):
+                one = values.copy()
+                if amplitudes > 1:
+                    one[[b for b in range(amplitudes) if b != a]] = 0.0
+                models.append(before.model.extended(effect, one))
+    rows = len(before.y)
+    runs = fitter.problem.simulate(models, rows)
+    columns: list[Array | None] = [None if run is None else (run - before.y) / fitter.problem.noise for run in runs]
+    promises = _promises(fitter, before, trials, columns, rows)
+    near = max(fitter.horizon(before.y), rows // 16)
+    if near < fitter.settings.screen.straight * rows:  # beyond it nothing is linear any more
+        close = _promises(fitter, before, trials, [None if c is None else c[:near] for c in columns], near)
+        promises = [p for pair in itertools.zip_longest(close, promises) for p in pair if p is not None]
+    return promises
+
+
+def scanned(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> dict[BoxEffect, list[tuple[float, ...]]]:
+    """Return, of each effect that asks for a scan, the starts that promise most on the surrogate of the FMU.
+
+    Args:
+        fitter: gives the filters and the surrogate.
+        effects: that are looked through.
+        before: fit of the model before.
+
+    Returns:
+        Starts by effect; none where no surrogate could be found.
+    """
+    own, run = fitter.settings.screen, _Sight(fitter, before)
+    chosen: dict[BoxEffect, list[tuple[float, ...]]] = {}
+    for effect in effects:
+        values = effect.kind.scan(effect.scene)
+        gains = run.gains(effect, values) if values else {}
+        kept: list[int] = []
+        for k in sorted(gains, key=lambda k: -gains[k]):
+            if len(kept) < own.scanned and all(abs(k - other) >= own.apart for other in kept):
+                kept.append(k)
+        for k in kept:
+            edges = values[max(k - 1, 0)], values[min(k + 1, len(values) - 1)]
+            finer = tuple(float(v) for v in np.linspace(*edges, 2 * own.parts + 1))
+            close = run.gains(effect, finer)
+            best = finer[max(close, key=lambda n: close[n])] if close else values[k]
+            chosen.setdefault(effect, []).append(_with(effect, best))
+    return chosen
+
+
+def _with(effect: BoxEffect, value: float) -> tuple[float, ...]:
+    """Return a start of an effect with another last value."""
+    return (*effect.kind.starts(effect.scene)[0][:-1], value)
+
+
+class _Sight:
+    """What effects promise on top of one fit, seen through the surrogate of the FMU."""
+
+    def __init__(self, fitter: Fitter, before: BoxFit) -> None:
+        self._fitter, self._before = fitter, before
+        problem, self._rows = fitter.problem, len(before.y)
+        self._table = problem.table(before.model, series_of(problem, self._rows))
+        self._read = problem.read_finely(before.model, self._rows)
+
+    def gains(self, effect: BoxEffect, values: Sequence[float]) -> dict[int, float]:
+        """Return the gain that each of ``values`` promises, by its place."""
+        fitter, problem = self._fitter, self._fitter.problem
+        at_input = effect.kind.where == INPUT
+        surrogate = problem.input_surrogate() if at_input else fitter.ladder.surrogate
+        if surrogate.order == 0 or self._read is None:
+            return {}
+        efforts = [e for v in values for e in (self._arriving if at_input else self._felt)(effect, v)]
+        pushes = np.stack([e.reshape(self._rows - 1, problem.m).mean(axis=1) for e in efforts], axis=1)
+        name = effect.place if at_input else problem.map.ports[effect.place].input
+        at = problem.runner.inputs.index(name)
+        place = problem.inputs.index(name) if at_input else problem.noise_places.index(at)
+        answers = surrogate.response(pushes / problem.drive([at])[0], place)
+        amplitudes = _amplitude_count(effect)
+        trials = [(effect, np.array(_with(effect, v)), amplitudes) for v in values]
+        columns = [answers[:, :, k] for k in range(answers.shape[2])]
+        found = _promises(fitter, self._before, trials, columns, self._rows, exact=True)
+        places = {v: k for k, v in enumerate(values)}
+        return {places[float(p.values[-1])]: p.gain for p in found}
+
+    def _arriving(self, effect: BoxEffect, value: float) -> list[Array]:
+        """Return what an effect in series changes of its input."""
+        fine = self._table[:, self._fitter.problem.runner.inputs.index(effect.place)]
+        return [at_input(effect, fine, self._fitter.problem.h / self._fitter.problem.m, value) - fine]
+
+    def _felt(self, effect: BoxEffect, value: float) -> list[Array]:
+        """Return the efforts, sine and cosine, of a ripple of this wavenumber over the motion."""
+        problem = self._fitter.problem
+        assert self._read is not None
+        x = self._read[:-1, problem.runner.reads.index(problem.map.ports[effect.place].position)]
+        size = -problem.sign.get(effect.place, 1.0) * effect.kind.starts(effect.scene)[0][0]
+        return [size * np.sin(value * x), size * np.cos(value * x)]
+
+
+def _promises(
+    fitter: Fitter, before: BoxFit, trials: Sequence[Trial], columns: Sequence[Array | None], rows: int,
+    exact: bool = False,
+) -> list[Promise]:  # fmt: skip
+    """Return what each trial promises over the first ``rows``, best first; ``exact``: its values are not scaled."""
+    y, own = before.y[:rows], fitter.settings.screen
+    start = fitter.best_level(y, slice(0, rows))
+    now = fitter.likelihood(fitter.whitened(y, start), start, slice(0, rows)) + before.prior
+    best: dict[int, Promise] = {}
+    usable = [k for k, c in enumerate(columns) if c is not None and np.any(c)]
+    if not usable:
+        return []
+    residual = fitter.problem.residual(y)[:, :, None]
+    block = np.concatenate(
+        [residual, before.J[:rows], np.stack([c for c in (columns[k] for k in usable) if c is not None], axis=2)],
+        axis=2,
+    )
+    count = before.J.shape[2]
+    prior = np.zeros((len(fitter.mean), count))
+    prior[:, : len(fitter.mean)] = np.diag(1.0 / fitter.sd)
+    missing = (fitter.mean - before.model.p) / fitter.sd
+    place = {k: n for n, k in enumerate(usable)}
+    for level in _levels(fitter, start):
+        white = fitter.ladder[level].whiten(block).reshape(-1, block.shape[2])
+        e = np.concatenate([white[:, 0], missing])
+        J = np.concatenate([white[:, 1 : 1 + count], prior])
+        D = np.concatenate([white[:, 1 + count :], np.zeros((len(missing), len(usable)))])
+        Q, R = np.linalg.qr(J / np.maximum(np.sqrt(np.sum(J * J, axis=0)), 1e-300))
+        Q = Q[:, np.abs(np.diag(R)) > 1e-9]
+        e = e - Q @ (Q.T @ e)
+        D = D - Q @ (Q.T @ D)
+        log_det = float(np.sum(fitter.ladder[level].half_log[:rows]))
+        at = 0
+        for n, (effect, values, amplitudes) in enumerate(trials):
+            mine = [place[at + a] for a in range(max(amplitudes, 1)) if at + a in place]
+            at += max(amplitudes, 1)
+            if len(mine) < max(amplitudes, 1):
+                continue
+            bounds = (own.smallest if effect.kind.shrinks else own.least, own.most)
+            bounds = (1.0 - own.exact, 1.0 + own.exact) if exact else bounds
+            explained, c = _regressed(e, D[:, mine], amplitudes > 0, bounds)
+            gain = -0.5 * (float(e @ e) - explained) - log_det - now
+            if n not in best or gain > best[n].gain:
+                found = values.copy()
+                if amplitudes:
+                    found[:amplitudes] = values[:amplitudes] * c
+                elif effect.kind.shrinks and c[0] < own.least and not exact:
+                    found[0] = values[0] * c[0]
+                best[n] = Promise(effect, found, gain, level)
+    return sorted(best.values(), key=lambda promise: promise.gain, reverse=True)
+
+
+def _levels(fitter: Fitter, now: int) -> list[int]:
+    ladder = fitter.ladder
+    lower = [k for k in range(ladder.size) if ladder.colour(k) == 0.0 and ladder.share(k) < ladder.share(now)]
+    return sorted({now, 0, *lower[1::3], *lower[-1:]})
+
+
+def _amplitude_count(effect: BoxEffect) -> int:
+    """Return in how many of its leading values the response to an effect is linear."""
+    if effect.kind.linear:
+        return len(effect.kind.parameters)
+    return {"coulomb_friction": 1, "ripple": 2}.get(effect.kind.name, 0)
+
+
+def _regressed(e: Array, D: Array, free: bool, bounds: tuple[float, float]) -> tuple[float, Array]:
+    """Return what columns explain of ``|e|^2``, and their factors; those of a finite size are close to 1."""
+    if not free:
+        size = float(D[:, 0] @ D[:, 0])
+        c = float(np.clip(D[:, 0] @ e / size, *bounds)) if size > 0.0 else 1.0
+        return float(2.0 * c * (D[:, 0] @ e) - c * c * size), np.array([c])
+    N = D.T @ D
+    scale = np.sqrt(np.maximum(np.diag(N), 1e-300))
+    g = D.T @ e / scale
+    found = np.linalg.pinv(N / scale / scale[:, None], rcond=1e-8) @ g
+    return float(found @ g), found / scale
