@@ -30,10 +30,13 @@ _STAMP = re.compile(rb'<Build fingerprint="([0-9a-f]{64})"')
 def default_directory() -> Path:
     """Return where FMUs live: ``fmus/`` of the repository; of an installed package, ``fmus/`` in the current folder.
 
+    A repository that the user cannot write is an installed package, too.
+
     Returns:
         The folder, which may not exist yet.
     """
-    return ROOT / "fmus" if (ROOT / "pyproject.toml").exists() else Path("fmus")
+    beside = ROOT / "fmus"
+    return beside if (ROOT / "pyproject.toml").exists() and os.access(beside, os.W_OK) else Path("fmus")
 
 
 def ensure_built(

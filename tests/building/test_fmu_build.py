@@ -252,3 +252,9 @@ def test_binaries_for_linux_and_windows_are_inside(fmus: dict[str, Path]) -> Non
     assert "binaries/linux64/Drivetrain.so" in names
     assert "binaries/win64/Drivetrain.dll" in names
     assert "resources/pythonfmu/__init__.py" not in names
+
+
+def test_in_a_source_tree_that_cannot_be_written_fmus_go_to_the_current_folder(monkeypatch):
+    assert build.default_directory() == build.ROOT / "fmus"
+    monkeypatch.setattr(build.os, "access", lambda path, mode: False)
+    assert build.default_directory() == Path("fmus")

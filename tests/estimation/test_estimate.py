@@ -18,6 +18,8 @@ from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.protocol import METHODS, NotApplicableError, estimator
 from orchestrator.records.model_file import default_model, read_model
 from orchestrator.records.record import Record, record_from_columns
+from orchestrator.shared.results import as_plain, read
+from orchestrator.shared.results.estimate import EstimateFound
 from pyfmu_sources.drivetrain_parameters import DEFAULTS, with_values
 from tests.support.independent_plant import make_record, write_csv
 from tests.support.online_loop import run_case
@@ -222,7 +224,8 @@ def test_limits_that_show_nothing_are_told(tmp_path: Path, capsys: pytest.Captur
     shown = capsys.readouterr().out
     assert "not seen" in shown
     assert "No excitation within these limits shows a half-gap of 0.005 rad: raise `--torque-limit`" in shown
-    assert json.loads((tmp_path / "out" / "estimate.json").read_text())["results"]["design"] == []
+    results = json.loads((tmp_path / "out" / "estimate.json").read_text())["results"]
+    assert results == {"schema_version": 1, "design": []}
 
 
 @pytest.fixture(scope="module")
@@ -236,6 +239,7 @@ def test_the_command_writes_everything(csv_file: Path, tmp_path: Path, capsys: p
     assert main(["estimate", str(csv_file), "--method", "all", "--out", str(tmp_path / "out")]) == 0
     document = json.loads((tmp_path / "out" / "estimate.json").read_text())
     results = document["results"]
+    assert json.loads(json.dumps(as_plain(read(results, EstimateFound)))) == results
     assert document["command"] == "estimate"
     assert results["method"] == "maximum_likelihood"
     assert results["alpha"] == pytest.approx(0.02, rel=0.02)

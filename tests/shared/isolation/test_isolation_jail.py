@@ -30,7 +30,7 @@ def nothing_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     place.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(place))
     yield
-    assert not list(place.iterdir())
+    assert not [p.name for p in place.iterdir() if "-cache-" not in p.name]  # without a home, until the process ends
 
 
 def test_answers_come_back_with_their_types() -> None:
