@@ -1,8 +1,10 @@
 """Sweeps: many sizes, noise levels and seeds of the paired loops."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,6 @@ from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import Calibration
 from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.figures import draw_errors, draw_estimates, draw_pair
 from orchestrator.paired.metric import ErrorStatistics, trust_of_sweep
 from orchestrator.paired.pair import run_pair, with_settings
 from orchestrator.paired.settings import MapSettings
@@ -86,6 +87,8 @@ class SweepResult(AnySweepResult):
         Args:
             path: a PNG, SVG or PDF file.
         """
+        from orchestrator.paired.figures import draw_estimates
+
         a = self.arrays
         title = f"Estimated half-gap with 95 % intervals ({self.plan.experiment.name} experiment)"
         draw_estimates(Path(path), a.actual, a.estimate, a.lower, a.upper, a.noise, title)
@@ -160,6 +163,8 @@ class SweepResult(AnySweepResult):
         if not len(a.actual):
             return
         name = plan.experiment.name
+        from orchestrator.paired.figures import draw_errors, draw_pair
+
         self.plot(folder / "estimates.png")
         draw_errors(folder / "errors.png", a.actual, a.estimate, a.noise, f"Error against size ({name} experiment)")
         middle = float(np.sort(a.actual)[len(a.actual) // 2])
@@ -223,8 +228,10 @@ def sweep(
     plan = SweepPlan(chosen, text, levels, seeds, seed, words, count)
     cases = plan.cases()
     if tell is not None:
-        tell("preparing FMUs, compiled loop and calibration (the first time takes half a minute)")
-    builds = ensure_fastest(FMUS)
+        tell("preparing FMUs, compiled loop and calibration (the first time: half a minute without a C compiler)")
+    with ThreadPoolExecutor(1) as pool:  # figures take half a second to import: while the compiler runs
+        pool.submit(import_module, "orchestrator.paired.figures")
+        builds = ensure_fastest(FMUS)
     fmus = builds.paths
     check_parameters(loop_system(plan.experiment, fmus, (MACHINE,)), cases, OWN_PARAMETERS)
     calibrations = plan.calibrations(tell, calibrated)

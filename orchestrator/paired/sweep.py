@@ -17,7 +17,7 @@ from orchestrator.engine.cases import Value
 from orchestrator.engine.grid import MAX_CASES
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import DEFAULT_SETTINGS, Calibration, GapMap, load_or_calibrate
-from orchestrator.paired.cosimulation import LoopSession
+from orchestrator.paired.cosimulation import LoopSession, LoopValues, loop_values
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, difference_sum, error_statistics
 from orchestrator.paired.pair import with_settings
@@ -116,7 +116,7 @@ def sweep_work(plan: SweepPlan, fmus: Mapping[str, Path], calibrations: Mapping[
         prepare=_prepare,
         run=_run,
         columns=COLUMNS,
-        payload=(plan.experiment, dict(calibrations)),
+        payload=(plan.experiment, loop_values(plan.experiment), dict(calibrations)),
         files=dict(fmus),
         definition={
             "experiment": asdict(plan.experiment),
@@ -134,9 +134,9 @@ class _Prepared:
     maps: Mapping[float, GapMap]
 
 
-def _prepare(payload: tuple[Experiment, dict[float, Calibration]], files: Mapping[str, Path]) -> _Prepared:
-    experiment, calibrations = payload
-    session = LoopSession(experiment, files, ("theta_l_hat",))
+def _prepare(payload: tuple[Experiment, LoopValues, dict[float, Calibration]], files: Mapping[str, Path]) -> _Prepared:
+    experiment, values, calibrations = payload
+    session = LoopSession(experiment, files, ("theta_l_hat",), values)
     maps = {level: GapMap(calibration) for level, calibration in calibrations.items()}
     return _Prepared(session, session.run(0.0)["theta_l_hat"].copy(), experiment, maps)
 
