@@ -18,6 +18,7 @@ from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, Machin
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import LONGEST_STEP, own_frequency
 from orchestrator.records.record import MINIMUM_ROWS
+from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound
 
 DEFAULT_SIZE = 0.005  # rad
 # Least and largest value of each argument: rad, N.m, rad/s, s, Hz.
@@ -95,21 +96,17 @@ class DesignResult(Result):
         duration = float(self.arguments["duration"])
         return [table(f"To see a half-gap of {self.size:g} rad in {duration:g} s", head, rows)]
 
-    def entries(self) -> list[dict[str, Any]]:
+    def entries(self) -> tuple[ExcitationFound, ...]:
         """List the candidates that see anything, as ``estimate.json`` does.
 
         Returns:
             Name, bound [rad], peak torque [N.m] and peak motor speed [rad/s] of each.
         """
-        return [
-            {"name": c.name, "bound": c.bound, "peak_torque": c.torque, "peak_motor_speed": c.speed}
-            for c in self.candidates
-            if c.bound < UNSEEN
-        ]
+        return tuple(ExcitationFound(c.name, c.bound, c.torque, c.speed) for c in self.candidates if c.bound < UNSEEN)
 
-    def results(self, place: Path | None = None) -> dict[str, Any]:
+    def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says of the design."""
-        return {"design": self.entries()}
+        return EstimateFound(design=self.entries())
 
     def write_files(self, folder: Path) -> None:
         """Write ``design.csv`` and ``design.png``."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar, overload
 
 import msgspec
+from msgspec import UNSET
 
 from orchestrator.api.any_fmu import FmuDiagnosisResult, diagnose_fmu
 from orchestrator.api.arguments import chosen_settings
@@ -28,7 +29,7 @@ from orchestrator.diagnosis.figures import (
     draw_missing,
     draw_signals,
 )
-from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Named
+from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Named, step_found
 from orchestrator.diagnosis.proof.corrected import BeforeAfter, before_and_after, build_corrected, fmu_name
 from orchestrator.diagnosis.proof.model_text import corrected_model
 from orchestrator.diagnosis.proof.other_record import STAGES, Validation, torque_errors, unharmed
@@ -41,6 +42,7 @@ from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
+from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound, ValidatedFound
 from orchestrator.shared.trust import Trust
 
 SHOWN = 5
@@ -184,23 +186,19 @@ class DiagnosisResult(Result):
         """Return the summary, and the tables of candidates, misfit and what else was seen."""
         return [*self.summary(), *_tables(self)]
 
-    def results(self, place: Path) -> dict[str, Any]:
+    def results(self, place: Path) -> DiagnoseFound:
         """Return what ``diagnose.json`` says; the corrected FMU is in ``place``."""
-        found = self.diagnosis.as_json() | {"model": str(place / self.fmu_name)}
-        found["cosimulation"] = {"largest_difference_from_compiled": self.runs.difference, "unit": "rad"}
-        errors: dict[str, Any] = {"record": dict(self.torque_error)} if self.torque_error else {}
-        if self.validation is not None:
-            found["validation"] = _signals(self.validation)
-            if self.validation.torque_error:
-                errors["validation"] = self.validation.torque_error
-        if errors:
-            found["torque_error"] = errors
-        found["also_seen"] = [described_term(term, self.diagnosis) for term in self.evidence.terms]
-        found["live"] = corrected_live(self.diagnosis, self.runs)
-        found["told"] = list(told(self.diagnosis))
-        found["trust"] = self.trust.as_json()
-        found["seconds"] = self.seconds
-        return found
+        return msgspec.structs.replace(
+            self.diagnosis.found(),
+            model=str(place / self.fmu_name),
+            cosimulation=DifferenceFound(self.runs.difference, "rad"),
+            validation=UNSET if self.validation is None else _signals(self.validation),
+            torque_error=_torque_errors(self) or UNSET,
+            also_seen=tuple(described_term(term, self.diagnosis) for term in self.evidence.terms),
+            live=corrected_live(self.diagnosis, self.runs),
+            told=tuple(told(self.diagnosis)),
+            seconds=self.seconds,
+        )
 
     @property
     def fmu_name(self) -> str:
@@ -327,31 +325,33 @@ def comparable_record(given: Record | Path | str, model: Model, settings: Diagno
     return record
 
 
-def _signals(found: Validation) -> dict[str, Any]:
+def _signals(found: Validation) -> dict[str, ValidatedFound]:
     return {
-        misfit.signal: {
-            "before": misfit.before,
-            "after": misfit.after,
-            "noise": misfit.noise,
-            "unit": misfit.unit,
-            "r_squared": {name: values[n] for name, values in found.r_squared.items()},
-        }
-        for n, misfit in enumerate(found.misfit)
+        one.signal: ValidatedFound(
+            one.before, one.after, one.noise, one.unit, {name: values[n] for name, values in found.r_squared.items()}
+        )
+        for n, one in enumerate(found.misfit)
     }
+
+
+def _torque_errors(found: DiagnosisResult) -> dict[str, dict[str, float]]:
+    """Return the inverse models' relative torque errors by record; empty for plants without one."""
+    by_record = {"record": found.torque_error, "validation": found.validation and found.validation.torque_error}
+    return {name: dict(errors) for name, errors in by_record.items() if errors}
 
 
 def _tables(found: DiagnosisResult) -> Iterator[Block]:
     diagnosis, unit = found.diagnosis, found.misfit[0].unit
     rows = [
         [
-            ", ".join(step["on_top_of"]) or "parameters",
-            tried["effect"],
-            f"{tried['gain']:.1f}",
-            f"{tried['decided']:.1f}",
-            "added" if step["accepted"] and n == 0 else "",
+            ", ".join(step.on_top_of) or "parameters",
+            tried.effect,
+            f"{tried.gain:.1f}",
+            f"{tried.decided:.1f}",
+            "added" if step.accepted and n == 0 else "",
         ]
-        for step in diagnosis.as_json()["candidates"]
-        for n, tried in enumerate(step["tried"][:SHOWN])
+        for step in map(step_found, diagnosis.workings.steps)
+        for n, tried in enumerate(step.tried[:SHOWN])
     ]
     if rows:
         yield table("Candidates", ("on top of", "effect", "gain", "of it on deciding part", ""), rows)
@@ -359,16 +359,14 @@ def _tables(found: DiagnosisResult) -> Iterator[Block]:
     yield table("Misfit on held-out data", ("signal", "model", f"rms [{unit}]", "times noise"), rows)
     yield from of_each_record(diagnosis)
     yield from also_seen([described_term(term, diagnosis) for term in found.evidence.terms])
-    errors: dict[str, Mapping[str, float]] = {"record": found.torque_error} if found.torque_error else {}
     if found.validation is not None:
-        signals = _signals(found.validation)
-        rows = [[name, f"{g['before']:.4g}", f"{g['after']:.4g}", f"{g['noise']:.4g}"] for name, g in signals.items()]
+        misfits, fits = found.validation.misfit, found.validation.r_squared
+        rows = [[m.signal, f"{m.before:.4g}", f"{m.after:.4g}", f"{m.noise:.4g}"] for m in misfits]
         head = ("signal", *(f"{name} [{unit}]" for name in ("before", "after", "noise")))
         yield table("Misfit on the other record", head, rows)
-        rows = [[name, *(f"{g['r_squared'][stage]:.4f}" for stage in STAGES)] for name, g in signals.items()]
+        rows = [[m.signal, *(f"{fits[stage][n]:.4f}" for stage in STAGES)] for n, m in enumerate(misfits)]
         yield table("R2 of one free run over all of the other record", ("signal", *STAGES), rows)
-        if found.validation.torque_error:
-            errors["validation"] = found.validation.torque_error
+    errors = _torque_errors(found)
     if errors:
         rows = [[name, *(f"{100.0 * of[stage]:.2f} %" for stage in STAGES)] for name, of in errors.items()]
         yield table("Relative torque error of the inverse model", ("on", *STAGES), rows)

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
+import msgspec
+
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.diagnose import DiagnosisResult
 from orchestrator.api.diagnose import diagnose as find_missing
@@ -28,6 +30,7 @@ from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
+from orchestrator.shared.results.estimate import EstimateFound, MethodFound, RepeatsFound
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Level, Trust
 
@@ -163,26 +166,26 @@ class EstimateResult(Result):
         floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_beside(self.estimates)}"]
         return [table(title, HEAD, rows), *sizes, *floor, *messages, *doubts, *unfit, *missing]
 
-    def results(self, place: Path | None = None) -> dict[str, Any]:
+    def results(self, place: Path | None = None) -> EstimateFound:
         """Return what ``estimate.json`` says."""
         entries = {m.method: method_entry(m) for m in self.methods}
-        r = self.record
-        found: dict[str, Any] = {"record": described(r), "estimates": entries}
-        if self.more:
-            found["more_records"] = [described(other) for other in self.more]
-        if self.repeats is not None:
-            found["repeats"] = {"sources": list(self.repeats.sources), "floor": self.repeats.floor, "unit": "rad"}
-        if self.estimates:
-            found |= entries[self.best.method] | {"method": self.best.method}
-            found["play"] = self._play().as_json()
+        r, repeats = self.record, self.repeats
         fit = next((e for e in self.estimates if e.method == "maximum_likelihood"), None)
-        if fit is not None and not r.missing:
-            found["live"] = fitted_live(r, fit)
-        if self.diagnosis is not None:
-            found["diagnosis"] = self.diagnosis.results((place or Path()) / DIAGNOSIS)
-        if self.undiagnosed:
-            found["undiagnosed"] = self.undiagnosed
-        return found | {"trust": self.trust.as_json(), "settings": as_tables(self.settings)}
+        best = entries[self.best.method] if self.estimates else MethodFound()
+        answer = msgspec.structs.asdict(best) | {"trust": self.trust.found()}
+        return EstimateFound(
+            **answer,
+            record=described(r),
+            estimates=entries,
+            more_records=tuple(described(other) for other in self.more) or None,
+            repeats=None if repeats is None else RepeatsFound(repeats.sources, repeats.floor),
+            method=self.best.method if self.estimates else None,
+            play=self._play().found() if self.estimates else None,
+            live=None if fit is None or r.missing else fitted_live(r, fit),
+            diagnosis=None if self.diagnosis is None else self.diagnosis.results((place or Path()) / DIAGNOSIS),
+            undiagnosed=self.undiagnosed or None,
+            settings=as_tables(self.settings),
+        )
 
     def write_diagnosis(self, folder: Path, place: Path) -> None:
         """Write the diagnosis, if there is one, as a folder of its own.

@@ -1,12 +1,10 @@
 """What result files say for pages that simulate: the model, and from where on it runs beside the record."""
 
-from typing import Any
-
 from orchestrator.diagnosis.outcome import Diagnosis
 from orchestrator.diagnosis.proof.corrected import BeforeAfter, start_values
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
-from orchestrator.shared.results import LiveFound, as_plain
+from orchestrator.shared.results import LiveFound
 from pyfmu_sources.drivetrain_parameters import PARAMETERS
 
 SPAN = 2.0
@@ -15,7 +13,7 @@ LEAST_ROWS = 100
 STARTS = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
 
 
-def corrected_live(diagnosis: Diagnosis, runs: BeforeAfter) -> dict[str, Any]:
+def corrected_live(diagnosis: Diagnosis, runs: BeforeAfter) -> LiveFound:
     """Return the corrected model and the starts of its runs over the held-out part.
 
     Args:
@@ -23,14 +21,14 @@ def corrected_live(diagnosis: Diagnosis, runs: BeforeAfter) -> dict[str, Any]:
         runs: over its held-out part.
 
     Returns:
-        A ``LiveFound`` as JSON has it.
+        What a page needs to simulate it.
     """
     w = diagnosis.workings
     values = start_values(w.plant, w.final.p)
-    return dict(as_plain(LiveFound(w.plant.name, w.likelihood.signals.h, values, list(runs.rows), list(runs.starts))))
+    return LiveFound(w.plant.name, w.likelihood.signals.h, values, list(runs.rows), list(runs.starts))
 
 
-def fitted_live(record: Record, fit: Estimate) -> dict[str, Any]:
+def fitted_live(record: Record, fit: Estimate) -> LiveFound:
     """Return the fitted model, which starts anew from the fitted states every two seconds.
 
     Args:
@@ -38,7 +36,7 @@ def fitted_live(record: Record, fit: Estimate) -> dict[str, Any]:
         fit: by ``maximum_likelihood``.
 
     Returns:
-        A ``LiveFound`` as JSON has it.
+        What a page needs to simulate it.
     """
     rows = list(range(0, record.size - 1, max(round(SPAN / record.step), LEAST_ROWS)))
     states, p = fit.curves["states"], fit.curves["model"]
@@ -48,4 +46,4 @@ def fitted_live(record: Record, fit: Estimate) -> dict[str, Any]:
         for entry, value in zip(PARAMETERS, p, strict=True)
         if value != entry.default
     }
-    return dict(as_plain(LiveFound("Drivetrain", record.step, values, rows, starts)))
+    return LiveFound("Drivetrain", record.step, values, rows, starts)

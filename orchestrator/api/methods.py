@@ -2,10 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from orchestrator.estimation.protocol import LEVEL, Estimate
 from orchestrator.records.record import Record
+from orchestrator.shared.results.estimate import MethodFound, RecordFound
 from orchestrator.shared.trust import Trust
 
 HEAD = ("method", "half-gap [rad]", "trust", "95 % interval", "standard error", "Cramer-Rao")
@@ -32,7 +32,7 @@ class MethodResult:
     trust: Trust | None = None
 
 
-def described(record: Record) -> dict[str, Any]:
+def described(record: Record) -> RecordFound:
     """Return rows, step, source of a record, and what was detected and assumed when it was read.
 
     Args:
@@ -41,8 +41,7 @@ def described(record: Record) -> dict[str, Any]:
     Returns:
         The entry of ``estimate.json``.
     """
-    entry: dict[str, Any] = {"rows": record.size, "step": record.step, "source": record.source}
-    return entry | {"missing": record.missing, "notes": list(record.notes)}
+    return RecordFound(record.size, record.step, record.source, record.missing, tuple(record.notes))
 
 
 def method_row(result: MethodResult) -> list[str]:
@@ -66,7 +65,7 @@ def _word(result: MethodResult) -> str:
     return "" if result.trust is None else result.trust.level.word
 
 
-def method_entry(result: MethodResult) -> dict[str, Any]:
+def method_entry(result: MethodResult) -> MethodFound:
     """Return what ``estimate.json`` says of a method.
 
     Args:
@@ -77,17 +76,17 @@ def method_entry(result: MethodResult) -> dict[str, Any]:
     """
     estimate = result.estimate
     if estimate is None:
-        return {"not_applicable": result.reason}
-    return {
-        "alpha": estimate.alpha,
-        "standard_error": estimate.standard_error,
-        "cramer_rao": result.bound,
-        "interval": list(estimate.interval),
-        "level": LEVEL,
-        "unit": "rad",
-        "visible": estimate.visible,
-        "message": estimate.message,
-        "trust": None if result.trust is None else result.trust.as_json(),
-        "seconds": result.seconds,
-        "diagnostics": dict(estimate.diagnostics),
-    }
+        return MethodFound(not_applicable=result.reason)
+    return MethodFound(
+        alpha=estimate.alpha,
+        standard_error=estimate.standard_error,
+        cramer_rao=result.bound,
+        interval=estimate.interval,
+        level=LEVEL,
+        unit="rad",
+        visible=estimate.visible,
+        message=estimate.message,
+        trust=None if result.trust is None else result.trust.found(),
+        seconds=result.seconds,
+        diagnostics=dict(estimate.diagnostics),
+    )

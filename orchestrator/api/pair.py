@@ -134,8 +134,8 @@ class PairResult(Result):
         return PairFound(
             alpha=self.alpha,
             play={
-                "actual": self._play(self.alpha).as_json(),
-                "estimated": None if self.estimate is None else self._play(self.estimate.alpha).as_json(),
+                "actual": self._play(self.alpha).found(),
+                "estimated": None if self.estimate is None else self._play(self.estimate.alpha).found(),
             },
             S=self.total,
             estimate=None if self.estimate is None else GapFound(**asdict(self.estimate)),

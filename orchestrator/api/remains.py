@@ -1,14 +1,14 @@
 """What a diagnosis leaves at the motor, and what it follows: for ``diagnose.json`` and for the terminal."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from orchestrator.api.shown import Block, table
 from orchestrator.diagnosis.outcome import Diagnosis
 from orchestrator.diagnosis.verdict.evidence import Term
+from orchestrator.shared.results.diagnose import TermFound
 
 
-def described_term(term: Term, diagnosis: Diagnosis) -> dict[str, Any]:
+def described_term(term: Term, diagnosis: Diagnosis) -> TermFound:
     """Return one of them as ``diagnose.json`` has it.
 
     Args:
@@ -19,19 +19,19 @@ def described_term(term: Term, diagnosis: Diagnosis) -> dict[str, Any]:
         Name, period, size and gain, with their units.
     """
     metric = diagnosis.misfit[0].unit == "m"
-    return {
-        "name": term.name,
-        "period": None if term.period is None else 1e3 * term.period if metric else term.period,
-        "period_unit": "mm" if metric else "rad",
-        "size": term.size,
-        "unit": "N" if metric else "N.m",
-        "gain": term.gain,
-        "level": term.level,
-        "sure": term.sure,
-    }
+    return TermFound(
+        name=term.name,
+        period=None if term.period is None else 1e3 * term.period if metric else term.period,
+        period_unit="mm" if metric else "rad",
+        size=term.size,
+        unit="N" if metric else "N.m",
+        gain=term.gain,
+        level=term.level,
+        sure=term.sure,
+    )
 
 
-def also_seen(terms: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
+def also_seen(terms: Sequence[TermFound]) -> Iterator[Block]:
     """Yield the table of what the final model leaves that chance does not explain.
 
     Args:
@@ -42,14 +42,14 @@ def also_seen(terms: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
     """
     rows = [
         [
-            term["name"],
-            "" if term["period"] is None else f"{term['period']:.4g} {term['period_unit']}",
-            f"{term['size']:.3g} {term['unit']}",
-            f"{term['gain']:.0f}",
-            f"{term['gain'] / term['level']:.0f}",
+            term.name,
+            "" if term.period is None else f"{term.period:.4g} {term.period_unit}",
+            f"{term.size:.3g} {term.unit}",
+            f"{term.gain:.0f}",
+            f"{term.gain / term.level:.0f}",
         ]
         for term in terms
-        if term["sure"]
+        if term.sure
     ]
     if rows:
         columns = ("what", "period", "size", "gain", "times that of any period")

@@ -1,8 +1,10 @@
 """Sweeps: many sizes, noise levels and seeds of the paired loops."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +25,9 @@ from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import Calibration
 from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.figures import draw_errors, draw_estimates, draw_pair
 from orchestrator.paired.metric import ErrorStatistics, trust_of_sweep
 from orchestrator.paired.pair import run_pair, with_settings
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sweep import OWN_PARAMETERS, SweepArrays, SweepPlan, gather, sweep_work
 from orchestrator.scenarios.sweep import check_parameters
 from orchestrator.shared.play import Play
@@ -86,6 +87,8 @@ class SweepResult(AnySweepResult):
         Args:
             path: a PNG, SVG or PDF file.
         """
+        from orchestrator.paired.figures import draw_estimates
+
         a = self.arrays
         title = f"Estimated half-gap with 95 % intervals ({self.plan.experiment.name} experiment)"
         draw_estimates(Path(path), a.actual, a.estimate, a.lower, a.upper, a.noise, title)
@@ -144,9 +147,9 @@ class SweepResult(AnySweepResult):
             cases=len(self.cases),
             failed=self.failed,
             columns=self.columns(),
-            play={word: play.as_json() for word, play in self._plays().items()},
+            play={word: play.found() for word, play in self._plays().items()},
             statistics=[ErrorsFound(noise=level, **asdict(s)) for level, s in self.statistics.items()],
-            trust=self.trust.as_json(),
+            trust=self.trust.found(),
             experiment=asdict(self.plan.experiment),
             calibrations={f"{level:g}": _provenance(c) for level, c in self.calibrations.items()},
             fmus={name: file_hash(path) for name, path in self.fmus.items()},
@@ -160,6 +163,8 @@ class SweepResult(AnySweepResult):
         if not len(a.actual):
             return
         name = plan.experiment.name
+        from orchestrator.paired.figures import draw_errors, draw_pair
+
         self.plot(folder / "estimates.png")
         draw_errors(folder / "errors.png", a.actual, a.estimate, a.noise, f"Error against size ({name} experiment)")
         middle = float(np.sort(a.actual)[len(a.actual) // 2])
@@ -178,7 +183,7 @@ def sweep(
     samples: int | None = None,
     experiment: str | Experiment = "default",
     backlash_model: str | None = None,
-    settings: CalibrationSettings | Path | str | None = None,
+    settings: MapSettings | Path | str | None = None,
     options: RunOptions | None = None,
     tell: Callable[[str], None] | None = None,
     **more: Any,
@@ -216,15 +221,17 @@ def sweep(
     options = options or RunOptions(**more)
     levels = _levels(noise)
     words = varied(vary)
-    calibrated = chosen_settings(settings, CalibrationSettings)
+    calibrated = chosen_settings(settings, MapSettings)
     text = sizes if isinstance(sizes, str) else ",".join(repr(float(size)) for size in sizes)
     count = draws_of(samples, words, text)
     chosen = chosen_experiment(experiment, backlash_model)
     plan = SweepPlan(chosen, text, levels, seeds, seed, words, count)
     cases = plan.cases()
     if tell is not None:
-        tell("preparing FMUs, compiled loop and calibration (the first time takes half a minute)")
-    builds = ensure_fastest(FMUS)
+        tell("preparing FMUs, compiled loop and calibration (the first time: half a minute without a C compiler)")
+    with ThreadPoolExecutor(1) as pool:  # figures take half a second to import: while the compiler runs
+        pool.submit(import_module, "orchestrator.paired.figures")
+        builds = ensure_fastest(FMUS)
     fmus = builds.paths
     check_parameters(loop_system(plan.experiment, fmus, (MACHINE,)), cases, OWN_PARAMETERS)
     calibrations = plan.calibrations(tell, calibrated)

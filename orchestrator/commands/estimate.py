@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
@@ -35,6 +36,7 @@ from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.reporting import write_report
 from orchestrator.shared.output import staged, write_result
+from orchestrator.shared.results.estimate import EstimateFound
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
     if args.design:
         check_design(model, args.size, **options)
     with staged(args.out) as folder:
-        results: dict[str, Any] = {}
+        results = EstimateFound()
         blocks: list[Block] = []
         found: EstimateResult | None = None
         if records:
@@ -156,7 +158,7 @@ def run(args: argparse.Namespace) -> int:
                     "`--speed-limit` or `--duration`"
                 )
             plan.write_files(folder)
-            results |= plan.results()
+            results = msgspec.structs.replace(results, design=plan.entries())
         given = {"record": str(args.records[0]) if args.records else None}
         given |= {k: _plain(v) for k, v in vars(args).items() if k not in ("run", "command")}
         write_result(folder, "estimate", given, None, results)

@@ -1,7 +1,6 @@
 """What a diagnosis says: plain immutable values, with their form in ``diagnose.json``."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +14,28 @@ from orchestrator.diagnosis.verdict.where import Missing, Place
 from orchestrator.plants.description import Plant
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
+from orchestrator.shared.results.diagnose import (
+    AnalysisFound,
+    DiagnoseFound,
+    EffectFound,
+    EvidenceFound,
+    FloorFound,
+    HorizonFound,
+    LearnedFound,
+    MisfitFound,
+    ParameterFound,
+    PlaceFound,
+    PredictableFound,
+    RemainderFound,
+    StageFound,
+    StepFound,
+    TriedFound,
+    ValueFound,
+)
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Trust
 
 Array = NDArray[np.float64]
-
-SCHEMA_VERSION = 2  # of the results in diagnose.json
 
 
 @dataclass(frozen=True)
@@ -154,15 +169,15 @@ class Diagnosis:
     effects: tuple[Named, ...]
     suspects: tuple[Named, ...]
     nuisances: tuple[Named, ...]
-    parameters: dict[str, dict[str, Any]]
+    parameters: dict[str, ParameterFound]
     where: tuple[Place, ...]
     misfit: tuple[Misfit, ...]
     remainder: Remainder
     warnings: tuple[str, ...]
     corrected: dict[str, float]
     trust: Trust
-    horizons: list[dict[str, Any]]
-    analysis: dict[str, Any]
+    horizons: tuple[HorizonFound, ...]
+    analysis: AnalysisFound
     settings: DiagnosisSettings
     workings: Workings = field(repr=False)
     records: tuple[RecordEvidence, ...] = ()
@@ -177,112 +192,102 @@ class Diagnosis:
             return None
         return Play(gap.parameters["alpha"].value, self.workings.plant.ratio(self.workings.final.p))
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the results for ``diagnose.json`` (``model`` is filled in by the command).
+    def found(self) -> DiagnoseFound:
+        """Return the results for ``diagnose.json``, as far as the diagnosis knows them.
 
         Returns:
-            Plain data.
+            The results without the corrected FMU and what follows from it.
         """
-        return {
-            "schema_version": SCHEMA_VERSION,
-            "verdict": self.verdict,
-            "effects": [_named(effect) for effect in self.effects],
-            "play": self.play and self.play.as_json(),
-            "nuisances": [_named(nuisance) for nuisance in self.nuisances],
-            "parameters": self.parameters,
-            "where": [
-                {
-                    "signal": place.signal,
-                    "regime": place.regime,
-                    "interval": [*place.interval],
-                    "unit": place.unit,
-                    "share_of_misfit": place.share,
-                }
-                for place in self.where
-            ],
-            "misfit": _misfits(self.misfit),
-            "records": [
-                {"source": one.source, "rows": one.rows, "misfit": _misfits(one.misfit)} for one in self.records
-            ],
-            "repeats": self.repeats and {"sources": [*self.repeats.sources], "floor": self.repeats.floor},
-            "learned_law": self.learned and _learned(self.learned),
-            "horizons": self.horizons,
-            "analysis": self.analysis,
-            "trust": self.trust.as_json(),
-            "model": None,
-            "suspects": [_named(effect) for effect in self.suspects],
-            "warnings": list(self.warnings),
-            "remainder": {
-                "explained": min(self.remainder.explained, 1.0),
-                "missing_log_likelihood": self.remainder.missing,
-                "growth": self.remainder.growth,
-                "tails": self.remainder.tails,
-                "predictable": [
-                    {"site": p.site, "kind": p.kind, "gain": p.gain, "share": p.share}
-                    for p in self.remainder.predictable[:5]
-                ],
-            },
-            "settings": as_tables(self.settings),
-            "candidates": [_step(step) for step in self.workings.steps],
-        }
+        left = self.remainder
+        return DiagnoseFound(
+            verdict=self.verdict,
+            effects=_named(self.effects),
+            play=None if self.play is None else self.play.found(),
+            nuisances=_named(self.nuisances),
+            parameters=self.parameters,
+            where=tuple(PlaceFound(p.signal, p.regime, p.interval, p.unit, p.share) for p in self.where),
+            misfit=_misfits(self.misfit),
+            records=tuple(EvidenceFound(one.source, one.rows, _misfits(one.misfit)) for one in self.records),
+            repeats=None if self.repeats is None else FloorFound(self.repeats.sources, self.repeats.floor),
+            learned_law=None if self.learned is None else _learned(self.learned),
+            horizons=self.horizons,
+            analysis=self.analysis,
+            trust=self.trust.found(),
+            suspects=_named(self.suspects),
+            warnings=self.warnings,
+            remainder=RemainderFound(
+                explained=min(left.explained, 1.0),
+                missing_log_likelihood=left.missing,
+                growth=left.growth,
+                tails=left.tails,
+                predictable=tuple(PredictableFound(p.site, p.kind, p.gain, p.share) for p in left.predictable[:5]),
+            ),
+            settings=as_tables(self.settings),
+            candidates=tuple(step_found(step) for step in self.workings.steps),
+        )
 
 
-def _learned(law: LearnedLaw) -> dict[str, Any]:
+def _learned(law: LearnedLaw) -> LearnedFound:
+    return LearnedFound(
+        site=law.site,
+        argument=law.argument,
+        argument_unit=law.argument_unit,
+        unit=law.unit,
+        words=law.words,
+        knots=law.knots,
+        values=law.values,
+        band=(law.low, law.high),
+        formula=law.formula,
+        misfit=_misfits(law.misfit),
+        times_smaller=law.shrinks,
+    )
+
+
+def _misfits(found: tuple[Misfit, ...]) -> dict[str, MisfitFound]:
     return {
-        "site": law.site,
-        "argument": law.argument,
-        "argument_unit": law.argument_unit,
-        "unit": law.unit,
-        "words": law.words,
-        "knots": [*law.knots],
-        "values": [*law.values],
-        "band": [[*law.low], [*law.high]],
-        "formula": law.formula,
-        "misfit": _misfits(law.misfit),
-        "times_smaller": law.shrinks,
+        one.signal: MisfitFound(
+            one.before, one.after, one.noise, one.unit, tuple(StageFound(name, rms) for name, rms in one.stages)
+        )
+        for one in found
     }
 
 
-def _misfits(found: tuple[Misfit, ...]) -> dict[str, Any]:
-    return {
-        misfit.signal: {
-            "before": misfit.before,
-            "after": misfit.after,
-            "noise": misfit.noise,
-            "unit": misfit.unit,
-            "stages": [{"model": name, "rms": rms} for name, rms in misfit.stages],
-        }
-        for misfit in found
-    }
-
-
-def _named(effect: Named) -> dict[str, Any]:
-    return {
-        "name": effect.name,
-        "site": effect.site,
-        "parameters": {
-            short: {"value": e.value, "standard_error": e.standard_error, "interval": [*e.interval], "unit": e.unit}
-            for short, e in effect.parameters.items()
-        },
-        "score": effect.score,
-        "runner_up": effect.runner_up,
-        "margin": effect.margin,
-        "family": list(effect.family),
-    }
-
-
-def _step(step: ForwardStep) -> dict[str, Any]:
-    return {
-        "on_top_of": [effect.label for effect in step.before.effects],
-        "accepted": step.accepted,
-        "tried": [
+def _named(effects: tuple[Named, ...]) -> tuple[EffectFound, ...]:
+    return tuple(
+        EffectFound(
+            effect.name,
+            effect.site,
             {
-                "effect": candidate.effects[-1].label,
-                "gain": candidate.gain_over(step.before),
-                "fitted": candidate.fit.fitted - step.before.fit.fitted,
-                "decided": candidate.fit.validated - step.before.fit.validated,
-                "process_noise": candidate.fit.q,
-            }
-            for candidate in step.candidates
-        ],
-    }
+                short: ValueFound(e.value, e.standard_error, e.interval, e.unit)
+                for short, e in effect.parameters.items()
+            },
+            effect.score,
+            effect.runner_up,
+            effect.margin,
+            effect.family,
+        )
+        for effect in effects
+    )
+
+
+def step_found(step: ForwardStep) -> StepFound:
+    """Return a step of the search as results have it.
+
+    Args:
+        step: of the search.
+
+    Returns:
+        Its candidates, best first, with their gains over the model before.
+    """
+    before = step.before
+    tried = tuple(
+        TriedFound(
+            effect=candidate.effects[-1].label,
+            gain=candidate.gain_over(before),
+            fitted=candidate.fit.fitted - before.fit.fitted,
+            decided=candidate.fit.validated - before.fit.validated,
+            process_noise=candidate.fit.q,
+        )
+        for candidate in step.candidates
+    )
+    return StepFound(tuple(effect.label for effect in before.effects), step.accepted, tried)

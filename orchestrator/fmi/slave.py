@@ -174,10 +174,11 @@ class FmuSlave(Slave):
             raise SlaveError(f"{self.name}: {what} must not be called after a failure, but was")
 
     def _call(self, function: str, *arguments: Any) -> None:
-        self._alive(function)
-        entry = getattr(self._library, function)
-        entry.restype = ctypes.c_int
-        self._check(entry(self._component, *arguments), function)
+        if self._closed or self._worst >= ERROR:
+            self._alive(function)
+        status = getattr(self._library, function)(self._component, *arguments)
+        if status:
+            self._check(status, function)
 
     def _batches(self, names: Sequence[str], direction: str, buffer: Signals | None = None) -> list[_Batch]:
         groups: dict[str, list[int]] = {}

@@ -1,5 +1,6 @@
 """Algebraic loops: values that depend on one another at the same instant, solved by repeating with rollback."""
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,17 @@ Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
 
 
-def _backward_slots(layout: Layout, names: tuple[str, ...]) -> NDArray[np.int64]:
+def backward_slots(layout: Layout, names: Iterable[str]) -> Slots:
     """Return the output slots that an instance of ``names`` takes from itself or from one that is stepped later.
 
     Fixing their values fixes what one pass over the instances computes: they are the unknowns of the loop.
+
+    Args:
+        layout: plan of the signals.
+        names: of instances.
+
+    Returns:
+        The slots, rising.
     """
     position = {block.name: k for k, block in enumerate(layout.blocks)}
     owner = {block.first_output + j: block.name for block in layout.blocks for j in range(len(block.outputs))}
@@ -32,11 +40,12 @@ def _backward_slots(layout: Layout, names: tuple[str, ...]) -> NDArray[np.int64]
     return np.array(sorted(cut), dtype=np.int64)
 
 
-def initialise(wiring: Wiring, table: Array, tolerance: float, iterations: int) -> int:
+def initialise(wiring: Wiring, cut: Slots, table: Array, tolerance: float, iterations: int) -> int:
     """Make inputs and outputs agree while all slaves are in initialisation; return the number of passes.
 
     Args:
         wiring: bound slaves.
+        cut: ``backward_slots`` of all of them.
         table: what the sources add to inputs, see ``Layout.signal_table``.
         tolerance: largest relative change in the last pass.
         iterations: the most passes.
@@ -48,7 +57,6 @@ def initialise(wiring: Wiring, table: Array, tolerance: float, iterations: int) 
         ConvergenceError: the initial values of a loop do not settle.
     """
     values, view = wiring.values, wiring.view
-    cut = _backward_slots(wiring.layout, tuple(block.name for block in wiring.layout.blocks))
     for stage in wiring.stages:
         stage.receive()
 
@@ -102,7 +110,7 @@ def run_iterated(
 
 def _groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], NDArray[np.int64]]]:
     loops = wiring.layout.system.loops()
-    groups: list[tuple[tuple[Stage, ...], NDArray[np.int64]]] = []
+    groups: list[tuple[tuple[Stage, ...], Slots]] = []
     done: set[str] = set()
     for stage in wiring.stages:
         name = stage.block.name
@@ -110,7 +118,7 @@ def _groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], NDArray[np.int64]]]
             continue
         loop = next((g for g in loops if name in g), (name,))
         stages = tuple(s for s in wiring.stages if s.block.name in loop)
-        cut = _backward_slots(wiring.layout, loop) if loop in loops else np.zeros(0, dtype=np.int64)
+        cut = backward_slots(wiring.layout, loop) if loop in loops else np.zeros(0, dtype=np.int64)
         for member in stages if len(cut) else ():
             if not member.slave.model.can_save_state:
                 raise ScenarioError(

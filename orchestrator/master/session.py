@@ -11,7 +11,7 @@ from orchestrator.errors import FmuError, ScenarioError, SimulationError
 from orchestrator.master.adaptive import run_adaptive
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
 from orchestrator.master.fixed_step import run_sequential, run_simultaneous
-from orchestrator.master.iterated import initialise, run_iterated
+from orchestrator.master.iterated import backward_slots, initialise, run_iterated
 from orchestrator.master.layout import Layout, lay_out
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import Slave, Value
@@ -61,6 +61,7 @@ class Session:
         self.layout: Layout = lay_out(
             system, names, simultaneous=isinstance(algorithm, Jacobi), states=isinstance(algorithm, Adaptive)
         )
+        self._cut = backward_slots(self.layout, [block.name for block in self.layout.blocks])
         self._slaves: dict[str, Slave] = {}
         self._wiring: Wiring | None = None
         self._compiled: CompiledWiring | None = None
@@ -178,7 +179,7 @@ class Session:
             if values[name]:
                 slave.set(values[name])
             slave.begin(self.start, self.stop, None)
-        initialise(wiring, table, INITIAL_TOLERANCE, INITIAL_PASSES)
+        initialise(wiring, self._cut, table, INITIAL_TOLERANCE, INITIAL_PASSES)
         for stage in wiring.stages:
             stage.slave.start()
         for stage in wiring.stages:

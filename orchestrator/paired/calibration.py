@@ -17,7 +17,6 @@ from typing import Any, Protocol
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 import pyfmu_sources
 from orchestrator.building.fastest import NATIVE, ensure_fastest
@@ -25,8 +24,9 @@ from orchestrator.errors import CalibrationError
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import difference_sum
+from orchestrator.paired.monotone import MonotoneCubic
 from orchestrator.paired.native_loop import NativeLoop
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.output import write_text
@@ -38,7 +38,7 @@ Each = Callable[[Callable[[Any], float], Iterable[Any]], Iterable[float]]
 
 # Seeds of calibration and of tests come from different branches of one tree, so that none is ever shared.
 CALIBRATION_BRANCH = 7
-DEFAULT_SETTINGS: CalibrationSettings = CalibrationSettings()
+DEFAULT_SETTINGS: MapSettings = MapSettings()
 
 
 class Calibration(msgspec.Struct, frozen=True):
@@ -72,7 +72,7 @@ class Calibration(msgspec.Struct, frozen=True):
     level: float
     runs: int
     seed_branch: int
-    settings: CalibrationSettings
+    settings: MapSettings
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class GapMap:
 
     def __init__(self, calibration: Calibration) -> None:
         self._calibration = calibration
-        self._centre = PchipInterpolator(calibration.log_sum, calibration.log_alpha)
+        self._centre = MonotoneCubic(calibration.log_sum, calibration.log_alpha)
         self._log_sum, self._spread = np.array(calibration.log_sum), np.array(calibration.log_spread)
         self._room = _noise_below(calibration)
 
@@ -139,7 +139,7 @@ class GapMap:
                 f"outside {calibration.smallest:g} to {calibration.largest:g} rad"
             )
         at = np.log(total)
-        centre = float(self._centre(at))
+        centre = self._centre.value(float(at))
         reach = calibration.width * float(np.interp(at, self._log_sum, self._spread))
         return GapEstimate(float(np.exp(centre)), float(np.exp(centre - reach)), float(np.exp(centre + reach)))
 
@@ -174,7 +174,7 @@ def _noise_below(calibration: Calibration) -> float:
 def load_or_calibrate(
     experiment: Experiment,
     progress: Callable[[str], None] | None = None,
-    settings: CalibrationSettings = DEFAULT_SETTINGS,
+    settings: MapSettings = DEFAULT_SETTINGS,
 ) -> Calibration:
     """Return the calibration of ``experiment`` from the user's cache, or make and store it.
 
@@ -203,7 +203,7 @@ def load_or_calibrate(
     return calibration
 
 
-def _digest(experiment: Experiment, settings: CalibrationSettings) -> str:
+def _digest(experiment: Experiment, settings: MapSettings) -> str:
     digest = hashlib.sha256(experiment.digest().encode())
     digest.update(msgspec.json.encode(settings))
     for folder in (Path(pyfmu_sources.__file__).parent, Path(__file__).parent):
@@ -212,7 +212,7 @@ def _digest(experiment: Experiment, settings: CalibrationSettings) -> str:
     return digest.hexdigest()[:24]
 
 
-def calibrate(experiment: Experiment, settings: CalibrationSettings = DEFAULT_SETTINGS) -> Calibration:
+def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) -> Calibration:
     """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds.
 
     Args:
@@ -234,7 +234,7 @@ def calibrate(experiment: Experiment, settings: CalibrationSettings = DEFAULT_SE
         return calibrate_loop(loop, settings, usable_cores())
 
 
-def calibrate_loop(loop: CalibratedLoop, settings: CalibrationSettings, threads: int = 1) -> Calibration:
+def calibrate_loop(loop: CalibratedLoop, settings: MapSettings, threads: int = 1) -> Calibration:
     """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`.
 
     Args:
@@ -249,7 +249,7 @@ def calibrate_loop(loop: CalibratedLoop, settings: CalibrationSettings, threads:
         return _calibrated(loop, settings, pool.map)
 
 
-def _calibrated(loop: CalibratedLoop, settings: CalibrationSettings, each: Each) -> Calibration:
+def _calibrated(loop: CalibratedLoop, settings: MapSettings, each: Each) -> Calibration:
     experiment = loop.experiment
     zero = (np.zeros(experiment.steps + 1), np.zeros(experiment.steps + 1))
     twin = loop.run(0.0, zero)[:, 2]
@@ -296,7 +296,7 @@ def _require_monotone(sums: Array, sizes: Array, experiment: Experiment) -> None
 
 def _interpolation_error(log_sum: Array, log_alpha: Array, least: float) -> Array:
     """Return how far every second node lies from the map through the others, as the larger of neighbours."""
-    coarse = PchipInterpolator(log_sum[::2], log_alpha[::2])
+    coarse = MonotoneCubic(log_sum[::2], log_alpha[::2])
     error = np.abs(coarse(log_sum) - log_alpha)
     nearby = np.array([error[max(0, n - 2) : n + 3].max() for n in range(len(error))])
     return np.maximum(nearby, least)
@@ -308,16 +308,16 @@ def _generator(*key: int) -> np.random.Generator:
 
 def _noisy_sum(loop: CalibratedLoop, twin: Array, alpha: float, generator: np.random.Generator) -> float:
     noise = loop.experiment.encoder_noise
-    errors = generator.normal(0.0, noise, (2, len(twin)))
+    errors = generator.normal(0.0, noise, (2, len(twin))) if noise else np.zeros((2, len(twin)))
     return difference_sum(loop.run(alpha, (errors[0], errors[1]))[:, 2], twin)
 
 
 def _noisy_map(
-    loop: CalibratedLoop, twin: Array, log_alpha: Array, log_sum: Array, settings: CalibrationSettings, each: Each
+    loop: CalibratedLoop, twin: Array, log_alpha: Array, log_sum: Array, settings: MapSettings, each: Each
 ) -> tuple[Array, Array]:
     """Return (mean of log S under noise, spread of log alpha_hat), both at the clean map's nodes."""
     nodes = np.linspace(log_alpha[0], log_alpha[-1], settings.noisy_sizes)
-    clean = PchipInterpolator(log_alpha, log_sum)
+    clean = MonotoneCubic(log_alpha, log_sum)
     count = settings.seeds_per_size
 
     def drawn(job: int) -> float:
@@ -327,9 +327,9 @@ def _noisy_map(
     draws = np.array(list(each(drawn, range(settings.noisy_sizes * count)))).reshape(-1, count)
     shift = draws.mean(axis=1) - clean(nodes)
     variance = draws.var(axis=1, ddof=1)
-    moved = log_sum + PchipInterpolator(nodes, _smoothed(shift))(log_alpha)
-    slope = PchipInterpolator(log_alpha, moved).derivative()(log_alpha)
-    deviation = np.exp(0.5 * PchipInterpolator(nodes, np.log(_smoothed(variance)))(log_alpha))
+    moved = log_sum + MonotoneCubic(nodes, _smoothed(shift))(log_alpha)
+    slope = MonotoneCubic(log_alpha, moved).rate(log_alpha)
+    deviation = np.exp(0.5 * MonotoneCubic(nodes, np.log(_smoothed(variance)))(log_alpha))
     return moved, deviation / np.maximum(np.abs(slope), settings.least_slope)
 
 
@@ -345,18 +345,18 @@ def _conformal_width(
     log_alpha: Array,
     log_sum: Array,
     spread: Array,
-    settings: CalibrationSettings,
+    settings: MapSettings,
     each: Each = map,
 ) -> float:
     """Return the multiple of the spread that covers ``settings.level`` of runs that the map has not seen."""
-    inverse = PchipInterpolator(log_sum, log_alpha)
+    inverse = MonotoneCubic(log_sum, log_alpha)
     low, high = np.log(loop.experiment.smallest), np.log(loop.experiment.largest)
 
     def score(n: int) -> float:
         generator = _generator(1, n)
         actual = generator.uniform(low, high)
         at = np.clip(np.log(_noisy_sum(loop, twin, float(np.exp(actual)), generator)), log_sum[0], log_sum[-1])
-        return abs(float(inverse(at)) - actual) / float(np.interp(at, log_sum, spread))
+        return abs(inverse.value(float(at)) - actual) / float(np.interp(at, log_sum, spread))
 
     scores = np.array(list(each(score, range(settings.validation_runs))))
     rank = int(np.ceil((settings.validation_runs + 1) * settings.level)) - 1

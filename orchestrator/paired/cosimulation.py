@@ -12,7 +12,7 @@ from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.protocol import Value
 from orchestrator.master.session import Session
-from orchestrator.master.signals import Samples
+from orchestrator.master.signals import Samples, Signal
 from orchestrator.master.system import Connection, Instance, SignalSource, System
 from orchestrator.paired.experiment import Experiment
 from orchestrator.plants.design import KalmanFilter
@@ -33,7 +33,13 @@ RECORDED = {
 MACHINE, TWIN = "", "twin_"
 
 
-def loop_system(experiment: Experiment, fmus: Mapping[str, Path], prefixes: tuple[str, ...]) -> System:
+LoopValues = Mapping[str, Mapping[str, Any]]
+"""Parameters by name, for each of the three ``FMUS``."""
+
+
+def loop_system(
+    experiment: Experiment, fmus: Mapping[str, Path], prefixes: tuple[str, ...], values: LoopValues | None = None
+) -> System:
     """Return one loop for each of ``prefixes``, all on the same reference.
 
     Instances are called ``plant``, ``estimator`` and ``controller``, each after its loop's prefix. Without further
@@ -43,11 +49,13 @@ def loop_system(experiment: Experiment, fmus: Mapping[str, Path], prefixes: tupl
         experiment: what is run.
         fmus: paths of the three ``FMUS``.
         prefixes: ``(MACHINE,)``, ``(TWIN,)`` or both.
+        values: what ``loop_values`` returned for the experiment (default: it is asked).
 
     Returns:
         The system.
     """
-    values = loop_values(experiment)
+    if values is None:
+        values = loop_values(experiment)
     instances: list[Instance] = []
     connections: list[Connection] = []
     sources: list[SignalSource] = []
@@ -143,6 +151,20 @@ class LoopRun:
         return self.signals[name]
 
 
+@dataclass(frozen=True, slots=True)
+class _AtPoints(Signal):
+    """One value per communication point of a run: nothing is looked up."""
+
+    values: Array
+
+    def sample(self, times: Array) -> Array:
+        assert len(times) == len(self.values)
+        return self.values
+
+    def breaks(self, start: float, stop: float) -> list[float]:
+        return []
+
+
 class LoopSession:
     """One loop of three FMUs, instantiated once and run for any number of sizes. Use as a context manager.
 
@@ -150,15 +172,20 @@ class LoopSession:
         experiment: what is run.
         fmus: paths of the three ``FMUS``.
         record: which of ``RECORDED``; fewer are quicker.
+        values: what ``loop_values`` returned for the experiment (default: it is asked).
     """
 
     def __init__(
-        self, experiment: Experiment, fmus: Mapping[str, Path], record: tuple[str, ...] = tuple(RECORDED)
+        self,
+        experiment: Experiment,
+        fmus: Mapping[str, Path],
+        record: tuple[str, ...] = tuple(RECORDED),
+        values: LoopValues | None = None,
     ) -> None:
         self._experiment = experiment
         self._record = record
         self._session = Session(
-            loop_system(experiment, fmus, (MACHINE,)),
+            loop_system(experiment, fmus, (MACHINE,), values),
             [RECORDED[name] for name in record],
             GaussSeidel(experiment.sample_time),
             experiment.duration,
@@ -191,10 +218,9 @@ class LoopSession:
             SlaveError: a slave refused or failed a call.
         """
         values = plant_values(self._experiment, alpha) | dict(start or {})
-        h = self._experiment.sample_time
         signals = None
         if errors is not None:
-            signals = {k: Samples(error, h) for k, error in zip(ERROR_SOURCES, errors, strict=True)}
+            signals = {k: _AtPoints(error) for k, error in zip(ERROR_SOURCES, errors, strict=True)}
         result = self._session.run(values, signals)
         return LoopRun(result.time, dict(zip(self._record, result.values, strict=True)))
 

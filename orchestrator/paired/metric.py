@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import bdtr
 
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
@@ -79,6 +78,8 @@ def trust_of_sweep(statistics: Iterable[ErrorStatistics], level: float, failed: 
     Returns:
         The trust, with a reason for each noise level whose intervals hold too few sizes.
     """
+    from scipy.special import bdtr  # every worker process would pay for its import
+
     found = [Reason(Level.AMBER, f"{failed} cases failed")] if failed else []
     for entry in statistics:
         held = round(entry.coverage * entry.count)

@@ -17,11 +17,11 @@ from orchestrator.engine.cases import Value
 from orchestrator.engine.grid import MAX_CASES
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import DEFAULT_SETTINGS, Calibration, GapMap, load_or_calibrate
-from orchestrator.paired.cosimulation import LoopSession
+from orchestrator.paired.cosimulation import LoopSession, LoopValues, loop_values
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, difference_sum, error_statistics
 from orchestrator.paired.pair import with_settings
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sizes import read_sizes
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ class SweepPlan:
         return DesignCases(parse_design(specifications, sizes.count or self.samples, self.seed), self.seed)
 
     def calibrations(
-        self, progress: Callable[[str], None] | None = None, settings: CalibrationSettings = DEFAULT_SETTINGS
+        self, progress: Callable[[str], None] | None = None, settings: MapSettings = DEFAULT_SETTINGS
     ) -> dict[float, Calibration]:
         """Return the calibration of each noise level; ``progress`` is told of those that must be made.
 
@@ -116,7 +116,7 @@ def sweep_work(plan: SweepPlan, fmus: Mapping[str, Path], calibrations: Mapping[
         prepare=_prepare,
         run=_run,
         columns=COLUMNS,
-        payload=(plan.experiment, dict(calibrations)),
+        payload=(plan.experiment, loop_values(plan.experiment), dict(calibrations)),
         files=dict(fmus),
         definition={
             "experiment": asdict(plan.experiment),
@@ -134,9 +134,9 @@ class _Prepared:
     maps: Mapping[float, GapMap]
 
 
-def _prepare(payload: tuple[Experiment, dict[float, Calibration]], files: Mapping[str, Path]) -> _Prepared:
-    experiment, calibrations = payload
-    session = LoopSession(experiment, files, ("theta_l_hat",))
+def _prepare(payload: tuple[Experiment, LoopValues, dict[float, Calibration]], files: Mapping[str, Path]) -> _Prepared:
+    experiment, values, calibrations = payload
+    session = LoopSession(experiment, files, ("theta_l_hat",), values)
     maps = {level: GapMap(calibration) for level, calibration in calibrations.items()}
     return _Prepared(session, session.run(0.0)["theta_l_hat"].copy(), experiment, maps)
 

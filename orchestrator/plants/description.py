@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.compiled import compiled
 from orchestrator.plants.effects import Effect
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 
@@ -299,6 +298,8 @@ class Plant:
             return u, u
         means, begins = np.empty_like(u), np.empty_like(u)
         request = float(u[0])
+        from orchestrator.plants.compiled import compiled  # numba takes its time to import
+
         follow = compiled("effects").followed_request
         for n, asked in enumerate(u.tolist()):
             begins[n] = request

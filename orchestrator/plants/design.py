@@ -1,16 +1,14 @@
-"""Controller and estimator gains, computed with python-control, and the rank report that comes before them.
+"""Controller and estimator gains from the discrete Riccati equation, and the rank report that comes before them.
 
 Models are those of the thesis with its errata mended: the regulator works on the controllable five-state model, the
 estimator on six states with the load torque as an integrated disturbance. All gains are for a sampled system whose
-input is held over a sample.
+input is held over a sample. ``scipy.linalg`` is imported where it is used: worker processes design nothing.
 """
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, solve_discrete_are
 
 from orchestrator.errors import DesignError
 
@@ -183,6 +181,8 @@ def sampled(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
     Returns:
         Matrices of shape (states, states) and (states, inputs).
     """
+    from scipy.linalg import expm
+
     n, m = model.B.shape
     augmented = np.zeros((n + m, n + m))
     augmented[:n, :n] = model.A
@@ -206,7 +206,7 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
     Raises:
         DesignError: ``model`` is not stabilisable, or the Riccati equation has no solution.
     """
-    import control  # takes a second to import, which every command would pay
+    from scipy.linalg import eigvals, solve, solve_discrete_are
 
     report = rank_report(model)
     if not report.stabilisable:
@@ -216,11 +216,17 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
             f"no input moves the mode at {modes} 1/s; leave the uncontrollable states out of the regulator and "
             "feed their estimate forward"
         )
-    A, B = sampled(model, sample_time)
-    gains, _, poles = _quiet(control.dlqr, A, B, Q * sample_time, np.array([[R * sample_time]]))
+    A, B = map(np.ascontiguousarray, sampled(model, sample_time))
+    weight = np.array([[R * sample_time]])
+    try:
+        X = solve_discrete_are(A, B, Q * sample_time, weight)
+    except np.linalg.LinAlgError as error:
+        raise DesignError(f"the regulator's Riccati equation has no solution: {error}") from None
+    gains = solve(B.T @ X @ B + weight, B.T @ X @ A)
+    poles = eigvals(A - B @ gains)
     if not np.all(np.abs(poles) < 1.0):
         raise DesignError("the regulator's Riccati equation has no stabilising solution for these weights")
-    k = tuple(float(g) for g in np.asarray(gains).ravel())
+    k = tuple(float(g) for g in gains.ravel())
     return Regulator(k, sample_time, tuple(complex(p) for p in poles))  # type: ignore[arg-type]
 
 
@@ -239,6 +245,8 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
     Raises:
         DesignError: ``model`` is not detectable, or the Riccati equation has no solution.
     """
+    from scipy.linalg import solve_discrete_are
+
     if not rank_report(model).detectable:
         raise DesignError("`model` must be detectable, but a mode that does not decay reaches no output")
     A, B = sampled(model, sample_time)
@@ -255,14 +263,10 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
 
 def _sampled_noise(A: Array, intensity: Array, h: float) -> Array:
     """Return the covariance that white noise of ``intensity`` gathers in ``h`` (Van Loan, IEEE TAC 23(3), 1978)."""
+    from scipy.linalg import expm
+
     n = A.shape[0]
     block = np.block([[-A, intensity], [np.zeros((n, n)), A.T]])
     step = expm(block * h)
     transposed = step[n:, n:].T
     return np.asarray(transposed @ step[:n, n:])
-
-
-def _quiet(function: object, *arguments: object) -> tuple[Array, Array, Array]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PendingDeprecationWarning)
-        return function(*arguments)  # type: ignore[operator]

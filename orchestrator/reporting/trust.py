@@ -1,9 +1,9 @@
 """The level of trust that a result file states, as a badge and as a section."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from orchestrator.reporting.model import Badge, Section, Text
+from orchestrator.shared.results import TrustFound
 
 BADGES: Mapping[str, Badge] = {"green": "good", "amber": "warn", "red": "bad"}
 MEANINGS = {
@@ -13,7 +13,7 @@ MEANINGS = {
 }
 
 
-def trust_badge(trust: Mapping[str, Any] | None, label: str, default: Badge = "neutral") -> tuple[Badge, str]:
+def trust_badge(trust: TrustFound | None, label: str, default: Badge = "neutral") -> tuple[Badge, str]:
     """Return the badge of a result: its label in the colour of its trust, with the level's word.
 
     Args:
@@ -24,13 +24,12 @@ def trust_badge(trust: Mapping[str, Any] | None, label: str, default: Badge = "n
     Returns:
         Colour and text.
     """
-    level = str((trust or {}).get("level"))
-    if level not in BADGES:
+    if trust is None or trust.level not in BADGES:
         return default, label
-    return BADGES[level], f"{level}: {label}"
+    return BADGES[trust.level], f"{trust.level}: {label}"
 
 
-def trust_section(trust: Mapping[str, Any] | None) -> list[Section]:
+def trust_section(trust: TrustFound | None) -> list[Section]:
     """Return the section that says why a result is not green; empty where it is.
 
     Args:
@@ -39,9 +38,7 @@ def trust_section(trust: Mapping[str, Any] | None) -> list[Section]:
     Returns:
         One section or none.
     """
-    reasons = [str(reason) for reason in (trust or {}).get("reasons") or ()]
-    if not reasons:
+    if trust is None or not trust.reasons:
         return []
-    level = str((trust or {}).get("level"))
-    lines = tuple(text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".") for text in reasons)
-    return [Text("How far this can be trusted", (MEANINGS.get(level, level), *lines))]
+    lines = tuple(text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".") for text in trust.reasons)
+    return [Text("How far this can be trusted", (MEANINGS.get(trust.level, trust.level), *lines))]

@@ -2,7 +2,8 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
+
+from orchestrator.shared.results import Sizes
 
 ARCMIN = 60.0 * 180.0 / math.pi  # arc minutes in a radian
 
@@ -24,7 +25,7 @@ class Play:
         """Return the total play [rad] at the load, from one flank to the other."""
         return 2.0 * self.alpha
 
-    def as_json(self) -> dict[str, Any]:
+    def found(self) -> Sizes:
         """Return half-gap and total play, at the load and at the motor, in rad and arc minutes.
 
         Returns:

@@ -7,7 +7,8 @@ not be used. A level is the worst of what single checks find, so that no good ne
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+
+from orchestrator.shared.results import TrustFound
 
 
 class Level(IntEnum):
@@ -43,13 +44,13 @@ class Trust:
     level: Level
     reasons: tuple[str, ...] = ()
 
-    def as_json(self) -> dict[str, Any]:
+    def found(self) -> TrustFound:
         """Return the level's word and the reasons, as they stand in result files.
 
         Returns:
             ``level`` and ``reasons``.
         """
-        return {"level": self.level.word, "reasons": list(self.reasons)}
+        return TrustFound(self.level.word, self.reasons)
 
     def __str__(self) -> str:
         """Return one line: the level, then the reasons."""

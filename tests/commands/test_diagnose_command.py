@@ -8,6 +8,8 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.fmi.model_description import read_description
+from orchestrator.shared.results import as_plain, read
+from orchestrator.shared.results.diagnose import DiagnoseFound
 from tests.support.independent_plant import make_record, write_csv
 
 
@@ -29,6 +31,7 @@ def test_json_keeps_the_contract(result) -> None:
     _, document = result
     assert document["command"] == "diagnose"
     results = document["results"]
+    assert json.loads(json.dumps(as_plain(read(results, DiagnoseFound)))) == results
     assert results["verdict"] == "effects"
     (effect,) = results["effects"]
     assert {"name", "site", "parameters", "score", "runner_up", "margin"} <= set(effect)

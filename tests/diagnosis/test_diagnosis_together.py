@@ -123,5 +123,5 @@ def test_one_verdict_with_the_evidence_of_each_record() -> None:
     for one in found.records:
         for misfit in one.misfit:
             assert misfit.after < 2.0 * misfit.noise < misfit.before
-    assert found.as_json()["records"][1]["rows"] == records[1].size
+    assert found.found().records[1].rows == records[1].size
     assert found.repeats is None

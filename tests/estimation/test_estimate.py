@@ -12,12 +12,14 @@ from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao, ekf
 from orchestrator.estimation.design import SEARCHED, MachineLimits, design
 from orchestrator.estimation.innovations import NoiseLevels, affine_model, innovations, simulate
-from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.likelihood import Likelihood, maximise
 from orchestrator.estimation.paired_sum import twin
 from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.protocol import METHODS, NotApplicableError, estimator
 from orchestrator.records.model_file import default_model, read_model
 from orchestrator.records.record import Record, record_from_columns
+from orchestrator.shared.results import as_plain, read
+from orchestrator.shared.results.estimate import EstimateFound
 from pyfmu_sources.drivetrain_parameters import DEFAULTS, with_values
 from tests.support.independent_plant import make_record, write_csv
 from tests.support.online_loop import run_case
@@ -88,10 +90,20 @@ def test_score_and_information_agree_with_differences_of_the_objective(exact: tu
         values.append(likelihood.at(moved).objective)
     point = likelihood.at(theta)
     for _ in range(3):
-        gradient, information = likelihood.derivatives(point, np.array([place]))
+        gradient, information, likelihood = likelihood.derivatives(point, np.array([place]))
     assert (values[1] - values[0]) / (4.0 * step) == pytest.approx(gradient[0], abs=0.02 * math.sqrt(information[0, 0]))
     curvature = (values[0] + values[1] - 2.0 * point.objective) / (2.0 * step**2)
     assert curvature == pytest.approx(information[0, 0], rel=0.1)
+
+
+def test_a_fit_leaves_the_likelihood_as_it_was(exact: tuple[Record, dict]) -> None:
+    likelihood = Likelihood(make_problem(exact[0], MODEL))
+    before, start = likelihood.information.copy(), likelihood.problem.start
+    fit = maximise(likelihood, start, [likelihood.problem.index("alpha")], iterations=1)
+    assert np.array_equal(likelihood.information, before)
+    assert not np.array_equal(fit.likelihood.information, before)
+    assert fit.likelihood.changed(soft=True).soft
+    assert not fit.likelihood.soft
 
 
 @pytest.mark.slow
@@ -222,7 +234,8 @@ def test_limits_that_show_nothing_are_told(tmp_path: Path, capsys: pytest.Captur
     shown = capsys.readouterr().out
     assert "not seen" in shown
     assert "No excitation within these limits shows a half-gap of 0.005 rad: raise `--torque-limit`" in shown
-    assert json.loads((tmp_path / "out" / "estimate.json").read_text())["results"]["design"] == []
+    results = json.loads((tmp_path / "out" / "estimate.json").read_text())["results"]
+    assert results == {"schema_version": 1, "design": []}
 
 
 @pytest.fixture(scope="module")
@@ -236,6 +249,7 @@ def test_the_command_writes_everything(csv_file: Path, tmp_path: Path, capsys: p
     assert main(["estimate", str(csv_file), "--method", "all", "--out", str(tmp_path / "out")]) == 0
     document = json.loads((tmp_path / "out" / "estimate.json").read_text())
     results = document["results"]
+    assert json.loads(json.dumps(as_plain(read(results, EstimateFound)))) == results
     assert document["command"] == "estimate"
     assert results["method"] == "maximum_likelihood"
     assert results["alpha"] == pytest.approx(0.02, rel=0.02)

@@ -9,6 +9,7 @@ from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import TrustSettings
 from orchestrator.estimation.trust import trust_of_estimates
 from orchestrator.records.model_file import default_model
+from orchestrator.shared.results import TrustFound
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 GOOD = Estimate(
@@ -39,7 +40,7 @@ def fitted(name: str, factor: float, error: float = 0.0) -> Estimate:
 def test_the_worst_reason_decides_and_comes_first() -> None:
     found = trust_of([Reason(Level.AMBER, "a"), Reason(Level.GREEN, "b"), Reason(Level.RED, "c")])
     assert found == Trust(Level.RED, ("c", "a"))
-    assert found.as_json() == {"level": "red", "reasons": ["c", "a"]}
+    assert found.found() == TrustFound("red", ("c", "a"))
     assert str(found) == "red: c; a"
     assert str(trust_of([])) == "green"
 

@@ -8,6 +8,8 @@ from orchestrator.cli import main
 from orchestrator.paired.thesis import published
 from orchestrator.paired.thesis.errata import errata
 from orchestrator.paired.thesis.recompute import gain_comparisons, size_hidden_in_the_filter, table_comparison
+from orchestrator.shared.results import as_plain, read
+from orchestrator.shared.results.thesis import ThesisFound
 
 
 def test_every_printed_gain_is_recovered():
@@ -50,6 +52,7 @@ def test_the_command_writes_everything(tmp_path, capsys):
     assert "Table 4.1" in text
     assert "7.399e-03" in text
     results = json.loads((tmp_path / "out" / "thesis.json").read_text())["results"]
+    assert json.loads(json.dumps(as_plain(read(results, ThesisFound)))) == results
     assert len(results["errata"]) == 9
     assert (
         max(abs(e - r.alpha) for e, r in zip(results["table"]["our_estimates"], published.TABLE_4_1, strict=True))

@@ -102,3 +102,15 @@ def test_an_undetectable_model_is_refused():
     model = LinearModel(np.zeros((2, 2)), np.eye(2), np.array([[1.0, 0.0], [1.0, 0.0]]), ("a", "b"))
     with pytest.raises(DesignError, match="detectable"):
         design_estimator(model, np.ones(2), np.ones(2), 1e-3)
+
+
+def test_regulator_has_the_gains_and_poles_of_python_control():
+    import control
+
+    model = five_state_model(VALUES)
+    Q, R, h = np.diag([10.0, 50.0, 1.0, 1.0, 0.01]), 2e-3, 1e-3
+    regulator = design_regulator(model, Q, R, h)
+    A, B = sampled(model, h)
+    gains, _, poles = control.dlqr(A, B, Q * h, np.array([[R * h]]))
+    assert regulator.gains == pytest.approx(tuple(np.ravel(gains)), rel=1e-12)
+    assert np.sort_complex(regulator.poles) == pytest.approx(np.sort_complex(poles), rel=1e-12)

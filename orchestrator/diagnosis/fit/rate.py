@@ -7,7 +7,6 @@ the new samples, which keeps its impulse. What is left out is noise; a diagnosis
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from orchestrator.diagnosis.fit.record_likelihood import noise_level
 from orchestrator.diagnosis.settings import DiagnosisSettings, RateSettings
 from orchestrator.plants.description import Plant
 from orchestrator.records.record import Record
+from orchestrator.shared.results.diagnose import AnalysisFound
 
 Array = NDArray[np.float64]
 
@@ -39,14 +39,13 @@ class Analysis:
         """Return the rate [Hz]."""
         return 1.0 / self.record.step
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the rate [Hz], the rows, the file's rows for each, and the notes.
+    def found(self) -> AnalysisFound:
+        """Return the rate [Hz], the rows, the file's rows for each, and the notes, as results have them.
 
         Returns:
-            Plain data.
+            The entry.
         """
-        own = {"rate": self.rate, "rows": self.record.size, "rows_of_the_file": self.factor}
-        return own | {"notes": list(self.notes)}
+        return AnalysisFound(self.rate, self.record.size, self.factor, self.notes)
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from orchestrator.diagnosis.proof.free_run import FreeRun, free_run, simulate
 from orchestrator.diagnosis.proof.misfit import segments
 from orchestrator.diagnosis.settings import HorizonSettings
 from orchestrator.shared.inference.long_run import long_run_covariance
+from orchestrator.shared.results.diagnose import HorizonFound
 
 Array = NDArray[np.float64]
 Runs = Sequence[tuple[FreeRun, slice]]  # with the samples that they cover
@@ -198,7 +199,7 @@ def _predicted(
     return np.square(np.array(ran)), np.square(np.array(moved))
 
 
-def table(names: Sequence[str], found: Sequence[Horizons]) -> list[dict[str, object]]:
+def table(names: Sequence[str], found: Sequence[Horizons]) -> tuple[HorizonFound, ...]:
     """Return one row a horizon for the result: its label and each model's error of each signal.
 
     Args:
@@ -209,13 +210,13 @@ def table(names: Sequence[str], found: Sequence[Horizons]) -> list[dict[str, obj
         The rows.
     """
     signals = ("theta_m", "theta_l")
-    return [
-        {
-            "horizon": label,
-            "errors": [
+    return tuple(
+        HorizonFound(
+            label,
+            tuple(
                 {"model": name, **{s: float(e) for s, e in zip(signals, one.errors[row], strict=False)}}
                 for name, one in zip(names, found, strict=True)
-            ],
-        }
+            ),
+        )
         for row, label in enumerate(found[0].labels)
-    ]
+    )

@@ -22,8 +22,11 @@ from orchestrator.reporting.pages.live import plant_section
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument, numbers, words
 from orchestrator.reporting.trust import trust_badge, trust_section
+from orchestrator.shared.results import TrustFound, read
+from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound, MethodFound
 
 Json = Mapping[str, Any]
+Methods = Mapping[str, MethodFound]
 CURVE_POINTS = 121
 CHI_SQUARE_95 = 3.841458820694124  # of one degree of freedom
 OFFERED = ("effects.coulomb_friction.motor.torque", "effects.coulomb_friction.load.torque")  # live, beside the gap
@@ -40,84 +43,78 @@ def build(source: ResultDocument) -> Report:
     Returns:
         The report.
     """
-    results = source.results
-    estimates: Json = results.get("estimates") or {}
-    found = {name: e for name, e in estimates.items() if e.get("alpha") is not None}
-    sections: list[Section] = trust_section(results.get("trust"))
+    results = read(source.results, EstimateFound)
+    found = {name: e for name, e in results.estimates.items() if e.alpha is not None}
+    sections: list[Section] = trust_section(results.trust)
     sections += [*_missing(results), *_repeats(results)]
-    if estimates:
-        sections += [_methods(estimates), *_remarks(estimates), *_comparison(found)]
-    sections += [*_profile(source), *_online(source), *record_plots(source, "estimate.csv"), *_errors(source)]
-    sections += plant_section(source, "estimate.csv", results, OFFERED)
-    parameters = (results.get("diagnostics") or {}).get("parameters")
+    if results.estimates:
+        sections += [_methods(found), *_remarks(results.estimates), *_comparison(found)]
+    limit = (results.diagnostics or {}).get("profile_limit") or CHI_SQUARE_95
+    sections += [*_profile(source, limit), *_online(source), *record_plots(source, "estimate.csv"), *_errors(source)]
+    sections += plant_section(source, "estimate.csv", results.live, OFFERED)
+    parameters = (results.diagnostics or {}).get("parameters")
     if parameters:
         sections.append(_parameters(parameters))
-    sections += _design(source, results.get("design") or [])
+    sections += _design(source, results.design or ())
     sections += _diagnostics(found)
     badge, summary = _answer(results)
     return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads())
 
 
-def _missing(results: Json) -> list[Section]:
+def _missing(results: EstimateFound) -> list[Section]:
     """Return what the model lacks, or why no diagnosis tells, where it does not explain the records."""
-    diagnosis: Json = results.get("diagnosis") or {}
-    if not diagnosis:
-        why = results.get("undiagnosed")
+    diagnosis, why = results.diagnosis, results.undiagnosed
+    if diagnosis is None:
         return [Text(UNEXPLAINED, (f"No diagnosis says what it lacks: {why}.",))] if why else []
-    named = [f"{words(e['name'])} ({e['site']})" for e in diagnosis.get("effects") or ()]
-    said = f"It lacks {', '.join(named)}." if named else f"The diagnosis says: {diagnosis['verdict']}."
+    named = [f"{words(e.name)} ({e.site})" for e in diagnosis.effects]
+    said = f"It lacks {', '.join(named)}." if named else f"The diagnosis says: {diagnosis.verdict}."
     place = "The folder diagnosis beside this page has its report and the corrected FMU."
     return [Text(UNEXPLAINED, (said, place))]
 
 
-def _repeats(results: Json) -> list[Section]:
+def _repeats(results: EstimateFound) -> list[Section]:
     """Return what repeats of one experiment differ by, beside the encoders' noise."""
-    repeats: Json = results.get("repeats") or {}
-    if not repeats:
+    repeats = results.repeats
+    if repeats is None:
         return []
-    noise = ((results.get("diagnostics") or {}).get("measurement_noise")) or []
+    noise = (results.diagnostics or {}).get("measurement_noise") or []
     rows = tuple(
         (words(name), value, noise[n] if n < len(noise) else None)
-        for n, (name, value) in enumerate(repeats["floor"].items())
+        for n, (name, value) in enumerate(repeats.floor.items())
     )
     columns = (
         TableColumn("signal"),
         TableColumn("what does not repeat", "rad", 3),
         TableColumn("encoder's noise as fitted", "rad", 3),
     )
-    note = f"{', '.join(repeats['sources'])} have the same torque. No model explains more than they have in common."
+    note = f"{', '.join(repeats.sources)} have the same torque. No model explains more than they have in common."
     return [ReportTable("Repeats", columns, rows, note)]
 
 
-def _answer(results: Json) -> tuple[tuple[Badge, str] | None, str]:
-    if results.get("alpha") is None:
-        if results.get("estimates"):
+def _answer(results: EstimateFound) -> tuple[tuple[Badge, str] | None, str]:
+    if results.alpha is None:
+        if results.estimates:
             return ("bad", "no estimate"), "No method can be applied to this record."
         return None, "An excitation that shows the gap."
-    low, high = _interval(results)
+    low, high = results.interval or (None, None)
     interval = f"with 95 % confidence between {_number(low)} and {_number(high)} rad"
-    record = results.get("record") or {}
-    source = f" (record {record['source']}, {record['rows']} rows)" if record.get("source") else ""
-    message = str(results.get("message") or "")
-    if not results.get("visible"):
+    record = results.record
+    source = f" (record {record.source}, {record.rows} rows)" if record and record.source else ""
+    message = results.message or ""
+    if not results.visible:
         said = f"{message[:1].upper()}{message[1:]}"
         if "confidence" not in message:
             said = f"No gap is seen: it is {interval}. {said}".strip()
-        return trust_badge(results.get("trust"), "no gap is seen"), f"{said}{source}."
-    summary = f"The half-gap is {results['alpha']:.6g} rad, {interval}{source}."
-    return trust_badge(results.get("trust"), "the gap is seen", "good"), " ".join(filter(None, [summary, message]))
-
-
-def _interval(estimate: Json) -> tuple[float | None, float | None]:
-    low, high = estimate.get("interval") or (None, None)
-    return low, high
+        return trust_badge(results.trust, "no gap is seen"), f"{said}{source}."
+    summary = f"The half-gap is {results.alpha:.6g} rad, {interval}{source}."
+    return trust_badge(results.trust, "the gap is seen", "good"), " ".join(filter(None, [summary, message]))
 
 
 def _number(value: float | None) -> str:
     return "any size" if value is None else f"{value:.6g}"
 
 
-def _methods(estimates: Json) -> ReportTable:
+def _methods(found: Methods) -> ReportTable:
     columns = (
         TableColumn("method"),
         TableColumn("half-gap", "rad", 6),
@@ -128,35 +125,33 @@ def _methods(estimates: Json) -> ReportTable:
         TableColumn("Cramér-Rao", "rad", 3),
     )
     rows = []
-    for name, e in estimates.items():
-        if e.get("alpha") is None:
-            continue
-        level = (e.get("trust") or {}).get("level")
-        rows.append((words(name), e["alpha"], level, *_interval(e), e.get("standard_error"), e.get("cramer_rao")))
+    for name, e in found.items():
+        level = None if e.trust is None else e.trust.level
+        rows.append((words(name), e.alpha, level, *(e.interval or (None, None)), e.standard_error, e.cramer_rao))
     note = "Lower and upper: ends of the 95 % interval. Cramér-Rao: the least standard error that the record allows."
     return ReportTable("Estimates", columns, tuple(rows), note)
 
 
-def _remarks(estimates: Json) -> list[Section]:
+def _remarks(estimates: Methods) -> list[Section]:
     """Return what is to be said of single methods: messages, what keeps them from green, why they do not apply."""
     said = []
     for name, e in estimates.items():
-        if e.get("alpha") is None:
-            said.append(f"{words(name)} does not apply: {e.get('not_applicable')}.")
+        if e.alpha is None:
+            said.append(f"{words(name)} does not apply: {e.not_applicable}.")
             continue
-        message = str(e.get("message") or "")
+        message = e.message or ""
         said += [f"{words(name)}: {message}."] if message else []
-        trust: Json = e.get("trust") or {}
-        reasons = [str(reason) for reason in trust.get("reasons") or () if reason not in message]
-        said += [f"{words(name)} is {trust.get('level')}: {'; '.join(reasons)}."] if reasons else []
+        trust = e.trust or TrustFound("")
+        reasons = [reason for reason in trust.reasons if reason not in message]
+        said += [f"{words(name)} is {trust.level}: {'; '.join(reasons)}."] if reasons else []
     return [Text("Remarks", tuple(text[:1].upper() + text[1:] for text in said))] if said else []
 
 
-def _comparison(found: Json) -> list[Section]:
+def _comparison(found: Methods) -> list[Section]:
     if len(found) < 2:
         return []
-    alpha = [float(e["alpha"]) for e in found.values()]
-    low, high = zip(*(_interval(e) for e in found.values()), strict=True)
+    alpha = [e.alpha or 0.0 for e in found.values()]
+    low, high = zip(*(e.interval or (None, None) for e in found.values()), strict=True)
     series = Series("half-gap", list(range(len(found))), alpha, "points", low, high)
     positive = [v for v in alpha if v > 0.0]
     wide = bool(positive) and max(positive) > 5.0 * min(positive)
@@ -164,7 +159,7 @@ def _comparison(found: Json) -> list[Section]:
     return [Plot("Estimates by method", "method", "half-gap [rad]", (series,), log_y=wide, categories=names)]
 
 
-def _profile(source: ResultDocument) -> list[Section]:
+def _profile(source: ResultDocument, limit: float) -> list[Section]:
     """Return the profile; between its points the root of the drop, with its side's sign, is interpolated linearly."""
     table = source.columns("profile.csv")
     if not {"alpha", "drop"} <= set(table):
@@ -173,7 +168,6 @@ def _profile(source: ResultDocument) -> list[Section]:
     alpha, drop = np.array([p for p in points if None not in p], dtype=float).T
     signed = np.sign(alpha - alpha[np.argmin(drop)]) * np.sqrt(np.maximum(drop, 0.0))
     fine = np.linspace(signed[0], signed[-1], CURVE_POINTS)
-    limit = (source.results.get("diagnostics") or {}).get("profile_limit") or CHI_SQUARE_95
     series = (
         Series("profile", np.interp(fine, signed, alpha).tolist(), (fine**2).tolist()),
         Series("computed", alpha.tolist(), drop.tolist(), "points"),
@@ -214,7 +208,7 @@ def _parameters(parameters: Json) -> ReportTable:
     return ReportTable("Parameters fitted with the gap", tuple(TableColumn(c, "", 6) for c in columns), tuple(rows))
 
 
-def _design(source: ResultDocument, candidates: Sequence[Json]) -> list[Section]:
+def _design(source: ResultDocument, candidates: Sequence[ExcitationFound]) -> list[Section]:
     if not candidates:
         return []
     columns = (
@@ -223,7 +217,7 @@ def _design(source: ResultDocument, candidates: Sequence[Json]) -> list[Section]
         TableColumn("peak torque", "N.m"),
         TableColumn("peak motor speed", "rad/s"),
     )
-    rows = tuple((c["name"], c["bound"], c["peak_torque"], c["peak_motor_speed"]) for c in candidates)
+    rows = tuple((c.name, c.bound, c.peak_torque, c.peak_motor_speed) for c in candidates)
     note = "Best first: the smallest standard error of the half-gap that any estimator can have."
     table = source.columns("design.csv")
     made: list[Section] = [ReportTable("Proposed excitations", columns, rows, note)]
@@ -233,10 +227,10 @@ def _design(source: ResultDocument, candidates: Sequence[Json]) -> list[Section]
     return made
 
 
-def _diagnostics(found: Json) -> list[Section]:
+def _diagnostics(found: Methods) -> list[Section]:
     made: list[Section] = []
     for name, estimate in found.items():
-        given = {k: v for k, v in (estimate.get("diagnostics") or {}).items() if k != "parameters"}
+        given = {k: v for k, v in (estimate.diagnostics or {}).items() if k != "parameters"}
         facts = [s for s in sections_of(f"Diagnostics of {words(name)}", given) if isinstance(s, Facts)]
         made += facts[:1]
     return made

@@ -27,7 +27,7 @@ from orchestrator.reporting.model import (
     Text,
 )
 from orchestrator.reporting.source import ResultDocument, numbers
-from orchestrator.shared.results import LiveFound, PairFound, read
+from orchestrator.shared.results import LiveFound, PairFound
 from pyfmu_sources.drivetrain_parameters import BIG
 
 TITLE = "Simulate it here"
@@ -176,22 +176,21 @@ def _pair_plots(names: Sequence[str]) -> Sequence[LivePlot]:
 
 
 def plant_section(
-    source: ResultDocument, name: str, results: Mapping[str, Any], offered: Sequence[str] = ()
+    source: ResultDocument, name: str, found: LiveFound | None, offered: Sequence[str] = ()
 ) -> list[Section]:
     """Return a model beside its record, live.
 
     Args:
         source: the result directory.
         name: the CSV file of the record: ``time``, ``u`` and measured angles.
-        results: of the document, with ``live``.
+        found: what the result says of it, or None.
         offered: effects [N.m] that get a slider although the model has none of them.
 
     Returns:
         One section; none where the results or the file do not hold what it takes.
     """
-    if not results.get("live"):
+    if found is None:
         return []
-    found = read(results["live"], LiveFound)
     own = {entry.name for entry in plants()[found.fmu].table}
     found = replace(found, values={name: 0.0 for name in ("alpha", *offered) if name in own} | found.values)
     table = source.columns(name)

@@ -19,7 +19,7 @@ from orchestrator.reporting.model import (
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import ResultDocument, by_column, numbers, plain, table_of, words
 from orchestrator.reporting.trust import trust_badge, trust_section
-from orchestrator.shared.results import SweepFound, as_plain, read
+from orchestrator.shared.results import SweepFound, TrustFound, as_plain, read
 
 Columns = Mapping[str, list[Cell]]
 UNITS = {"alpha": "rad", "noise": "rad"}
@@ -72,7 +72,7 @@ def build(source: ResultDocument) -> Report:
     )
 
 
-def _badge(trust: Mapping[str, Any] | None, failed: int, total: int) -> tuple[Badge, str]:
+def _badge(trust: TrustFound | None, failed: int, total: int) -> tuple[Badge, str]:
     """Return the colour of the worse of trust and failures, and how many cases are done."""
     if failed:
         return "bad", f"{failed} of {total} cases failed"

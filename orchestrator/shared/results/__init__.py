@@ -12,10 +12,31 @@ import msgspec
 F = TypeVar("F", bound=msgspec.Struct)
 
 
+Interval = tuple[float | None, float | None]
+Sizes = dict[str, dict[str, dict[str, float | None]]]
+"""A backlash: half-gap and total play, at the load and at the motor, by unit."""
+
+
+def first_version() -> int:
+    """Return the first version of a result; a default that is made is never left out of a file.
+
+    Returns:
+        1.
+    """
+    return 1
+
+
 class Found(msgspec.Struct, frozen=True, kw_only=True):
     """Base: what one command found."""
 
-    schema_version: int = 1
+    schema_version: int = msgspec.field(default_factory=first_version)
+
+
+class TrustFound(msgspec.Struct, frozen=True):
+    """How far a result can be trusted: "green", "amber" or "red", and why it is not green."""
+
+    level: str
+    reasons: tuple[str, ...] = ()
 
 
 class GapFound(msgspec.Struct, frozen=True):
@@ -118,7 +139,7 @@ class SweepFound(Found, frozen=True, kw_only=True):
     failed: int
     columns: list[ColumnFound] = []
     statistics: list[ErrorsFound] = []
-    trust: dict[str, Any] | None = None
+    trust: TrustFound | None = None
     experiment: dict[str, Any] | None = None
     calibrations: dict[str, CalibrationFound] = {}
     fmus: dict[str, str] | None = None
@@ -166,7 +187,11 @@ def as_plain(found: Any) -> Any:
     Returns:
         Nested dictionaries, lists, numbers and texts.
     """
-    return found if isinstance(found, Mapping) else msgspec.to_builtins(found)
+    return found if isinstance(found, Mapping) else msgspec.to_builtins(found, enc_hook=_otherwise)
+
+
+def _otherwise(value: Any) -> Any:
+    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def read(results: Any, kind: type[F]) -> F:
