@@ -221,9 +221,10 @@ def arrives(kind, u, size, held, buffer, at, step, drop):
     if kind == 5:
         return np.sign(u) * max(abs(u) - size, 0.0)
     if kind == 6:
-        before = held[0]
-        held[0] += min(max(u - before, -size * step), size * step)
-        return 0.5 * (before + held[0])
+        before, most = held[0], size * step
+        held[0] += min(max(u - before, -most), most)
+        way = held[0] - before  # it takes abs(way) / most of the step, and the rest of it stays there
+        return held[0] - 0.5 * way * abs(way) / most
     if kind == 7:
         return size * np.rint(u / size)
     return 0.0 if drop else u

@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.harm import counted, harmed
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.outcome import Diagnosis
 from orchestrator.plants.bank import DRIVETRAIN_BANK
@@ -77,6 +78,7 @@ def judge(case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     row["warned"] = bool(diagnosis.warnings)
     row["nuisances"] = {n.name: e.value for n in diagnosis.nuisances for e in n.parameters.values()}
     row["misfits"] = [[misfit.before, misfit.after, misfit.noise] for misfit in diagnosis.misfit]
+    row["harm"] = harmed(diagnosis)
     row["errors"] = errors(case, diagnosis)
     row["linear"] = linear_errors(case, diagnosis)
     return row
@@ -170,6 +172,7 @@ def report(rows: list[dict[str, Any]]) -> dict[str, Any]:
             "count": len(linear),
         }
         print(figures["misfit"], figures["parameters"], figures["linear"])
+    print(counted([row for row in rows if "harm" in row]))
     figures["seconds_median"] = float(np.median([row["seconds"] for row in rows]))
     figures["seconds_largest"] = float(np.max([row["seconds"] for row in rows]))
     print({name: round(value, 1) for name, value in figures.items() if isinstance(value, float)})

@@ -1,6 +1,6 @@
 """Kills a sweep or its workers with SIGKILL at random moments, resumes it, and compares its table with a calm one's.
 
-    python -m benchmarks.kill_resume --kills 100              # a sweep of an FMU that is not ours, behind walls
+    python -m benchmarks.kill_resume --kills 100 --workers 30     # a sweep of an FMU that is not ours, behind walls
     python -m benchmarks.kill_resume --kills 50 --table table.csv -- \\
         python -m tests.support.engine_driver {out} 2000 0.02 2
 
@@ -57,28 +57,32 @@ def run(command: list[str], out: Path) -> float:
     return time.monotonic() - start
 
 
-def kill_workers(process: "subprocess.Popen[str]", dice: random.Random, after: float) -> int:
-    """Kill one worker, at a random moment at most ``after`` seconds from its start; return how many were killed."""
-    while process.poll() is None and not children(process.pid):
-        time.sleep(0.01)
-    time.sleep(dice.uniform(0.0, after))
-    workers = children(process.pid)
-    if not workers:
-        return 0
-    with contextlib.suppress(ProcessLookupError):
-        os.kill(dice.choice(workers), signal.SIGKILL)
-    return 1
+def kill_workers(process: "subprocess.Popen[str]", out: Path, dice: random.Random, most: int) -> int:
+    """Kill at most ``most`` workers, each at a random moment after a case has come in; return how many were killed."""
+    lost = 0
+    while lost < most:
+        known = finished_cases(out)
+        while process.poll() is None and finished_cases(out) <= known:
+            time.sleep(0.01)
+        time.sleep(dice.uniform(0.0, 0.5))
+        workers = children(process.pid)
+        if process.poll() is not None or not workers:
+            break
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(dice.choice(workers), signal.SIGKILL)
+            lost += 1
+    return lost
 
 
 def kill_once(command: list[str], out: Path, dice: random.Random, after: float) -> tuple[bool, int, int]:
-    """Start or resume the sweep, kill a worker and then the sweep.
+    """Start or resume the sweep, kill workers (in every other run) and then the sweep.
 
     Returns:
         Whether the sweep was killed, the cases kept, and the number of workers killed.
     """
     words = [*(word.replace("{out}", str(out)) for word in command), "--resume"]
     process = subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    lost = kill_workers(process, dice, after) if dice.random() < 0.5 else 0
+    lost = kill_workers(process, out, dice, 3) if dice.random() < 0.5 else 0
     try:
         _, errors = process.communicate(timeout=after)
     except subprocess.TimeoutExpired:
@@ -95,7 +99,8 @@ def kill_once(command: list[str], out: Path, dice: random.Random, after: float) 
 def main() -> int:
     """Kill, resume, compare."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--kills", type=int, default=50, help="of sweeps, at least")
+    parser.add_argument("--workers", type=int, default=0, help="kills of workers, at least")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--longest", type=float, default=4.0, help="seconds until a kill, at most")
     parser.add_argument("--table", default="sweep.csv")
@@ -110,7 +115,7 @@ def main() -> int:
         print(f"undisturbed: {run(command, calm):.1f} s")
         reference = (calm / args.table).read_bytes()
         kills, workers, sweeps, kept = 0, 0, 0, 0
-        while kills < args.kills:
+        while kills < args.kills or workers < args.workers:
             out = Path(scratch) / f"killed{sweeps}"
             killed, found, lost = kill_once(command, out, dice, dice.uniform(0.2, args.longest))
             kills += killed

@@ -4,7 +4,8 @@
 
 ``FOLDER`` holds one folder a machine, each with ``model.toml`` and CSV records. ``KNOWN.toml`` says what is known: for
 ``[machine]`` the ``source``, ``licence``, ``finding`` (text) and ``right``, the labels that must be named, ``allowed``,
-those that may be. Without it the table has no judgement. One line a record, and ``real_machines.json``.
+those that may be. Without it the table has no judgement. One line a record, the count of
+harm, and ``real_machines.json``.
 """
 
 import argparse
@@ -14,6 +15,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from benchmarks.harm import counted, harmed
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.proof.other_record import torque_errors
 from orchestrator.errors import OrchestratorError
@@ -39,7 +41,8 @@ def row_of(path: Path, known: dict[str, Any]) -> dict[str, Any]:
         "sizes": {label: {n: [e.value, *e.interval] for n, e in effect.parameters.items()}
                   for label, effect in zip(labels, found.effects, strict=True)},
         "misfit": {m.signal: list(m.stages) for m in found.misfit}, "horizons": found.horizons,
-        "torque_error": errors, "rate": found.analysis["rate"], "seconds": time.process_time() - begun,
+        "harm": harmed(found), "torque_error": errors, "rate": found.analysis["rate"],
+        "seconds": time.process_time() - begun,
     }  # fmt: skip
     return row | {"judged": judged(labels, known)}
 
@@ -75,6 +78,7 @@ def main() -> None:
         print(row["machine"], row["record"], row["verdict"], row.get("trust", ""), sizes, f"force error {force}",
               row["judged"], f"{row.get('seconds', 0.0):.0f} s", flush=True)  # fmt: skip
         (args.out / "real_machines.json").write_text(json.dumps(rows, indent=1) + "\n")
+    print(counted(rows))
 
 
 if __name__ == "__main__":

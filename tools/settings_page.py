@@ -8,7 +8,7 @@ from pathlib import Path
 from orchestrator.diagnosis.blackbox.settings import BoxSettings
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.estimation.settings import EstimationSettings
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.settings import Settings, described
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
@@ -16,7 +16,7 @@ WORKFLOWS: tuple[tuple[str, str, type[Settings]], ...] = (
     ("Diagnosis", "diagnose", DiagnosisSettings),
     ("Diagnosis of any FMU", "diagnose --fmu", BoxSettings),
     ("Estimation", "estimate", EstimationSettings),
-    ("Calibration", "sweep", CalibrationSettings),
+    ("Calibration", "sweep", MapSettings),
 )
 HEAD = """# Settings
 

@@ -27,7 +27,7 @@ from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, trust_of_sweep
 from orchestrator.paired.pair import run_pair, with_settings
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sweep import OWN_PARAMETERS, SweepArrays, SweepPlan, gather, sweep_work
 from orchestrator.scenarios.sweep import check_parameters
 from orchestrator.shared.play import Play
@@ -183,7 +183,7 @@ def sweep(
     samples: int | None = None,
     experiment: str | Experiment = "default",
     backlash_model: str | None = None,
-    settings: CalibrationSettings | Path | str | None = None,
+    settings: MapSettings | Path | str | None = None,
     options: RunOptions | None = None,
     tell: Callable[[str], None] | None = None,
     **more: Any,
@@ -221,7 +221,7 @@ def sweep(
     options = options or RunOptions(**more)
     levels = _levels(noise)
     words = varied(vary)
-    calibrated = chosen_settings(settings, CalibrationSettings)
+    calibrated = chosen_settings(settings, MapSettings)
     text = sizes if isinstance(sizes, str) else ",".join(repr(float(size)) for size in sizes)
     count = draws_of(samples, words, text)
     chosen = chosen_experiment(experiment, backlash_model)

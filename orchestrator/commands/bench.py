@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         result.write(folder, arguments.out)
     print_blocks(result.blocks())
     base = result.base.title if result.base else "nothing"
-    sys.stdout.write(f"Ratios: {base} over the row's tool. Written to {arguments.out}\n")
+    print_blocks([f"Ratios: {base} over the row's tool. Written to {arguments.out}"])
     return 0
 
 

@@ -1,7 +1,6 @@
 """``calibrate``: the parameters of any FMU from a measured record, with intervals."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from orchestrator.api.any_fmu import calibrate
@@ -35,5 +34,5 @@ def run(args: argparse.Namespace) -> int:
         found = calibrate(args.record, args.fmu, args.map, progress=say)
         found.write(folder, args.out)
         print_blocks(found.blocks())
-    sys.stdout.write(f"Written to {args.out}: report.html, calibrate.json\n")
+    print_blocks([f"Written to {args.out}: report.html, calibrate.json"])
     return 0

@@ -1,7 +1,6 @@
 """``diagnose``: where a record and the model disagree, what is missing, and the corrected FMU."""
 
 import argparse
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -115,7 +114,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
         text = draft_map(path, args.fmu)
         with staged(args.out) as folder:
             (folder / "map.toml").write_text(text, encoding="utf-8")
-        sys.stdout.write(f"Written to {args.out / 'map.toml'}: look it over, and give it with --map\n")
+        print_blocks([f"Written to {args.out / 'map.toml'}: look it over, and give it with --map"])
         return 0
     if args.map is None:
         raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
@@ -126,7 +125,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
         finally:
             found.close()
         print_blocks(found.blocks())
-    sys.stdout.write(f"Written to {args.out}: report.html, diagnose.json, diagnose.csv, figure\n")
+    print_blocks([f"Written to {args.out}: report.html, diagnose.json, diagnose.csv, figure"])
     return 0
 
 

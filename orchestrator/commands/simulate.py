@@ -1,7 +1,6 @@
 """``simulate``: one paired run with its plots, or any scenario file."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from orchestrator.api.pair import run_pair
@@ -42,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
         result = _run(arguments)
         result.write(folder, arguments.out)
     print_blocks(result.blocks())
-    sys.stdout.write(f"Written to {arguments.out}: report.html, simulate.csv, simulate.json, simulate.png\n")
+    print_blocks([f"Written to {arguments.out}: report.html, simulate.csv, simulate.json, simulate.png"])
     return 0
 
 

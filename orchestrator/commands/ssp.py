@@ -1,7 +1,6 @@
 """``ssp export``: systems as SSP 1.0 files. ``ssp run``: any SSP of FMI 2.0 co-simulation FMUs under our master."""
 
 import argparse
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -68,7 +67,7 @@ def _export(arguments: argparse.Namespace) -> int:
         write_report(folder, "ssp")
     system = written.scenario.system
     counts = f"{len(system.instances)} FMUs, {len(system.connections)} connections"
-    sys.stdout.write(f"Written to {arguments.out / name}: {counts}\n")
+    print_blocks([f"Written to {arguments.out / name}: {counts}"])
     return 0
 
 
@@ -90,7 +89,7 @@ def _run(arguments: argparse.Namespace) -> int:
         )
         result.write(folder, arguments.out, _words(arguments))
     print_blocks(result.blocks())
-    sys.stdout.write(f"Written to {arguments.out}: ssp.csv, ssp.json\n")
+    print_blocks([f"Written to {arguments.out}: ssp.csv, ssp.json"])
     return 0
 
 

@@ -1,7 +1,6 @@
 """``sweep``: many sizes, noise levels and seeds of the paired loops; or any scenario over any parameters."""
 
 import argparse
-import sys
 from pathlib import Path
 
 from orchestrator.api.cases import DEFAULT_SAMPLES, RunOptions
@@ -91,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_blocks(blocks)
     result.sweep.discard_journal()
     figures = ", estimates.png, errors.png, loops.png" if arguments.scenario is None else ""
-    sys.stdout.write(f"Written to {arguments.out}: report.html, sweep.csv, sweep.json{figures}\n")
+    print_blocks([f"Written to {arguments.out}: report.html, sweep.csv, sweep.json{figures}"])
     return 1 if failed else 0
 
 

@@ -8,14 +8,15 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.sizes import with_model_error
 from orchestrator.diagnosis.fit.together import at_one_rate, series
-from orchestrator.diagnosis.outcome import Diagnosis, Workings
-from orchestrator.diagnosis.passes import Progress, passes
+from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Workings
+from orchestrator.diagnosis.passes import Pass, Progress, passes
 from orchestrator.diagnosis.proof.by_record import by_record, repeats
 from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
-from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, ladder
 from orchestrator.diagnosis.search.search import in_metres
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.admission import check_comparable, check_diagnosable, check_resolved
@@ -70,13 +71,17 @@ def diagnose(
     likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
     base_fit, final = found.base, found.final
     units = METRIC if in_metres(model) else {}
+    position = units.get("rad", "rad")
+    chosen = base_fit if unknown else final
+    stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
+    misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
+    chosen = _honest(found, chosen, misfit)
     everything = [
-        (named(plant, effect, final, search.steps, units, settings.verdict), effect.measurement)
+        (named(plant, effect, final if unknown else chosen, search.steps, units, settings.verdict), effect.measurement)
         for effect in best.effects
     ]
     effects = tuple(one for one, of_the_log in everything if not of_the_log)
     nuisances = tuple(one for one, of_the_log in everything if of_the_log)
-    chosen = base_fit if unknown else final
     if unknown or effects or nuisances:
         verdict = "unknown" if unknown else "effects" if effects else "parameters"
     else:
@@ -85,14 +90,12 @@ def diagnose(
     untouched = replace(base_fit, p=nominal)
     before = missing_torque(likelihood, untouched if verdict in ("none", "parameters") else base_fit)
     after = missing_torque(likelihood, chosen)
-    stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
     where = places(before, signals.h, settings.places)
     far = far_off(model, chosen.p, settings.verdict)
     unnamed = replace(found.proof, final=found.proof.base) if unknown else found.proof
-    position = units.get("rad", "rad")
     ends = (stages[0], stages[-1])
     named_stages = ("parameters", "final")[: 1 if unknown or not best.effects else 2]
-    misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
+    learning = unknown and not search.stopped and not found.hopeless
     warnings = warnings_of(found, effects, signals.channels, len(plant.bodies))
     return Diagnosis(
         verdict=verdict,
@@ -112,7 +115,7 @@ def diagnose(
         workings=Workings(likelihood, parts, base_fit, chosen, best, tuple(search.steps), before, after),
         records=by_record(likelihood, chosen.q, ends, parts.held_out, position),
         repeats=repeats(likelihood.signals, plant.encoders, settings.proof),
-        learned=learned_law(likelihood, chosen, parts, position) if unknown and not search.stopped else None,
+        learned=learned_law(likelihood, chosen, parts, position) if learning else None,
     )
 
 
@@ -127,6 +130,15 @@ def evidence_of(diagnosis: Diagnosis) -> Evidence:
     """
     w = diagnosis.workings
     return evidence(w.likelihood, w.final, w.parts)
+
+
+def _honest(found: Pass, chosen: Fit, misfit: Sequence[Misfit]) -> Fit:
+    """Return the chosen fit, its intervals as wide as the model's error asks for where its misfit tells of one."""
+    likelihood, settings = found.likelihood, found.likelihood.settings
+    if all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit):
+        return chosen
+    levels = ladder(settings.levels, () if found.unknown else found.best.effects, chosen.q)
+    return with_model_error(likelihood, chosen, found.parts.seen, levels)
 
 
 def _plain_verdict(likelihood: RecordLikelihood, nominal: Array, base: Fit, parts: Parts) -> str:

@@ -50,6 +50,11 @@ class Pass:
     proof: Proof
     withdrawn: tuple[str, ...]
 
+    @property
+    def hopeless(self) -> bool:
+        """Tell whether the final model predicts nothing: no other part, and no curve, will make up for that."""
+        return self.proof.final.is_hopeless(self.likelihood.settings.verdict.hopeless)
+
 
 def passes(
     model: Model, signals: Signals, parts: Parts, nominal: Array, settings: DiagnosisSettings, progress: Progress
@@ -74,7 +79,7 @@ def passes(
     likelihood = RecordLikelihood(model.plant, signals, nominal, parts.validated.stop, settings)
     found = _search(model, likelihood, parts, parts, settings.search.most_effects, progress, deadline)
     first = int(size * (1.0 - settings.fit.looked_at))  # as many samples as are held out
-    if found.unknown and time.monotonic() < deadline:
+    if found.unknown and not found.hopeless and time.monotonic() < deadline:
         # What shows on the deciding part alone (a limit that is reached once) must be fitted to be found.
         exchanged = Parts(slice(first, parts.validated.stop), slice(head, first), parts.held_out)
         other = _search(model, likelihood, parts, exchanged, again, progress, deadline)

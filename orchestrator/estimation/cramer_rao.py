@@ -77,7 +77,7 @@ def _refined_information(likelihood: Likelihood, theta: Array, free: NDArray[np.
     point = likelihood.at(theta)
     information = np.eye(free.size)
     for _ in range(4):
-        _, information = likelihood.derivatives(point, free)
+        _, information, likelihood = likelihood.derivatives(point, free)
     return information
 
 

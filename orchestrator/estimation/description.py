@@ -16,22 +16,22 @@ from orchestrator.estimation.settings import GapVerdictSettings
 from pyfmu_sources.drivetrain_parameters import P_I
 
 
-def describe(likelihood: Likelihood, fit: GapFit) -> Estimate:
+def describe(fit: GapFit) -> Estimate:
     """Return the estimate of a fit: interval, visibility, and what else the fit says.
 
     Args:
-        likelihood: of the record.
-        fit: its maximum.
+        fit: the maximum of the likelihood of a record.
 
     Returns:
         The estimate.
     """
+    likelihood = fit.likelihood
     problem, settings = likelihood.problem, likelihood.settings.verdict
     place = problem.index("alpha")
     column = list(fit.free).index(place)
     alpha = float(fit.point.theta[place])
     error = math.sqrt(fit.covariance[column, column])
-    curve = profile(likelihood, fit)
+    curve = profile(fit)
     # Torque noise above the least means that the model is not exact; what it lacks is not white, as the likelihood
     # takes it to be, so the interval is widened.
     inexact = max(likelihood.noise(fit.point.theta).torque) > 10.0 * LEAST_TORQUE_NOISE

@@ -3,6 +3,7 @@
 Each record has an initial state of its own, and an angle between its encoders' zeros, which may have been set anew.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -44,11 +45,15 @@ class JointLikelihood(Likelihood):
     """The likelihood of several records: their innovations one after the other."""
 
     def __init__(
-        self, problems: Sequence[GapProblem], threads: int = 1, settings: EstimationSettings = DEFAULT_SETTINGS
+        self,
+        problems: Sequence[GapProblem],
+        threads: int = 1,
+        settings: EstimationSettings = DEFAULT_SETTINGS,
+        deadline: float = math.inf,
     ) -> None:
-        super().__init__(_joint_problem(problems), threads, settings)
+        super().__init__(_joint_problem(problems), threads, settings, deadline)
         names = self.problem.names
-        self._parts = [Likelihood(problem) for problem in problems]
+        self._parts = [Likelihood(problem, deadline=deadline) for problem in problems]
         self._own = [
             np.array(
                 [names.index(f"{u.name}@{number}" if number > 1 and u.name in OWN else u.name) for u in p.unknowns]
@@ -60,8 +65,7 @@ class JointLikelihood(Likelihood):
         """Return the innovations of all records at ``theta``."""
         runs = []
         for part, places in zip(self._parts, self._own, strict=True):
-            part.soft, part.deadline = self.soft, self.deadline
-            runs.append(part.run(theta[places], keep))
+            runs.append(part.changed(soft=self.soft).run(theta[places], keep))
         return Innovations(
             np.concatenate([run.errors for run in runs]),
             np.concatenate([run.variances for run in runs]),

@@ -9,7 +9,9 @@ import math
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +52,7 @@ class GapFit:
         covariance: (k, k) its inverse.
         iterations: scoring steps taken.
         converged: whether the last step changed the objective by less than the tolerance.
+        likelihood: the likelihood with what the fit has learnt of it, for the next fit.
     """
 
     point: Point
@@ -58,6 +61,7 @@ class GapFit:
     covariance: Array
     iterations: int
     converged: bool
+    likelihood: "Likelihood" = field(repr=False)
 
 
 class Likelihood:
@@ -65,9 +69,16 @@ class Likelihood:
 
     ``soft`` blurs the flanks by the uncertainty of the twist, which smooths the likelihood for the start of a fit.
     ``information`` is the last Fisher information of each unknown; the difference quotients are scaled by it.
+    Nothing of it changes once it is made: a fit returns another one with what it has learnt.
     """
 
-    def __init__(self, problem: GapProblem, threads: int = 1, settings: EstimationSettings = DEFAULT_SETTINGS) -> None:
+    def __init__(
+        self,
+        problem: GapProblem,
+        threads: int = 1,
+        settings: EstimationSettings = DEFAULT_SETTINGS,
+        deadline: float = math.inf,
+    ) -> None:
         self.problem = problem
         self.settings = settings
         self.soft = False
@@ -82,10 +93,29 @@ class Likelihood:
         self._noise = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_noise_")]
         self._torque = [n for n, u in enumerate(problem.unknowns) if u.name.startswith("log_torque_")]
         self._scale = names.index(SCALE) if SCALE in names else None
-        self.deadline = math.inf  # of time.monotonic()
+        self.deadline = deadline  # of time.monotonic()
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._mean = problem.start
         self._weight = np.array([u.deviation**-2 if math.isfinite(u.deviation) else 0.0 for u in problem.unknowns])
+
+    def changed(
+        self, *, soft: bool | None = None, information: Array | None = None, problem: GapProblem | None = None
+    ) -> Self:
+        """Return the likelihood with other flanks, information or bounds of the unknowns.
+
+        Args:
+            soft: whether flanks are blurred (default: as they are).
+            information: (unknowns, unknowns) of the unknowns (default: the last one).
+            problem: the same with other bounds (default: as it is).
+
+        Returns:
+            Another likelihood, which shares the threads.
+        """
+        other = copy(self)
+        other.soft = self.soft if soft is None else soft
+        other.information = self.information if information is None else information
+        other.problem = self.problem if problem is None else problem
+        return other
 
     @property
     def difference(self) -> float:
@@ -168,7 +198,7 @@ class Likelihood:
         prior = float(np.sum(self._weight * (theta - self._mean) ** 2))
         return Point(theta, deviance + prior, deviance, result)
 
-    def derivatives(self, point: Point, free: NDArray[np.int64]) -> tuple[Array, Array]:
+    def derivatives(self, point: Point, free: NDArray[np.int64]) -> tuple[Array, Array, Self]:
         """Return the gradient (k,) of half the objective and the Fisher information (k, k) of the free unknowns.
 
         Differences are taken along the columns of a factor of the covariance that the last information implies, a
@@ -179,7 +209,7 @@ class Likelihood:
             free: (k,) indices of the free unknowns.
 
         Returns:
-            Both.
+            Both, and the likelihood that knows this information.
         """
         base = point.result
         basis = self._basis(free)
@@ -211,8 +241,9 @@ class Likelihood:
         weight = self._weight[free]
         gradient += weight * (point.theta - self._mean)[free]
         information = 0.5 * (information + information.T) + np.diag(weight)
-        self.information[np.ix_(free, free)] = information
-        return gradient, information
+        known = self.information.copy()
+        known[np.ix_(free, free)] = information
+        return gradient, information, self.changed(information=known)
 
     def _basis(self, free: NDArray[np.int64]) -> Array:
         """Return a factor (k, k) of the covariance of the free unknowns; alpha never moves down along a column."""
@@ -259,7 +290,7 @@ def maximise(
     for _ in range(iterations):
         done += 1
         value = point.theta[places]
-        gradient, information = likelihood.derivatives(point, places)
+        gradient, information, likelihood = likelihood.derivatives(point, places)
         held = ((value <= lower) & (gradient > 0.0)) | ((value >= upper) & (gradient < 0.0))
         before = point.objective
         point, damping = _step(likelihood, point, places, gradient, information, held, (lower, upper), damping)
@@ -270,7 +301,7 @@ def maximise(
                 continue
             converged = True
             break
-    return GapFit(point, places, information, inverse(information), done, converged)
+    return GapFit(point, places, information, inverse(information), done, converged, likelihood)
 
 
 def _step(

@@ -94,7 +94,7 @@ def estimate(
     if fit is None:
         fit = fit_record(likelihood, report)
     report("finding the interval", BEFORE_INTERVAL)
-    found = describe(likelihood, fit)
+    found = describe(fit)
     return by_record(found, records) if more else found
 
 
@@ -103,29 +103,26 @@ def _likelihood(
 ) -> Likelihood:
     first, *more = (make_problem(one, model) for one in records)
     if more:
-        likelihood: Likelihood = JointLikelihood([first, *more], threads, settings)
-    else:
-        likelihood = Likelihood(first, threads, settings)
-    likelihood.deadline = deadline
-    return likelihood
+        return JointLikelihood([first, *more], threads, settings, deadline)
+    return Likelihood(first, threads, settings, deadline)
 
 
 def _refined(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit | None:
     """Return the fit that starts from that of the beginning; None where the beginning does not show the gap."""
     first = fit_record(short)
+    short = first.likelihood
     flanks = short.run(first.point.theta, keep=True).contacts
     flanks = flanks[flanks != 0]
     if np.count_nonzero(np.diff(flanks)) < likelihood.settings.fit.enough_traversals:
         return None
     report("fitting the whole record", BEFORE_WHOLE)
-    likelihood.soft = short.soft
-    likelihood.information = short.information.copy()
+    likelihood = likelihood.changed(soft=short.soft, information=short.information)
     if short.problem.unknowns[_split(short)[0][-1]].lower >= math.log(LEAST_WHERE_INEXACT[-1]):
-        likelihood.problem = with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT)
+        likelihood = likelihood.changed(problem=with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT))
     torque, others = _split(likelihood)
     start = maximise(likelihood, first.point.theta, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
-    best = _free_fit(likelihood, start, torque, others)
-    return _with_contact(likelihood, best, torque, others) if likelihood.problem.outputs.shape[1] == 2 else best
+    best = _free_fit(start.likelihood, start, torque, others)
+    return _with_contact(best, torque, others) if likelihood.problem.outputs.shape[1] == 2 else best
 
 
 def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
@@ -142,30 +139,32 @@ def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
     torque, others = _split(likelihood)
     report("trying sizes", 0.0)
     if problem.outputs.shape[1] == 2:
-        tried = _first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
+        tried, likelihood = _first_fits(likelihood, torque, others, np.log(BOTH_ENCODERS[0]))
         firsts = _different(tried, problem.index("alpha"), likelihood.settings.fit.different)
         fits = []
         for n, first in enumerate(firsts):
             report("fitting all values", BEFORE_FIT + (BEFORE_FREE - BEFORE_FIT) * n / len(firsts))
-            fits.append(_continue(likelihood, first, BOTH_ENCODERS[1:]))
+            best, likelihood = _continue(likelihood, first, BOTH_ENCODERS[1:])
+            fits.append(best)
         report("fitting the noise", BEFORE_FREE)
         best = _free_fit(likelihood, min(fits, key=lambda fit: fit.point.objective), torque, others)
-        return _with_contact(likelihood, best, torque, others)
-    best = _fit_one_encoder(likelihood, torque, others)
+        return _with_contact(best, torque, others)
+    best, likelihood = _fit_one_encoder(likelihood, torque, others)
     return _free_fit(likelihood, best, torque, others)
 
 
-def _with_contact(likelihood: Likelihood, best: GapFit, torque: list[int], others: list[int]) -> GapFit:
+def _with_contact(best: GapFit, torque: list[int], others: list[int]) -> GapFit:
     """Return the fit, with a least torque noise where the machine's contact law is not the model's."""
+    likelihood = best.likelihood
     if not _has_other_contact(likelihood, best):
         return best
     if likelihood.problem.unknowns[torque[-1]].lower >= math.log(LEAST_WHERE_INEXACT[-1]):
         return best  # it has that already
-    likelihood.problem = with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT)
+    likelihood = likelihood.changed(problem=with_least_torque_noise(likelihood.problem, LEAST_WHERE_INEXACT))
     start = best.point.theta.copy()
     start[torque] = np.maximum(start[torque], np.log(LEAST_WHERE_INEXACT))
     best = maximise(likelihood, start, others, 2 * likelihood.settings.fit.steps_per_level, tolerance=0.01)
-    return _free_fit(likelihood, best, torque, others)
+    return _free_fit(best.likelihood, best, torque, others)
 
 
 def _has_other_contact(likelihood: Likelihood, fit: GapFit) -> bool:
@@ -176,65 +175,62 @@ def _has_other_contact(likelihood: Likelihood, fit: GapFit) -> bool:
     return abs(float(fit.point.theta[place])) > likelihood.settings.fit.clear_impulse * deviation
 
 
-def _continue(likelihood: Likelihood, best: GapFit, levels: Sequence[tuple[float, float]]) -> GapFit:
-    """Return the last fit that paid while the torque noise goes through ``levels``."""
+def _continue(likelihood: Likelihood, best: GapFit, levels: Sequence[tuple[float, float]]) -> tuple[GapFit, Likelihood]:
+    """Return the last fit that paid while the torque noise goes through ``levels``, and what it has learnt."""
     torque, others = _split(likelihood)
     failures, least = 0, best.point.objective
     for level in levels:
         start = best.point.theta.copy()
         start[torque] = np.log(level)
-        known = likelihood.information.copy()
         trial = maximise(likelihood, start, others, likelihood.settings.fit.steps_per_level, tolerance=1.0)
         least = min(least, trial.point.objective)
         if trial.point.objective < least + likelihood.settings.fit.allowed_rise:
-            best, failures = trial, 0
+            best, failures, likelihood = trial, 0, trial.likelihood
             continue
-        likelihood.information = known
         failures += 1
         if failures == 2:
             break
-    return best
+    return best, likelihood
 
 
-def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int]) -> GapFit:
-    """Return the best fit with little torque noise, and leave ``likelihood`` with its flanks as that fit took them.
+def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int]) -> tuple[GapFit, Likelihood]:
+    """Return the best fit with little torque noise, and the likelihood with its flanks as that fit took them.
 
     The flanks are blurred at first and sharpened then. The second start of the grid is tried where the first one does
     not get down to little noise. Where no fit with sharp flanks comes up to a blurred one, that one stays, with the
     wide interval that it deserves.
     """
-    found: list[tuple[GapFit, bool, Array]] = []
-    likelihood.soft = True
-    for first in _first_fits(likelihood, torque, others, np.log(BLURRED[0]))[:2]:
-        likelihood.soft = True
-        likelihood.information[np.ix_(first.free, first.free)] = first.information
-        blurred = _continue(likelihood, first, BLURRED[1:])
-        found.append((blurred, True, likelihood.information.copy()))
-        likelihood.soft = False
-        sharp = _sharpen(likelihood, blurred, torque, others)
-        found.append((sharp, False, likelihood.information.copy()))
+    found: list[tuple[GapFit, Likelihood]] = []
+    firsts, likelihood = _first_fits(likelihood.changed(soft=True), torque, others, np.log(BLURRED[0]))
+    for first in firsts[:2]:
+        known = likelihood.information.copy()
+        known[np.ix_(first.free, first.free)] = first.information
+        blurred, likelihood = _continue(likelihood.changed(soft=True, information=known), first, BLURRED[1:])
+        found.append((blurred, likelihood))
+        sharp, likelihood = _sharpen(likelihood.changed(soft=False), blurred, torque, others)
+        found.append((sharp, likelihood))
         if likelihood.noise(sharp.point.theta).torque[1] <= likelihood.settings.fit.calm_torque_noise:
             break
-    best, likelihood.soft, likelihood.information = min(found, key=lambda entry: entry[0].point.objective)
-    return best
+    return min(found, key=lambda entry: entry[0].point.objective)
 
 
-def _sharpen(likelihood: Likelihood, blurred: GapFit, torque: list[int], others: list[int]) -> GapFit:
-    """Return the fit with sharp flanks that starts from one with ``blurred`` flanks.
+def _sharpen(
+    likelihood: Likelihood, blurred: GapFit, torque: list[int], others: list[int]
+) -> tuple[GapFit, Likelihood]:
+    """Return the fit with sharp flanks that starts from one with ``blurred`` flanks, and what was learnt last.
 
     Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it.
     """
-    known = likelihood.information.copy()
     fits: list[GapFit] = []
     for place in SHARP_STARTS:
-        likelihood.information = known.copy()
         start = blurred.point.theta.copy()
         start[torque] = np.log(MOTOR_ENCODER[place])
         first = maximise(likelihood, start, others, likelihood.settings.fit.steps_per_level, tolerance=0.5)
-        fits.append(_continue(likelihood, first, MOTOR_ENCODER[place + 1 :]))
+        best, learnt = _continue(first.likelihood, first, MOTOR_ENCODER[place + 1 :])
+        fits.append(best)
         if likelihood.noise(fits[-1].point.theta).torque[1] <= likelihood.settings.fit.calm_torque_noise:
             break
-    return min(fits, key=lambda fit: fit.point.objective)
+    return min(fits, key=lambda fit: fit.point.objective), learnt
 
 
 def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
@@ -244,8 +240,10 @@ def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
     return torque, [n for n in range(len(names)) if n not in torque]
 
 
-def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], level: Array) -> list[GapFit]:
-    """Return fits at high torque noise (its logarithm ``level``), the best first.
+def _first_fits(
+    likelihood: Likelihood, torque: list[int], others: list[int], level: Array
+) -> tuple[list[GapFit], Likelihood]:
+    """Return fits at high torque noise (its logarithm ``level``), the best first, and what they have learnt.
 
     They start from the two best places of a grid of alpha and from the smallest size that is about as good: where the
     gap is traversed rarely, much noise hides that sizes beyond it are too large.
@@ -265,8 +263,11 @@ def _first_fits(likelihood: Likelihood, torque: list[int], others: list[int], le
     smallest = next(point for point in points if point.objective < best + likelihood.settings.fit.about_as_good)
     if all(smallest is not start for start in starts):
         starts.append(smallest)
-    fits = [maximise(likelihood, point.theta, others, 3, tolerance=1.0) for point in starts]
-    return sorted(fits, key=lambda fit: fit.point.objective)
+    fits: list[GapFit] = []
+    for point in starts:
+        fits.append(maximise(likelihood, point.theta, others, 3, tolerance=1.0))
+        likelihood = fits[-1].likelihood
+    return sorted(fits, key=lambda fit: fit.point.objective), likelihood
 
 
 def _different(fits: list[GapFit], place: int, ratio: float) -> list[GapFit]:
@@ -282,11 +283,12 @@ def _different(fits: list[GapFit], place: int, ratio: float) -> list[GapFit]:
 
 def _free_fit(likelihood: Likelihood, best: GapFit, torque: list[int], others: list[int]) -> GapFit:
     """Return the fit with the torque noise free, except where the record cannot tell it from none."""
-    _, information = likelihood.derivatives(best.point, np.array(torque))
+    _, information, likelihood = likelihood.derivatives(best.point, np.array(torque))
     flat = likelihood.settings.fit.flat_information
     free = [n for n, value in zip(torque, np.diag(information), strict=True) if value > flat]
     while True:
         best = maximise(likelihood, best.point.theta, sorted(others + free), 40, tolerance=2e-3)
+        likelihood = best.likelihood
         column = {int(n): k for k, n in enumerate(best.free)}
         told = [n for n in free if best.information[column[n], column[n]] > flat]
         if told == free:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from orchestrator.estimation.innovations import Array
-from orchestrator.estimation.likelihood import GapFit, Likelihood, Point, maximise
+from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
 from orchestrator.estimation.protocol import LEVEL
 
 
@@ -35,17 +35,17 @@ class Profile:
         return low, high
 
 
-def profile(likelihood: Likelihood, fit: GapFit, level: float = LEVEL) -> Profile:
+def profile(fit: GapFit, level: float = LEVEL) -> Profile:
     """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0).
 
     Args:
-        likelihood: of the record.
         fit: the maximum.
         level: of the interval.
 
     Returns:
         The profile.
     """
+    likelihood = fit.likelihood
     place = likelihood.problem.index("alpha")
     column = list(fit.free).index(place)
     deviation = math.sqrt(fit.covariance[column, column])
@@ -57,7 +57,8 @@ def profile(likelihood: Likelihood, fit: GapFit, level: float = LEVEL) -> Profil
         reach = 0.5 * edge * deviation
         for _ in range(14):
             alpha = max(best + side * reach, 0.0)
-            drop = _constrained(likelihood, fit, place, alpha, slope).objective - fit.point.objective
+            held = _constrained(likelihood, fit, place, alpha, slope)
+            likelihood, drop = held.likelihood, held.point.objective - fit.point.objective
             entries.append((alpha, drop))
             if drop > edge**2 or alpha == 0.0:
                 break
@@ -69,12 +70,12 @@ def profile(likelihood: Likelihood, fit: GapFit, level: float = LEVEL) -> Profil
     return Profile(np.array([e[0] for e in entries]), np.array([e[1] for e in entries]))
 
 
-def _constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> Point:
-    """Return the best point found with alpha held: the linear prediction, then some scoring steps."""
+def _constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
+    """Return the best fit found with alpha held: the linear prediction, then some scoring steps."""
     unknowns = likelihood.problem.unknowns
     theta = fit.point.theta.copy()
     theta[fit.free] += slope * (alpha - fit.point.theta[place])
     theta[place] = alpha
     theta = np.clip(theta, [u.lower for u in unknowns], [u.upper for u in unknowns])
     others = [n for n in fit.free if n != place]
-    return maximise(likelihood, theta, others, 5, tolerance=0.05).point
+    return maximise(likelihood, theta, others, 5, tolerance=0.05)

@@ -26,7 +26,7 @@ from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import difference_sum
 from orchestrator.paired.monotone import MonotoneCubic
 from orchestrator.paired.native_loop import NativeLoop
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.output import write_text
@@ -38,7 +38,7 @@ Each = Callable[[Callable[[Any], float], Iterable[Any]], Iterable[float]]
 
 # Seeds of calibration and of tests come from different branches of one tree, so that none is ever shared.
 CALIBRATION_BRANCH = 7
-DEFAULT_SETTINGS: CalibrationSettings = CalibrationSettings()
+DEFAULT_SETTINGS: MapSettings = MapSettings()
 
 
 class Calibration(msgspec.Struct, frozen=True):
@@ -72,7 +72,7 @@ class Calibration(msgspec.Struct, frozen=True):
     level: float
     runs: int
     seed_branch: int
-    settings: CalibrationSettings
+    settings: MapSettings
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def _noise_below(calibration: Calibration) -> float:
 def load_or_calibrate(
     experiment: Experiment,
     progress: Callable[[str], None] | None = None,
-    settings: CalibrationSettings = DEFAULT_SETTINGS,
+    settings: MapSettings = DEFAULT_SETTINGS,
 ) -> Calibration:
     """Return the calibration of ``experiment`` from the user's cache, or make and store it.
 
@@ -203,7 +203,7 @@ def load_or_calibrate(
     return calibration
 
 
-def _digest(experiment: Experiment, settings: CalibrationSettings) -> str:
+def _digest(experiment: Experiment, settings: MapSettings) -> str:
     digest = hashlib.sha256(experiment.digest().encode())
     digest.update(msgspec.json.encode(settings))
     for folder in (Path(pyfmu_sources.__file__).parent, Path(__file__).parent):
@@ -212,7 +212,7 @@ def _digest(experiment: Experiment, settings: CalibrationSettings) -> str:
     return digest.hexdigest()[:24]
 
 
-def calibrate(experiment: Experiment, settings: CalibrationSettings = DEFAULT_SETTINGS) -> Calibration:
+def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) -> Calibration:
     """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds.
 
     Args:
@@ -234,7 +234,7 @@ def calibrate(experiment: Experiment, settings: CalibrationSettings = DEFAULT_SE
         return calibrate_loop(loop, settings, usable_cores())
 
 
-def calibrate_loop(loop: CalibratedLoop, settings: CalibrationSettings, threads: int = 1) -> Calibration:
+def calibrate_loop(loop: CalibratedLoop, settings: MapSettings, threads: int = 1) -> Calibration:
     """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`.
 
     Args:
@@ -249,7 +249,7 @@ def calibrate_loop(loop: CalibratedLoop, settings: CalibrationSettings, threads:
         return _calibrated(loop, settings, pool.map)
 
 
-def _calibrated(loop: CalibratedLoop, settings: CalibrationSettings, each: Each) -> Calibration:
+def _calibrated(loop: CalibratedLoop, settings: MapSettings, each: Each) -> Calibration:
     experiment = loop.experiment
     zero = (np.zeros(experiment.steps + 1), np.zeros(experiment.steps + 1))
     twin = loop.run(0.0, zero)[:, 2]
@@ -313,7 +313,7 @@ def _noisy_sum(loop: CalibratedLoop, twin: Array, alpha: float, generator: np.ra
 
 
 def _noisy_map(
-    loop: CalibratedLoop, twin: Array, log_alpha: Array, log_sum: Array, settings: CalibrationSettings, each: Each
+    loop: CalibratedLoop, twin: Array, log_alpha: Array, log_sum: Array, settings: MapSettings, each: Each
 ) -> tuple[Array, Array]:
     """Return (mean of log S under noise, spread of log alpha_hat), both at the clean map's nodes."""
     nodes = np.linspace(log_alpha[0], log_alpha[-1], settings.noisy_sizes)
@@ -345,7 +345,7 @@ def _conformal_width(
     log_alpha: Array,
     log_sum: Array,
     spread: Array,
-    settings: CalibrationSettings,
+    settings: MapSettings,
     each: Each = map,
 ) -> float:
     """Return the multiple of the spread that covers ``settings.level`` of runs that the map has not seen."""

@@ -5,7 +5,7 @@ from typing import Annotated
 from orchestrator.shared.settings import Settings, setting, share
 
 
-class CalibrationSettings(Settings, frozen=True):
+class MapSettings(Settings, frozen=True):
     """How the map from S to the half-gap is made."""
 
     clean_sizes: Annotated[int, setting("runs without noise: nodes of the map", ge=9)] = 241

@@ -21,7 +21,7 @@ from orchestrator.paired.cosimulation import LoopSession, LoopValues, loop_value
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, difference_sum, error_statistics
 from orchestrator.paired.pair import with_settings
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 from orchestrator.paired.sizes import read_sizes
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ class SweepPlan:
         return DesignCases(parse_design(specifications, sizes.count or self.samples, self.seed), self.seed)
 
     def calibrations(
-        self, progress: Callable[[str], None] | None = None, settings: CalibrationSettings = DEFAULT_SETTINGS
+        self, progress: Callable[[str], None] | None = None, settings: MapSettings = DEFAULT_SETTINGS
     ) -> dict[float, Calibration]:
         """Return the calibration of each noise level; ``progress`` is told of those that must be made.
 

@@ -40,5 +40,5 @@ def trust_section(trust: TrustFound | None) -> list[Section]:
     """
     if trust is None or not trust.reasons:
         return []
-    lines = tuple(text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".") for text in trust.reasons)
+    lines = tuple(text if text.endswith(".") else f"{text}." for text in trust.reasons)
     return [Text("How far this can be trusted", (MEANINGS.get(trust.level, trust.level), *lines))]

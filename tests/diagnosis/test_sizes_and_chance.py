@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from orchestrator.diagnosis.fit.fitting import Free, Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import Signals
-from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized
+from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.verdict.chance import torque_noise
@@ -40,6 +40,22 @@ def test_white_innovations_have_nothing_to_dispute() -> None:
     assert np.array_equal(same.fit.p, found.p)
     robust = _with_robust_errors(likelihood, found, parts.fitted)
     assert robust.standard_error(free[0].place) == pytest.approx(found.standard_error(free[0].place), rel=1.0)
+
+
+def test_an_interval_holds_what_free_runs_ask_for() -> None:
+    likelihood, _ = axis_likelihood()
+    place = likelihood.plant.index("b")
+    free, part = (Free(place, 0.01, 0.0, 10.0),), slice(10, likelihood.stop)
+    long = fit(likelihood, likelihood.nominal, 1e-5, free, Parts(part, part, part), most=0)
+    same = with_model_error(likelihood, long, part, (0.3, 1e-5))
+    assert same.standard_error(place) == pytest.approx(long.standard_error(place), rel=0.1)
+    off = replace(long, p=long.p + 0.5 * (np.arange(long.p.size) == place))
+    wide = with_model_error(likelihood, off, part, (0.3, 1e-5))
+    low, high = wide.interval(place)
+    assert low < long.p[place] < off.p[place] < high
+    assert np.array_equal(wide.p, off.p)
+    nothing = replace(long, free=())
+    assert with_model_error(likelihood, nothing, part, (1e-5,)) is nothing
 
 
 def horizons(errors: list[float], squares: np.ndarray | None = None) -> Horizons:
@@ -86,6 +102,16 @@ def test_doubts_are_listed_once_and_worst_first() -> None:
     assert trust.reasons[0] == UNEXPLAINED
     assert trust.reasons[1:3] == ("a note", "the misfit of theta_m on held-out data is 4.0 times the noise")
     assert any("`J` lies far outside" in reason for reason in trust.reasons)
+
+
+def test_what_makes_the_misfit_larger_is_never_green() -> None:
+    base = horizons([0.1, 1.0, 1.0, 1.0])
+    left = Remainder(0.0, 1.0, 1.0, ())
+    stages = (("nominal", 2.0), ("parameters", 0.1), ("+ gravity_load@load", 0.12))
+    for final, expected in ((stages, 1), ((*stages[:2], ("+ gravity_load@load", 0.1005)), 0)):
+        misfit = (Misfit("theta_l", "rad", 0.1, final),)
+        trust = doubts("effects", left, False, Proof(base, base), [], misfit, (), SETTINGS.verdict)
+        assert sum("20 % larger with what is named" in reason for reason in trust.reasons) == expected
 
 
 def test_torque_noise_passes_the_lag_of_the_drive() -> None:

@@ -12,7 +12,7 @@ from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao, ekf
 from orchestrator.estimation.design import SEARCHED, MachineLimits, design
 from orchestrator.estimation.innovations import NoiseLevels, affine_model, innovations, simulate
-from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.likelihood import Likelihood, maximise
 from orchestrator.estimation.paired_sum import twin
 from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.protocol import METHODS, NotApplicableError, estimator
@@ -90,10 +90,20 @@ def test_score_and_information_agree_with_differences_of_the_objective(exact: tu
         values.append(likelihood.at(moved).objective)
     point = likelihood.at(theta)
     for _ in range(3):
-        gradient, information = likelihood.derivatives(point, np.array([place]))
+        gradient, information, likelihood = likelihood.derivatives(point, np.array([place]))
     assert (values[1] - values[0]) / (4.0 * step) == pytest.approx(gradient[0], abs=0.02 * math.sqrt(information[0, 0]))
     curvature = (values[0] + values[1] - 2.0 * point.objective) / (2.0 * step**2)
     assert curvature == pytest.approx(information[0, 0], rel=0.1)
+
+
+def test_a_fit_leaves_the_likelihood_as_it_was(exact: tuple[Record, dict]) -> None:
+    likelihood = Likelihood(make_problem(exact[0], MODEL))
+    before, start = likelihood.information.copy(), likelihood.problem.start
+    fit = maximise(likelihood, start, [likelihood.problem.index("alpha")], iterations=1)
+    assert np.array_equal(likelihood.information, before)
+    assert not np.array_equal(fit.likelihood.information, before)
+    assert fit.likelihood.changed(soft=True).soft
+    assert not fit.likelihood.soft
 
 
 @pytest.mark.slow

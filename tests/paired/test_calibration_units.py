@@ -21,9 +21,9 @@ from orchestrator.paired.calibration import (
     load_or_calibrate,
 )
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 
-SMALL = CalibrationSettings(clean_sizes=41, noisy_sizes=41, seeds_per_size=6, validation_runs=200)
+SMALL = MapSettings(clean_sizes=41, noisy_sizes=41, seeds_per_size=6, validation_runs=200)
 CLEAN = Experiment()
 NOISY = replace(CLEAN, encoder_noise=0.001)
 LENGTH = CLEAN.steps + 1
@@ -104,7 +104,7 @@ def by_hand(**changes) -> Calibration:
     values = {
         "experiment": {"encoder_noise": 0.0}, "digest": "", "version": "", "smallest": 0.01, "largest": 0.1,
         "log_sum": [0.0, 1.0, 2.0, 3.0], "log_alpha": [-4.0, -3.5, -3.0, -2.5], "log_spread": [0.1, 0.2, 0.3, 0.4],
-        "width": 2.0, "level": 0.95, "runs": 1, "seed_branch": 7, "settings": CalibrationSettings(),
+        "width": 2.0, "level": 0.95, "runs": 1, "seed_branch": 7, "settings": MapSettings(),
     }  # fmt: skip
     return Calibration(**(values | changes))
 
@@ -162,13 +162,13 @@ def test_the_width_is_the_quantile_of_unseen_scores() -> None:
     nodes = np.linspace(low - 1.0, high + 1.0, 301)
     off = 0.1 * (nodes - low) / (high - low)
     spread = np.full(301, 0.01)
-    settings = CalibrationSettings(validation_runs=400, level=0.8)
+    settings = MapSettings(validation_runs=400, level=0.8)
     loop = Loop(CLEAN)
     width = _conformal_width(
         loop, loop.run(0.0, (np.zeros(1), np.zeros(1)))[:, 2], nodes - off, nodes + np.log(LENGTH), spread, settings
     )
     assert width == pytest.approx(8.0, abs=0.45)
-    full = CalibrationSettings(validation_runs=20, level=0.999)
+    full = MapSettings(validation_runs=20, level=0.999)
     assert 8.0 < _conformal_width(
         loop, loop.run(0.0, (np.zeros(1), np.zeros(1)))[:, 2], nodes - off, nodes + np.log(LENGTH), spread, full
     ) <= 10.0  # fmt: skip
@@ -202,7 +202,7 @@ def test_calibrations_are_stored_once_and_remade_when_damaged(tmp_path, monkeypa
     assert load_or_calibrate(CLEAN, said.append, SMALL).log_sum == clean.log_sum
     assert len(said) == 2
     assert load_or_calibrate(CLEAN, None, SMALL).settings == SMALL
-    load_or_calibrate(CLEAN, said.append, CalibrationSettings())
+    load_or_calibrate(CLEAN, said.append, MapSettings())
     assert len(said) == 3
 
 
@@ -210,4 +210,4 @@ def test_the_digest_names_experiment_settings_and_sources(monkeypatch, tmp_path)
     base = _digest(CLEAN, SMALL)
     assert len(base) == 24
     assert base == _digest(dataclasses.replace(CLEAN), SMALL)
-    assert len({base, _digest(NOISY, SMALL), _digest(CLEAN, CalibrationSettings())}) == 3
+    assert len({base, _digest(NOISY, SMALL), _digest(CLEAN, MapSettings())}) == 3

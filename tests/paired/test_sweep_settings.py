@@ -3,7 +3,7 @@
 import json
 
 from orchestrator.cli import main
-from orchestrator.paired.settings import CalibrationSettings
+from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.settings import as_tables
 
 SMALL = {"clean_sizes": 41, "noisy_sizes": 41, "seeds_per_size": 6, "validation_runs": 200}
@@ -18,7 +18,7 @@ def test_a_sweep_takes_the_settings_of_its_calibration_and_writes_them(tmp_path,
     assert document["arguments"]["settings"] == str(path)
     calibration = document["results"]["calibrations"]["0"]
     assert calibration["runs"] == 41 + 200
-    assert calibration["settings"] == as_tables(CalibrationSettings(**SMALL))
+    assert calibration["settings"] == as_tables(MapSettings(**SMALL))
     capsys.readouterr()
 
 

@@ -218,3 +218,33 @@ def test_the_page_of_an_ssp_file_that_was_written(tmp_path):
     assert report_from_directory(tmp_path).summary == (
         "paired.ssp was written: plant, controller; 4 connections. It was not run."
     )
+
+
+def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delivered(tmp_path):
+    level = {"value": 0.8, "standard_error": 1e-4, "interval": [0.79, 0.81], "unit": "N.m"}
+    friction = {"name": "coulomb_friction", "site": "axis", "parameters": {"level": level}, "family": []}
+    part = {"name": "coulomb_friction_1", "effect": "coulomb_friction@axis", "values": {"q0": 0.8}}
+    results = {
+        "kind": "fmu",
+        "verdict": "effects",
+        "effects": [friction],
+        "suspects": [],
+        "parameters": {},
+        "misfit": {"theta_m": {"nominal": 50.0, "refitted": 40.0, "corrected": 1.1, "noise": 1e-4, "unit": "rad"}},
+        "where": [],
+        "warnings": [],
+        "candidates": [],
+        "remainder": {"explained": False, "disturbance": 1e-4, "reasons": [], "power": [[1.0], [1.1]]},
+        "delivery": [{"file": "corrected.ssp", "parts": [part], "difference_over_noise": 0.5, "note": ""}],
+        "settings": {"search": {"penalty": 5.0}, "start": {"pays": 15.0}},
+        "runs": 1994,
+    }
+    write_result(tmp_path, "diagnose", {}, None, results)
+    report = report_from_directory(tmp_path)
+    assert report.summary.endswith("It lacks coulomb friction at axis.")
+    (left,) = sections(report, Facts)
+    assert left.items == (("nothing but measurement noise", False), ("disturbance, share of the drive [%]", 0.01))
+    delivered = sections(report, ReportTable)[-1]
+    assert delivered.rows[0][:3] == ("corrected.ssp", "coulomb_friction@axis", 0.5)
+    assert "Settings" not in [section.title for section in report.sections]
+    assert ("runs of the FMU", 1994) in report.origin

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.building.build import ensure_built
+from orchestrator.cli import main
 from orchestrator.errors import ConnectionMismatchError, FmuError, InputError, ScenarioError, SimulationError
 from orchestrator.scenarios.scenario import load_scenario, run_scenario
 
@@ -68,6 +69,14 @@ def test_a_torque_without_meaning_is_refused_with_its_name_and_time(tmp_path: Pa
     text = GOOD.replace("step = 1e-3\n", f"step = 1e-3\ncompiled = {compiled}\n") + LATE
     with pytest.raises(SimulationError, match=r"^plant: \w+ at t = 0.019 s returned Discard: `T_l` must be within"):
         run_scenario(write(tmp_path, text))
+
+
+def test_time_is_limited_for_fmus_of_ours_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = write(tmp_path, GOOD.replace("stop = 0.05", "stop = 1000.0")), tmp_path / "out"
+    for words in (["--scenario", str(path)], []):  # without a scenario: the pair
+        assert main(["simulate", *words, "--out", str(out), "--time-limit", "0.1"]) == 1
+        assert "the run must take at most 0.1 s (`--time-limit`), but takes longer\n" in capsys.readouterr().err
+        assert not out.exists()
 
 
 def test_units_of_parameters_are_converted(tmp_path: Path) -> None:

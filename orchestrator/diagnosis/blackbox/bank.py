@@ -125,7 +125,8 @@ def _all_widths(s: Surroundings) -> tuple[float, ...]:
 
 
 def _all_rates(s: Surroundings) -> tuple[float, ...]:
-    return tuple(float(f * _rates(s)[-1][0]) for f in np.geomspace(0.003, 1.25, 48))
+    """Return rates up to many times what the samples show: a jump between two of them takes its time all the same."""
+    return tuple(float(f * _rates(s)[-1][0]) for f in np.geomspace(0.003, 60.0, 64))
 
 
 def _all_quanta(s: Surroundings) -> tuple[float, ...]:

@@ -188,29 +188,32 @@ def _diagnosed(
                 other.steps = search.steps
                 rebased = other.fitter.fit(base.model, base.level)
                 search, best, base = other, other.run(again), rebased or base
-    search, base, best = _interleaved(search, base, best)
+    search, base, best = _interleaved(search, base, best, settings.rest)
     # What a start that is off explains by itself needs no effect.
-    if len(tried) == 1 and best.model.effects:
-        offset = fitters(problem, parts, settings)[1]
+    if best.model.effects and (len(tried) == 1 or search.fitter.parts is not parts):
+        offset = fitters(problem, search.fitter.parts, settings)[1]
         plain = BoxSearch(offset, effects, settings.search, progress)
         found = plain.base()
         if found is not None:
-            tried.append((plain, found, found))
+            tried = [tried[0], (plain, found, found)]
     for other, found, _ in tried[1:]:
         if other is not search and best.model.effects and search.score(best) < found.total + settings.start.pays:
             search, base, best = other, found, found
     return _judged(problem, probe, search, base, best, begun, settings.rest)
 
 
-def _interleaved(search: BoxSearch, base: BoxFit, best: BoxFit) -> tuple[BoxSearch, BoxFit, BoxFit]:
+def _interleaved(
+    search: BoxSearch, base: BoxFit, best: BoxFit, settings: RestSettings
+) -> tuple[BoxSearch, BoxFit, BoxFit]:
     """Return a search whose parts take turns, where that explains what the one before does not.
 
-    An effect that acts in one half of the record only (a limit that is seldom reached) is not found in the other.
+    An effect that acts in one half of the record only (a limit that is seldom reached) is not found in the other, and
+    one that acts in the held-out quarter only is not found at all.
     """
-    if search.explained(best) or search.late:
+    fitter, whole = search.fitter, search.explained(best)
+    if search.late or (whole and _goes_on(fitter, best, settings)):
         return search, base, best
-    fitter = search.fitter
-    parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces)
+    parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces, whole)
     turns = BoxSearch(
         Fitter(fitter.problem, fitter.ladder, parts, fitter.settings),
         search.effects, search.settings, search.progress, until=search.until,
@@ -224,6 +227,15 @@ def _interleaved(search: BoxSearch, base: BoxFit, best: BoxFit) -> tuple[BoxSear
     return (turns, plain, found) if explains else (search, base, best)
 
 
+def _goes_on(fitter: Fitter, fit: BoxFit, settings: RestSettings) -> bool:
+    """Tell whether a model leaves nothing that must be explained over all of the record either."""
+    y = fitter.problem.simulate([fit.model])[0]
+    if y is None:
+        return False
+    rest = rest_of(fitter, replace(fit, y=y), slice(0, fitter.problem.n), settings)
+    return rest.explained or rest.disturbed
+
+
 def _judged(
     problem: BoxProblem,
     probe: Probe,
@@ -234,7 +246,7 @@ def _judged(
     settings: RestSettings,
 ) -> BoxOutcome:
     fitter, parts = search.fitter, search.fitter.parts
-    seen = slice(0, parts.seen)
+    seen = parts.looked_at
     last = fitter.fit(best.model, best.level, None, seen, iterations=4) or best
     whole = problem.simulate([problem.nominal, base.model, last.model])
     if whole[0] is None:
@@ -248,7 +260,7 @@ def _judged(
     if rest.disturbed:
         rest = _doubted(fitter, last, rest, bool(best.model.effects), settings)
     fine = rest.explained or rest.disturbed
-    share = recovered(base, best, len(problem.outputs), parts.seen)
+    share = recovered(base, best, len(problem.outputs), len(seen))
     nominal = BoxFit(problem.nominal, last.level, stages[0], 0.0, 0.0, 0.0, last.J)
     if best.model.effects:
         verdict = "effects" if fine else "unknown"

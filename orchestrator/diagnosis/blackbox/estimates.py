@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.fitting import Rows
 from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
 from orchestrator.errors import FmuError
 from orchestrator.shared.inference.normal import interval_95
@@ -53,7 +54,7 @@ class OutputMisfit:
     unit: str
 
 
-def misfits(problem: BoxProblem, stages: Sequence[Array], rows: slice) -> tuple[OutputMisfit, ...]:
+def misfits(problem: BoxProblem, stages: Sequence[Array], rows: Rows) -> tuple[OutputMisfit, ...]:
     """Return rms over noise of nominal, re-fitted and corrected model over ``rows`` that no fit has seen.
 
     Args:

@@ -187,7 +187,7 @@ class BoxSearch:
         Returns:
             True when it leaves no more.
         """
-        seen = self.fitter.parts.seen * len(self.fitter.problem.outputs)
+        seen = len(self.fitter.parts.looked_at) * len(self.fitter.problem.outputs)
         return fit.fitted + fit.decided > -0.5 * seen - self.settings.noise_margin * np.sqrt(0.5 * seen)
 
     def _extended(self, before: BoxFit, promise: Promise) -> list[BoxFit]:

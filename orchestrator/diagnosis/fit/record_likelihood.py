@@ -310,9 +310,11 @@ class RecordLikelihood:
         """
         raw, _ = self.innovations(p, q)
         roots = self.gains(q, p).roots[: self.stop]
-        m = self.signals.channels
         with np.errstate(over="ignore", invalid="ignore"):  # of an unstable predictor; the caller sees that
-            return np.asarray((roots @ raw[:, :m, None])[:, :, 0])
+            first = roots[:, 0, 0] * raw[:, 0]
+            if self.signals.channels == 1:
+                return np.asarray(first[:, None])
+            return np.column_stack([first, roots[:, 1, 0] * raw[:, 0] + roots[:, 1, 1] * raw[:, 1]])
 
     def _records(self, signals: Signals, stop: int) -> Iterator[tuple[Any, Array, tuple[float, ...]]]:
         """Yield of each record its rows before ``stop``, its requests there and its initial state."""

@@ -5,6 +5,7 @@ it is the error of a law, whitening weighs the rare moments at which the law is 
 the rest. A fit in white innovations, weighed like white torques, is less efficient and needs neither: its standard
 errors hold whatever the colour (Newey and West). Where the two disagree by more than chance the first one's assumption
 is refuted (Hausman, Econometrica 46(6), 1978): sizes are then those of white innovations, and intervals hold both.
+Where a model misses held-out data by far more than noise, intervals hold what free runs would ask for as well.
 """
 
 from collections.abc import Sequence
@@ -67,6 +68,31 @@ def sized(
     covariance = robust.covariance + np.diag((0.5 * change) ** 2)
     colour = colour_of(robust.z, parts.fitted)
     return Sized(replace(robust, covariance=covariance, colour=colour), disputed)
+
+
+def with_model_error(likelihood: RecordLikelihood, found: Fit, part: slice, levels: Sequence[float]) -> Fit:
+    """Return a fit whose intervals hold what long predictions ask for, too.
+
+    A right model has one set of values for predictions of a sample and for runs over all of a record. Where a law is
+    not quite right, each asks for its own, and what they differ by is the size of the model's error.
+
+    Args:
+        likelihood: of the record.
+        found: the fit as it is reported.
+        part: the samples that it was fitted to.
+        levels: of process noise that the model may have, falling; at the last, predictions are nearly free runs.
+
+    Returns:
+        The fit; unchanged where no free run follows the record.
+    """
+    if not found.free:
+        return found
+    parts = Parts(part, part, part)
+    long = fit(likelihood, found.p, levels[-1], found.free, parts, most=0)
+    if not np.all(np.isfinite(long.z)):
+        return found
+    places = [entry.place for entry in found.free]
+    return replace(found, covariance=found.covariance + np.diag((long.p[places] - found.p[places]) ** 2))
 
 
 def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -> Fit:

@@ -67,8 +67,11 @@ def gap_of_the_estimator(likelihood: RecordLikelihood, model: Model, part: slice
         for rows in signals.stretches(part)
     ]
     threads = usable_cores()
-    estimated = Likelihood(problems[0], threads) if len(problems) == 1 else JointLikelihood(problems, threads)
-    estimated.deadline = deadline
+    estimated = (
+        Likelihood(problems[0], threads, deadline=deadline)
+        if len(problems) == 1
+        else JointLikelihood(problems, threads, deadline=deadline)
+    )
     try:
         fit = fit_record(estimated)
     except (ConvergenceError, FloatingPointError, np.linalg.LinAlgError):

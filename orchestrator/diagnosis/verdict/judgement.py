@@ -100,6 +100,10 @@ def doubts(
         if entry.after > settings.notable_misfit * entry.noise:
             times = entry.after / entry.noise
             found.append(f"the misfit of {entry.signal} on held-out data is {times:.1f} times the noise")
+        before = dict(entry.stages).get("parameters", entry.after)
+        if entry.after > before * (1.0 + settings.larger):
+            share = 100.0 * (entry.after / before - 1.0)
+            found.append(f"the misfit of {entry.signal} on held-out data is {share:.0f} % larger with what is named")
     if floor_off and _structured(left, settings):
         found.append("what the final model leaves is no noise")
     if left.growth > settings.grown:
