@@ -1,7 +1,10 @@
 """Machine code on disk: used when it is intact, compiled anew when it is not, done without where there is no place."""
 
+import gc
 import importlib.util
 import os
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +12,13 @@ import pytest
 from orchestrator.shared import numba_cache
 
 SOURCE = "def twice(x):\n    return 2.0 * x\n"
+MODULE = "source_of_the_numba_cache_test"
+
+
+@pytest.fixture(autouse=True)
+def _no_module_is_left() -> Iterator[None]:
+    yield
+    sys.modules.pop(MODULE, None)
 
 
 def compiled(folder: Path):
@@ -16,10 +26,12 @@ def compiled(folder: Path):
     path = folder / "source.py"
     if not path.exists():
         path.write_text(SOURCE)
-    spec = importlib.util.spec_from_file_location("source", path)
+    gc.collect()  # what an earlier function left in memory is not there in a new process
+    spec = importlib.util.spec_from_file_location(MODULE, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[MODULE] = module  # numba imports a kept function's module by its name
     spec.loader.exec_module(module)
     return numba_cache.kept()(module.twice)
 
