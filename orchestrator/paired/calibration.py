@@ -24,7 +24,6 @@ from orchestrator.errors import CalibrationError
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import difference_sum
-from orchestrator.paired.monotone import MonotoneCubic
 from orchestrator.paired.native_loop import NativeLoop
 from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.cache import cache_directory
@@ -112,7 +111,7 @@ class GapMap:
 
     def __init__(self, calibration: Calibration) -> None:
         self._calibration = calibration
-        self._centre = MonotoneCubic(calibration.log_sum, calibration.log_alpha)
+        self._centre = _monotone_cubic(calibration.log_sum, calibration.log_alpha)
         self._log_sum, self._spread = np.array(calibration.log_sum), np.array(calibration.log_spread)
         self._room = _noise_below(calibration)
 
@@ -139,7 +138,7 @@ class GapMap:
                 f"outside {calibration.smallest:g} to {calibration.largest:g} rad"
             )
         at = np.log(total)
-        centre = self._centre.value(float(at))
+        centre = float(self._centre(at))
         reach = calibration.width * float(np.interp(at, self._log_sum, self._spread))
         return GapEstimate(float(np.exp(centre)), float(np.exp(centre - reach)), float(np.exp(centre + reach)))
 
@@ -294,9 +293,15 @@ def _require_monotone(sums: Array, sizes: Array, experiment: Experiment) -> None
         )
 
 
+def _monotone_cubic(x: Array | list[float], y: Array | list[float]) -> Any:
+    from scipy.interpolate import PchipInterpolator  # here, for it takes half a second to import
+
+    return PchipInterpolator(x, y)
+
+
 def _interpolation_error(log_sum: Array, log_alpha: Array, least: float) -> Array:
     """Return how far every second node lies from the map through the others, as the larger of neighbours."""
-    coarse = MonotoneCubic(log_sum[::2], log_alpha[::2])
+    coarse = _monotone_cubic(log_sum[::2], log_alpha[::2])
     error = np.abs(coarse(log_sum) - log_alpha)
     nearby = np.array([error[max(0, n - 2) : n + 3].max() for n in range(len(error))])
     return np.maximum(nearby, least)
@@ -317,7 +322,7 @@ def _noisy_map(
 ) -> tuple[Array, Array]:
     """Return (mean of log S under noise, spread of log alpha_hat), both at the clean map's nodes."""
     nodes = np.linspace(log_alpha[0], log_alpha[-1], settings.noisy_sizes)
-    clean = MonotoneCubic(log_alpha, log_sum)
+    clean = _monotone_cubic(log_alpha, log_sum)
     count = settings.seeds_per_size
 
     def drawn(job: int) -> float:
@@ -327,9 +332,9 @@ def _noisy_map(
     draws = np.array(list(each(drawn, range(settings.noisy_sizes * count)))).reshape(-1, count)
     shift = draws.mean(axis=1) - clean(nodes)
     variance = draws.var(axis=1, ddof=1)
-    moved = log_sum + MonotoneCubic(nodes, _smoothed(shift))(log_alpha)
-    slope = MonotoneCubic(log_alpha, moved).rate(log_alpha)
-    deviation = np.exp(0.5 * MonotoneCubic(nodes, np.log(_smoothed(variance)))(log_alpha))
+    moved = log_sum + _monotone_cubic(nodes, _smoothed(shift))(log_alpha)
+    slope = _monotone_cubic(log_alpha, moved).derivative()(log_alpha)
+    deviation = np.exp(0.5 * _monotone_cubic(nodes, np.log(_smoothed(variance)))(log_alpha))
     return moved, deviation / np.maximum(np.abs(slope), settings.least_slope)
 
 
@@ -349,14 +354,14 @@ def _conformal_width(
     each: Each = map,
 ) -> float:
     """Return the multiple of the spread that covers ``settings.level`` of runs that the map has not seen."""
-    inverse = MonotoneCubic(log_sum, log_alpha)
+    inverse = _monotone_cubic(log_sum, log_alpha)
     low, high = np.log(loop.experiment.smallest), np.log(loop.experiment.largest)
 
     def score(n: int) -> float:
         generator = _generator(1, n)
         actual = generator.uniform(low, high)
         at = np.clip(np.log(_noisy_sum(loop, twin, float(np.exp(actual)), generator)), log_sum[0], log_sum[-1])
-        return abs(inverse.value(float(at)) - actual) / float(np.interp(at, log_sum, spread))
+        return abs(float(inverse(at)) - actual) / float(np.interp(at, log_sum, spread))
 
     scores = np.array(list(each(score, range(settings.validation_runs))))
     rank = int(np.ceil((settings.validation_runs + 1) * settings.level)) - 1
