@@ -41,7 +41,7 @@ def designed_starts() -> dict[str, dict[str, float]]:
     return {name: {key: float(f"{value:.12g}") for key, value in values.items()} for name, values in designs.items()}
 
 
-# python-control takes a second to import and no build needs it, hence the imports in the functions.
+# Most builds find the stored values and need no numpy, hence the imports in the functions.
 
 
 def _controller() -> dict[str, float]:
