@@ -104,8 +104,10 @@ def linear_errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, bo
     rows = []
     for name, entry in diagnosis.parameters.items():
         true = case.truth["linear"][name]
-        low, high = entry["interval"]
-        rows.append((name, (entry["value"] - true) / true, low <= true <= high))
+        assert entry.value is not None
+        assert entry.interval is not None
+        low, high = entry.interval
+        rows.append((name, (entry.value - true) / true, low <= true <= high))
     return rows
 
 
@@ -122,7 +124,7 @@ def cases(args: argparse.Namespace) -> Any:
     for n in range(args.unknown):
         groups.append(("unknown", partial(unknown_case, unknown[n % len(unknown)], first + 3000 + n)))
     for n in range(args.doubles):
-        groups.append(("double", partial(double_case, tuple(pairs[n % len(pairs)]), first + 2000 + n)))
+        groups.append(("double", partial(double_case, pairs[n % len(pairs)], first + 2000 + n)))
     if args.one_encoder:
         groups = [("one_encoder", partial(one_encoder_case, first + 4000 + n)) for n in range(args.one_encoder)]
     order = np.random.default_rng(args.seed + 1).permutation(len(groups))

@@ -24,7 +24,7 @@ FRICTION = {
     "effects.coulomb_friction.load.torque": 2.0,
 }
 # name: parameters, amplitude [N.m] and frequency [Hz] of the request, steps
-CASES = {
+CASES: dict[str, tuple[dict[str, float], float, float, int]] = {
     "typical (gap 20 mrad, 0.5 Hz)": ({"alpha": 0.02}, 30.0, 0.5, 1_000_000),
     "no gap": ({"backlash_model": 1}, 30.0, 0.5, 1_000_000),
     "many events (gap 2 mrad, 5 Hz)": ({"alpha": 0.002}, 60.0, 5.0, 500_000),

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
@@ -265,7 +266,8 @@ def row_of(kind: str, seed: int, two: bool) -> dict[str, Any]:
     return row | {
         "verdict": found.verdict, "trust": found.trust.level.word, "named": named,
         "wrong": [label for label in named if label not in NEAR.get(kind, set())],
-        "harm": harmed(found), "reasons": list(found.trust.reasons), "seconds": time.process_time() - begun,
+        "harm": harmed(found), "reasons": msgspec.to_builtins(found.trust.reasons),
+        "seconds": time.process_time() - begun,
         "sizes": {label: {short: e.value for short, e in effect.parameters.items()}
                   for label, effect in zip(named, found.effects, strict=True)},
         "over_noise": [m.after / m.noise for m in found.misfit],

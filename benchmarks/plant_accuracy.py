@@ -22,8 +22,8 @@ def run_fmu(path, torque, **values):
     system = System((plant,), sources=(SignalSource("plant.u", Samples(torque, H)),))
     record = [f"plant.{name}" for name in (*SIGNALS, "contact")]
     with Session(system, record, GaussSeidel(H), STEPS * H) as session:
-        values = session.run().values
-    return values[:5].T, values[5]
+        signals = session.run().values
+    return signals[:5].T, signals[5]
 
 
 def run_compiled(torque, **values):

@@ -67,8 +67,8 @@ def row_of(name: str, record: Record, model: Model) -> dict[str, Any]:
     return {
         "version": name, "verdict": found.verdict, "trust": found.trust.level.word, "named": list(sizes),
         "sizes": sizes, "nuisances": {n.name: e.value for n in found.nuisances for e in n.parameters.values()},
-        "analysed": found.analysis["rate"], "harm": harmed(found), "warnings": list(found.warnings),
-        "parameters": {n: [v["value"], *v["interval"]] for n, v in found.parameters.items()},
+        "analysed": found.analysis.rate, "harm": harmed(found), "warnings": list(found.warnings),
+        "parameters": {n: [v.value, *(v.interval or ())] for n, v in found.parameters.items()},
         "seconds": time.process_time() - begun,
     }  # fmt: skip
 

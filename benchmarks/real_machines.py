@@ -15,6 +15,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from benchmarks.harm import counted, harmed
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.proof.other_record import torque_errors
@@ -40,8 +42,8 @@ def row_of(path: Path, known: dict[str, Any]) -> dict[str, Any]:
         "verdict": found.verdict, "trust": found.trust.level.word, "named": labels,
         "sizes": {label: {n: [e.value, *e.interval] for n, e in effect.parameters.items()}
                   for label, effect in zip(labels, found.effects, strict=True)},
-        "misfit": {m.signal: list(m.stages) for m in found.misfit}, "horizons": found.horizons,
-        "harm": harmed(found), "torque_error": errors, "rate": found.analysis["rate"],
+        "misfit": {m.signal: list(m.stages) for m in found.misfit}, "horizons": msgspec.to_builtins(found.horizons),
+        "harm": harmed(found), "torque_error": errors, "rate": found.analysis.rate,
         "seconds": time.process_time() - begun,
     }  # fmt: skip
     return row | {"judged": judged(labels, known)}

@@ -59,7 +59,10 @@ def timed(plan: SweepPlan, pool: OpenPool, directory: Path) -> tuple[Timing, str
     ) as sweep:
         seconds = time.perf_counter() - start
         write_csv(directory / "sweep.csv", cases.names, sweep.columns, sweep.rows())
-        first_cases = [(r.case.parameters["alpha"], r.outcome.values[0]) for r in islice(sweep.rows(), 100)]
+        first_cases = [
+            (float(r.case.parameters["alpha"] or 0.0), float(r.outcome.values[0] or 0.0))
+            for r in islice(sweep.rows(), 100)
+        ]
         sweep.discard_journal()
     (first, begun), (last, ended) = next(m for m in marks if m[0] >= len(cases) // 5), marks[-1]
     timing = Timing(seconds, (ended - begun) / (last - first), (processor_time() - cpu) / len(cases))

@@ -29,7 +29,7 @@ def page() -> str:
     Returns:
         Its Markdown text.
     """
-    objects = {name: getattr(oc, name) for name in sorted(oc.__all__) if not name.startswith("_")}
+    objects = {name: getattr(oc, name) for name in sorted(dir(oc)) if not name.startswith("_")}
     functions = {n: o for n, o in objects.items() if inspect.isfunction(o)}
     errors = {n: o for n, o in objects.items() if inspect.isclass(o) and issubclass(o, Exception)}
     classes = {n: o for n, o in objects.items() if n not in functions and n not in errors}
@@ -49,7 +49,7 @@ def stub() -> str:
     Returns:
         Its text.
     """
-    homes = {**oc._PUBLIC, "__version__": "orchestrator.shared.version"}
+    homes = {**vars(oc)["_PUBLIC"], "__version__": "orchestrator.shared.version"}
     lines = sorted(f"from {home} import {name} as {name}\n" for name, home in homes.items())
     return "# What a type checker and an editor see of the package; the names are loaded lazily.\n" + "".join(lines)
 
@@ -74,7 +74,7 @@ def _signature(name: str, function: Any) -> str:
             given.append("*")
         default = argument.default
         shown = getattr(default, "__name__", None) or repr(default)
-        text = {argument.VAR_KEYWORD: f"**{argument.name}"}.get(argument.kind, argument.name)
+        text = f"**{argument.name}" if argument.kind is argument.VAR_KEYWORD else argument.name
         given.append(text if default is argument.empty else f"{text}=..." if callable(default) else f"{text}={shown}")
     line = f"oc.{name}({', '.join(given)})"
     return line if len(line) <= 110 else f"oc.{name}(\n    " + ",\n    ".join(given) + ",\n)"

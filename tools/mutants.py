@@ -18,9 +18,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 TIME_LIMIT = 180.0  # s, of one test run: a mutant that loops for ever is caught
@@ -109,7 +110,7 @@ def changes(tree: ast.Module) -> Iterator[tuple[int, str, ast.Module]]:
             yield node.lineno, change[0], changed
 
 
-def _mutable(tree: ast.Module) -> Iterator[ast.AST]:
+def _mutable(tree: ast.Module) -> Iterator[Any]:
     """Yield the nodes of functions that may change: no docstrings, messages, annotations."""
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef):
@@ -127,7 +128,7 @@ def _inside(body: list[ast.stmt]) -> Iterator[ast.AST]:
         waiting += [child for child in reversed(list(ast.iter_child_nodes(node))) if id(child) not in skipped]
 
 
-def _of(node: ast.AST) -> Iterator[tuple[str, object]]:
+def _of(node: ast.AST) -> Iterator[tuple[str, Callable[[Any], object]]]:
     """Yield (description, function that makes the change in such a node)."""
     if isinstance(node, ast.Compare) and len(node.ops) == 1:
         kind = type(node.ops[0])
@@ -153,7 +154,7 @@ def _of(node: ast.AST) -> Iterator[tuple[str, object]]:
         if plain is not None:
             yield "sign changed", lambda n: setattr(n, "op", plain())
     elif isinstance(node, ast.Constant) and type(node.value) in (int, float):
-        value = node.value
+        value: Any = node.value
         yield f"{value} -> {value + 1}", lambda n: setattr(n, "value", value + 1)
         if value not in (0, 1, 2, -1):
             yield f"{value} -> {0.5 * value}", lambda n: setattr(n, "value", type(value)(0.5 * value))
