@@ -89,6 +89,7 @@ class Tally:
     """What came out."""
 
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
+    trusts: dict[str, dict[str, int]] = field(default_factory=dict)
     misfits: list[float] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
     z: list[float] = field(default_factory=list)
@@ -100,6 +101,8 @@ class Tally:
         """Count one record."""
         self.counts.setdefault(kind, {}).setdefault(verdict, 0)
         self.counts[kind][verdict] += 1
+        of_level = self.trusts.setdefault(found.trust.level.word, {})
+        of_level[verdict] = of_level.get(verdict, 0) + 1
         if verdict != "right" or kind == "unknown":
             return
         self.misfits.append(max(m.corrected for m in found.outcome.misfit))
@@ -115,7 +118,7 @@ class Tally:
 
     def show(self) -> None:
         """Print the rates."""
-        for kind, counts in self.counts.items():
+        for kind, counts in (*self.counts.items(), *self.trusts.items()):
             listed = ", ".join(f"{k} {n}" for k, n in sorted(counts.items()))
             print(f"{kind}: {sum(counts.values())} records; {listed}")
         if self.misfits:
@@ -145,10 +148,11 @@ def judged(tally: Tally, kind: str, label: str, names: tuple[str, ...], sizes: t
     found.close()
     verdict = right(kind, names, found)
     tally.take(kind, verdict, names, sizes, parameters, found)
-    o = found.outcome
+    o, level = found.outcome, found.trust.level.word
     shown = ", ".join(f"{f.effect.label}={f.estimates[0].value:.5g}" for f in found.effects)
     print(
-        f"{kind:8s}{label} {verdict:7s}{found.verdict:10s} {shown} true {', '.join(f'{s:.5g}' for s in sizes)} "
+        f"{kind:8s}{label} {verdict:7s}{found.verdict:10s} {level:5s} {shown} "
+        f"true {', '.join(f'{s:.5g}' for s in sizes)} "
         f"misfit {max(m.corrected for m in o.misfit):.3f} {tally.seconds[-1]:.1f} s {o.runs} runs "
         f"{[f.family for f in found.effects if f.family] or ''} {o.suspects or ''} "
         f"{'' if verdict == 'right' else o.rest.reasons}",

@@ -24,16 +24,12 @@ from orchestrator.diagnosis.blackbox.problem import Data
 from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
 from orchestrator.diagnosis.blackbox.search import counted
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
+from orchestrator.diagnosis.blackbox.trust import SECOND, doubts, harm, statement
 from orchestrator.fmi.model_description import read_description
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.settings import as_tables
+from orchestrator.shared.trust import Trust
 
-MEANING = {
-    "none": "the FMU explains the record to its noise",
-    "parameters": "re-fitted parameters explain the record",
-    "effects": "effects are missing around the FMU",
-    "unknown": "something is missing that no effect at a port explains",
-}
 Progress = Callable[[str], None]
 
 
@@ -101,18 +97,23 @@ class FmuDiagnosisResult(Result):
     @property
     def harm(self) -> tuple[str, ...]:
         """Sentences: on which outputs of the second record the corrected model is worse than without effects."""
-        worse = self.settings.rest.worse
-        return tuple(
-            f"on the second record `{m.output}` is worse with the effects: {m.corrected:.3g} times its noise, "
-            f"{m.refitted:.3g} without"
-            for m in self.validation
-            if self.effects and m.corrected > worse * max(m.refitted, 1.0)
-        )
+        return harm(self.validation, SECOND, self.settings.rest) if self.effects else ()
+
+    @property
+    def statement(self) -> str:
+        """What explains the record, and to what: a sentence without a full stop."""
+        return statement(self.verdict, self.outcome.rest)
+
+    @property
+    def trust(self) -> Trust:
+        """How far the result can be trusted."""
+        o = self.outcome
+        return doubts(o.verdict, o.effects, o.rest, o.misfit, self.validation, o.late, self.settings.rest)
 
     def blocks(self) -> Sequence[Block]:
         """Return the verdict, the effects and the misfit."""
         o = self.outcome
-        lines: list[Block] = [f"Verdict: {o.verdict}: {MEANING[o.verdict]}"]
+        lines: list[Block] = [f"Verdict: {o.verdict}: {self.statement}"]
         for found in o.effects:
             values = ", ".join(
                 f"{e.name} = {e.value:.5g} +- {e.standard_error:.2g} {e.unit}".rstrip() for e in found.estimates
@@ -123,6 +124,9 @@ class FmuDiagnosisResult(Result):
         lines += [f"  nearest, and not it: {name}" for name in o.suspects]
         lines += [f"Where: {text}" for text in o.where]
         lines += [f"Note: {text}" for text in o.warnings]
+        trust = self.trust
+        lines.append(f"Trust: {trust.level.word}")
+        lines += [f"  {reason}" for reason in trust.reasons]
         rows = [(e.name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.standard_error:.2g}", e.unit) for e in o.parameters]
         lines.append(table("Parameters", ("name", "nominal", "re-fitted", "standard error", "unit"), rows))
         shown = [("held-out quarter", o.misfit)] + [("second record", self.validation)] * bool(self.validation)
@@ -133,7 +137,6 @@ class FmuDiagnosisResult(Result):
             ]
             head = ("output", "nominal", "re-fitted", "corrected", "noise")
             lines.append(table(f"Misfit over noise, {which}", head, cells))
-        lines += [f"Note: {text}" for text in self.harm]
         for d in self.delivered:
             lines.append(f"Corrected system: {d.path.name}; differs from the fit by {d.difference:.2g} of the noise")
         return lines
@@ -144,6 +147,8 @@ class FmuDiagnosisResult(Result):
         return {
             "kind": "fmu",
             "verdict": o.verdict,
+            "statement": self.statement,
+            "trust": {"level": self.trust.level.word, "reasons": list(self.trust.reasons)},
             "effects": [_found(f) for f in o.effects],
             "suspects": list(o.suspects),
             "parameters": {e.name: _estimate(e) for e in o.parameters},

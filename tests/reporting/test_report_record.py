@@ -227,6 +227,8 @@ def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delive
     results = {
         "kind": "fmu",
         "verdict": "effects",
+        "statement": "effects explain the record but for a disturbance",
+        "trust": {"level": "amber", "reasons": ["more than measurement noise is left"]},
         "effects": [friction],
         "suspects": [],
         "parameters": {},
@@ -241,9 +243,15 @@ def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delive
     }
     write_result(tmp_path, "diagnose", {}, None, results)
     report = report_from_directory(tmp_path)
-    assert report.summary.endswith("It lacks coulomb friction at axis.")
+    assert report.summary == "Effects explain the record but for a disturbance. It lacks coulomb friction at axis."
+    assert report.badge == ("warn", "amber: effects are missing")
+    (trust,) = sections(report, Text)
+    assert trust.paragraphs[1:] == ("more than measurement noise is left.",)
     (left,) = sections(report, Facts)
-    assert left.items == (("nothing but measurement noise", False), ("disturbance, share of the drive [%]", 0.01))
+    assert left.items == (
+        ("kind", "measurement noise and a disturbance"),
+        ("disturbance, share of the drive [%]", 0.01),
+    )
     delivered = sections(report, ReportTable)[-1]
     assert delivered.rows[0][:3] == ("corrected.ssp", "coulomb_friction@axis", 0.5)
     assert "Settings" not in [section.title for section in report.sections]

@@ -64,6 +64,11 @@ class BoxOutcome:
     seconds: float = 0.0
     runs: int = 0
 
+    @property
+    def late(self) -> bool:
+        """Whether the search was cut short."""
+        return self.search is not None and self.search.late
+
 
 Progress = Callable[[str], None]
 
@@ -284,13 +289,13 @@ def _judged(
     where = _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else ()
     return BoxOutcome(
         verdict, named, suspects, parameters, misfits(problem, stages, parts.held_out), model, rest, probe,
-        where, _warned(probe, search, rest, verdict, best, share),
+        where, _warned(probe, search, verdict, best, share),
         base.model, problem, stages, search,
         time.monotonic() - begun, problem.runner.runs,
     )  # fmt: skip
 
 
-def _warned(probe: Probe, search: BoxSearch, rest: Rest, verdict: str, best: BoxFit, share: float) -> tuple[str, ...]:
+def _warned(probe: Probe, search: BoxSearch, verdict: str, best: BoxFit, share: float) -> tuple[str, ...]:
     """Return sentences for the user; ``share``: of what is missing, how much the effects explain."""
     problem = search.fitter.problem
     warnings = list(probe.notes)
@@ -298,10 +303,6 @@ def _warned(probe: Probe, search: BoxSearch, rest: Rest, verdict: str, best: Box
         warnings.append(
             f"the search was cut short after {problem.map.options.budget:g} s (`budget` of the map): a run takes about "
             f"{probe.step_cost * problem.n * problem.m:.2g} s; shorten the record or lower `substeps`"
-        )
-    if rest.disturbed:
-        warnings.append(
-            f"a disturbance of about {100.0 * rest.share:.2g} % of the drive acts at the ports beside the noise"
         )
     if verdict == "unknown" and best.model.effects:
         warnings.append(

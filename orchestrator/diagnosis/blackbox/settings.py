@@ -117,6 +117,14 @@ class RestSettings(Settings, frozen=True):
     worse: Annotated[
         float, setting("times the misfit without effects from which effects do harm on data not fitted", ge=1)
     ] = 1.1
+    notable_misfit: Annotated[
+        float,
+        setting(
+            "times its noise from which an output's misfit on data not fitted takes a result from green: noise alone "
+            "stays below over 300 rows, by five deviations",
+            ge=1,
+        ),
+    ] = 1.2
 
 
 class CalibrationSettings(Settings, frozen=True):

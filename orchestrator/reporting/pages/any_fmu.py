@@ -6,16 +6,19 @@ from typing import Any
 from orchestrator.reporting.model import Badge, Cell, Facts, Picture, Report, Section, Text
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import ResultDocument, table_of, words
+from orchestrator.reporting.trust import trust_badge, trust_section
+from orchestrator.shared.results import TrustFound, read
 
-VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
-    "none": ("good", "nothing is missing", "The FMU explains the record to its noise."),
-    "parameters": ("good", "some values are off", "The FMU explains the record once its parameters are re-fitted."),
-    "effects": ("neutral", "effects are missing", "Effects attached around the FMU explain the record."),
-    "unknown": ("bad", "unexplained", "Something is missing that no effect at an input, an output or a port explains."),
+VERDICTS: Mapping[str, tuple[Badge, str]] = {
+    "none": ("good", "nothing is missing"),
+    "parameters": ("good", "some values are off"),
+    "effects": ("neutral", "effects are missing"),
+    "unknown": ("bad", "unexplained"),
 }
 MADE = {"walls": "walls", "runs": "runs of the FMU", "seconds": "time taken [s]"}
-SHOWN = ("kind", "verdict", "effects", "suspects", "parameters", "misfit", "where", "warnings", "candidates")
-PLACED = frozenset((*SHOWN, *MADE, "settings", "delivery", "remainder", "model", "step_cost"))
+SAID = ("kind", "verdict", "statement", "trust", "where", "warnings")
+SHOWN = ("effects", "suspects", "parameters", "misfit", "candidates")
+PLACED = frozenset((*SAID, *SHOWN, *MADE, "settings", "delivery", "remainder", "model", "step_cost"))
 
 
 def build(source: ResultDocument) -> Report:
@@ -28,8 +31,11 @@ def build(source: ResultDocument) -> Report:
         The report.
     """
     results = source.results
-    badge, label, sentence = VERDICTS[results["verdict"]]
-    sections: list[Section] = []
+    badge, label = VERDICTS[results["verdict"]]
+    said = results.get("statement") or label  # files of older versions have none
+    sentence = f"{said[:1].upper()}{said[1:]}."
+    trust = read(results["trust"], TrustFound) if results.get("trust") else None
+    sections: list[Section] = trust_section(trust)
     if results["effects"]:
         rows = [
             {
@@ -47,9 +53,11 @@ def build(source: ResultDocument) -> Report:
         sections.append(table_of("What is missing", rows))
     if results["suspects"]:
         sections.append(Text("Nearest, and not it", tuple(results["suspects"])))
+    reasons = () if trust is None else trust.reasons
     for title, key in (("Where", "where"), ("Take note", "warnings")):
-        if results[key]:
-            sections.append(Text(title, tuple(str(text) for text in results[key])))
+        lines = tuple(str(text) for text in results[key] if text not in reasons)
+        if lines:
+            sections.append(Text(title, lines))
     misfit = [{"output": name, **values} for name, values in results["misfit"].items()]
     sections.append(table_of("Misfit over noise on the held-out quarter", misfit))
     name = "diagnose_signals.png"
@@ -71,7 +79,7 @@ def build(source: ResultDocument) -> Report:
     return Report(
         title="Diagnosis of an FMU",
         summary=f"{sentence} It lacks {found}." if found else sentence,
-        badge=(badge, label),
+        badge=trust_badge(trust, label, badge),
         sections=tuple(sections),
         origin=(
             *source.origin(),
@@ -82,14 +90,16 @@ def build(source: ResultDocument) -> Report:
 
 
 def _left(remainder: Mapping[str, Any]) -> list[Section]:
-    """Return whether noise alone is left."""
+    """Return what the final model leaves, in the words of the statement above it."""
     if not remainder:
         return []
-    facts: list[tuple[str, Cell]] = [("nothing but measurement noise", remainder["explained"])]
+    if remainder["explained"]:
+        return [Facts("What is left", (("kind", "measurement noise"),))]
     if remainder.get("disturbance"):
-        facts.append(("disturbance, share of the drive [%]", 100.0 * remainder["disturbance"]))
-    reasons = [("why it counts as unexplained", "; ".join(remainder["reasons"]))] if remainder.get("reasons") else []
-    return [Facts("What is left", (*facts, *reasons))]
+        share = ("disturbance, share of the drive [%]", 100.0 * remainder["disturbance"])
+        return [Facts("What is left", (("kind", "measurement noise and a disturbance"), share))]
+    why: list[tuple[str, Cell]] = [("why", "; ".join(remainder["reasons"]))] if remainder.get("reasons") else []
+    return [Facts("What is left", (("kind", "more than noise"), *why))]
 
 
 def _delivered(files: Sequence[Mapping[str, Any]]) -> list[Section]:

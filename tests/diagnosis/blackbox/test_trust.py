@@ -1,0 +1,76 @@
+"""Trust in a diagnosis of any FMU, on results made by hand: what keeps it from green, one statement of what is left."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit
+from orchestrator.diagnosis.blackbox.settings import RestSettings
+from orchestrator.diagnosis.blackbox.trust import SECOND, UNEXPLAINED, doubts, harm, statement
+from orchestrator.diagnosis.blackbox.verdict import Rest
+from orchestrator.shared.trust import Level
+
+NOISE = Rest(True, False, 0.0, (), np.ones((8, 1)))
+DISTURBED = replace(NOISE, explained=False, disturbed=True, share=1e-4)
+LEFT = replace(NOISE, explained=False, reasons=("output 1: comes in bursts",))
+GOOD = OutputMisfit("phi", 1e-4, 50.0, 40.0, 1.02, "rad")
+FRICTION = FoundEffect(SimpleNamespace(label="coulomb_friction@shaft"), (), 900.0, ())
+
+
+def judged(verdict="effects", effects=(FRICTION,), rest=NOISE, held_out=(GOOD,), second=(), late=False, **settings):
+    return doubts(verdict, effects, rest, held_out, second, late, RestSettings(**settings))
+
+
+@pytest.mark.parametrize(("verdict", "effects"), [("none", ()), ("parameters", ()), ("effects", (FRICTION,))])
+def test_what_leaves_noise_alone_is_green_and_says_so(verdict, effects):
+    trust = judged(verdict, effects, second=(GOOD,))
+    assert (trust.level, trust.reasons) == (Level.GREEN, ())
+    assert statement(verdict, NOISE).endswith("the record to its noise")
+
+
+def test_unknown_is_red_whatever_else_is_good():
+    trust = judged("unknown", (), LEFT)
+    assert (trust.level, trust.reasons) == (Level.RED, (UNEXPLAINED,))
+    assert statement("unknown", LEFT) == UNEXPLAINED
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            {"effects": (replace(FRICTION, family=("load@shaft",)),)},
+            "does not tell coulomb_friction@shaft from load@sha",
+        ),
+        ({"rest": DISTURBED}, "a disturbance of about 0.01 % of the drive"),
+        ({"held_out": (replace(GOOD, corrected=2.07),)}, "misfit of `phi` on held-out data is 2.07 times its noise"),
+        ({"second": (replace(GOOD, corrected=3.0),)}, "misfit of `phi` on the second record is 3 times its noise"),
+        ({"held_out": (replace(GOOD, refitted=1.0, corrected=1.15),)}, "on held-out data `phi` is worse"),
+        ({"second": (replace(GOOD, refitted=1.0, corrected=1.15),)}, "on the second record `phi` is worse"),
+        ({"late": True}, "the search was cut short"),
+    ],
+)
+def test_what_was_not_shown_is_amber_with_its_reason(change, words):
+    trust = judged(**change)
+    assert trust.level is Level.AMBER
+    (reason,) = trust.reasons
+    assert words in reason
+
+
+def test_a_disturbance_is_part_of_the_statement():
+    said = statement("effects", DISTURBED)
+    assert said.endswith("explain the record but for a disturbance of about 0.01 % of the drive at the ports")
+    assert "to its noise" not in said
+
+
+def test_thresholds_are_those_of_the_settings():
+    misfit = (replace(GOOD, corrected=2.07),)
+    assert judged(held_out=misfit, notable_misfit=2.5).level is Level.GREEN
+    worse = (replace(GOOD, refitted=1.0, corrected=1.15),)
+    assert harm(worse, SECOND)
+    assert not harm(worse, SECOND, RestSettings(worse=1.3))
+
+
+def test_without_effects_nothing_can_do_harm():
+    assert judged("parameters", (), held_out=(replace(GOOD, refitted=1.0, corrected=1.15),)).level is Level.GREEN
