@@ -71,12 +71,16 @@ ROOMS = (
             "orchestrator/diagnosis/fit/record_likelihood.py",
             "orchestrator/diagnosis/fit/fitting.py",
         ),
-        ("tests/estimation/test_innovations_units.py", "tests/diagnosis/test_likelihood_units.py"),
+        (
+            "tests/estimation/test_innovations_units.py",
+            "tests/diagnosis/test_likelihood_units.py",
+            "tests/diagnosis/test_sizes_and_chance.py",
+        ),
     ),
     Room(
         "contact",
         ("pyfmu_sources/contact.py", "pyfmu_sources/equations.py"),
-        ("tests/plants/test_contact.py",),
+        ("tests/plants/test_contact.py", "tests/plants/test_effects_in_equations.py"),
     ),
     Room("journal", ("orchestrator/engine/journal.py",), ("tests/engine/test_engine_journal.py",)),
     Room(

@@ -94,7 +94,8 @@ def test_ripple_has_three_harmonics() -> None:
     assert eq.ripple(1.7, p_of(**base, **first)) == pytest.approx(1.1 * one)
     assert eq.ripple(1.7, p_of(**base, **second)) == pytest.approx(0.7 * two)
     assert eq.ripple(1.7, p_of(**base, **third)) == pytest.approx(-0.5 * three)
-    assert eq.ripple(1.7, p_of(**base, **first, **second, **third)) == pytest.approx(1.1 * one + 0.7 * two - 0.5 * three)
+    all_three = p_of(**base, **first, **second, **third)
+    assert eq.ripple(1.7, all_three) == pytest.approx(1.1 * one + 0.7 * two - 0.5 * three)
 
 
 def test_a_resonance_turns_with_the_load() -> None:
@@ -185,3 +186,32 @@ def test_impacts_feel_the_inertia_at_their_angle() -> None:
     assert inertia > J_L
     assert J_M * I * after[1] + inertia * after[3] == pytest.approx(J_M * I * 2.3 - inertia * 0.6)
     assert after[1] / I - after[3] == pytest.approx(-0.5 * (2.3 / I + 0.6))
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "spring_load__stiffness", "spring_load__cubic", "directional_friction__motor__difference",
+        "directional_friction__load__difference", "load_dependent_friction__motor__coefficient",
+        "load_dependent_friction__load__coefficient", "periodic_friction__motor__amplitude",
+        "periodic_friction__load__amplitude", "torque_ripple__amplitude", "torque_ripple__second__amplitude",
+        "torque_ripple__third__amplitude", "varying_inertia__amplitude", "varying_stiffness__amplitude",
+        "shaft_hysteresis__torque", "impact_damping__depth", "gear_eccentricity__amplitude",
+        "drive_filter__time_constant", "rate_limit__rate", "extra_resonance__inertia",
+        "stribeck_friction__motor__breakaway", "load_torque__torque", "stribeck_friction__load__breakaway",
+        "gravity_load__amplitude", "hardening_stiffness__cubic",
+    ],
+)  # fmt: skip
+def test_one_unit_of_an_effect_acts(effect: str) -> None:
+    """No effect takes a size of one for off."""
+    without, having = (eq.rates(X, 1, 1.0, -1.0, p, 20.0, 0.0) for p in (p_of(), p_of(**{effect: 1.0})))
+    assert without != having
+
+
+def test_an_eccentricity_of_one_radian_drives_rigid_teeth() -> None:
+    p = p_of(dt.RIGID_IMPACT, gear_eccentricity__amplitude=1.0, gear_eccentricity__phase=0.3)
+    own = -math.sin(1.7 + 0.3) * 2.3**2
+    i = 1.0 / (1.0 / I + math.cos(1.7 + 0.3))
+    drive = i * (4.1 - 0.23) + 0.6 + J_M * i * i * own
+    joined = drive / (J_M * i * i + J_L)
+    assert eq.rigid_rates(X, 1, 0.0, 0.0, p, 0.0) == pytest.approx(((joined - own) * i, joined))
