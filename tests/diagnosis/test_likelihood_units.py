@@ -160,6 +160,9 @@ def test_signals_that_a_log_has_not_shifted_are_the_same() -> None:
     moved = both.signals.aligned(DRIVETRAIN, late)
     assert np.array_equal(moved.u, both.signals.u)
     assert np.allclose(moved.y[:-1, 1], both.signals.y[1:, 1])
+    short, _ = drivetrain_likelihood(size=5)
+    late[DRIVETRAIN.index(SHIFT.name)] = 0.5 * H
+    assert np.isfinite(short.signals.aligned(DRIVETRAIN, late).y).all()  # its cubic takes all there are
 
 
 def test_gains_are_computed_once_and_shared() -> None:
@@ -367,6 +370,7 @@ def test_the_ladder_of_noise_is_climbed_both_ways() -> None:
     at = levels.index(best)
     for start in {levels[max(at - 1, 0)], best, levels[at + 1]}:
         assert anneal(likelihood, wrong, start, (), PARTS, levels).q == best
+    assert anneal(likelihood, wrong, levels[at + 1], (), PARTS, levels[at:]).q == best  # the first of the ladder
 
 
 def test_the_deciding_part_may_have_more_noise() -> None:
