@@ -9,7 +9,6 @@ of mutants; results are merged into the file, so that the slices may run at diff
 
 import argparse
 import ast
-import copy
 import json
 import os
 import random
@@ -72,12 +71,16 @@ ROOMS = (
             "orchestrator/diagnosis/fit/record_likelihood.py",
             "orchestrator/diagnosis/fit/fitting.py",
         ),
-        ("tests/estimation/test_innovations_units.py", "tests/diagnosis/test_likelihood_units.py"),
+        (
+            "tests/estimation/test_innovations_units.py",
+            "tests/diagnosis/test_likelihood_units.py",
+            "tests/diagnosis/test_sizes_and_chance.py",
+        ),
     ),
     Room(
         "contact",
         ("pyfmu_sources/contact.py", "pyfmu_sources/equations.py"),
-        ("tests/plants/test_contact.py",),
+        ("tests/plants/test_contact.py", "tests/plants/test_effects_in_equations.py"),
     ),
     Room("journal", ("orchestrator/engine/journal.py",), ("tests/engine/test_engine_journal.py",)),
     Room(
@@ -99,15 +102,19 @@ class Mutant:
     text: str
 
 
-def changes(tree: ast.Module) -> Iterator[tuple[int, str, ast.Module]]:
-    """Yield (line, change, changed tree) of every change that is made in a module's functions."""
-    nodes = list(_mutable(tree))
-    for place, node in enumerate(nodes):
-        for what, change in enumerate(_of(node)):
-            changed = copy.deepcopy(tree)
-            target = list(_mutable(changed))[place]
-            list(_of(target))[what][1](target)
-            yield node.lineno, change[0], changed
+def changes(tree: ast.Module) -> Iterator[tuple[int, str, int, int]]:
+    """Yield (line, change, place of the node, number of its change) of every change in a module's functions."""
+    for place, node in enumerate(_mutable(tree)):
+        for number, (change, _) in enumerate(_of(node)):
+            yield node.lineno, change, place, number
+
+
+def changed(text: str, place: int, number: int) -> str:
+    """Return the source of a module with one of its ``changes``."""
+    tree = ast.parse(text)
+    node = list(_mutable(tree))[place]
+    list(_of(node))[number][1](node)
+    return ast.unparse(tree)
 
 
 def _mutable(tree: ast.Module) -> Iterator[Any]:
@@ -172,27 +179,27 @@ def _of(node: ast.AST) -> Iterator[tuple[str, Callable[[Any], object]]]:
         yield "call left out", lambda n: setattr(n, "value", ast.Constant(None))
 
 
-def all_mutants(root: Path) -> Iterator[tuple[Mutant, str]]:
-    """Yield every mutant of every room with the changed source."""
+def all_mutants(root: Path) -> Iterator[tuple[Mutant, int, int]]:
+    """Yield every mutant of every room with the place of its node and the number of its change."""
     for room in ROOMS:
         for module in room.modules:
             text = (root / module).read_text(encoding="utf-8")
             lines = text.splitlines()
-            for line, change, tree in changes(ast.parse(text)):
-                yield Mutant(room.name, module, line, change, lines[line - 1].strip()), ast.unparse(tree)
+            for line, change, place, number in changes(ast.parse(text)):
+                yield Mutant(room.name, module, line, change, lines[line - 1].strip()), place, number
 
 
 def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
-    """Return ``count`` mutants, shared out among the rooms evenly."""
+    """Return ``count`` mutants with their changed sources, shared out among the rooms evenly."""
     found = list(all_mutants(root))
     generator = random.Random(seed)
-    chosen: list[tuple[Mutant, str]] = []
+    chosen: list[tuple[Mutant, int, int]] = []
     for place, room in enumerate(ROOMS):
         own = [entry for entry in found if entry[0].room == room.name]
         share = count // len(ROOMS) + (place < count % len(ROOMS))
         chosen += generator.sample(own, min(share, len(own)))
     generator.shuffle(chosen)
-    return chosen
+    return [(m, changed((root / m.module).read_text(encoding="utf-8"), node, number)) for m, node, number in chosen]
 
 
 def caught(root: Path, tests: tuple[str, ...]) -> bool:

@@ -14,6 +14,7 @@ import stat
 import tempfile
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
@@ -145,8 +146,10 @@ class Journal:
     def _offset_table(self) -> IO[bytes]:
         """Return a nameless file of zeros, eight bytes per case."""
         try:
-            table = tempfile.TemporaryFile(dir=self.path.parent)  # noqa: SIM115 - the caller closes it
-            os.posix_fallocate(table.fileno(), 0, 8 * self.total)  # else a full disk is a SIGBUS later
+            with ExitStack() as opened:
+                table = opened.enter_context(tempfile.TemporaryFile(dir=self.path.parent))
+                os.posix_fallocate(table.fileno(), 0, 8 * self.total)  # else a full disk is a SIGBUS later
+                opened.pop_all()  # the caller closes it
         except OSError as error:
             raise OutputError(
                 f"cannot write in {self.path.parent}: {error.strerror}; {self._advice()}", "resume"

@@ -18,6 +18,7 @@ from orchestrator.diagnosis.fit.record_likelihood import (
     noise_level,
     signals_of,
 )
+from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import record_from_columns
 from orchestrator.shared.inference.colour import colour_of
 from tests.support.short_records import (
@@ -141,6 +142,27 @@ def test_a_halted_likelihood_stops_every_run() -> None:
     for one in (likelihood, shorter):
         with pytest.raises(CancelledError):
             one.innovations(p, Q)
+
+
+def test_signals_that_a_log_has_not_shifted_are_the_same() -> None:
+    """An axis has no second encoder that could be late."""
+    likelihood, p = axis_likelihood(size=40)
+    assert SHIFT.name not in AXIS.names
+    assert likelihood.signals.aligned(AXIS, p) is likelihood.signals
+    lead = p.copy()
+    lead[AXIS.index(LEAD.name)] = H
+    found = likelihood.signals.aligned(AXIS, lead)
+    assert np.array_equal(found.u[:-1], likelihood.signals.u[1:])
+    assert np.array_equal(found.y, likelihood.signals.y)
+    both, p = drivetrain_likelihood(size=40)
+    late = p.copy()
+    late[DRIVETRAIN.index(SHIFT.name)] = H
+    moved = both.signals.aligned(DRIVETRAIN, late)
+    assert np.array_equal(moved.u, both.signals.u)
+    assert np.allclose(moved.y[:-1, 1], both.signals.y[1:, 1])
+    short, _ = drivetrain_likelihood(size=5)
+    late[DRIVETRAIN.index(SHIFT.name)] = 0.5 * H
+    assert np.isfinite(short.signals.aligned(DRIVETRAIN, late).y).all()  # its cubic takes all there are
 
 
 def test_gains_are_computed_once_and_shared() -> None:
@@ -348,6 +370,7 @@ def test_the_ladder_of_noise_is_climbed_both_ways() -> None:
     at = levels.index(best)
     for start in {levels[max(at - 1, 0)], best, levels[at + 1]}:
         assert anneal(likelihood, wrong, start, (), PARTS, levels).q == best
+    assert anneal(likelihood, wrong, levels[at + 1], (), PARTS, levels[at:]).q == best  # the first of the ladder
 
 
 def test_the_deciding_part_may_have_more_noise() -> None:

@@ -310,3 +310,23 @@ def test_what_a_model_leaves_above_the_noise_is_not_at_the_floor() -> None:
     wrong = p.copy()
     wrong[likelihood.plant.index("k")] *= 0.5
     assert not at_the_floor(likelihood, fit(likelihood, wrong, 1e-3, (), PARTS), PARTS.fitted)
+
+
+def test_a_size_that_no_machine_has_is_refused_and_said_once() -> None:
+    likelihood, p = axis_likelihood()
+    search = search_of(likelihood)
+    scene = scene_of(likelihood, fit(likelihood, likelihood.nominal, 0.01, (), PARTS))
+    place = AXIS.index("effects.coulomb_friction.motor.torque")
+
+    def of_size(torque: float) -> Candidate:
+        sized = p.copy()
+        sized[place] = torque
+        found = Fit(sized, 1e-5, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
+        return Candidate((FRICTION,), found, SEARCH)
+
+    small, large, larger = of_size(0.1), of_size(1e4), of_size(2e4)
+    assert search.possible([large, small], scene) == [small]
+    assert list(search.refused) == [FRICTION.label]
+    assert "1e+04 N.m is more than the drive's largest torque" in search.refused[FRICTION.label]
+    assert search.possible([larger], scene) == []
+    assert "1e+04" in search.refused[FRICTION.label]

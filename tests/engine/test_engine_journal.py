@@ -227,3 +227,39 @@ def test_wrong_headers_are_refused(tmp_path, header):
     path.write_text(f"{zlib.crc32(header.encode()):08x} {header}\n")
     with pytest.raises(ScenarioError, match="must be the journal of a sweep, but is not"):
         Journal(path, {}, 3, resume=True)
+
+
+def test_a_name_that_no_file_can_have_leaves_no_directory(tmp_path):
+    with pytest.raises(OutputError, match=r"cannot write .* too long"):
+        Journal(tmp_path / "a" / "b" / ("x" * 300), DEFINITION, 10, resume=False)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("whole", [0, 3])
+def test_what_a_crash_left_torn_is_cut_off_before_anything_is_added(tmp_path, whole):
+    """A torn piece may be longer than all that is written over it."""
+    path = filled(tmp_path / "j", range(2))
+    lines = path.read_bytes().splitlines(keepends=True)[:whole]
+    path.write_bytes(b"".join(lines) + b"x" * 4096)
+    with Journal(path, DEFINITION, 10, resume=True) as journal:
+        kept = path.read_bytes()
+        assert kept.count(b"\n") == max(1, whole)
+        assert b"x" * 9 not in kept
+        journal.append(outcomes([7]))
+        assert path.read_bytes().startswith(kept)
+
+
+def test_a_disk_without_room_for_the_offsets_is_said_in_words(tmp_path, monkeypatch):
+    """Room is reserved for eight bytes per case: a mapped file that cannot grow ends the process."""
+    asked = []
+
+    def full(descriptor, offset, size):
+        asked.append((offset, size))
+        raise OSError(28, "No space left on device")
+
+    with Journal(tmp_path / "j", DEFINITION, 10, resume=False) as journal:
+        journal.append(outcomes([1]))
+        monkeypatch.setattr(os, "posix_fallocate", full)
+        with pytest.raises(OutputError, match="No space left on device; 1 of 10 cases are kept"):
+            list(journal.outcomes())
+    assert asked == [(0, 80)]

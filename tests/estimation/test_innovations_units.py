@@ -117,6 +117,7 @@ def test_dry_friction_is_not_seen() -> None:
     smooth, seen = affine_model(dt.parameters(alpha=0.01)), affine_model(rough)
     assert np.array_equal(seen.constants, smooth.constants)
     assert np.array_equal(seen.matrices, smooth.matrices)
+    assert np.array_equal(seen.inputs, smooth.inputs)
 
 
 def test_the_impulse_of_a_contact_fades_with_the_gap() -> None:

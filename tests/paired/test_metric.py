@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import bdtr
 
 from orchestrator.paired.metric import difference_sum, error_statistics, trust_of_sweep
 from orchestrator.shared.trust import Level
@@ -55,5 +56,7 @@ def test_trust_in_a_sweep_follows_its_coverage() -> None:
 def test_what_counts_as_unlikely_is_given() -> None:
     # 86 of 100 at 95 % has probability 4.3e-4, 87 has 1.5e-3.
     assert trust_of_sweep([statistics(87, 100)], 0.95, 0).level is Level.GREEN
+    at_the_limit = float(bdtr(80, 100, 0.95))
+    assert trust_of_sweep([statistics(80, 100)], 0.95, 0, at_the_limit).level is Level.GREEN
     assert trust_of_sweep([statistics(86, 100)], 0.95, 0).level is Level.RED
     assert trust_of_sweep([statistics(87, 100)], 0.95, 0, unlikely=1e-2).level is Level.RED

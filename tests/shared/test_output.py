@@ -155,3 +155,14 @@ def test_results_are_plain_json(tmp_path):
     assert found["results"] == {"a": 1.5, "b": [1, 2], "c": None, "d": [True, None, "x"], "e": "p", "3": 4}
     assert (found["command"], found["seed"], found["arguments"]) == ("test", 7, {"x": 1})
     assert found["version"] == __version__
+
+
+def test_a_staging_directory_that_is_gone_hides_no_error(tmp_path):
+    def fail():
+        with staged(tmp_path / "out") as directory:
+            directory.rmdir()
+            raise ValueError("bad")
+
+    with pytest.raises(ValueError, match="bad"):
+        fail()
+    assert list(tmp_path.iterdir()) == []
