@@ -10,7 +10,6 @@ from orchestrator.diagnosis.fit.fitting import Free, Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
-from orchestrator.diagnosis.passes import honest
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.verdict.chance import torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
@@ -55,10 +54,6 @@ def test_an_interval_holds_what_free_runs_ask_for() -> None:
     low, high = wide.interval(place)
     assert low < long.p[place] < off.p[place] < high
     assert np.array_equal(wide.p, off.p)
-    parts = Parts(slice(10, 150), slice(150, 200), slice(200, likelihood.stop))
-    assert honest(likelihood, long, (), parts) is long  # predicted almost to the encoder's noise
-    far = replace(long, p=long.p + 20.0 * (np.arange(long.p.size) == place))
-    assert honest(likelihood, far, (), parts).standard_error(place) > 1e3 * far.standard_error(place)
     nothing = replace(long, free=())
     assert with_model_error(likelihood, nothing, part, (1e-5,)) is nothing
 
