@@ -48,7 +48,10 @@ ROOMS = (
     Room("metric", ("orchestrator/paired/metric.py",), ("tests/paired/test_metric.py",)),
     Room(
         "search",
-        tuple(f"orchestrator/diagnosis/search/{name}.py" for name in ("candidate", "search", "screening", "periodic")),
+        tuple(
+            f"orchestrator/diagnosis/search/{name}.py"
+            for name in ("candidate", "model_space", "search", "screening", "periodic")
+        ),
         ("tests/diagnosis/test_search_units.py", "tests/diagnosis/test_search_screening.py"),
     ),
     Room(
