@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pyfmu_sources import port_laws as laws
 
 Array = NDArray[np.float64]
-INPUT, OUTPUT, PORT = "input", "output", "port"
+INPUT, OUTPUT, PORT, PARAMETER, CUT = "input", "output", "port", "parameter", "cut"
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,7 @@ class Surroundings:
         position: rms of the position about zero; span: from the smallest to the largest.
         speed: rms of the speed.
         angular: the position is an angle.
+        effort: rms of what goes through a cut, negative where it acts against the twist.
         cycles: wavenumbers of ripples over the position, in order, told apart within its span.
     """
 
@@ -38,6 +39,7 @@ class Surroundings:
     speed: float = 1.0
     acceleration: float = 1.0
     angular: bool = False
+    effort: float = 1.0
     cycles: tuple[float, ...] = ()
 
 
@@ -54,9 +56,10 @@ class Kind:
 
     Attributes:
         name: of the effect.
-        where: in series at an ``input`` or an ``output``, or as feedback at a ``port``.
+        where: in series at an ``input`` or an ``output``, as feedback at a ``port``, in the value of a ``parameter``,
+            or in the ``cut`` between two FMUs.
         parameters: their names, in the order of the values.
-        units: of each: "effort", "flow" and "s" stand for the units at the place where it acts.
+        units: of each: "effort", "flow", "signal" and "s" stand for the units at the place where it acts.
         scales: scene -> what counts as a small change of each.
         starts: scene -> values to try.
         linear: the response is proportional to all values (found from one small change of each).
@@ -222,25 +225,42 @@ _FEEDBACK = (
          lambda s: ((0.003 * s.size / s.acceleration,),), True, laws.INERTIA),
 )  # fmt: skip
 
-BANK: Mapping[str, Kind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK)}
+_INSIDE = (
+    Kind("parameter_drift", PARAMETER, ("rate",), ("effort/s",), lambda s: (0.05 * s.size / s.span,),
+         lambda s: ((0.1 * s.size / s.span,),), True),
+    Kind("parameter_dependence", PARAMETER, ("slope",), ("effort/signal",), lambda s: (0.05 * s.size / s.span,),
+         lambda s: ((0.1 * s.size / s.span,),), True),
+)  # fmt: skip
+
+_BETWEEN = (
+    Kind("backlash", CUT, ("width",), ("flow",), lambda s: (0.02 * s.size,),
+         lambda s: tuple((f * s.size,) for f in (0.1, 0.4, 1.5, 6.0, 25.0)), law=laws.BACKLASH, lower=(0.0,),
+         shrinks=True, plausible=lambda v, s: 0.0 < v[0] < 0.5 * s.span),
+    Kind("compliance", CUT, ("compliance",), ("flow/effort",), lambda s: (0.01 * s.size / s.effort,),
+         lambda s: ((0.01 * s.size / s.effort,),), True, law=laws.COMPLIANCE, plausible=_positive),
+)  # fmt: skip
+
+BANK: Mapping[str, Kind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK, *_INSIDE, *_BETWEEN)}
 
 
 @dataclass(frozen=True)
 class BoxEffect:
-    """An effect of the bank at a place: the name of an input, an output or a port of the map.
+    """An effect of the bank at a place: the name of an input, an output, a parameter, a port or a cut of the map.
 
-    ``at_rest``: a signal with memory was zero before the record, and not what it was at first.
+    ``at_rest``: a signal with memory was zero before the record, and not what it was at first. ``signal``: what a
+    parameter depends on.
     """
 
     kind: Kind
     place: str
     scene: Surroundings = field(compare=False, repr=False)
     at_rest: bool = False
+    signal: str = ""
 
     @property
     def label(self) -> str:
         """Return name and place."""
-        return f"{self.kind.name}@{self.place}"
+        return f"{self.kind.name}@{self.place}" + (f"({self.signal})" if self.signal else "")
 
     def scales(self, values: Array) -> Values:
         """Return what counts as a small change of each value.

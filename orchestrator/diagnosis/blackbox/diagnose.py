@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +11,11 @@ from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit,
 from orchestrator.diagnosis.blackbox.fitting import BoxFit, BoxParts, Fitter, Ladder, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
-from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data, effects_of
+from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
+from orchestrator.diagnosis.blackbox.sites import effects_of
+from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.verdict import (
     Rest,
     beginning_of,
@@ -74,20 +75,18 @@ Progress = Callable[[str], None]
 
 
 def prepared(
-    path: Path,
+    subject: Subject,
     given: Map,
     data: Data,
-    units: dict[str, str],
     workers: int | None = None,
     progress: Progress = lambda what: None,
 ) -> tuple[BoxProblem, Probe]:
     """Return a probed problem without what does nothing, its noise known.
 
     Args:
-        path: of the FMU.
+        subject: the FMU, or several.
         given: the map.
         data: the record.
-        units: of the FMU's variables, by name.
         workers: child processes.
 
     Returns:
@@ -96,8 +95,8 @@ def prepared(
     Raises:
         FmuError: the FMU cannot be used.
     """
-    problem, probe = opened(path, given, data, workers, progress)
-    problem.units = units
+    problem, probe = opened(subject, given, data, workers, progress)
+    problem.units = subject.units
     problem.map = reduced(given, probe)
     problem.sign = probe.sign
     y = problem.must_simulate(problem.nominal)
@@ -125,21 +124,19 @@ def fitters(problem: BoxProblem, parts: BoxParts, settings: BoxSettings = DEFAUL
 
 
 def diagnose(
-    path: Path,
+    subject: Subject,
     given: Map,
     data: Data,
-    units: dict[str, str],
     settings: BoxSettings = DEFAULT,
     progress: Progress = lambda what: None,
     workers: int | None = None,
 ) -> BoxOutcome:
-    """Return what ``data`` says of the FMU at ``path``.
+    """Return what ``data`` says of an FMU, or of several.
 
     Args:
-        path: of the FMU.
+        subject: the FMU, or several.
         given: the map.
         data: the record.
-        units: of the FMU's variables, by name.
         settings: thresholds.
         progress: called with what is being done.
         workers: child processes.
@@ -153,7 +150,7 @@ def diagnose(
     """
     begun = time.monotonic()
     progress("probing")
-    problem, probe = prepared(path, given, data, units, workers, progress)
+    problem, probe = prepared(subject, given, data, workers, progress)
     try:
         with np.errstate(all="ignore"):
             return _diagnosed(problem, probe, settings, progress, begun)

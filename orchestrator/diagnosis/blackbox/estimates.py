@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.bank import CUT, PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Rows
 from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
 from orchestrator.errors import FmuError
@@ -118,9 +118,12 @@ def _units_at(problem: BoxProblem, effect: BoxEffect) -> tuple[str, ...]:
     if effect.kind.where == PORT:
         port = problem.map.ports[effect.place]
         names = {"effort": problem.units.get(port.input, ""), "flow": problem.units.get(port.position, "")}
+    elif effect.kind.where == CUT:
+        cut = problem.map.cuts[effect.place]
+        names = {"effort": problem.units.get(cut.effort or "", ""), "flow": problem.units.get(cut.input, "")}
     else:
         unit = problem.units.get(effect.place, "")
-        names = {"effort": unit, "flow": unit}
+        names = {"effort": unit, "flow": unit, "signal": effect.signal}
     found = []
     for unit in effect.kind.units:
         shown = unit

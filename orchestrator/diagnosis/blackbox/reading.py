@@ -43,7 +43,7 @@ def read_data(path: Path, given: Map) -> Data:
         given: the map.
 
     Returns:
-        Times (n,) [s], inputs (n, inputs), outputs (n, outputs).
+        Times (n,) [s], inputs (n, inputs), outputs (n, outputs), signals (n, signals) off their references.
 
     Raises:
         RecordError: the file is missing or unreadable, a column is not there, or its values cannot be used.
@@ -72,7 +72,12 @@ def read_data(path: Path, given: Map) -> Data:
     if all(float(np.ptp(values)) == 0.0 for values in inputs):
         raise RecordError(f"{path}: at least one input must change, but none does")
     even = time[0] + step * np.arange(len(time))
-    return Data(even, np.column_stack(inputs), np.column_stack(outputs), str(path))
+    signals = [
+        e.factor * _column(path, header, rows, e.column, f"$.signals.{name}.column") - e.reference
+        for name, e in given.signals.items()
+    ]
+    others = np.column_stack(signals) if signals else np.zeros((len(even), 0))
+    return Data(even, np.column_stack(inputs), np.column_stack(outputs), str(path), others)
 
 
 def _split(path: Path) -> tuple[list[str], list[list[str]]]:

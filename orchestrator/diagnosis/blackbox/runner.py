@@ -4,13 +4,13 @@ import threading
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Job, Load
+from orchestrator.diagnosis.blackbox.subject import Subject
+from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Job, Load, Through, Wire
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
@@ -55,11 +55,12 @@ Grid = tuple[float, float, int, float]
 
 
 class Runner:
-    """An FMU in child processes behind walls.
+    """An FMU, or several, in child processes behind walls.
 
     Args:
-        path: of the FMU.
+        subject: the FMU, or several.
         inputs, reads: what is set before and read after every step.
+        tunables: parameters that are set at every step in runs that ask for it.
         tolerance: of the FMU's own solver; None: its own.
         fresh: make a new instance for every run instead of a reset.
         workers: children (default: one a core, two at most).
@@ -71,37 +72,40 @@ class Runner:
 
     def __init__(
         self,
-        path: Path,
+        subject: Subject,
         inputs: Sequence[str],
         reads: Sequence[str],
+        tunables: Sequence[str] = (),
         tolerance: float | None = None,
         fresh: bool = False,
         workers: int | None = None,
     ) -> None:
-        self.path = path
-        self.inputs, self.reads = tuple(inputs), tuple(reads)
+        self.path, self.subject = subject.path, subject
+        self.inputs, self.reads, self.tunables = tuple(inputs), tuple(reads), tuple(tunables)
         self.fresh, self.tolerance = fresh, tolerance
         self.step_cost = 0.0  # s, of one step, measured
         self.runs = 0
         self.lost = 0
+        self.through: list[Through] = []  # measured
         self.reason = ""  # why the last run that failed did
         self._jails: dict[int, Jail] = {}
         self._warm: set[int] = set()
         self._lock = threading.Lock()
         self._scratch = Scratch("box")
-        self._folder = self._scratch.path / "fmu"
+        self._folders = {name: self._scratch.path / f"fmu_{k}" for k, name in enumerate(subject.members)}
         # A jail dies with the thread that made it: the threads live as long as this.
         self._pool = ThreadPoolExecutor(min(2, usable_cores()) if workers is None else workers)
         try:
             _compile_loop()
-            unpack(path, self._folder)
+            for name, folder in self._folders.items():
+                unpack(subject.members[name], folder)
             self._pool.submit(self._jail).result()
         except ChildError as error:
             self.close()
-            raise SlaveError(f"{path}: must load and instantiate, but {_worded(error, LOADING)}") from None
+            raise SlaveError(f"{self.path}: must load and instantiate, but {_worded(error, LOADING)}") from None
         except OrchestratorError as error:
             self.close()
-            raise FmuError(str(error).replace(str(self._folder), str(path))) from None
+            raise FmuError(self._named(error)) from None
         except BaseException:
             self.close()
             raise
@@ -172,9 +176,17 @@ class Runner:
         """Return this thread's jail, its FMU loaded."""
         mine = threading.get_ident()
         if mine not in self._jails:
-            request = Load(str(self._folder), list(self.inputs), list(self.reads), self.tolerance, self.fresh)
+            members = {name: str(folder) for name, folder in self._folders.items()}
+            wires = [
+                Wire(self.reads.index(c.source), self.inputs.index(c.target), c.factor, c.offset)
+                for c in self.subject.connections
+            ]
+            request = Load(
+                members, list(self.inputs), list(self.reads), self.tolerance, self.fresh, list(self.tunables), wires
+            )
             limits = Limits(time=LOADING, memory=MEMORY, total=TOTAL)
-            jail = Jail("orchestrator.diagnosis.blackbox.inside:opened", request, read=[self._folder], limits=limits)
+            folders = list(self._folders.values())
+            jail = Jail("orchestrator.diagnosis.blackbox.inside:opened", request, read=folders, limits=limits)
             try:
                 jail.start(LOADING)
             except BaseException:
@@ -190,7 +202,9 @@ class Runner:
         count = (len(plans[chunk[0]].table) // grid[2] + 1) * len(self.reads)
         try:
             jail = self._jail()
-            answer = jail.call(_batch(chunk, plans, grid), time=allowed, most=8 * count * len(chunk) + SLACK)
+            answer = jail.call(
+                _batch(chunk, plans, grid, self.through), time=allowed, most=8 * count * len(chunk) + SLACK
+            )
         except ChildError as error:
             self._lose(_worded(error, allowed))
             if len(chunk) > 1:  # one of them was the culprit
@@ -198,7 +212,7 @@ class Runner:
                     self._chunk([k], plans, grid, results)
             return
         except OrchestratorError as error:
-            raise SlaveError(str(error).replace(str(self._folder), str(self.path))) from None
+            raise SlaveError(self._named(error)) from None
         self._take(answer, chunk, plans, grid, results, steps)
 
     def _take(
@@ -215,11 +229,18 @@ class Runner:
             if isinstance(rows, np.ndarray) and rows.shape == shape and rows.dtype == np.float64:
                 results[k] = rows
             elif isinstance(reason, str) and reason:
-                self.reason = reason.replace(str(self._folder), str(self.path))
+                self.reason = self._named(reason)
         mine = threading.get_ident()
         if mine in self._warm:  # the first answer of a child includes what it loads
             self.step_cost = max(0.5 * self.step_cost, seconds / max(steps, 1))
         self._warm.add(mine)
+
+    def _named(self, error: object) -> str:
+        """Return a message with FMUs in place of the folders that they lie in here."""
+        text = str(error)
+        for name, folder in reversed(self._folders.items()):
+            text = text.replace(str(folder), str(self.subject.members[name]))
+        return text
 
     def _lose(self, reason: str) -> None:
         """Close this thread's jail.
@@ -242,7 +263,7 @@ SMALL = 0.01
 """Seconds of work below which a second child is not asked."""
 
 
-def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid) -> Batch:
+def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid, through: list[Through]) -> Batch:
     tables: list[Array] = []
     places: dict[int, int] = {}
     jobs = []
@@ -254,7 +275,7 @@ def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid) -> Batch:
         starts = {name: float(value) for name, value in plan.starts.items()}
         jobs.append(Job(starts, places[id(plan.table)], list(plan.effects)))
     start, step, per_row, lead = grid
-    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead))
+    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through)
 
 
 def _worded(error: ChildError, allowed: float) -> str:
@@ -278,7 +299,8 @@ def _compile_loop() -> None:
 
     whole, real = numba.int64, numba.float64
     run_loop.compile(
-        (whole[::1], whole[::1], whole[::1], real[::1], real[::1], real[:, ::1], real[::1], whole[:, ::1], real[::1],
-         real[:, ::1], real, real[:, ::1])
+        (whole[:, ::1], whole[:, ::1], whole[:, ::1], real[::1], real[::1], whole[::1], whole[::1], real[:, ::1],
+         real[::1], whole[:, ::1], real[:, ::1], whole[:, ::1], real[::1], whole[:, ::1], real[::1], real[:, ::1], real,
+         real[:, ::1])
     )  # fmt: skip
     _compiled.append(True)
