@@ -19,7 +19,7 @@ from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.verdict import (
     Rest,
     beginning_of,
-    family_of,
+    families_of,
     predicted,
     recovered,
     rest_of,
@@ -273,15 +273,13 @@ def _judged(
     parameters, values = estimates_of(problem, last.model, covariance)
     named: tuple[FoundEffect, ...] = ()
     if verdict == "effects":
-        family = family_of(search, best)
-        n = len(best.model.effects)
+        families = families_of(search, best)
         named = tuple(
-            FoundEffect(e, values[k], best.total - base.total, family if k == n - 1 else ())
-            for k, e in enumerate(last.model.effects)
+            FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
         )
     suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
     if suspects:
-        suspects += family_of(search, best)
+        suspects += tuple(dict.fromkeys(label for family in families_of(search, best) for label in family))
     model = last.model if verdict != "unknown" else base.model
     where = _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else ()
     return BoxOutcome(
