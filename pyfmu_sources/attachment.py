@@ -67,14 +67,15 @@ class AttachedEffect(Fmi2Slave):
         Returns:
             True: done.
         """
-        if self.series < 0 and cuts(self.law):
+        kind = FEEDBACK if self.series < 0 else SERIES[self.series]
+        if kind == FEEDBACK and cuts(self.law):
             self.result = across(self.law, self.signal, self._ahead(self.position), self.sign, self.q0)
-        elif SERIES[self.series] == "connection":
-            self.result = self.q0 * self._ahead(self._current()) + self.q1
-        elif SERIES[self.series] == "drift":
-            self.result = self.q1 + self.q0 * (time + 0.5 * step - self.q2)
-        elif self.series < 0:
+        elif kind == FEEDBACK:
             self.result = self.signal - self.sign * self._force(step)
+        elif kind == "connection":
+            self.result = self.q0 * self._ahead(self._current()) + self.q1
+        elif kind == "drift":
+            self.result = self.q1 + self.q0 * (time + 0.5 * step - self.q2)
         else:
             self.result = self._through(self.signal, step)
         self._steps += 1

@@ -253,8 +253,8 @@ def of_a_box(
     used = chosen_settings(settings, BoxSettings)
     subject = subject_of(Path(fmu))
     given = read_map(Path(map), subject)
-    data = read_data(Path(record), given)
-    second = None if validate is None else read_data(Path(validate), given)
+    data = read_data(Path(record), given, used.read)
+    second = None if validate is None else read_data(Path(validate), given, used.read)
     outcome = diagnosing(subject, given, data, used, progress)
     try:
         models = (outcome.problem.nominal, outcome.refitted, outcome.model)

@@ -27,6 +27,7 @@ class Surroundings:
         angular: the position is an angle.
         effort: rms of what goes through a cut, negative where it acts against the twist.
         cycles: wavenumbers of ripples over the position, in order, told apart within its span.
+        once, long: thresholds that tell ripples from gravity, and hysteresis from friction.
     """
 
     h: float
@@ -41,13 +42,13 @@ class Surroundings:
     angular: bool = False
     effort: float = 1.0
     cycles: tuple[float, ...] = ()
+    once: float = 0.0
+    long: float = 0.0
 
 
 Values = tuple[float, ...]
 REMEMBERS = ("input_delay", "input_lag", "input_rate_limit")
 """Effects in series with an input for which it matters what the signal was before the record."""
-STARTS_OFF = 1e-3
-"""Share of its rms by which a signal starts away from zero, so that this makes a difference."""
 
 
 @dataclass(frozen=True)
@@ -151,16 +152,8 @@ def _small(share: float) -> Callable[[Surroundings], Values]:
     return lambda s: (share * s.size,)
 
 
-ONCE = 0.03
-"""How far from 1 a ripple's wavenumber over an angle is at least: gravity is what comes once a turn."""
-
-
-LONG = 0.04
-"""Share of the motion over which hysteresis builds up at least: over less of it, it is dry friction."""
-
-
 def _once_a_turn(values: Values, scene: Surroundings) -> bool:
-    return scene.angular and abs(values[2] - 1.0) < ONCE
+    return scene.angular and abs(values[2] - 1.0) < scene.once
 
 
 def _positive(values: Values, scene: Surroundings) -> bool:
@@ -217,7 +210,7 @@ _FEEDBACK = (
          lambda s: (0.01 * s.size, 0.02 * s.span),
          lambda s: tuple((0.05 * s.size, f * s.span) for f in (0.08, 0.25, 0.8)),
          law=laws.HYSTERESIS, lower=(0.0, 1e-300), amplitudes=1,
-         plausible=lambda v, s: 0.0 < v[0] < 10.0 * s.peak and LONG * s.span < v[1] < 3.0 * s.span),
+         plausible=lambda v, s: 0.0 < v[0] < 10.0 * s.peak and s.long * s.span < v[1] < 3.0 * s.span),
     Kind("load", PORT, ("effort",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True, laws.LOAD),
     Kind("directional_friction", PORT, ("difference",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
          lambda s: ((0.01 * s.size / s.speed,),), True, laws.DIRECTIONAL),

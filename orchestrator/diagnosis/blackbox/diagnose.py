@@ -80,6 +80,7 @@ def prepared(
     data: Data,
     workers: int | None = None,
     progress: Progress = lambda what: None,
+    settings: BoxSettings = DEFAULT,
 ) -> tuple[BoxProblem, Probe]:
     """Return a probed problem without what does nothing, its noise known.
 
@@ -88,6 +89,7 @@ def prepared(
         given: the map.
         data: the record.
         workers: child processes.
+        settings: thresholds.
 
     Returns:
         The problem, whose children the caller ends, and what the FMU was found to be.
@@ -95,7 +97,7 @@ def prepared(
     Raises:
         FmuError: the FMU cannot be used.
     """
-    problem, probe = opened(subject, given, data, workers, progress)
+    problem, probe = opened(subject, given, data, workers, progress, settings)
     problem.units = subject.units
     problem.map = reduced(given, probe)
     problem.sign = probe.sign
@@ -118,7 +120,7 @@ def fitters(problem: BoxProblem, parts: BoxParts, settings: BoxSettings = DEFAUL
     """
     surrogate, drive = problem.impulses(problem.nominal, max(problem.n // 2, 16))
     return [
-        Fitter(problem, Ladder(surrogate, drive, problem.n, off), parts, settings)
+        Fitter(problem, Ladder(surrogate, drive, problem.n, off, settings.noise), parts, settings)
         for off in (0.0, settings.start.spread)
     ]
 
@@ -150,7 +152,7 @@ def diagnose(
     """
     begun = time.monotonic()
     progress("probing")
-    problem, probe = prepared(subject, given, data, workers, progress)
+    problem, probe = prepared(subject, given, data, workers, progress, settings)
     try:
         with np.errstate(all="ignore"):
             return _diagnosed(problem, probe, settings, progress, begun)

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.problem import IMPULSE, BoxModel, BoxProblem, Data, series_of
+from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data, series_of
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.wire import Through
 from orchestrator.errors import FmuError
@@ -17,22 +18,8 @@ from orchestrator.errors import FmuError
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-STUCK = 0.15
-"""Share of communication steps in which nothing moves, from which an FMU is taken to have a coarser grid of its own."""
-REPEATS = 1e-3
-"""Largest difference between two runs of one model, as a share of the noise."""
-FEWEST, FEWEST_EACH = 20, 6
-"""Runs that the probes and the first fit take, and for each uncertain value."""
-SLOW = 0.5
-"""Seconds of a run from which the user is told."""
 TRIMMED = 0.7767
 """Mean magnitude of Gaussian noise of variance 1 without the largest hundredth."""
-PUSHED = 1e-3
-"""By how much an input between two FMUs is moved, to see what depends on it at once."""
-SHORTER, AT_ONCE = 4.0, 0.5
-"""How much shorter the second such step is, and the share of a response that it must leave."""
-MOVES = 1e-9
-"""Share of a variable's size by which a parameter must change something."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +58,12 @@ def _names_of(given: Map, subject: Subject) -> tuple[list[str], list[str]]:
 
 
 def opened(
-    subject: Subject, given: Map, data: Data, workers: int | None = None, progress: Progress = lambda what: None
+    subject: Subject,
+    given: Map,
+    data: Data,
+    workers: int | None = None,
+    progress: Progress = lambda what: None,
+    settings: BoxSettings = DEFAULT,
 ) -> tuple[BoxProblem, Probe]:
     """Return a problem ready to be fitted, and what its FMU was found to be.
 
@@ -80,6 +72,7 @@ def opened(
         given: the map.
         data: the record.
         workers: child processes.
+        settings: thresholds.
 
     Returns:
         The problem, whose children the caller ends, and what the FMU was found to be.
@@ -88,15 +81,21 @@ def opened(
         FmuError: the FMU cannot be used: it does not load, run or repeat.
     """
     inputs, reads = _names_of(given, subject)
-    runner = Runner(subject, inputs, reads, given.tunable, given.options.tolerance, workers=workers)
+    runner = Runner(
+        subject, inputs, reads, given.tunable, given.options.tolerance, workers=workers, settings=settings.process
+    )
     try:
         rough = noise_of(given, data.outputs, data.outputs)
-        runner.through = through = _passing(runner, given, data)
-        problem = BoxProblem(data, given, runner, _affordable(runner, given, data, progress), rough)
+        runner.through = through = _passing(runner, given, data, settings)
+        problem = BoxProblem(
+            data, given, runner, _affordable(runner, given, data, progress, settings), rough, settings=settings
+        )
         fresh = _repeats(problem)
         if fresh:
             runner.close()
-            runner = Runner(subject, inputs, reads, given.tunable, given.options.tolerance, fresh=True, workers=workers)
+            runner = Runner(
+                subject, inputs, reads, given.tunable, given.options.tolerance, True, workers, settings.process
+            )
             runner.through = through
             problem.runner = runner
             if _repeats(problem):
@@ -107,7 +106,7 @@ def opened(
         raise
 
 
-def _passing(runner: Runner, given: Map, data: Data) -> list[Through]:
+def _passing(runner: Runner, given: Map, data: Data, settings: BoxSettings) -> list[Through]:
     """Return what FMUs hand on that depends at once on what they are handed, measured over one step.
 
     Raises:
@@ -117,25 +116,26 @@ def _passing(runner: Runner, given: Map, data: Data) -> list[Through]:
     if not connected:
         return []
     problem = BoxProblem(data, given, runner, given.options.substeps, np.ones(len(given.outputs)))
+    own = settings.probe
     plan = problem.starts(problem.nominal)
     plain = series_of(problem, 2)[:1]
     pushed = [plain.copy() for _ in connected]
     for table, c in zip(pushed, connected, strict=True):
-        table[0, runner.inputs.index(c.target)] += PUSHED
+        table[0, runner.inputs.index(c.target)] += own.pushed
     gains = []
-    for step in (problem.h / problem.m, problem.h / problem.m / SHORTER):
+    for step in (problem.h / problem.m, problem.h / problem.m / own.shorter):
         runs = runner.run([Plan(plan, table) for table in (plain, *pushed)], float(data.time[0]), step, 1)
         rows = [y[-1] for y in runs if y is not None]
         if len(rows) < len(runs):
             raise problem.does_not_run()
-        gains.append((np.array(rows[1:]).reshape(len(connected), -1) - rows[0]) / PUSHED)
+        gains.append((np.array(rows[1:]).reshape(len(connected), -1) - rows[0]) / own.pushed)
     # What depends at once does not shrink with the step; what the step brings falls out of this mean.
-    at_once = (SHORTER * gains[1] - gains[0]) / (SHORTER - 1.0)
+    at_once = (own.shorter * gains[1] - gains[0]) / (own.shorter - 1.0)
     found = []
     for k in range(len(connected)):
         for n, source in enumerate(connected):
             at = runner.reads.index(source.source)
-            if abs(at_once[k, at]) > AT_ONCE * abs(gains[0][k, at]):
+            if abs(at_once[k, at]) > own.at_once * abs(gains[0][k, at]):
                 found.append(Through(n, k, float(at_once[k, at])))
     return found
 
@@ -163,19 +163,19 @@ def noise_of(given: Map, outputs: Array, residual: Array) -> Array:
     return np.array(found)
 
 
-def _affordable(runner: Runner, given: Map, data: Data, progress: Progress) -> int:
+def _affordable(runner: Runner, given: Map, data: Data, progress: Progress, settings: BoxSettings) -> int:
     """Return how many communication steps a sample has, fewer where the FMU is too slow for as many.
 
     Raises:
         FmuError: it does not run, or even the fewest runs take longer than the budget of the map.
     """
-    m, budget = _steps_in_a_sample(runner, given, data), given.options.budget
+    m, budget = _steps_in_a_sample(runner, given, data, settings.probe.stuck), given.options.budget
     short = BoxProblem(data, given, runner, m, np.ones(len(given.outputs)))
     plan = Plan(short.starts(short.nominal), series_of(short, min(len(data.time), 100)))
     for _ in range(3):  # the first answer of a child is not timed
         if runner.step_cost == 0.0:
             runner.run([plan], float(data.time[0]), data.step / m, m)
-    runs = FEWEST + FEWEST_EACH * len(given.uncertain)
+    runs = settings.probe.fewest + settings.probe.fewest_each * len(given.uncertain)
     while m > 1 and runner.step_cost * len(data.time) * m * runs > budget:
         m //= 2
     one = runner.step_cost * len(data.time) * m
@@ -184,12 +184,12 @@ def _affordable(runner: Runner, given: Map, data: Data, progress: Progress) -> i
             f"{runner.path}: must run {runs} times within the {budget:g} s of `budget`, but a run takes about "
             f"{one:.2g} s: shorten the record or raise `budget`"
         )
-    if one > SLOW:
+    if one > settings.probe.slow:
         progress(f"a run takes about {one:.2g} s, the search up to {budget:g} s")
     return m
 
 
-def _steps_in_a_sample(runner: Runner, given: Map, data: Data) -> int:
+def _steps_in_a_sample(runner: Runner, given: Map, data: Data, stuck: float) -> int:
     """Return how many communication steps a sample has: as the map says, but none in which the FMU stands still.
 
     An FMU with a fixed step of its own that is longer stands still in some, and takes two at once in others.
@@ -208,7 +208,7 @@ def _steps_in_a_sample(runner: Runner, given: Map, data: Data) -> int:
         moves = np.any(np.diff(y, axis=0) != 0.0, axis=1)
         samples = moves[: len(moves) // m * m].reshape(-1, m)
         moving = samples[np.any(samples, axis=1)]
-        if not len(moving) or float(np.mean(~moving)) < STUCK:
+        if not len(moving) or float(np.mean(~moving)) < stuck:
             break
         m = m // 2
     return m
@@ -225,7 +225,7 @@ def _repeats(problem: BoxProblem) -> bool:
     if first is None or again is None:
         raise problem.does_not_run()
     count = len(problem.outputs)
-    return bool(np.max(np.abs(again - first)[:, :count] / problem.noise) > REPEATS)
+    return bool(np.max(np.abs(again - first)[:, :count] / problem.noise) > problem.settings.probe.repeats)
 
 
 def _pushed(problem: BoxProblem, fresh: bool) -> Probe:
@@ -244,11 +244,11 @@ def _pushed(problem: BoxProblem, fresh: bool) -> Probe:
     for name, port in problem.map.ports.items():
         place = problem.runner.inputs.index(port.input)
         pushed = plain.copy()
-        pushed[: 4 * problem.m, place] += IMPULSE * problem.drive([place])[0]
+        pushed[: 4 * problem.m, place] += problem.settings.probe.impulse * problem.drive([place])[0]
         y = problem.runner.run([Plan(problem.starts(problem.nominal), pushed)], start, step, problem.m)[0]
         at = problem.runner.reads.index(port.position)
         moved = None if y is None else (y - base)[:, at]
-        if moved is None or np.max(np.abs(moved)) < MOVES * size[at]:
+        if moved is None or np.max(np.abs(moved)) < problem.settings.probe.moves * size[at]:
             blind.append(name)
             notes.append(f"port {name}: `{port.input}` does not move `{port.position}`: left out")
             continue
@@ -293,7 +293,7 @@ def _tunable(problem: BoxProblem, base: Array) -> tuple[str, ...]:
         if y is None:
             continue
         moved = np.max(np.abs(y - base)[:, :count] / problem.noise, axis=1)
-        if np.max(moved[: problem.n // 2]) < REPEATS < np.max(moved[problem.n // 2 :]):
+        if np.max(moved[: problem.n // 2]) < problem.settings.probe.repeats < np.max(moved[problem.n // 2 :]):
             found.append(name)
     return tuple(found)
 
@@ -308,7 +308,7 @@ def _dead(problem: BoxProblem, base: Array, size: Array) -> list[str]:
     return [
         u.name
         for u, y in zip(problem.map.uncertain, runs, strict=True)
-        if y is not None and np.max(np.abs(y - base) / size) < MOVES
+        if y is not None and np.max(np.abs(y - base) / size) < problem.settings.probe.moves
     ]
 
 

@@ -10,17 +10,13 @@ from orchestrator.diagnosis.blackbox import series
 from orchestrator.diagnosis.blackbox.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
 from orchestrator.diagnosis.blackbox.wire import Feedback
 from orchestrator.errors import SlaveError
 from pyfmu_sources.port_laws import COMPLIANCE
 
 Array = NDArray[np.float64]
-
-GROWS = 2.5
-"""How much larger than at the start a response within the record may be: beyond, its motion is not stable."""
-IMPULSE = 0.5
-"""Size of the pulse that measures a response, as a share of the drive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +108,7 @@ class BoxProblem:
         noise: (outputs,) standard deviations.
         sign: of each port and cut, the direction in which its effort acts.
         units: of the variables that have one.
+        settings: thresholds.
     """
 
     data: Data
@@ -121,6 +118,7 @@ class BoxProblem:
     noise: Array
     sign: dict[str, float] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    settings: BoxSettings = DEFAULT
     _from_inputs: Surrogate | None = field(init=False, default=None, repr=False)
     _tables: dict[tuple[int, int], Array] = field(init=False, default_factory=dict, repr=False)
 
@@ -394,8 +392,12 @@ class BoxProblem:
         later = min(self.n // 4, self.n - length)
         within = self._responses(model, later, length, places)
         first = self._responses(model, 0, length, places)
-        chosen = within if float(np.max(np.abs(within))) < GROWS * float(np.max(np.abs(first))) else first
-        return realised(chosen), np.ones(len(places))
+        chosen = (
+            within
+            if float(np.max(np.abs(within))) < self.settings.probe.grows * float(np.max(np.abs(first)))
+            else first
+        )
+        return realised(chosen, self.settings.noise), np.ones(len(places))
 
     def input_surrogate(self) -> Surrogate:
         """Return the surrogate from the recorded inputs to the outputs, measured when first asked for.
@@ -414,14 +416,14 @@ class BoxProblem:
         tables = [plain]
         for place, size in zip(places, self.drive(places), strict=True):
             pulsed = plain.copy()
-            pulsed[at * self.m : (at + 1) * self.m, place] += IMPULSE * size
+            pulsed[at * self.m : (at + 1) * self.m, place] += self.settings.probe.impulse * size
             tables.append(pulsed)
         plans = [Plan(self.starts(model), t, self._feedback(model)) for t in tables]
         rows = [None if y is None else self._measured(y, model) for y in self._runs(plans)]
         base = rows[0]
         if base is None or any(y is None for y in rows):
             raise self.does_not_run()
-        responses = [(y - base)[at + 1 :] / self.noise / IMPULSE for y in rows[1:] if y is not None]
+        responses = [(y - base)[at + 1 :] / self.noise / self.settings.probe.impulse for y in rows[1:] if y is not None]
         return np.stack(responses, axis=2)
 
     @property

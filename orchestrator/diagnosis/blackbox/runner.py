@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, ProcessSettings
 from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Job, Load, Through, Wire
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
@@ -20,20 +21,8 @@ from orchestrator.shared.isolation.scratch import Scratch
 
 Array = NDArray[np.float64]
 
-LOADING = 60.0
-"""Seconds that loading an FMU may take: some unpack a whole tool."""
-PATIENCE = 20.0
-"""Seconds that a batch may take beyond what it is expected to."""
-SLOWER = 20.0
-"""How many times as long as expected a batch may take."""
-MOST_LOST = 5
-"""Processes that an FMU may cost."""
-CHUNK = 3
-"""Runs that are sent to a child at a time."""
-TOTAL = 86_400.0
-"""Seconds that a child may live."""
-MEMORY = 4096 * MEBIBYTE
 SLACK = 1 << 20
+"""Bytes of an answer beside its values."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +53,7 @@ class Runner:
         tolerance: of the FMU's own solver; None: its own.
         fresh: make a new instance for every run instead of a reset.
         workers: children (default: one a core, two at most).
+        settings: how long it is waited for, and what it may take.
 
     Raises:
         FmuError: the FMU cannot be loaded.
@@ -79,8 +69,9 @@ class Runner:
         tolerance: float | None = None,
         fresh: bool = False,
         workers: int | None = None,
+        settings: ProcessSettings = DEFAULT.process,
     ) -> None:
-        self.path, self.subject = subject.path, subject
+        self.path, self.subject, self.settings = subject.path, subject, settings
         self.inputs, self.reads, self.tunables = tuple(inputs), tuple(reads), tuple(tunables)
         self.fresh, self.tolerance = fresh, tolerance
         self.step_cost = 0.0  # s, of one step, measured
@@ -102,7 +93,9 @@ class Runner:
             self._pool.submit(self._jail).result()
         except ChildError as error:
             self.close()
-            raise SlaveError(f"{self.path}: must load and instantiate, but {_worded(error, LOADING)}") from None
+            raise SlaveError(
+                f"{self.path}: must load and instantiate, but {_worded(error, self.settings.loading)}"
+            ) from None
         except OrchestratorError as error:
             self.close()
             raise FmuError(self._named(error)) from None
@@ -139,8 +132,9 @@ class Runner:
         if not plans:
             return results
         self.runs += len(plans)
-        size = CHUNK if len(plans) >= 2 * CHUNK else 1
-        if together or len(plans) * self.step_cost * len(plans[0].table) < SMALL:
+        own = self.settings
+        size = own.chunk if len(plans) >= 2 * own.chunk else 1
+        if together or len(plans) * self.step_cost * len(plans[0].table) < own.small:
             size = len(plans)  # the latter: not worth a second child
         chunks = [list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size)]
         grid = (start, step, per_row, lead)
@@ -184,11 +178,12 @@ class Runner:
             request = Load(
                 members, list(self.inputs), list(self.reads), self.tolerance, self.fresh, list(self.tunables), wires
             )
-            limits = Limits(time=LOADING, memory=MEMORY, total=TOTAL)
+            own = self.settings
+            limits = Limits(time=own.loading, memory=own.memory * MEBIBYTE, total=own.total)
             folders = list(self._folders.values())
             jail = Jail("orchestrator.diagnosis.blackbox.inside:opened", request, read=folders, limits=limits)
             try:
-                jail.start(LOADING)
+                jail.start(own.loading)
             except BaseException:
                 jail.close()
                 raise
@@ -198,7 +193,8 @@ class Runner:
     def _chunk(self, chunk: list[int], plans: Sequence[Plan], grid: Grid, results: list[Array | None]) -> None:
         """Run some of the plans in this thread's jail; where that is lost, each of them alone in a new one."""
         steps = sum(len(plans[k].table) for k in chunk)
-        allowed = PATIENCE + SLOWER * steps * self.step_cost + (LOADING if self.step_cost == 0.0 else 0.0)
+        own = self.settings
+        allowed = own.patience + own.slower * steps * self.step_cost + (own.loading if self.step_cost == 0.0 else 0.0)
         count = (len(plans[chunk[0]].table) // grid[2] + 1) * len(self.reads)
         try:
             jail = self._jail()
@@ -255,12 +251,8 @@ class Runner:
         with self._lock:
             self.reason = reason
             self.lost += 1
-            if self.lost > MOST_LOST:
+            if self.lost > self.settings.most_lost:
                 raise SlaveError(f"{self.path}: must run, but {reason}; given up after {self.lost} processes")
-
-
-SMALL = 0.01
-"""Seconds of work below which a second child is not asked."""
 
 
 def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid, through: list[Through]) -> Batch:

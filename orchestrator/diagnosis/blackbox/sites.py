@@ -9,7 +9,6 @@ from orchestrator.diagnosis.blackbox.bank import (
     OUTPUT,
     PORT,
     REMEMBERS,
-    STARTS_OFF,
     BoxEffect,
     Surroundings,
 )
@@ -18,10 +17,6 @@ from orchestrator.diagnosis.blackbox.problem import BoxProblem
 Array = NDArray[np.float64]
 
 ANGLES = ("rad", "deg", "")
-LEAST_PHASE = 4.0
-"""Radians of a ripple within the span of the motion, from which it is no spring."""
-MOST_CYCLES = 500
-"""Wavenumbers that are looked through."""
 
 
 def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
@@ -35,14 +30,14 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
         The effects, each at a place.
     """
     found = []
-    h, runner = problem.h, problem.runner
+    h, runner, own = problem.h, problem.runner, problem.settings.place
     for k, name in enumerate(problem.inputs):
         u = problem.data.inputs[:, k]
         if float(np.ptp(u)) == 0.0:
             continue
         scene = Surroundings(h, _rms(u), float(np.max(np.abs(u))), u)
         found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
-        if abs(u[0]) > STARTS_OFF * scene.size:
+        if abs(u[0]) > own.starts_off * scene.size:
             found += [BoxEffect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
     for k, name in enumerate(problem.outputs):
         y = problem.data.outputs[:, k]
@@ -57,9 +52,22 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
         span = float(np.ptp(x)) or 1.0
         # From two thirds of a cycle within the span to what the samples still follow, half a radian of it apart.
         top = 0.5 * np.pi / max(float(np.quantile(np.abs(v), 0.8)) * h, 1e-300)
-        cycles = tuple((LEAST_PHASE + 0.5 * k) / span for k in range(MOST_CYCLES) if LEAST_PHASE + 0.5 * k < top * span)
+        phases = own.least_phase + 0.5 * np.arange(own.most_cycles)
+        cycles = tuple(float(phase) / span for phase in phases if phase < top * span)
         scene = Surroundings(
-            h, effort, effort, x, 0.0, _rms(x) or 1.0, span, _rms(v) or 1.0, a or 1.0, angular, cycles=cycles
+            h,
+            effort,
+            effort,
+            x,
+            0.0,
+            _rms(x) or 1.0,
+            span,
+            _rms(v) or 1.0,
+            a or 1.0,
+            angular,
+            cycles=cycles,
+            once=own.once,
+            long=own.long,
         )
         kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
         found += [BoxEffect(kind, name, scene) for kind in kinds]
