@@ -81,7 +81,7 @@ def calibrate(
             seen = slice(0, parts.seen)
             fit = fitter.fit(fit.model, fit.level, None, seen) or fit
             covariance = fitter.covariance(fit, seen)
-            parameters, _ = estimates_of(problem, fit.model, covariance)
+            parameters, _ = estimates_of(problem, fit.model, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
             before, after = problem.must_simulate(problem.nominal), problem.must_simulate(fit.model)
             stages = (before, after, after)
             rest = rest_of(fitter, replace(fit, y=stages[1]), slice(0, problem.n))

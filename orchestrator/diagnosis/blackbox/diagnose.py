@@ -7,7 +7,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, estimates_of, misfits
+from orchestrator.diagnosis.blackbox.estimates import (
+    FoundEffect,
+    OutputMisfit,
+    ValueEstimate,
+    errors_of,
+    estimates_of,
+    misfits,
+)
 from orchestrator.diagnosis.blackbox.fitting import BoxFit, BoxParts, Fitter, Ladder, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
@@ -271,8 +278,7 @@ def _judged(
     else:
         as_given = rest_of(fitter, nominal, slice(0, problem.n), settings).explained
         verdict = ("none" if as_given else "parameters") if fine else "unknown"
-    covariance = fitter.covariance(last, seen)
-    parameters, values = estimates_of(problem, last.model, covariance)
+    parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen))
     named: tuple[FoundEffect, ...] = ()
     if verdict == "effects":
         families = families_of(search, best)

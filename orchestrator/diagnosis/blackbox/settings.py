@@ -80,6 +80,12 @@ class FitterSettings(Settings, frozen=True):
     ] = 4.0
     combs: Annotated[int, setting("combs, one within the other", ge=0)] = 3
     teeth: Annotated[int, setting("values of each: their distance is that of the next comb's width", ge=3)] = 25
+    alike: Annotated[
+        float, setting("log-likelihood within which another quantum does as well: that of a 95 % interval")
+    ] = 1.92
+    alike_from: Annotated[float, share("of a quantum, the nearest other that is tried")] = 1e-6
+    alike_to: Annotated[float, share("of a quantum, the farthest")] = 0.03
+    alike_tried: Annotated[int, setting("others that are tried on either side", ge=2)] = 30
     finer: Annotated[float, share("width of a comb over that of the one before")] = 0.1
 
 
