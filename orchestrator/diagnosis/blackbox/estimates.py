@@ -10,11 +10,9 @@ from orchestrator.diagnosis.blackbox.bank import CUT, PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter, Rows
 from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
 from orchestrator.errors import FmuError
-from orchestrator.shared.inference.normal import interval_95
+from orchestrator.shared.inference.normal import NORMAL_95, interval_95
 
 Array = NDArray[np.float64]
-HALF = 1.96
-"""Standard errors from the middle of a 95 % interval to its ends."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,7 @@ def errors_of(fitter: Fitter, fit: BoxFit, rows: Rows) -> Array:
             found = [-np.inf if y is None else fitter.likelihood(fitter.whitened(y, fit.level), fit.level, rows)
                      for y in runs]  # fmt: skip
             alike = np.abs(offsets)[np.array(found) > best - own.alike]
-            errors[at] = max(errors[at], float(np.max(alike, initial=0.0)) / HALF)
+            errors[at] = max(errors[at], float(np.max(alike, initial=0.0)) / NORMAL_95)
         at += len(values)
     return errors
 
