@@ -18,7 +18,8 @@ def test_a_file_that_ends_its_reader_is_refused_in_one_line(tmp_path, capfd):
         read_record(CRASHES)
     assert main(["inspect", str(CRASHES), "--out", str(tmp_path / "out")]) == 2
     complaint = capfd.readouterr().err.strip()
-    assert complaint.startswith("error:") and str(CRASHES) in complaint.replace("\n", "")
+    assert complaint.startswith("error:")
+    assert str(CRASHES) in complaint.replace("\n", "")
     assert not (tmp_path / "out").exists()
 
 
