@@ -104,9 +104,8 @@ class _Apart(RecordSource):
         raise self._failed("what came back is no column")
 
     def _failed(self, why: str) -> RecordError:
-        return RecordError(
-            f"{self._shown}: must be a whole {self._kind} file, but cannot be read as one: {why}; export it again, or as CSV"
-        )
+        cure = "export it again, or as CSV"
+        return RecordError(f"{self._shown}: must be a whole {self._kind} file, but cannot be read: {why}; {cure}")
 
 
 def _sent(values: NDArray[Any]) -> tuple[str, NDArray[Any]]:
