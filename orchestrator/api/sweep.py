@@ -1,9 +1,8 @@
 """Sweeps: many sizes, noise levels and seeds of the paired loops."""
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -229,9 +228,7 @@ def sweep(
     cases = plan.cases()
     if tell is not None:
         tell("preparing FMUs, compiled loop and calibration (the first time: half a minute without a C compiler)")
-    with ThreadPoolExecutor(1) as pool:  # figures take half a second to import: while the compiler runs
-        pool.submit(import_module, "orchestrator.paired.figures")
-        builds = ensure_fastest(FMUS)
+    builds = ensure_fastest(FMUS, partial(import_module, "orchestrator.paired.figures"))  # half a second
     fmus = builds.paths
     check_parameters(loop_system(plan.experiment, fmus, (MACHINE,)), cases, OWN_PARAMETERS)
     calibrations = plan.calibrations(tell, calibrated)
