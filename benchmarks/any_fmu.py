@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.any_fmu_plants import INSIDE, PLANTS, Case, Maker, Plant
-from orchestrator.api.any_fmu import FmuDiagnosisResult, diagnose_fmu
+from orchestrator.api.any_fmu import FmuDiagnosisResult
+from orchestrator.api.diagnose import diagnose
 from orchestrator.errors import OrchestratorError
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 
@@ -138,7 +139,7 @@ def judged(tally: Tally, kind: str, label: str, names: tuple[str, ...], sizes: t
     """Diagnose one record, print a line."""
     begun = time.monotonic()
     try:
-        found = diagnose_fmu(*files)
+        found = diagnose(*files)
     except OrchestratorError as error:
         print(f"{kind:8s}{label} ERROR {error}", flush=True)
         tally.counts.setdefault(kind, {}).setdefault("error", 0)

@@ -43,7 +43,6 @@ _PUBLIC = {
     "check": "orchestrator.api.check",
     "design": "orchestrator.api.design",
     "diagnose": "orchestrator.api.diagnose",
-    "diagnose_fmu": "orchestrator.api.any_fmu",
     "draft_map": "orchestrator.api.any_fmu",
     "estimate": "orchestrator.api.estimate",
     "inspect": "orchestrator.api.inspect",

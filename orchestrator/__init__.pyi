@@ -2,7 +2,6 @@
 from orchestrator.api.any_fmu import CalibrationResult as CalibrationResult
 from orchestrator.api.any_fmu import FmuDiagnosisResult as FmuDiagnosisResult
 from orchestrator.api.any_fmu import calibrate as calibrate
-from orchestrator.api.any_fmu import diagnose_fmu as diagnose_fmu
 from orchestrator.api.any_fmu import draft_map as draft_map
 from orchestrator.api.benchmark import BenchmarkResult as BenchmarkResult
 from orchestrator.api.benchmark import benchmark as benchmark

@@ -82,8 +82,8 @@ class AttachedEffect(Fmi2Slave):
         half = 0.0
         if has_memory(self.law):
             distance = distance_of(self.law, self.q1, self.q3)
-            half = built_up(self._built, middle, distance, 0.5 * step)
-            self._built = built_up(self._built, middle, distance, step)
+            half = built_up(self.law, self._built, middle, distance, 0.5 * step)
+            self._built = built_up(self.law, self._built, middle, distance, step)
         self._x, self._v = x, v
         return resistance(self.law, place, middle, (v - old) / step, half, self.q0, self.q1, self.q2)
 

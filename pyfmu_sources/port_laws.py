@@ -7,14 +7,18 @@ system runs it. ``x`` and ``v`` are position and speed of the port, in the middl
 from math import cos, exp, sin
 
 COULOMB, STRIBECK, QUADRATIC, VISCOUS, SPRING, HARDENING, GRAVITY, RIPPLE, LOAD, DIRECTIONAL, INERTIA = range(1, 12)
+HYSTERESIS = 12
 
 
-def built_up(z: float, v: float, distance: float, time: float) -> float:
-    """Return how far dry friction has built up (-1 to 1) after ``time`` at speed ``v``.
+def built_up(kind: int, z: float, v: float, distance: float, time: float) -> float:
+    """Return how far dry friction or hysteresis has built up (-1 to 1) after ``time`` at speed ``v``.
 
-    Dahl's law, ``dz/dt = (v - |v| z)/distance``, solved exactly for a constant speed.
+    Friction by Dahl's law, ``dz/dt = (v - |v| z)/distance``; hysteresis by that of Bouc and Wen,
+    ``dz/dt = (v - (|v| z + v |z|)/2)/distance``: a straight way back to zero. Both are solved exactly for a constant
+    speed.
 
     Args:
+        kind: number of the law.
         z: at the beginning, -1 to 1.
         v: speed, in the port's unit.
         distance: over which it builds up, in the port's unit.
@@ -26,7 +30,13 @@ def built_up(z: float, v: float, distance: float, time: float) -> float:
     if v == 0.0:
         return z
     end = 1.0 if v > 0.0 else -1.0
-    return end + (z - end) * exp(-abs(v) * time / distance)
+    way = abs(v) * time / distance
+    if kind == HYSTERESIS and z * end < 0.0:
+        back = -z * end
+        if way <= back:
+            return z + end * way
+        z, way = 0.0, way - back
+    return end + (z - end) * exp(-way)
 
 
 def has_memory(kind: int) -> bool:
@@ -38,7 +48,7 @@ def has_memory(kind: int) -> bool:
     Returns:
         True when it does.
     """
-    return kind in (COULOMB, STRIBECK)
+    return kind in (COULOMB, STRIBECK, HYSTERESIS)
 
 
 def distance_of(kind: int, q1: float, q3: float) -> float:
@@ -52,7 +62,7 @@ def distance_of(kind: int, q1: float, q3: float) -> float:
     Returns:
         The distance, in the port's unit.
     """
-    return q1 if kind == COULOMB else q3
+    return q3 if kind == STRIBECK else q1
 
 
 def resistance(kind: int, x: float, v: float, a: float, z: float, q0: float, q1: float, q2: float) -> float:
@@ -61,13 +71,13 @@ def resistance(kind: int, x: float, v: float, a: float, z: float, q0: float, q1:
     Args:
         kind: one of the constants above.
         x, v, a: position, speed and acceleration.
-        z: how far dry friction has built up, -1 to 1.
+        z: how far dry friction or hysteresis has built up, -1 to 1.
         q0, q1, q2: parameters of the law.
 
     Returns:
         The force, in the port's unit.
     """
-    if kind == COULOMB:
+    if kind in (COULOMB, HYSTERESIS):
         return q0 * z
     if kind == STRIBECK:
         ratio = v / q2

@@ -226,7 +226,7 @@ def write_signals(path: Path, outcome: BoxOutcome, data: Data) -> None:
         writer.writerows([f"{v:.9g}" for v in row] for row in np.column_stack(columns))
 
 
-def diagnose_fmu(
+def of_a_box(
     record: Path | str,
     fmu: Path | str,
     map: Path | str,  # noqa: A002 - as on the command line
@@ -251,11 +251,6 @@ def diagnose_fmu(
     Raises:
         InputError: record, FMU, map or settings cannot be used.
         SimulationError: the FMU fails again and again.
-
-    Example:
-        >>> found = oc.diagnose_fmu("axis.csv", "axis.fmu", "axis_map.toml")
-        >>> found.verdict, [effect.name for effect in found.effects]
-        ('effects', ['coulomb_friction'])
     """
     used = chosen_settings(settings, BoxSettings)
     description = read_description(Path(fmu))

@@ -1,6 +1,7 @@
 """What a model misses, from a measured record."""
 
 import csv
+import itertools
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,7 +13,7 @@ from typing import Any, ClassVar, overload
 import msgspec
 from msgspec import UNSET
 
-from orchestrator.api.any_fmu import FmuDiagnosisResult, diagnose_fmu
+from orchestrator.api.any_fmu import FmuDiagnosisResult, of_a_box
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.live import corrected_live
 from orchestrator.api.numerics import fitting
@@ -20,6 +21,7 @@ from orchestrator.api.records import as_record
 from orchestrator.api.remains import also_seen, described_term, of_each_record
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis import diagnose as diagnosing
+from orchestrator.diagnosis.blackbox.settings import BoxSettings
 from orchestrator.diagnosis.diagnose import evidence_of
 from orchestrator.diagnosis.figures import (
     draw_candidates,
@@ -235,33 +237,39 @@ def diagnose(
 
 
 @overload
-def diagnose(record: Path | str, *, fmu: Path | str, map: Path | str) -> FmuDiagnosisResult:
+def diagnose(
+    record: Path | str,
+    model: Path | str,
+    map: Path | str,
+    *,
+    validate: Path | str | None = None,
+    settings: BoxSettings | Path | str | None = None,
+    progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
+) -> FmuDiagnosisResult:
     """Of an FMU of others."""
 
 
 def diagnose(
     record: Record | Path | str | Sequence[Record | Path | str],
-    model: Model | None = None,
+    model: Model | Path | str | None = None,
+    map: Path | str | None = None,  # noqa: A002 - as on the command line
     *,
     validate: Record | Path | str | None = None,
-    settings: DiagnosisSettings | Path | str | None = None,
+    settings: DiagnosisSettings | BoxSettings | Path | str | None = None,
     search: bool = True,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
-    fmu: Path | str | None = None,
-    map: Path | str | None = None,  # noqa: A002 - as on the command line
 ) -> DiagnosisResult | FmuDiagnosisResult:
     """Find out which effects a model misses, and prove it on data that was not fitted.
 
     Args:
         record: a measured record, or its path; one encoder or two, at least 200 rows. Or several of one machine, which
             then share parameters and effects.
-        model: what it is compared with (default: ``read_model()``).
+        model: what it is compared with (default: ``read_model()``), or the path of any FMI 2.0 co-simulation FMU.
+        map: with an FMU, the TOML file of columns, uncertain parameters and ports; it runs in a child process.
         validate: another record, or its path, on which the misfit is shown too.
         settings: thresholds, or the path of a TOML file with those that differ from the default.
         search: False: the model is re-fitted and judged as it stands, no effect is looked for.
-        progress: called with (fits done, expected, what was fitted).
-        fmu: any FMI 2.0 co-simulation FMU in place of a model of ours; ``diagnose_fmu`` says more.
-        map: with it, the TOML file that says which column is which variable.
+        progress: called with (fits done, expected, what was fitted); of an FMU the number expected is not known: 0.
 
     Returns:
         Verdict, named effects with intervals, the misfit before and after, and the corrected model.
@@ -270,17 +278,21 @@ def diagnose(
         RecordError: a record is wrong, nothing moves in it, or nothing drives.
         ScenarioError: the model cannot be compared with this record.
         ConvergenceError: no model can be fitted.
+        InputError: the FMU or its map cannot be used.
+        SimulationError: the FMU fails again and again.
 
     Example:
         >>> found = oc.diagnose("machine.csv", oc.read_model("machine.toml"))
         >>> found.verdict, sorted(effect.name for effect in found.effects)
         ('effects', ['backlash', 'coulomb_friction'])
+        >>> oc.diagnose("axis.csv", "axis.fmu", "axis_map.toml").effects[0].name
+        'coulomb_friction'
     """
-    if fmu is not None or map is not None:
-        if fmu is None or map is None or model or not isinstance(record, (Path, str)) or validate or settings:
-            raise ScenarioError("`fmu` must come with a record's path and a `map` alone, but does not", "fmu", "map")
-        return diagnose_fmu(record, fmu, map)
+    if map is not None or isinstance(model, (Path, str)):
+        return _of_a_box(record, model, map, validate, settings, search, progress)
     model = read_model(None) if model is None else model
+    if isinstance(settings, BoxSettings):
+        raise ScenarioError("`settings` must be those of a diagnosis of a model of ours, but are of an FMU", "settings")
     chosen = chosen_settings(settings, DiagnosisSettings)
     if not search:
         none = msgspec.structs.replace(chosen.search, most_effects=0, most_in_a_repeat=0)
@@ -302,6 +314,23 @@ def diagnose(
     given = {"record": measured.source, "model": model.source, "validate": None if other is None else other.source}
     seconds = time.monotonic() - begun
     return DiagnosisResult(found, measured, validated, errors, evidence, seconds, given, model, tuple(more))
+
+
+def _of_a_box(
+    record: Any, fmu: Any, given: Path | str | None, validate: Any, settings: Any, search: bool,
+    progress: Callable[[int, int, str], None],
+) -> FmuDiagnosisResult:  # fmt: skip
+    """Return what a record says of an FMU, its arguments checked."""
+    if not isinstance(fmu, (Path, str)) or given is None:
+        raise ScenarioError("`map` must come with the path of an FMU as `model`, and the path with a `map`", "map")
+    if not isinstance(record, (Path, str)) or not isinstance(validate, (Path, str, type(None))):
+        raise ScenarioError("`record` and `validate` must be paths with an FMU, but are not", "record", "validate")
+    if isinstance(settings, DiagnosisSettings) or not search:
+        raise ScenarioError("`settings` must be those of an FMU, and `search` left as it is", "settings", "search")
+    done = itertools.count()
+    return of_a_box(
+        record, fmu, given, validate=validate, settings=settings, progress=lambda what: progress(next(done), 0, what)
+    )
 
 
 def comparable_record(given: Record | Path | str, model: Model, settings: DiagnosisSettings, **reading: Any) -> Record:

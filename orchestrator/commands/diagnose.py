@@ -101,7 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _any_fmu(args: argparse.Namespace) -> int:
     """Diagnose an FMU that is not ours, or draft its map."""
-    from orchestrator.api.any_fmu import diagnose_fmu, draft_map
+    from orchestrator.api.any_fmu import draft_map
 
     if len(args.records) > 1:
         raise ScenarioError("`records` must be one with an FMU of others", "records")
@@ -119,7 +119,10 @@ def _any_fmu(args: argparse.Namespace) -> int:
     if args.map is None:
         raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
     with staged(args.out) as folder:
-        found = diagnose_fmu(path, args.fmu, args.map, validate=args.validate, settings=args.settings, progress=say)
+        found = diagnose(
+            path, args.fmu, args.map, validate=args.validate, settings=args.settings,
+            progress=lambda done, expected, what: say(what),
+        )  # fmt: skip
         try:
             found.write(folder, args.out)
         finally:

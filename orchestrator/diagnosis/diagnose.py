@@ -17,7 +17,7 @@ from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, ladder
-from orchestrator.diagnosis.search.search import in_metres
+from orchestrator.diagnosis.search.model_space import in_metres
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.admission import check_comparable, check_diagnosable, check_resolved
 from orchestrator.diagnosis.verdict.evidence import Evidence, evidence

@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 FUNCTIONS = sorted(name for name in oc.__all__ if name.islower() and not name.startswith("_"))
 # Examples that take more than a few seconds.
-SLOW = {"diagnose", "benchmark", "calibrate", "design", "diagnose_fmu"}
+SLOW = {"diagnose", "benchmark", "calibrate", "design"}
 
 
 @pytest.fixture

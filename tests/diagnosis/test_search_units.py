@@ -9,9 +9,10 @@ import pytest
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
 from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder, parameter_count
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor
+from orchestrator.diagnosis.search.model_space import in_metres
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Guess
-from orchestrator.diagnosis.search.search import Search, in_metres
+from orchestrator.diagnosis.search.search import Search
 from orchestrator.plants.effects import Effect
 from orchestrator.records.columns import Column
 from orchestrator.records.model_file import default_model

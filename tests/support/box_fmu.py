@@ -168,6 +168,18 @@ def _force(kind, x, v, z, q, t):
         return q[0] * v * (t / q[1]) ** 2
     if kind == 8:  # drag that depends on the way
         return q[0] * v * np.cos(q[1] * x) ** 2
+    if kind == 9:
+        return q[0] * z
+    return 0.0
+
+
+@numba.njit(cache=True)
+def _memory(kind, z, v, q):
+    """Rate of the bristles of friction (1), or of the memory of hysteresis (9)."""
+    if kind == 1:
+        return v - abs(v) * z / q[1]
+    if kind == 9:
+        return (v - 0.5 * abs(v) * z - 0.5 * v * abs(z)) / q[1]
     return 0.0
 
 
@@ -182,19 +194,18 @@ def _solved(number, states, p, fine, step, per, kind, q, rows):
         t = k * step
         f1 = _force(kind, x[0], x[1], z, q, t)
         a = _rates(number, x, fine[k] - f1, p)
-        z1 = z + 0.5 * step * (x[1] - abs(x[1]) * z / q[1]) if kind == 1 else z
+        z1 = z + 0.5 * step * _memory(kind, z, x[1], q)
         w = x + 0.5 * step * a
         f2 = _force(kind, w[0], w[1], z1, q, t + 0.5 * step)
         x = x + step * _rates(number, w, fine[k] - f2, p)
-        if kind == 1:
-            z = z + step * (w[1] - abs(w[1]) * z1 / q[1])
+        z = z + step * _memory(kind, z1, w[1], q)
         if (k + 1) % per == 0:
             out[(k + 1) // per] = x
     return out
 
 
 KINDS = {"coulomb_friction": 1, "quadratic_drag": 2, "hardening_spring": 3, "gravity": 4, "load": 5,
-         "unknown_coming_load": 6, "unknown_growing_drag": 7, "unknown_patchy_drag": 8}  # fmt: skip
+         "unknown_coming_load": 6, "unknown_growing_drag": 7, "unknown_patchy_drag": 8, "hysteresis": 9}  # fmt: skip
 UNKNOWN = ("unknown_coming_load", "unknown_growing_drag", "unknown_patchy_drag", "unknown_dropouts")
 
 
@@ -265,7 +276,7 @@ def record(domain: Domain, names: tuple, rng, n: int = 1200, scale: float = 1.0,
             size = share * drive / {2: speed**2, 3: way**3, 7: 0.15 * speed, 8: 0.3 * speed}.get(kind, 1.0)
             q = np.array([size, 0.0, 0.0])
             q[1] = {1: 0.02 * way, 4: rng.uniform(0, 6.28), 6: 0.4 * n * domain.h, 7: 0.7 * n * domain.h,
-                    8: 4.0 / way}.get(kind, 0.0)  # fmt: skip
+                    8: 4.0 / way, 9: 0.6 * way}.get(kind, 0.0)  # fmt: skip
             q[2] = 0.1 * domain.h if kind == 1 else 0.0
         sizes.append(size)
         if name.startswith("input_"):

@@ -62,7 +62,7 @@ class Kind:
         linear: the response is proportional to all values (found from one small change of each).
         law: number of the law, for feedback.
         lower: smallest value of each.
-        nuisances: how many of the parameters, the last ones, are not its size.
+        amplitudes: in how many of the values, the first ones, the response is linear, where it is not in all.
         needs: the simpler effect that it contains.
         plausible: values -> False where the fit has left what the effect means.
         angular: only for angles.
@@ -81,7 +81,7 @@ class Kind:
     linear: bool = False
     law: int = 0
     lower: Values = ()
-    nuisances: int = 0
+    amplitudes: int = 0
     needs: str = ""
     plausible: Callable[[Values, Surroundings], bool] = lambda values, scene: True
     angular: bool = False
@@ -152,6 +152,10 @@ ONCE = 0.03
 """How far from 1 a ripple's wavenumber over an angle is at least: gravity is what comes once a turn."""
 
 
+LONG = 0.04
+"""Share of the motion over which hysteresis builds up at least: over less of it, it is dry friction."""
+
+
 def _once_a_turn(values: Values, scene: Surroundings) -> bool:
     return scene.angular and abs(values[2] - 1.0) < ONCE
 
@@ -184,12 +188,12 @@ _SERIES = (
 
 _FEEDBACK = (
     Kind("coulomb_friction", PORT, ("level", "distance"), ("effort", "flow"),
-         lambda s: (0.01 * s.size, 0.2 * s.speed * s.h), _friction, law=laws.COULOMB, lower=(0.0, 1e-300), nuisances=1,
+         lambda s: (0.01 * s.size, 0.2 * s.speed * s.h), _friction, law=laws.COULOMB, lower=(0.0, 1e-300), amplitudes=1,
          plausible=lambda v, s: 0.0 < v[0] < 3.0 * s.peak and v[1] < 0.5 * s.span),
     Kind("stribeck_friction", PORT, ("sliding", "breakaway", "speed", "distance"),
          ("effort", "effort", "flow/s", "flow"),
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 * s.speed, 0.2 * s.speed * s.h), lambda s: (),
-         law=laws.STRIBECK, lower=(0.0, 0.0, 1e-300, 1e-300), nuisances=1, needs="coulomb_friction",
+         law=laws.STRIBECK, lower=(0.0, 0.0, 1e-300, 1e-300), needs="coulomb_friction",
          plausible=lambda v, s: v[1] > 1.03 * v[0] > 0.0),
     Kind("quadratic_drag", PORT, ("coefficient",), ("effort.s2/flow2",), lambda s: (0.01 * s.size / s.speed**2,),
          lambda s: ((0.01 * s.size / s.speed**2,),), True, laws.QUADRATIC, plausible=_positive),
@@ -204,8 +208,13 @@ _FEEDBACK = (
     Kind("ripple", PORT, ("sine", "cosine", "wavenumber"), ("effort", "effort", "1/flow"),
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 / s.span),
          lambda s: tuple((0.01 * s.size, 0.01 * s.size, n) for n in s.cycles[:: max(len(s.cycles) // 24, 1)]),
-         law=laws.RIPPLE, scan=lambda s: s.cycles,
+         law=laws.RIPPLE, scan=lambda s: s.cycles, amplitudes=2,
          plausible=lambda v, s: not _once_a_turn(v, s)),
+    Kind("hysteresis", PORT, ("level", "distance"), ("effort", "flow"),
+         lambda s: (0.01 * s.size, 0.02 * s.span),
+         lambda s: tuple((0.05 * s.size, f * s.span) for f in (0.08, 0.25, 0.8)),
+         law=laws.HYSTERESIS, lower=(0.0, 1e-300), amplitudes=1,
+         plausible=lambda v, s: 0.0 < v[0] < 10.0 * s.peak and LONG * s.span < v[1] < 3.0 * s.span),
     Kind("load", PORT, ("effort",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True, laws.LOAD),
     Kind("directional_friction", PORT, ("difference",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
          lambda s: ((0.01 * s.size / s.speed,),), True, laws.DIRECTIONAL),

@@ -67,8 +67,8 @@ def run_loop(calls, counts, where, sent, read, table, grid, ports, sign, q, lead
             place = x + lead * (x - before)
             if _has_memory(kind):
                 distance = _distance(kind, q[e, 1], q[e, 3])
-                half = _built_up(built[e], middle, distance, 0.5 * step)
-                built[e] = _built_up(built[e], middle, distance, step)
+                half = _built_up(kind, built[e], middle, distance, 0.5 * step)
+                built[e] = _built_up(kind, built[e], middle, distance, step)
             else:
                 half = 0.0
             force = _resistance(kind, place, middle, a, half, q[e, 0], q[e, 1], q[e, 2])

@@ -203,9 +203,7 @@ def _levels(fitter: Fitter, now: int) -> list[int]:
 
 def _amplitude_count(effect: BoxEffect) -> int:
     """Return in how many of its leading values the response to an effect is linear."""
-    if effect.kind.linear:
-        return len(effect.kind.parameters)
-    return {"coulomb_friction": 1, "ripple": 2}.get(effect.kind.name, 0)
+    return len(effect.kind.parameters) if effect.kind.linear else effect.kind.amplitudes
 
 
 def _regressed(e: Array, D: Array, free: bool, bounds: tuple[float, float]) -> tuple[float, Array]:

@@ -1,6 +1,6 @@
 """Every threshold of the diagnosis of any FMU, in groups, each with one line of why.
 
-``diagnose_fmu(..., settings=...)`` takes others, or the path of a TOML file of them. Log-likelihoods are natural.
+``diagnose(record, fmu, map, settings=...)`` takes others, or the path of a TOML file. Log-likelihoods are natural.
 """
 
 from typing import Annotated

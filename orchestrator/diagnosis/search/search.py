@@ -7,7 +7,7 @@ must pay on both. Candidates are fitted in threads, one per core; the predictor 
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -17,8 +17,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.proof.horizons import horizons
 from orchestrator.diagnosis.search.candidate import (
     Candidate,
@@ -26,14 +25,12 @@ from orchestrator.diagnosis.search.candidate import (
     annealed,
 )
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
+from orchestrator.diagnosis.search.model_space import ModelSpace
 from orchestrator.diagnosis.search.periodic import with_cycles
 from orchestrator.diagnosis.search.plausible import implausible
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Guess, Screen
-from orchestrator.diagnosis.settings import SearchSettings
-from orchestrator.plants.description import Plant
 from orchestrator.plants.effects import Effect, Scene
-from orchestrator.records.model_file import Model
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.inference.colour import Colour, colour_of
 
@@ -48,11 +45,10 @@ class TimeUpError(Exception):
 
 
 @dataclass
-class Search:
+class Search(ModelSpace):
     """The state of a search; :meth:`run` carries it out.
 
     Attributes:
-        likelihood, model, parts: what is searched.
         most: effects that are named at most.
         progress: called with (done, expected, what) as candidates are fitted.
         deadline: by the monotonic clock [s]; no fit of a candidate begins after it.
@@ -60,9 +56,6 @@ class Search:
         hidden: the model with a gap before a body that is not measured; None: there is none to look for.
     """
 
-    likelihood: RecordLikelihood
-    model: Model
-    parts: Parts
     most: int
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None
     deadline: float = math.inf
@@ -72,16 +65,6 @@ class Search:
     refused: dict[str, str] = field(default_factory=dict)
     done: int = 0
     _counting: Lock = field(default_factory=Lock)
-
-    @property
-    def plant(self) -> Plant:
-        """Return the plant that is searched."""
-        return self.likelihood.plant
-
-    @property
-    def settings(self) -> SearchSettings:
-        """Return the settings of the search."""
-        return self.likelihood.settings.search
 
     def run(self) -> tuple[Candidate, Candidate]:
         """Return the model with re-fitted parameters only, and the best model found.
@@ -267,39 +250,6 @@ class Search:
         own = current.fit.colour
         return [own] if own.order == 0 else [own, colour_of(current.fit.z, self.parts.fitted, 0)]
 
-    def eligible(self, current: Candidate) -> Iterable[Effect]:
-        """Return the effects that could be added to ``current``.
-
-        Args:
-            current: the model to build on.
-
-        Yields:
-            Each effect.
-        """
-        present = {effect.label for effect in current.effects}
-        replaced = {effect.needs for effect in current.effects}
-        one_way = self.one_way
-        for effect in self.plant.bank:
-            if effect.needs or (effect.angular and in_metres(self.model)):
-                continue
-            blind = effect.both_encoders and self.likelihood.signals.channels < 2
-            # In one direction dry friction and a constant torque are the same, and so are viscous friction and its
-            # difference between the directions: the first of each is what machines have.
-            alike = one_way and effect.name in ("load_torque", "directional_friction")
-            if effect.label not in present | replaced and not blind and not alike:
-                yield effect
-
-    @property
-    def one_way(self) -> bool:
-        """Tell whether the motor turns in one direction only, in all that may be looked at."""
-        signals, ways = self.likelihood.signals, [0.0, 0.0]
-        for rows in signals.stretches(self.parts.seen):
-            angle = signals.y[rows, 0]
-            for n, s in enumerate((1.0, -1.0)):
-                back = float(np.max(np.maximum.accumulate(s * angle) - s * angle))
-                ways[n] = max(ways[n], back / max(float(np.ptp(angle)), 1e-300))
-        return min(ways) < self.settings.one_way
-
     def shortlist(
         self, own: list[tuple[Effect, Guesses]], white: Sequence[tuple[Effect, Guesses]] = ()
     ) -> list[tuple[Effect, Guesses]]:
@@ -459,71 +409,6 @@ class Search:
         self._tick(f"without {effect.label}")
         return self.candidate(kept, fitted)
 
-    def candidate(self, effects: tuple[Effect, ...], fitted: Fit) -> Candidate:
-        """Return a fitted model as a candidate.
-
-        Args:
-            effects: of the model.
-            fitted: its fit.
-
-        Returns:
-            The candidate.
-        """
-        return Candidate(effects, fitted, self.settings)
-
-    @property
-    def refitted(self) -> list[int]:
-        """Return the places of the plant's own parameters that every model re-fits."""
-        return [entry.place for entry in self.linear()]
-
-    def linear(self) -> tuple[Free, ...]:
-        """Return the uncertain parameters of the model file; a gear ratio cannot be seen from one side.
-
-        Returns:
-            Their places, scales, bounds and priors.
-        """
-        shaft, both = self.plant.shaft, self.likelihood.signals.channels == len(self.plant.bodies)
-        unseen = "" if both or shaft is None else shaft.ratio
-        return tuple(
-            Free(self.plant.index(u.name), u.standard_deviation, u.minimum, u.maximum, (u.value, u.standard_deviation))
-            for u in self.model.uncertain
-            if u.name != unseen
-        )
-
-    def free(self, effects: Sequence[Effect], scene: Scene) -> tuple[Free, ...]:
-        """Return the uncertain parameters and those of ``effects``.
-
-        Args:
-            effects: of the model.
-            scene: sizes of the record's signals.
-
-        Returns:
-            Their places, scales, bounds and priors.
-        """
-        free = list(self.linear())
-        taken = {entry.place for entry in free}
-        for effect in effects:
-            unit, scales = effect.unit_of_size(scene), effect.scales(scene)
-            for short, place in effect.places(self.plant).items():
-                if place not in taken:
-                    entry = self.plant.entry(place)
-                    low, high = effect.bounds(scene).get(short, (entry.minimum, entry.maximum))
-                    prior = effect.priors(scene).get(short)
-                    free.append(Free(place, scales.get(short, unit), low, high, prior))
-        return tuple(free)
-
-    def without(self, p: Array, effect: Effect) -> Array:
-        """Return ``p`` with one effect switched off.
-
-        Args:
-            p: (parameters,) of the predictor.
-            effect: of the bank.
-
-        Returns:
-            A copy.
-        """
-        return effect.taken_out(self.plant, p, self.plant.extended(self.model.values), self.refitted)
-
     def _each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
         """Return ``function`` of each item, in order, computed in threads."""
 
@@ -556,16 +441,3 @@ def _first(a: slice, b: slice) -> int:
 
 def _last(a: slice, b: slice) -> int:
     return int(max(a.stop, b.stop))
-
-
-def in_metres(model: Model) -> bool:
-    """Tell whether the model's position is a length.
-
-    Args:
-        model: that the record is compared with.
-
-    Returns:
-        True when it is.
-    """
-    column = model.columns.get("theta_m")
-    return column is not None and column.unit in ("m", "mm")

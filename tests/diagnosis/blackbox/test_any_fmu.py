@@ -7,7 +7,8 @@ import shutil
 import numpy as np
 import pytest
 
-from orchestrator.api.any_fmu import calibrate, diagnose_fmu, draft_map
+from orchestrator.api.any_fmu import calibrate, draft_map
+from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
 from orchestrator.errors import InputError, OrchestratorError
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
@@ -38,12 +39,13 @@ def made(tmp_path):
         (TWO_MASS, "input_delay", 0.01),
         (CIRCUIT, "quadratic_drag", 0.02),
         (TANKS, "input_saturation", 0.01),
+        (SPRING, "hysteresis", 0.02),
     ],
     ids=lambda v: getattr(v, "name", str(v)),
 )
 def test_a_hidden_effect_is_named_with_its_size(made, domain, name, tolerance):
     case, *files = made(domain, (name,))
-    found = diagnose_fmu(*files)
+    found = diagnose(*files)
     try:
         assert found.verdict == "effects"
         assert [f.effect.kind.name for f in found.effects] == [name]
@@ -56,7 +58,7 @@ def test_a_hidden_effect_is_named_with_its_size(made, domain, name, tolerance):
 @pytest.mark.parametrize("disturbance", [0.0, 0.01])
 def test_where_nothing_is_hidden_nothing_is_named(made, disturbance):
     _, *files = made(SPRING, disturbance=disturbance)
-    found = diagnose_fmu(*files)
+    found = diagnose(*files)
     found.close()
     assert found.verdict in ("none", "parameters")
     assert not found.effects
@@ -64,7 +66,7 @@ def test_where_nothing_is_hidden_nothing_is_named(made, disturbance):
 
 def test_a_load_that_comes_is_unknown_and_says_when(made):
     case, *files = made(SPRING, ("unknown_coming_load",))
-    found = diagnose_fmu(*files)
+    found = diagnose(*files)
     found.close()
     assert found.verdict == "unknown"
     assert not found.effects
@@ -117,7 +119,7 @@ def test_an_fmu_that_misbehaves_mildly_is_diagnosed_all_the_same(made, fault):
     if fault == "input_reversed":
         text = files[2].read_text().replace('hold = "zero"', 'hold = "zero", factor = -1.0')
         files[2].write_text(text)
-    found = diagnose_fmu(*files)
+    found = diagnose(*files)
     found.close()
     assert [f.effect.kind.name for f in found.effects] == ["quadratic_drag"]
 
@@ -131,12 +133,12 @@ def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault, monkeypa
     monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.LOADING", 8.0)
     _, *files = made(SPRING, rows=300, fault=fault)
     if fault in ("output_stuck", "input_ignored"):
-        found = diagnose_fmu(*files)
+        found = diagnose(*files)
         found.close()
         assert found.verdict == "unknown"
         return
     with pytest.raises(OrchestratorError) as caught:
-        diagnose_fmu(*files)
+        diagnose(*files)
     assert "\n" not in str(caught.value)
     assert "Spring.fmu" in str(caught.value)
 
@@ -148,20 +150,20 @@ def test_an_fmu_that_hangs_is_ended(made, fault, monkeypatch):
     monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.MOST_LOST", 1)
     _, *files = made(SPRING, rows=300, fault=fault)
     with pytest.raises(OrchestratorError, match="hangs"):
-        diagnose_fmu(*files)
+        diagnose(*files)
 
 
 def test_an_fmu_that_is_too_slow_for_its_budget_is_refused_with_an_estimate(made):
     _, *files = made(SPRING, rows=100, fault="slow")
     files[2].write_text(files[2].read_text() + "[options]\nbudget = 20\n")
     with pytest.raises(OrchestratorError, match="a run takes about"):
-        diagnose_fmu(*files)
+        diagnose(*files)
 
 
 def test_a_search_that_is_cut_short_says_so_and_names_nothing(made):
     _, *files = made(SPRING, ("quadratic_drag",), rows=300)
     files[2].write_text(files[2].read_text() + "[options]\nbudget = 0.2\n")
-    found = diagnose_fmu(*files)
+    found = diagnose(*files)
     found.close()
     assert found.verdict == "unknown"
     assert not found.effects
@@ -170,7 +172,7 @@ def test_a_search_that_is_cut_short_says_so_and_names_nothing(made):
 
 def test_an_fmu_with_a_step_of_its_own_is_stepped_by_it(made):
     _, *files = made(SPRING, rows=300, fault="own_grid")
-    found = diagnose_fmu(*files)
+    found = diagnose(*files)
     found.close()
     assert found.outcome.problem.m == 1
     assert any("step of its own" in note for note in found.outcome.warnings)
@@ -192,14 +194,14 @@ def test_a_second_record_shows_the_misfit_and_settings_are_followed(made, tmp_pa
 
 def test_an_fmu_that_changes_from_run_to_run_is_made_anew_for_each(made):
     _, *files = made(SPRING, rows=300, fault="drifts")
-    found = diagnose_fmu(*files)
+    found = diagnose(*files)
     found.close()
     assert any("new instance" in note for note in found.outcome.warnings)
 
 
 def test_parameters_that_do_nothing_are_left_out(made):
     _, *files = made(SPRING, rows=300, fault="parameters_ignored")
-    found = diagnose_fmu(*files)
+    found = diagnose(*files)
     found.close()
     assert any("changes nothing" in note for note in found.outcome.warnings)
 
@@ -220,7 +222,7 @@ def test_a_wrong_map_is_refused_in_one_line(made, change, words):
     _, record_path, fmu, map_path = made(SPRING, rows=300)
     map_path.write_text(change(map_path.read_text()))
     with pytest.raises(InputError, match=words) as caught:
-        diagnose_fmu(record_path, fmu, map_path)
+        diagnose(record_path, fmu, map_path)
     assert "\n" not in str(caught.value)
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.api.any_fmu import diagnose_fmu
+from orchestrator.api.diagnose import diagnose
 from orchestrator.diagnosis.blackbox.deliver import deliver, parts_of
 from orchestrator.diagnosis.blackbox.problem import series_of
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
@@ -21,7 +21,7 @@ def test_fmpy_reproduces_the_fit_within_a_tenth_of_the_noise(tmp_path):
     domain = DOMAINS[0]
     case = record(domain, ("quadratic_drag",), np.random.default_rng(4), 400)
     fmu = write_fmu(tmp_path / "Spring.fmu", domain)
-    found = diagnose_fmu(write_record(tmp_path / "r.csv", case), fmu, write_map(tmp_path / "m.toml", domain))
+    found = diagnose(write_record(tmp_path / "r.csv", case), fmu, write_map(tmp_path / "m.toml", domain))
     try:
         problem, outcome = found.outcome.problem, found.outcome
         assert [f.effect.kind.name for f in outcome.effects] == ["quadratic_drag"]

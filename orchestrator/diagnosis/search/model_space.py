@@ -1,0 +1,151 @@
+"""The models that a search chooses from: which effects may be added, and which parameters each model fits."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.search.candidate import Candidate
+from orchestrator.diagnosis.settings import SearchSettings
+from orchestrator.plants.description import Plant
+from orchestrator.plants.effects import Effect, Scene
+from orchestrator.records.model_file import Model
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class ModelSpace:
+    """The models of one record.
+
+    Attributes:
+        likelihood, model, parts: what is searched.
+    """
+
+    likelihood: RecordLikelihood
+    model: Model
+    parts: Parts
+
+    @property
+    def plant(self) -> Plant:
+        """Return the plant that is searched."""
+        return self.likelihood.plant
+
+    @property
+    def settings(self) -> SearchSettings:
+        """Return the settings of the search."""
+        return self.likelihood.settings.search
+
+    def eligible(self, current: Candidate) -> Iterable[Effect]:
+        """Return the effects that could be added to ``current``.
+
+        Args:
+            current: the model to build on.
+
+        Yields:
+            Each effect.
+        """
+        present = {effect.label for effect in current.effects}
+        replaced = {effect.needs for effect in current.effects}
+        one_way = self.one_way
+        for effect in self.plant.bank:
+            if effect.needs or (effect.angular and in_metres(self.model)):
+                continue
+            blind = effect.both_encoders and self.likelihood.signals.channels < 2
+            # In one direction dry friction and a constant torque are the same, and so are viscous friction and its
+            # difference between the directions: the first of each is what machines have.
+            alike = one_way and effect.name in ("load_torque", "directional_friction")
+            if effect.label not in present | replaced and not blind and not alike:
+                yield effect
+
+    @property
+    def one_way(self) -> bool:
+        """Tell whether the motor turns in one direction only, in all that may be looked at."""
+        signals, ways = self.likelihood.signals, [0.0, 0.0]
+        for rows in signals.stretches(self.parts.seen):
+            angle = signals.y[rows, 0]
+            for n, s in enumerate((1.0, -1.0)):
+                back = float(np.max(np.maximum.accumulate(s * angle) - s * angle))
+                ways[n] = max(ways[n], back / max(float(np.ptp(angle)), 1e-300))
+        return min(ways) < self.settings.one_way
+
+    @property
+    def refitted(self) -> list[int]:
+        """Return the places of the plant's own parameters that every model re-fits."""
+        return [entry.place for entry in self.linear()]
+
+    def linear(self) -> tuple[Free, ...]:
+        """Return the uncertain parameters of the model file; a gear ratio cannot be seen from one side.
+
+        Returns:
+            Their places, scales, bounds and priors.
+        """
+        shaft, both = self.plant.shaft, self.likelihood.signals.channels == len(self.plant.bodies)
+        unseen = "" if both or shaft is None else shaft.ratio
+        return tuple(
+            Free(self.plant.index(u.name), u.standard_deviation, u.minimum, u.maximum, (u.value, u.standard_deviation))
+            for u in self.model.uncertain
+            if u.name != unseen
+        )
+
+    def free(self, effects: Sequence[Effect], scene: Scene) -> tuple[Free, ...]:
+        """Return the uncertain parameters and those of ``effects``.
+
+        Args:
+            effects: of the model.
+            scene: sizes of the record's signals.
+
+        Returns:
+            Their places, scales, bounds and priors.
+        """
+        free = list(self.linear())
+        taken = {entry.place for entry in free}
+        for effect in effects:
+            unit, scales = effect.unit_of_size(scene), effect.scales(scene)
+            for short, place in effect.places(self.plant).items():
+                if place not in taken:
+                    entry = self.plant.entry(place)
+                    low, high = effect.bounds(scene).get(short, (entry.minimum, entry.maximum))
+                    prior = effect.priors(scene).get(short)
+                    free.append(Free(place, scales.get(short, unit), low, high, prior))
+        return tuple(free)
+
+    def without(self, p: Array, effect: Effect) -> Array:
+        """Return ``p`` with one effect switched off.
+
+        Args:
+            p: (parameters,) of the predictor.
+            effect: of the bank.
+
+        Returns:
+            A copy.
+        """
+        return effect.taken_out(self.plant, p, self.plant.extended(self.model.values), self.refitted)
+
+    def candidate(self, effects: tuple[Effect, ...], fitted: Fit) -> Candidate:
+        """Return a fitted model as a candidate.
+
+        Args:
+            effects: of the model.
+            fitted: its fit.
+
+        Returns:
+            The candidate.
+        """
+        return Candidate(effects, fitted, self.settings)
+
+
+def in_metres(model: Model) -> bool:
+    """Tell whether the model's position is a length.
+
+    Args:
+        model: that the record is compared with.
+
+    Returns:
+        True when it is.
+    """
+    column = model.columns.get("theta_m")
+    return column is not None and column.unit in ("m", "mm")
