@@ -24,7 +24,8 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.errors import OrchestratorError
-from orchestrator.estimation import cramer_rao, maximum_likelihood
+from orchestrator.estimation import cramer_rao
+from orchestrator.estimation.methods import maximum_likelihood
 from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.protocol import METHODS, estimator
 from orchestrator.records.model_file import default_model

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TextIO, cast
 
 from orchestrator.commands._console import ForgivingStream
+from orchestrator.commands._lines import folded
 from orchestrator.commands._parser import Parser, flags_of, one_line, worded
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.shared.version import __version__
@@ -85,14 +86,19 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return code
     except OrchestratorError as error:
-        sys.stderr.write(f"error: {one_line(worded(error, flags))}\n")
+        _say(f"error: {one_line(worded(error, flags))}")
         return 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
         text = worded(interruption, flags)
-        sys.stderr.write(f"interrupted: {text}\n" if text else "interrupted\n")
+        _say(f"interrupted: {text}" if text else "interrupted")
         return 130
     except BrokenPipeError:
         raise  # whoever read the output has gone: the program ends without a word
     except (OSError, MemoryError) as error:  # no descriptors, no memory, a full disk behind standard output
-        sys.stderr.write(f"error: {one_line(str(error) or 'out of memory')}\n")
+        _say(f"error: {one_line(str(error) or 'out of memory')}")
         return 1
+
+
+def _say(text: str) -> None:
+    """Write one line to standard error, folded between words on a terminal."""
+    sys.stderr.write(f"{folded(text, sys.stderr)}\n")

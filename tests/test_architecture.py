@@ -36,7 +36,7 @@ LAYERS = (
     {"scenarios"},
     {"checking"},
     {"paired", "estimation"},
-    {"estimation.inspection", "paired.bench"},
+    {"estimation.inspection", "estimation.methods", "paired.bench"},
     {"diagnosis"},
     {"diagnosis.blackbox"},
     {"reporting"},

@@ -3,8 +3,9 @@
     python -m tools.mutants --count 120 --slice 1/8 --out mutants.json
 
 Each mutant changes one operator, comparison, constant, branch or statement of one module in a copy of the project and
-runs the fast tests of its room there. A mutant that passes them all has survived. Slices of one seed share one sample
-of mutants; results are merged into the file, so that the slices may run at different times.
+runs the fast tests of its room there. A mutant that passes them all has survived; one whose run has to be ended counts
+as neither caught nor survived. Slices of one seed share one sample of mutants; results are merged into the file, so
+that the slices may run at different times.
 """
 
 import argparse
@@ -12,18 +13,20 @@ import ast
 import json
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-TIME_LIMIT = 180.0  # s, of one test run: a mutant that loops for ever is caught
+TIME_LIMIT = 180  # s of processor time, of one test run: a mutant may loop for ever
 
 COMPARED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
             ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is}  # fmt: skip
@@ -205,15 +208,25 @@ def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
     return [(m, changed((root / m.module).read_text(encoding="utf-8"), node, number)) for m, node, number in chosen]
 
 
-def caught(root: Path, tests: tuple[str, ...]) -> bool:
-    """Tell whether the tests fail in a copy of the project (or never end)."""
+def outcome(root: Path, tests: tuple[str, ...]) -> str:
+    """Run tests in a copy of the project.
+
+    Args:
+        root: of the copy.
+        tests: files, from there.
+
+    Returns:
+        ``"survived"``; ``"caught"`` where a test fails or a module cannot be imported; ``"no end"`` where the run was
+        ended by its limit of time or by another signal: nothing is known then.
+    """
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
-    try:
-        run = subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=TIME_LIMIT, check=False)
-    except subprocess.TimeoutExpired:
-        return True
-    return run.returncode != 0
+    run = subprocess.run(
+        command, cwd=root, env=environment, capture_output=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT)),
+    )  # fmt: skip
+    # pytest: 0 all passed, 1 tests failed, 2 stopped by an error while collecting.
+    return {0: "survived", 1: "caught", 2: "caught"}.get(run.returncode, "no end")
 
 
 def main() -> int:
@@ -235,7 +248,7 @@ def main() -> int:
         root = Path(folder) / "copy"
         shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".venv", ".git", "__pycache__", "fmus"))
         for room in ROOMS:
-            if options.room in (None, room.name) and caught(root, room.tests):
+            if options.room in (None, room.name) and outcome(root, room.tests) != "survived":
                 sys.exit(f"the tests of {room.name} fail without any change")
         for mutant, source in sample(root, options.count, options.seed)[part - 1 :: parts]:
             key = (mutant.module, mutant.line, mutant.change, mutant.text)
@@ -245,14 +258,14 @@ def main() -> int:
                 break
             original = (root / mutant.module).read_text(encoding="utf-8")
             (root / mutant.module).write_text(source, encoding="utf-8")
-            found = caught(root, tests[mutant.room])
+            found = outcome(root, tests[mutant.room])
             (root / mutant.module).write_text(original, encoding="utf-8")
-            results.append(asdict(mutant) | {"caught": found})
+            results.append(asdict(mutant) | {"outcome": found})
             options.out.write_text(json.dumps(results, indent=1))
-            if not found:
-                print(f"survived: {mutant.module}:{mutant.line} {mutant.change}: {mutant.text}", flush=True)
-    total = len(results)
-    print(f"{sum(r['caught'] for r in results)} of {total} mutants caught")
+            if found != "caught":
+                print(f"{found}: {mutant.module}:{mutant.line} {mutant.change}: {mutant.text}", flush=True)
+    counts = Counter(result["outcome"] for result in results)
+    print(f"{counts['caught']} of {len(results)} mutants caught, {counts['no end']} of unknown outcome")
     return 0
 
 

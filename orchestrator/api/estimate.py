@@ -19,7 +19,8 @@ from orchestrator.api.numerics import fitting
 from orchestrator.api.records import as_record
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
-from orchestrator.estimation import cramer_rao, maximum_likelihood
+from orchestrator.estimation import cramer_rao
+from orchestrator.estimation.methods import maximum_likelihood
 from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
 from orchestrator.estimation.repeats import in_words, repeats_of
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings

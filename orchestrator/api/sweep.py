@@ -1,9 +1,8 @@
 """Sweeps: many sizes, noise levels and seeds of the paired loops."""
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,7 @@ from orchestrator.engine import (
 from orchestrator.engine.work import file_hash
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.calibration import Calibration
-from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system
+from orchestrator.paired.cosimulation import FMUS, MACHINE, loop_system, loop_values
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import ErrorStatistics, trust_of_sweep
 from orchestrator.paired.pair import run_pair, with_settings
@@ -228,10 +227,8 @@ def sweep(
     plan = SweepPlan(chosen, text, levels, seeds, seed, words, count)
     cases = plan.cases()
     if tell is not None:
-        tell("preparing FMUs, compiled loop and calibration (the first time: half a minute without a C compiler)")
-    with ThreadPoolExecutor(1) as pool:  # figures take half a second to import: while the compiler runs
-        pool.submit(import_module, "orchestrator.paired.figures")
-        builds = ensure_fastest(FMUS)
+        tell("preparing FMUs and calibration")
+    builds = ensure_fastest(FMUS, partial(_ready, chosen))
     fmus = builds.paths
     check_parameters(loop_system(plan.experiment, fmus, (MACHINE,)), cases, OWN_PARAMETERS)
     calibrations = plan.calibrations(tell, calibrated)
@@ -239,6 +236,12 @@ def sweep(
     given: dict[str, Any] = {"experiment": chosen.name, "backlash_model": chosen.backlash_model, "sizes": text}
     given |= {"noise": ",".join(f"{level:g}" for level in levels), "seeds": seeds, "vary": list(words)}
     return SweepResult(plan, cases, done, fmus, calibrations, options.parquet, given, builds.kind)
+
+
+def _ready(experiment: Experiment) -> None:
+    """Do while the compiler runs what is wanted later and takes a second: imports and the loop's design."""
+    import_module("orchestrator.paired.figures")
+    loop_values(experiment)
 
 
 def _levels(noise: float | Sequence[float]) -> tuple[float, ...]:

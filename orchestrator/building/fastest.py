@@ -9,7 +9,7 @@ import hashlib
 import platform
 import random
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -48,11 +48,12 @@ class FmuBuilds:
     kind: str
 
 
-def ensure_fastest(names: Sequence[str]) -> FmuBuilds:
+def ensure_fastest(names: Sequence[str], meanwhile: Callable[[], object] | None = None) -> FmuBuilds:
     """Return our FMUs as they run fastest on this machine with the bits of the Python FMUs.
 
     Args:
-        names: which FMUs.
+        names: which FMUs; what takes longest to compile should come first.
+        meanwhile: something that can be done, in another thread, while the largest is compiled.
 
     Returns:
         Native builds for this platform, from the user's cache, or the Python FMUs.
@@ -65,6 +66,8 @@ def ensure_fastest(names: Sequence[str]) -> FmuBuilds:
             folder = cache_directory("native")
             with ThreadPoolExecutor(len(names)) as pool:  # each waits for a compiler most of its time
                 built = pool.map(partial(ensure_native, directory=folder, here=True), [[name] for name in names])
+                if meanwhile is not None:
+                    pool.submit(meanwhile)  # once a thread is free: all are translated by then
             paths = {name: path for found in built for name, path in found.items()}
             if all(same_bits(name, path) for name, path in paths.items()):
                 return FmuBuilds(paths, NATIVE)

@@ -11,8 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from orchestrator.api.shown import Block
-
-PIPE_WIDTH = 140
+from orchestrator.commands._lines import PIPE_WIDTH, folded
 
 
 def print_blocks(blocks: Sequence[Block]) -> None:
@@ -23,23 +22,9 @@ def print_blocks(blocks: Sequence[Block]) -> None:
     """
     for block in blocks:
         if isinstance(block, str):
-            sys.stdout.write(f"{_folded(block)}\n")
+            sys.stdout.write(f"{folded(block, sys.stdout)}\n")
         else:
             print_table(block.title, block.columns, block.rows)
-
-
-def _folded(text: str) -> str:
-    """Return lines that end between words on a terminal; in a pipe a line stays a line."""
-    if not sys.stdout.isatty():
-        return text
-    width = min(shutil.get_terminal_size().columns, PIPE_WIDTH)
-    return "\n".join(_fill(line, width) for line in text.split("\n"))
-
-
-def _fill(line: str, width: int) -> str:
-    """Return a line folded between words, what follows two columns further in than it begins."""
-    indent = line[: len(line) - len(line.lstrip())] + "  "
-    return textwrap.fill(line, width, break_long_words=False, break_on_hyphens=False, subsequent_indent=indent)
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

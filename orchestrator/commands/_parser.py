@@ -3,9 +3,12 @@
 import argparse
 import math
 import re
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
+
+from orchestrator.commands._lines import folded
 
 LARGEST_WHOLE_NUMBER = 10**18
 # What argparse says of an argument, and how that is said here.
@@ -37,7 +40,7 @@ class Parser(argparse.ArgumentParser):
         Returns:
             Never.
         """
-        self.exit(2, f"error: {one_line(_worded(message))}; see {self.prog} --help\n")
+        self.exit(2, folded(f"error: {one_line(_worded(message))}; see {self.prog} --help", sys.stderr) + "\n")
 
 
 def _whole(text: str) -> int:

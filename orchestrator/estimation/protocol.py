@@ -78,6 +78,6 @@ def estimator(name: str) -> Estimator:
     Returns:
         The function.
     """
-    module = importlib.import_module(f"orchestrator.estimation.{name}")
+    module = importlib.import_module(f"orchestrator.estimation.methods.{name}")
     function: Estimator = module.estimate
     return function

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -18,12 +19,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-import pyfmu_sources
 from orchestrator.building.fastest import NATIVE, ensure_fastest
+from orchestrator.building.sources import closure, recipe_of
 from orchestrator.errors import CalibrationError
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.metric import difference_sum
+from orchestrator.paired.monotone import monotone_cubic
 from orchestrator.paired.native_loop import NativeLoop
 from orchestrator.paired.settings import MapSettings
 from orchestrator.shared.cache import cache_directory
@@ -38,6 +40,8 @@ Each = Callable[[Callable[[Any], float], Iterable[Any]], Iterable[float]]
 # Seeds of calibration and of tests come from different branches of one tree, so that none is ever shared.
 CALIBRATION_BRANCH = 7
 DEFAULT_SETTINGS: MapSettings = MapSettings()
+# Calibrations of the default experiment come with the sources that they were made from: `python -m tools.calibrations`.
+SHIPPED = Path(__file__).parent / "data"
 
 
 class Calibration(msgspec.Struct, frozen=True):
@@ -111,7 +115,7 @@ class GapMap:
 
     def __init__(self, calibration: Calibration) -> None:
         self._calibration = calibration
-        self._centre = _monotone_cubic(calibration.log_sum, calibration.log_alpha)
+        self._centre = monotone_cubic(calibration.log_sum, calibration.log_alpha)
         self._log_sum, self._spread = np.array(calibration.log_sum), np.array(calibration.log_spread)
         self._room = _noise_below(calibration)
 
@@ -175,7 +179,7 @@ def load_or_calibrate(
     progress: Callable[[str], None] | None = None,
     settings: MapSettings = DEFAULT_SETTINGS,
 ) -> Calibration:
-    """Return the calibration of ``experiment`` from the user's cache, or make and store it.
+    """Return the calibration of ``experiment``: the one that comes with these sources, or the user's, or a new one.
 
     Args:
         experiment: what is calibrated.
@@ -188,7 +192,10 @@ def load_or_calibrate(
     Raises:
         CalibrationError: S is not strictly monotone over the sizes claimed.
     """
-    path = cache_directory("calibrations") / f"{_digest(experiment, settings)}.json"
+    name = f"{_digest(experiment, settings)}.json"
+    if (SHIPPED / name).exists():
+        return msgspec.json.decode((SHIPPED / name).read_bytes(), type=Calibration)
+    path = cache_directory("calibrations") / name
     if path.exists():
         try:
             return msgspec.json.decode(path.read_bytes(), type=Calibration)
@@ -198,17 +205,38 @@ def load_or_calibrate(
         progress(f"calibrating the {experiment.name} experiment at encoder noise {experiment.encoder_noise:g} rad")
     calibration = calibrate(experiment, settings)
     with contextlib.suppress(OSError):  # a full cache costs time, no result
-        write_text(path, msgspec.json.format(msgspec.json.encode(calibration), indent=1).decode())
+        write_text(path, calibration_text(calibration))
     return calibration
 
 
+def calibration_text(calibration: Calibration) -> str:
+    """Return a calibration as JSON, from which it is read again exactly.
+
+    Args:
+        calibration: the map.
+
+    Returns:
+        The text.
+    """
+    return msgspec.json.format(msgspec.json.encode(calibration), indent=1).decode()
+
+
 def _digest(experiment: Experiment, settings: MapSettings) -> str:
+    """Return what names a calibration: a hash of experiment, settings and every source that its numbers come from."""
     digest = hashlib.sha256(experiment.digest().encode())
     digest.update(msgspec.json.encode(settings))
-    for folder in (Path(pyfmu_sources.__file__).parent, Path(__file__).parent):
-        for source in sorted(folder.glob("*.py")):
-            digest.update(source.read_bytes())
+    for source in _sources():
+        digest.update(source.read_bytes())
     return digest.hexdigest()[:24]
+
+
+@cache
+def _sources() -> tuple[Path, ...]:
+    """Return the files of the three slaves, of their design and of the method."""
+    slaves = {path for name in FMUS for path in closure(recipe_of(name).module)}
+    here = Path(__file__).parent
+    method = ("calibration", "cosimulation", "experiment", "metric", "monotone", "native_loop", "settings")
+    return (*sorted(slaves), here.parent / "plants" / "design.py", *(here / f"{name}.py" for name in method))
 
 
 def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) -> Calibration:
@@ -293,15 +321,9 @@ def _require_monotone(sums: Array, sizes: Array, experiment: Experiment) -> None
         )
 
 
-def _monotone_cubic(x: Array | list[float], y: Array | list[float]) -> Any:
-    from scipy.interpolate import PchipInterpolator  # here, for it takes half a second to import
-
-    return PchipInterpolator(x, y)
-
-
 def _interpolation_error(log_sum: Array, log_alpha: Array, least: float) -> Array:
     """Return how far every second node lies from the map through the others, as the larger of neighbours."""
-    coarse = _monotone_cubic(log_sum[::2], log_alpha[::2])
+    coarse = monotone_cubic(log_sum[::2], log_alpha[::2])
     error = np.abs(coarse(log_sum) - log_alpha)
     nearby = np.array([error[max(0, n - 2) : n + 3].max() for n in range(len(error))])
     return np.maximum(nearby, least)
@@ -322,7 +344,7 @@ def _noisy_map(
 ) -> tuple[Array, Array]:
     """Return (mean of log S under noise, spread of log alpha_hat), both at the clean map's nodes."""
     nodes = np.linspace(log_alpha[0], log_alpha[-1], settings.noisy_sizes)
-    clean = _monotone_cubic(log_alpha, log_sum)
+    clean = monotone_cubic(log_alpha, log_sum)
     count = settings.seeds_per_size
 
     def drawn(job: int) -> float:
@@ -332,9 +354,9 @@ def _noisy_map(
     draws = np.array(list(each(drawn, range(settings.noisy_sizes * count)))).reshape(-1, count)
     shift = draws.mean(axis=1) - clean(nodes)
     variance = draws.var(axis=1, ddof=1)
-    moved = log_sum + _monotone_cubic(nodes, _smoothed(shift))(log_alpha)
-    slope = _monotone_cubic(log_alpha, moved).derivative()(log_alpha)
-    deviation = np.exp(0.5 * _monotone_cubic(nodes, np.log(_smoothed(variance)))(log_alpha))
+    moved = log_sum + monotone_cubic(nodes, _smoothed(shift))(log_alpha)
+    slope = monotone_cubic(log_alpha, moved).slope(log_alpha)
+    deviation = np.exp(0.5 * monotone_cubic(nodes, np.log(_smoothed(variance)))(log_alpha))
     return moved, deviation / np.maximum(np.abs(slope), settings.least_slope)
 
 
@@ -354,7 +376,7 @@ def _conformal_width(
     each: Each = map,
 ) -> float:
     """Return the multiple of the spread that covers ``settings.level`` of runs that the map has not seen."""
-    inverse = _monotone_cubic(log_sum, log_alpha)
+    inverse = monotone_cubic(log_sum, log_alpha)
     low, high = np.log(loop.experiment.smallest), np.log(loop.experiment.largest)
 
     def score(n: int) -> float:

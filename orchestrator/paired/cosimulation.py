@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -68,8 +69,9 @@ def loop_system(
     return System(tuple(instances), tuple(connections), tuple(sources))
 
 
+@cache
 def loop_values(experiment: Experiment) -> dict[str, dict[str, Any]]:
-    """Return the parameters of a loop without a gap.
+    """Return the parameters of a loop without a gap, designed once for each experiment.
 
     Args:
         experiment: what is run.

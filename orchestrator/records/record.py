@@ -44,7 +44,8 @@ def read_record(
         RecordError: the file is missing or unreadable, or breaks a rule; the message names the place and the cure.
     """
     reading = reading or Reading()
-    loaded = load(open_source(path), path, columns or {}, further, reading)
+    with open_source(path) as source:
+        loaded = load(source, path, columns or {}, further, reading)
     check_driven(loaded.table["u"], loaded.labels["u"], path.name)
     record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
     scale = (columns or {}).get("u", Column()).relative_uncertainty

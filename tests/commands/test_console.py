@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from orchestrator.cli import main
 from orchestrator.commands._console import print_blocks, print_table
 
 COLUMNS = ("tool", "version", "wall [s]", "times ours", "note")
@@ -14,7 +15,8 @@ ROWS = [["ours", "0.2.0", "1.25", "1", ""], ["another-tool-of-others", "10.11.12
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch):
     def of(width: int) -> None:
-        monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+        for stream in (sys.stdout, sys.stderr):
+            monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
         monkeypatch.setenv("COLUMNS", str(width))
 
     return of
@@ -65,3 +67,19 @@ def test_lines_end_between_words_on_a_terminal_only(terminal, capsys: pytest.Cap
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) > 2
     assert all(len(line) <= 40 for line in lines)
+
+
+def test_errors_end_between_words_on_a_terminal_only(terminal, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["estimate", "a_long_name_of_a_record.csv", "--model", "no.toml", "--method", "ekf"]
+    assert main(words) == 2
+    whole = capsys.readouterr().err
+    assert whole.count("\n") == 1
+    terminal(40)
+    assert main(words) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) > 1
+    assert all(len(line) <= 40 or " " not in line.strip() for line in lines)
+    assert " ".join(line.strip() for line in lines) == whole.strip()
+    with pytest.raises(SystemExit):
+        main(["sweep", "--sizes"])
+    assert all(len(line) <= 40 for line in capsys.readouterr().err.splitlines())

@@ -9,11 +9,12 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import DesignError
-from orchestrator.estimation import cramer_rao, ekf
+from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.design import SEARCHED, MachineLimits, design
 from orchestrator.estimation.innovations import NoiseLevels, affine_model, innovations, simulate
 from orchestrator.estimation.likelihood import Likelihood, maximise
-from orchestrator.estimation.paired_sum import twin
+from orchestrator.estimation.methods import ekf
+from orchestrator.estimation.methods.paired_sum import twin
 from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.protocol import METHODS, NotApplicableError, estimator
 from orchestrator.records.model_file import default_model, read_model

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.building.build import ensure_built
-from orchestrator.estimation import ekf
+from orchestrator.estimation.methods import ekf
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import Record, record_from_columns
 from orchestrator.scenarios.scenario import run_scenario

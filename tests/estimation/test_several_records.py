@@ -7,8 +7,9 @@ import pytest
 
 import orchestrator as oc
 from orchestrator.errors import RecordError
-from orchestrator.estimation import cramer_rao, maximum_likelihood
+from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.methods import maximum_likelihood
 from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.protocol import Estimate, TimeLimitError
 from orchestrator.records.model_file import default_model

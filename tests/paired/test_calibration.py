@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import CalibrationError, ScenarioError
+from orchestrator.paired import calibration as module
 from orchestrator.paired.calibration import calibrate, estimate_gap, load_or_calibrate
 from orchestrator.paired.compiled_loop import compiled_loop
 from orchestrator.paired.experiment import Experiment, named_experiment, thesis_experiment
@@ -85,6 +86,20 @@ def test_provenance_is_stored():
     assert np.all(np.diff(calibration.log_sum) > 0.0)
     assert np.all(np.diff(calibration.log_alpha) > 0.0)
     assert load_or_calibrate(Experiment()) == calibration
+
+
+@pytest.mark.parametrize("experiment", [Experiment(), NOISY], ids=["clean", "noisy"])
+def test_the_calibration_that_comes_with_the_package_is_that_of_these_sources(experiment, monkeypatch):
+    monkeypatch.setattr(module, "calibrate", lambda *_: pytest.fail("run `python -m tools.calibrations`"))
+    monkeypatch.setattr(module, "cache_directory", lambda name: pytest.fail("run `python -m tools.calibrations`"))
+    calibration = load_or_calibrate(experiment)
+    loop = compiled_loop(experiment)
+    zero = (np.zeros(experiment.steps + 1),) * 2
+    twin = loop.run(0.0, zero)[:, 2]
+    for n in range(0, len(calibration.log_sum), 24):
+        total = difference_sum(loop.run(float(np.exp(calibration.log_alpha[n])), zero)[:, 2], twin)
+        bound = 1e-9 if experiment.encoder_noise == 0.0 else 0.01
+        assert np.log(total) == pytest.approx(calibration.log_sum[n], abs=bound)
 
 
 def test_statistics():

@@ -202,7 +202,7 @@ def test_calibrations_are_stored_once_and_remade_when_damaged(tmp_path, monkeypa
     assert load_or_calibrate(CLEAN, said.append, SMALL).log_sum == clean.log_sum
     assert len(said) == 2
     assert load_or_calibrate(CLEAN, None, SMALL).settings == SMALL
-    load_or_calibrate(CLEAN, said.append, MapSettings())
+    load_or_calibrate(CLEAN, said.append, MapSettings(clean_sizes=43))
     assert len(said) == 3
 
 

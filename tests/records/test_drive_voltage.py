@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import RecordError
-from orchestrator.estimation import maximum_likelihood
+from orchestrator.estimation.methods import maximum_likelihood
 from orchestrator.records.columns import Column
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.model_file import default_model, read_model

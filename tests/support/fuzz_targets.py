@@ -170,12 +170,15 @@ def _columns() -> dict[str, np.ndarray]:
 
 
 def record_seeds() -> dict[str, bytes]:
-    """A short record in each dialect and format."""
+    """A short record in each dialect whose reader runs in this process: coverage is seen there alone.
+
+    The others are fuzzed by ``benchmarks.fuzz_readers``.
+    """
     found = {}
     with tempfile.TemporaryDirectory() as name:
         for write in dialects.DIALECTS:
             found[write.__name__] = write(Path(name), _columns())[0].read_bytes()
-    return found
+    return {name: data for name, data in found.items() if not data.startswith((b"MATLAB", b"MDF", b"PAR1"))}
 
 
 def seeds(target: str) -> dict[str, bytes]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from orchestrator.estimation.ekf import trace
+from orchestrator.estimation.methods.ekf import trace
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import record_from_columns
 from tests.support.independent_plant import make_record

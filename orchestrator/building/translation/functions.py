@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from orchestrator.building.translation.definitions import Function, Owner
 from orchestrator.building.translation.expressions import expression
@@ -37,13 +38,14 @@ def translate(
     mutated: set[str] = set()
     function.by_address = _by_address(function, node)
     kinds: dict[str, Kind] = {}
+    found = _survey(node, [name for name, _ in function.parameters])
     for _ in range(MOST_PASSES):
         scope = Scope(program, source, expression, owner, function.returns)
         scope.kinds = kinds | dict(function.parameters)
         scope.pointers = {name for name, kind in function.parameters if isinstance(kind, Items)} | function.by_address
         scope.fixed = function.by_address
         scope.mutated = set(mutated)
-        _survey(scope, node, [name for name, _ in function.parameters])
+        scope.read, scope.once, scope.homes = set(found.read), set(found.once), dict(found.homes)
         body = block(scope, _without_docstring(node))
         mutated = scope.mutated
         parameters = {name for name, _ in function.parameters}
@@ -130,8 +132,17 @@ def _late_declarations(scope: Scope, names: list[str]) -> list[str]:
 # Where variables begin ----------------------------------------------------------------------------------------
 
 
-def _survey(scope: Scope, node: ast.FunctionDef, parameters: list[str]) -> None:
-    """Find for each local where it begins, whether it is assigned once, and whether it is read."""
+class _Locals(NamedTuple):
+    """The locals of a function: those that are read, those that are assigned once, and where each begins."""
+
+    read: set[str]
+    once: set[str]
+    homes: dict[str, ast.AST]
+
+
+def _survey(node: ast.FunctionDef, parameters: list[str]) -> _Locals:
+    """Return what the text of a function says about its locals."""
+    seen = _Locals(set(), set(), {})
     places: dict[str, list[tuple[tuple[int, ...], ast.stmt, bool]]] = {}
     counters = {
         name.id
@@ -146,12 +157,13 @@ def _survey(scope: Scope, node: ast.FunctionDef, parameters: list[str]) -> None:
     for name, found in places.items():
         stores = [place for place in found if place[2]]
         if any(not store for *_, store in found) or any(isinstance(s, ast.AugAssign) for _, s, _ in found):
-            scope.read.add(name)
+            seen.read.add(name)
         if not stores or name in parameters or name in counters:
             continue
         if len(stores) == 1 and not isinstance(stores[0][1], ast.AugAssign):
-            scope.once.add(name)
-        scope.homes[name] = _home(node, found, stores[0][1])
+            seen.once.add(name)
+        seen.homes[name] = _home(node, found, stores[0][1])
+    return seen
 
 
 def _home(node: ast.FunctionDef, found: list[tuple[tuple[int, ...], ast.stmt, bool]], first: ast.stmt) -> ast.AST:

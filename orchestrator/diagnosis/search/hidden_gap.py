@@ -1,8 +1,8 @@
 """A gap before a body that has no encoder: where its fit starts, and the motion along which gains are taken.
 
 Its likelihood has many optima, and screening, which is linear, finds a wrong one. The estimator of the gap
-(:mod:`orchestrator.estimation.maximum_likelihood`) finds its way down from much torque noise; the predictor takes
-over its result, and takes its gains along the motion that belongs to it.
+(:mod:`orchestrator.estimation.methods.maximum_likelihood`) finds its way down from much torque noise; the predictor
+takes over its result, and takes its gains along the motion that belongs to it.
 """
 
 import math
@@ -15,7 +15,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.joint import JointLikelihood
 from orchestrator.estimation.likelihood import Likelihood
-from orchestrator.estimation.maximum_likelihood import fit_record
+from orchestrator.estimation.methods.maximum_likelihood import fit_record
 from orchestrator.estimation.problem import IMPULSE, make_problem
 from orchestrator.plants.known.drivetrain import PLANT
 from orchestrator.records.model_file import Model

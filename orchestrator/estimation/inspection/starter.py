@@ -42,8 +42,8 @@ def assumed_columns(path: Path, columns: Mapping[str, Column]) -> tuple[dict[str
     Raises:
         RecordError: the file cannot be read, or a column is missing or ambiguous.
     """
-    source = open_source(path)
-    chosen = chosen_channels(source, columns, str(path))
+    with open_source(path) as source:
+        chosen = chosen_channels(source, columns, str(path))
     filled, said = dict(columns), []
     for name, choice in chosen.items():
         column = filled.get(name, Column())

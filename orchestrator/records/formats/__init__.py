@@ -1,9 +1,12 @@
 """Readers of file formats, one module each, behind the interface of :mod:`orchestrator.records.formats.source`."""
 
-import importlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from orchestrator.errors import RecordError
+from orchestrator.records.formats import numpy_file, text
+from orchestrator.records.formats.apart import opened_apart
 from orchestrator.records.formats.source import MAXIMUM_BYTES, RecordSource
 
 # First bytes of a file (and where they stand) and the module that reads it.
@@ -33,30 +36,35 @@ _OTHERS = (
 FORMATS = "CSV, Parquet, MDF4, MAT or NumPy"
 
 
-def open_source(path: Path) -> RecordSource:
-    """Return the opened file; its first bytes decide on the reader, not its name.
+@contextmanager
+def open_source(path: Path) -> Iterator[RecordSource]:
+    """Open a file for a ``with`` statement; its first bytes decide on the reader, not its name.
 
     Args:
         path: the file.
 
-    Returns:
+    Yields:
         Its channels, read when they are asked for.
 
     Raises:
-        RecordError: the file is missing, too large, of an unknown format, or its reader is not installed.
+        RecordError: the file is missing, too large, broken, of an unknown format, or its reader is not installed.
     """
     head = _first_bytes(path)
     if not head:
         raise RecordError(f"{path}: a record must have a header and rows, but the file is empty")
     if head.startswith(b"PK\x03\x04"):
-        return _opened("numpy_file", path)
-    for place, magic, module in _MAGIC:
-        if head[place : place + len(magic)] == magic:
-            return _opened(module, path)
-    for magic, text in _OTHERS:
-        if head.startswith(magic):
-            raise RecordError(f"{path}: must be {FORMATS}, but {text}")
-    return _opened("text", path)
+        head = b"\x93NUMPY"
+    for start, what in _OTHERS:
+        if head.startswith(start):
+            raise RecordError(f"{path}: must be {FORMATS}, but {what}")
+    module = next((name for at, magic, name in _MAGIC if head[at : at + len(magic)] == magic), "text")
+    if module == "text":
+        yield text.open_file(path)
+    elif module == "numpy_file":
+        yield numpy_file.open_file(path)
+    else:
+        with opened_apart(module, path) as source:
+            yield source
 
 
 def _first_bytes(path: Path) -> bytes:
@@ -76,25 +84,3 @@ def _first_bytes(path: Path) -> bytes:
         raise RecordError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError:
         raise RecordError(f"{str(path)!r}: not a file name") from None
-
-
-def _opened(module: str, path: Path) -> RecordSource:
-    source: RecordSource = importlib.import_module(f"orchestrator.records.formats.{module}").open_file(path)
-    return source
-
-
-def missing_extra(path: Path, kind: str, package: str, extra: str) -> RecordError:
-    """Return the error that says which extra reads a format.
-
-    Args:
-        path: the file.
-        kind: what the file is, with an article.
-        package: that reads it.
-        extra: of this distribution, which installs the package.
-
-    Returns:
-        The error.
-    """
-    return RecordError(
-        f"{path}: is {kind}, which needs `{package}`: pip install 'backlash-cosim[{extra}]', or save the record as CSV"
-    )

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats import missing_extra
 from orchestrator.records.formats.numpy_file import ArraySource, columns_of
-from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, in_a_line
+from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, in_a_line, missing_extra
 
 DEEPEST = 4
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats import missing_extra
 from orchestrator.records.formats.dialect import named
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
@@ -21,6 +20,7 @@ from orchestrator.records.formats.source import (
     RecordSource,
     as_numbers,
     in_a_line,
+    missing_extra,
 )
 
 FORMULA_4, FORMULA_3 = 3, 10  # conversion types of the two versions

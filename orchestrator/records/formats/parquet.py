@@ -8,9 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats import missing_extra
 from orchestrator.records.formats.dialect import named
-from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, Head, RecordSource, in_a_line
+from orchestrator.records.formats.source import (
+    MAXIMUM_BYTES,
+    MAXIMUM_CHANNELS,
+    Head,
+    RecordSource,
+    in_a_line,
+    missing_extra,
+)
 
 
 class ParquetSource(RecordSource):

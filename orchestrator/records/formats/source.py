@@ -90,3 +90,20 @@ def in_a_line(error: BaseException) -> str:
         At most 120 characters without line breaks.
     """
     return " ".join(str(error).split())[:120]
+
+
+def missing_extra(path: Path, kind: str, package: str, extra: str) -> RecordError:
+    """Return the error that says which extra reads a format.
+
+    Args:
+        path: the file.
+        kind: what the file is, with an article.
+        package: that reads it.
+        extra: of this distribution, which installs the package.
+
+    Returns:
+        The error.
+    """
+    return RecordError(
+        f"{path}: is {kind}, which needs `{package}`: pip install 'backlash-cosim[{extra}]', or save the record as CSV"
+    )

@@ -28,6 +28,8 @@ def build(source: ResultDocument) -> Report:
 def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
     """Return an object's plain values as facts, its lists of objects as tables, its objects as further sections.
 
+    What is absent (null) is left out.
+
     Args:
         title: of the section with the plain values.
         value: a JSON object.
@@ -45,7 +47,7 @@ def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
             further.append(table_of(sentence(heading), [{"name": key, **inner} for key, inner in item.items()]))
         elif isinstance(item, Mapping):
             further += sections_of(sentence(heading), item)
-        elif not (isinstance(item, Sequence) and not isinstance(item, str) and len(item) > 12):
+        elif item is not None and not (isinstance(item, Sequence) and not isinstance(item, str) and len(item) > 12):
             facts.append((heading, plain(item)))
     return [*([Facts(title, tuple(facts))] if facts else []), *further]
 

@@ -1,0 +1,1 @@
+"""The ways to the gap: each module has a function `estimate` of a record and a model."""
