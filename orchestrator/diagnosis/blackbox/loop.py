@@ -26,6 +26,73 @@ SET, STEP, GET = 1, 2, 3
 
 
 @kept()
+def _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, handed, lead):  # type: ignore[no-untyped-def]
+    """Add to inputs what other FMUs hand to them, extrapolated."""
+    now = np.zeros(len(wires))
+    for w in range(len(wires)):
+        now[w] = read[outof[wires[w, 1]]]
+    if k > 1:
+        for t in range(len(passing)):
+            now[passing[t, 0]] += passed[t] * lead * (fed[passing[t, 1], 0] - fed[passing[t, 1], 1])
+    for w in range(len(wires)):
+        before = handed[w] if k > 0 else now[w]
+        sent[into[wires[w, 0]]] += gains[w, 0] * (now[w] + lead * (now[w] - before)) + gains[w, 1]
+        handed[w] = now[w]
+
+
+@kept()
+def _act(k, sent, read, into, outof, ports, sign, q, last, built, step, lead):  # type: ignore[no-untyped-def]
+    """Let the effects at ports and cuts act on the inputs."""
+    for e in range(len(ports)):
+        kind, target = ports[e, 1], into[ports[e, 0]]
+        x = read[outof[ports[e, 2]]]
+        before = last[e, 0] if k > 0 else x
+        place = x + lead * (x - before)
+        last[e, 0] = x
+        if _cuts(kind):
+            sent[target] = _across(kind, sent[target], place, sign[e], q[e, 0])
+            continue
+        if ports[e, 3] >= 0:
+            v = read[outof[ports[e, 3]]]
+            ahead = lead
+        else:
+            v = (x - before) / step
+            ahead = lead + 0.5
+        known = k > 0 if ports[e, 3] >= 0 else k > 1
+        old = last[e, 1] if known else v
+        a = (v - old) / step
+        middle = v + ahead * (v - old)
+        if _has_memory(kind):
+            distance = _distance(kind, q[e, 1], q[e, 3])
+            half = _built_up(kind, built[e], middle, distance, 0.5 * step)
+            built[e] = _built_up(kind, built[e], middle, distance, step)
+        else:
+            half = 0.0
+        sent[target] -= sign[e] * _resistance(kind, place, middle, a, half, q[e, 0], q[e, 1], q[e, 2])
+        last[e, 1] = v
+
+
+@kept()
+def _step(calls, counts, where, time, step):  # type: ignore[no-untyped-def]
+    """Set, step and read all FMUs; return ``(status, call, member)``."""
+    for n in range(len(calls)):
+        if counts[n, 0] > 0:
+            status = call_transfer(calls[n, 1], calls[n, 0], where[n, 0], counts[n, 0], where[n, 1])
+            if status > 1:
+                return status, SET, n
+    for n in range(len(calls)):
+        status = call_step(calls[n, 2], calls[n, 0], time, step)
+        if status > 1:
+            return status, STEP, n
+    for n in range(len(calls)):
+        if counts[n, 1] > 0:
+            status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
+            if status > 1:
+                return status, GET, n
+    return np.int32(0), GET, 0
+
+
+@kept()
 def run_loop(  # type: ignore[no-untyped-def]
     calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, sign, q, lead, out
 ):
@@ -51,13 +118,9 @@ def run_loop(  # type: ignore[no-untyped-def]
         out: (rows, variables read), row 0 the initial values.
     """
     start, step, per_row = grid[0], grid[1], int(grid[2])
-    members, effects = len(calls), len(ports)
-    last = np.zeros((effects, 3))
-    handed = np.zeros(len(wires))
-    fed = np.zeros((len(wires), 2))
-    now = np.zeros(len(wires))
-    built = np.zeros(effects)
-    for n in range(members):
+    last, built = np.zeros((len(ports), 2)), np.zeros(len(ports))
+    fed, handed = np.zeros((len(wires), 2)), np.zeros(len(wires))
+    for n in range(len(calls)):
         status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
         if status > 1:
             return status, GET, 0, n
@@ -66,61 +129,14 @@ def run_loop(  # type: ignore[no-untyped-def]
     for k in range(len(table)):
         for i in range(len(into)):
             sent[into[i]] = table[k, i]
-        for w in range(len(wires)):
-            now[w] = read[outof[wires[w, 1]]]
-        if k > 1:
-            for t in range(len(passing)):
-                now[passing[t, 0]] += passed[t] * lead * (fed[passing[t, 1], 0] - fed[passing[t, 1], 1])
-        for w in range(len(wires)):
-            x = now[w]
-            before = handed[w] if k > 0 else x
-            sent[into[wires[w, 0]]] += gains[w, 0] * (x + lead * (x - before)) + gains[w, 1]
-            handed[w] = x
-        for e in range(effects):
-            kind = ports[e, 1]
-            x = read[outof[ports[e, 2]]]
-            before = last[e, 0] if k > 0 else x
-            place = x + lead * (x - before)
-            last[e, 0] = x
-            if _cuts(kind):
-                sent[into[ports[e, 0]]] = _across(kind, sent[into[ports[e, 0]]], place, sign[e], q[e, 0])
-                continue
-            if ports[e, 3] >= 0:
-                v = read[outof[ports[e, 3]]]
-                ahead = lead
-            else:
-                v = (x - before) / step
-                ahead = lead + 0.5
-            known = k > 0 if ports[e, 3] >= 0 else k > 1
-            old = last[e, 1] if known else v
-            a = (v - old) / step
-            middle = v + ahead * (v - old)
-            if _has_memory(kind):
-                distance = _distance(kind, q[e, 1], q[e, 3])
-                half = _built_up(kind, built[e], middle, distance, 0.5 * step)
-                built[e] = _built_up(kind, built[e], middle, distance, step)
-            else:
-                half = 0.0
-            force = _resistance(kind, place, middle, a, half, q[e, 0], q[e, 1], q[e, 2])
-            sent[into[ports[e, 0]]] -= sign[e] * force
-            last[e, 1] = v
+        _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, handed, lead)
+        _act(k, sent, read, into, outof, ports, sign, q, last, built, step, lead)
         for w in range(len(wires)):
             fed[w, 1] = fed[w, 0]
             fed[w, 0] = sent[into[wires[w, 0]]]
-        for n in range(members):
-            if counts[n, 0] > 0:
-                status = call_transfer(calls[n, 1], calls[n, 0], where[n, 0], counts[n, 0], where[n, 1])
-                if status > 1:
-                    return status, SET, k, n
-        for n in range(members):
-            status = call_step(calls[n, 2], calls[n, 0], start + k * step, step)
-            if status > 1:
-                return status, STEP, k, n
-        for n in range(members):
-            if counts[n, 1] > 0:
-                status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
-                if status > 1:
-                    return status, GET, k, n
+        status, call, n = _step(calls, counts, where, start + k * step, step)
+        if status > 1:
+            return status, call, k, n
         if (k + 1) % per_row == 0:
             row = (k + 1) // per_row
             for i in range(len(outof)):
