@@ -173,7 +173,7 @@ class PlaceSettings(Settings, frozen=True):
     )
 
 
-class NoiseSettings(Settings, frozen=True):
+class PortNoiseSettings(Settings, frozen=True):
     """Noise at the ports, and the surrogate that whitens."""
 
     shares: Annotated[tuple[float, ...], note("levels of port noise over the drive, from none upwards")] = (
@@ -229,7 +229,7 @@ class BoxSettings(Settings, frozen=True):
     rest: Annotated[RestSettings, note("what is left")] = RestSettings()
     probe: Annotated[ProbeSettings, note("the probes of the FMU")] = ProbeSettings()
     place: Annotated[PlaceSettings, note("the effects that places offer")] = PlaceSettings()
-    noise: Annotated[NoiseSettings, note("noise at the ports")] = NoiseSettings()
+    noise: Annotated[PortNoiseSettings, note("noise at the ports")] = PortNoiseSettings()
     process: Annotated[ProcessSettings, note("the FMU's processes")] = ProcessSettings()
     read: Annotated[ReadSettings, note("the record")] = ReadSettings()
     calibration: Annotated[CalibrationSettings, note("parameters alone")] = CalibrationSettings()

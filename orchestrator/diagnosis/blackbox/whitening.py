@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, NoiseSettings
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, PortNoiseSettings
 from orchestrator.shared.numba_cache import kept
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ class Surrogate:
         return found
 
 
-def realised(impulses: Array, settings: NoiseSettings = DEFAULT.noise) -> Surrogate:
+def realised(impulses: Array, settings: PortNoiseSettings = DEFAULT.noise) -> Surrogate:
     """Return a surrogate of impulse responses.
 
     Args:
@@ -174,7 +174,7 @@ class Ladder:
     drive: Array
     n: int
     spread: float = 0.0
-    settings: NoiseSettings = DEFAULT.noise
+    settings: PortNoiseSettings = DEFAULT.noise
     made: dict[int, NoiseLevel] = field(default_factory=dict)
 
     @property
