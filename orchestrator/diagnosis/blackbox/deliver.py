@@ -117,6 +117,9 @@ def parts_of(outcome: BoxOutcome) -> tuple[Part, ...]:
 
     Returns:
         The parts: what hands values from one FMU to another, then the effects in their order.
+
+    Raises:
+        FmuError: what an FMU hands on depends at once on several connections.
     """
     problem = outcome.problem
     found = []
