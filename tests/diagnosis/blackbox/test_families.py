@@ -1,0 +1,73 @@
+"""What a record does not tell apart, for each effect; how surely a quantum is known. Fits are made by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
+from orchestrator.diagnosis.blackbox.estimates import errors_of
+from orchestrator.diagnosis.blackbox.fitting import BoxFit
+from orchestrator.diagnosis.blackbox.problem import BoxModel
+from orchestrator.diagnosis.blackbox.search import SearchStep
+from orchestrator.diagnosis.blackbox.series import quantised
+from orchestrator.diagnosis.blackbox.settings import DEFAULT
+from orchestrator.diagnosis.blackbox.verdict import families_of
+
+SCENE = Surroundings(0.01, 1.0, 1.0, np.linspace(-1.0, 1.0, 400))
+NONE = np.zeros((1, 1))
+
+
+def at(name: str) -> BoxEffect:
+    return BoxEffect(BANK[name], "p", SCENE)
+
+
+def fit(total: float, *names: str) -> BoxFit:
+    model = BoxModel(np.zeros(0))
+    for name in names:
+        model = model.extended(at(name), np.full(len(BANK[name].parameters), 0.1))
+    return BoxFit(model, 0, NONE, total, 0.0, 0.0, NONE)
+
+
+def search(totals: dict[str, float], *steps: SearchStep) -> SimpleNamespace:
+    """Return a search whose fits of further models have the totals given, by their last effect."""
+    fitter = SimpleNamespace(
+        fit=lambda model, level: fit(totals[model.effects[-1].kind.name], *(e.kind.name for e in model.effects)),
+        settled=lambda found: found,
+    )
+    return SimpleNamespace(fitter=fitter, steps=steps, settings=DEFAULT.search, score=lambda found: found.total)
+
+
+def test_an_earlier_effect_has_a_family_too() -> None:
+    first = SearchStep(fit(-90.0), (fit(-50.0, "input_delay"), fit(-52.0, "input_lag"), fit(-80.0, "load")), True)
+    best = fit(-10.0, "input_delay", "spring")
+    alone = fit(-50.0, "input_delay")
+    second = SearchStep(alone, (best, fit(-40.0, "input_delay", "load")), True)
+    found = families_of(search({"input_lag": -12.0, "load": -70.0}, first, second), best)
+    assert found == (("input_lag@p",), ())
+
+
+def test_what_contains_an_effect_is_none_of_its_family() -> None:
+    best = fit(-10.0, "coulomb_friction")
+    step = SearchStep(fit(-90.0), (best, fit(-9.0, "stribeck_friction"), fit(-13.0, "viscous_drag")), True)
+    assert families_of(search({}, step), best) == (("viscous_drag@p",),)
+
+
+def error_of_a_quantum(rows: int) -> float:
+    u, true = SCENE.signal[:: 400 // rows], 0.1003
+    model = BoxModel(np.zeros(0)).extended(at("input_quantisation"), np.array([true]))
+
+    def run(model: BoxModel) -> np.ndarray:
+        return quantised(u, float(model.values[0][0]))[:, None]
+
+    fitter = SimpleNamespace(
+        settings=DEFAULT,
+        problem=SimpleNamespace(simulate=lambda models, rows: [run(m) for m in models]),
+        covariance=lambda found, rows: np.array([[1e-16]]),
+        whitened=lambda y, level: (y - run(model)) / 0.02,
+        likelihood=lambda e, level, rows: float(-0.5 * np.sum(e * e)),
+    )
+    return float(errors_of(fitter, BoxFit(model, 0, run(model), 0.0, 0.0, 0.0, NONE), slice(0, rows))[0])
+
+
+def test_the_interval_of_a_quantum_holds_what_rounds_the_same() -> None:
+    assert error_of_a_quantum(20) > 2.0 * error_of_a_quantum(400) > 1e-6
