@@ -99,6 +99,11 @@ def test_what_predicts_better_does_so_beyond_scatter_and_by_more_than_a_hair() -
     scattered = noisy + 5.0 * rng.standard_normal((60, 1)) - 1e-3
     assert horizons([0.9, 0.9, 0.9, 0.1], scattered).surely_better_than(before) == ()
     assert before.surely_better_than(before) == ()
+    away = horizons([np.nan, np.inf, 1.0, np.nan], np.where(np.arange(60)[:, None] == 3, np.nan, noisy))
+    assert before.surely_better_than(away) == ("one sample", "50 ms")
+    assert away.surely_better_than(before) == ()
+    assert before.harm_over(away) == ()
+    assert "one sample" in away.harm_over(before)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,10 @@ class Horizons:
             Their labels.
         """
         settings = self.settings
-        most = other.errors * (1.0 + settings.larger) + settings.of_noise * self.noise
+        most = (
+            np.where(np.isnan(other.errors), np.inf, other.errors) * (1.0 + settings.larger)
+            + settings.of_noise * self.noise
+        )
         worse = np.any(~(self.errors <= most), axis=1)
         for row, (change, spread) in enumerate(self._changes_over(other)):
             worse[row] &= not change <= settings.sure * spread
@@ -80,13 +83,16 @@ class Horizons:
             Their labels.
         """
         settings = self.settings
-        less = np.any(self.errors * (1.0 + settings.larger) < other.errors, axis=1)
+        less = np.any(~(other.errors <= self.errors * (1.0 + settings.larger)), axis=1)
         changes = zip(self.labels, less, self._changes_over(other), strict=False)
         return tuple(label for label, enough, (mean, spread) in changes if enough and mean < -settings.sure * spread)
 
     def _changes_over(self, other: "Horizons") -> Iterator[tuple[float, float]]:
         """Yield, for each horizon of many starts, the mean change of the squared error and its standard error."""
         for own, before in zip(self.squares, other.squares, strict=True):
+            if not np.all(np.isfinite(own)) or not np.all(np.isfinite(before)):  # a prediction has run away
+                yield (-np.inf if np.all(np.isfinite(own)) else np.inf), 0.0
+                continue
             change = np.sum((own - before) / self.noise**2, axis=1)
             mean = float(np.mean(change))
             yield mean, float(np.sqrt(long_run_covariance((change - mean)[:, None])[0, 0]) / change.size)
