@@ -13,6 +13,7 @@ import ast
 import json
 import os
 import random
+import resource
 import shutil
 import subprocess
 import sys
@@ -25,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-TIME_LIMIT = 180.0  # s, of one test run: a mutant may loop for ever
+TIME_LIMIT = 180  # s of processor time, of one test run: a mutant may loop for ever
 
 COMPARED = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
             ast.In: ast.NotIn, ast.NotIn: ast.In, ast.Is: ast.IsNot, ast.IsNot: ast.Is}  # fmt: skip
@@ -207,24 +208,23 @@ def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
     return [(m, changed((root / m.module).read_text(encoding="utf-8"), node, number)) for m, node, number in chosen]
 
 
-def outcome(root: Path, tests: tuple[str, ...], limit: float = TIME_LIMIT) -> str:
+def outcome(root: Path, tests: tuple[str, ...]) -> str:
     """Run tests in a copy of the project.
 
     Args:
         root: of the copy.
         tests: files, from there.
-        limit: of the run [s].
 
     Returns:
         ``"survived"``; ``"caught"`` where a test fails or a module cannot be imported; ``"no end"`` where the run was
-        ended by the limit, or by a signal: nothing is known then, on a busy machine least of all.
+        ended by its limit of time or by another signal: nothing is known then.
     """
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
-    try:
-        run = subprocess.run(command, cwd=root, env=environment, capture_output=True, timeout=limit, check=False)
-    except subprocess.TimeoutExpired:
-        return "no end"
+    run = subprocess.run(
+        command, cwd=root, env=environment, capture_output=True, check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (TIME_LIMIT, TIME_LIMIT)),
+    )  # fmt: skip
     # pytest: 0 all passed, 1 tests failed, 2 stopped by an error while collecting.
     return {0: "survived", 1: "caught", 2: "caught"}.get(run.returncode, "no end")
 

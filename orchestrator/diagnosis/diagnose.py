@@ -8,15 +8,14 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.fit.sizes import with_model_error
 from orchestrator.diagnosis.fit.together import at_one_rate, series
-from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Workings
-from orchestrator.diagnosis.passes import Pass, Progress, passes
+from orchestrator.diagnosis.outcome import Diagnosis, Workings
+from orchestrator.diagnosis.passes import Progress, honest, passes
 from orchestrator.diagnosis.proof.by_record import by_record, repeats
 from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
-from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, ladder
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
 from orchestrator.diagnosis.search.model_space import in_metres
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.admission import check_comparable, check_diagnosable, check_resolved
@@ -72,10 +71,9 @@ def diagnose(
     base_fit, final = found.base, found.final
     units = METRIC if in_metres(model) else {}
     position = units.get("rad", "rad")
-    chosen = base_fit if unknown else final
+    chosen = honest(likelihood, base_fit, (), parts) if unknown else final
     stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
     misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
-    chosen = _honest(found, chosen, misfit)
     everything = [
         (named(plant, effect, final if unknown else chosen, search.steps, units, settings.verdict), effect.measurement)
         for effect in best.effects
@@ -130,15 +128,6 @@ def evidence_of(diagnosis: Diagnosis) -> Evidence:
     """
     w = diagnosis.workings
     return evidence(w.likelihood, w.final, w.parts)
-
-
-def _honest(found: Pass, chosen: Fit, misfit: Sequence[Misfit]) -> Fit:
-    """Return the chosen fit, its intervals as wide as the model's error asks for where its misfit tells of one."""
-    likelihood, settings = found.likelihood, found.likelihood.settings
-    if all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit):
-        return chosen
-    levels = ladder(settings.levels, () if found.unknown else found.best.effects, chosen.q)
-    return with_model_error(likelihood, chosen, found.parts.seen, levels)
 
 
 def _plain_verdict(likelihood: RecordLikelihood, nominal: Array, base: Fit, parts: Parts) -> str:

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals
-from orchestrator.diagnosis.fit.sizes import Sized, sized
-from orchestrator.diagnosis.proof.horizons import horizons
+from orchestrator.diagnosis.fit.sizes import Sized, sized, with_model_error
+from orchestrator.diagnosis.proof.horizons import Horizons, horizons
+from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.search import Search
@@ -169,8 +170,9 @@ class _Proven:
 def _proven(search: Search, whole: Parts, base: Candidate, plain: Fit, best: Candidate) -> _Proven:
     """Return the best model all of whose effects stand on all that may be looked at, and do no harm on the rest.
 
-    An effect is withdrawn when its size is not far from zero, or when with it the model predicts worse, at any horizon
-    and by more than chance, than without it or than re-fitted parameters alone.
+    An effect is withdrawn when its size, within what the model's error leaves open, is not far from zero, or when with
+    it the model predicts worse, at any horizon and by more than chance, than without it or than re-fitted parameters
+    alone.
     """
     likelihood = search.likelihood
     levels = likelihood.settings.levels
@@ -180,8 +182,9 @@ def _proven(search: Search, whole: Parts, base: Candidate, plain: Fit, best: Can
     while best.effects:
         efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
         final = sized(likelihood, efficient, whole, best.effects, ladder(levels, best.effects, efficient.q))
+        final = replace(final, fit=honest(likelihood, final.fit, best.effects, whole))
         after = horizons(likelihood, final.fit.p, plain.q, whole.held_out)
-        weak = next((effect for effect in reversed(best.effects) if _is_weak(likelihood, effect, final.fit)), None)
+        weak = next((e for e in reversed(best.effects) if _is_weak(search, e, final.fit, after, plain.q, whole)), None)
         noise = torque_noise(likelihood, final.fit, whole.fitted, sized_base.fit.p)
         out, harm = weak or best.effects[-1], after.harm_over(before, noise)
         fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
@@ -192,7 +195,27 @@ def _proven(search: Search, whole: Parts, base: Candidate, plain: Fit, best: Can
         why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
         notes.append(f"{out.name} ({out.site}) was withdrawn: {why}")
         best = fewer
-    return _Proven(base, plain, sized_base, sized_base, Proof(before, before), tuple(notes))
+    final = replace(sized_base, fit=honest(likelihood, sized_base.fit, (), whole))
+    return _Proven(base, plain, sized_base, final, Proof(before, before), tuple(notes))
+
+
+def honest(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect], parts: Parts) -> Fit:
+    """Return a fit with intervals as wide as the model's error asks for, where its misfit tells of one.
+
+    Args:
+        likelihood: of the record.
+        found: the fit as it is reported.
+        effects: of its model.
+        parts: of the record.
+
+    Returns:
+        The fit; unchanged where held-out data are predicted almost to the encoders' noise.
+    """
+    settings = likelihood.settings
+    misfit = held_out_misfit(likelihood, found.q, [("", found.p)], parts.held_out, "")
+    if all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit):
+        return found
+    return with_model_error(likelihood, found, parts.seen, effects, ladder(settings.levels, effects, found.q))
 
 
 def _dispute(names: tuple[str, ...]) -> str:
@@ -225,10 +248,19 @@ def _harm_over_fewer(
     return harm(sized(likelihood, again, whole, fewer.effects, levels).fit.p)
 
 
-def _is_weak(likelihood: RecordLikelihood, effect: Effect, final: Fit) -> bool:
-    """Tell whether the size of an effect lies within a few standard errors of zero."""
+def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: float, whole: Parts) -> bool:
+    """Tell whether an effect may be nothing: its size may be zero, and held-out predictions do not miss it.
+
+    Free runs hardly see a torque that changes sign within a short way, whatever its size: what they leave open of it
+    counts for nothing where predictions get worse, at some horizon and at none better, with nothing changed but that
+    it is taken out.
+    """
+    likelihood = search.likelihood
     place = effect.places(likelihood.plant)[effect.size]
-    return abs(float(final.p[place])) < likelihood.settings.search.least_errors * final.standard_error(place)
+    if abs(float(final.p[place])) >= likelihood.settings.search.least_errors * final.standard_error(place):
+        return False
+    without = horizons(likelihood, search.without(final.p, effect), q, whole.held_out)
+    return not after.surely_better_than(without) or bool(without.surely_better_than(after))
 
 
 def _over_floor(likelihood: RecordLikelihood, final: Fit, parts: Parts, lowest: float) -> float:

@@ -149,6 +149,9 @@ class SearchSettings(Settings, frozen=True):
     ] = 1e-3
     linearised: Annotated[int, setting("times that such a gap is fitted, gains taken along the fit before", ge=1)] = 2
     most_effects: Annotated[int, setting("effects named at most: more have no room in one record", ge=0)] = 4
+    most_steps: Annotated[
+        int, setting("forward steps at most: a step may end in a better fit, and no effect", ge=1)
+    ] = 10
     most_in_a_repeat: Annotated[
         int, setting("effects in a search with exchanged parts: one part explains few", ge=0)
     ] = 2

@@ -9,8 +9,10 @@ process is a jail's child; work that runs what is not ours has walls.
 
 import math
 import pickle
+import signal
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from orchestrator.engine.cases import Case, Outcome, Status
 from orchestrator.engine.work import Work
@@ -20,6 +22,7 @@ from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
 
 ATTEMPTS = 2
+KILLS = 5  # SIGKILL comes from others, on a busy or full machine more than once
 PREPARATION_LIMIT = 600.0
 LARGEST_ANSWER = 64 * MEBIBYTE
 _BOUNDLESS = 1 << 50
@@ -34,6 +37,14 @@ _BEYOND = {
 
 class LaneClosedError(Exception):
     """The lane was closed while a case was running or before it started; the case is not finished."""
+
+
+@dataclass(frozen=True)
+class Death:
+    """How a process died: the place in the batch of the case that was running, and whether somebody killed it."""
+
+    place: int
+    killed: bool
 
 
 class Lane:
@@ -54,8 +65,8 @@ class Lane:
         """Run a batch of cases, or as many of them as a worker process gets done in ``BATCH_TIME``.
 
         When the process dies, hangs or breaks another limit, the case that was running is the one whose outcome is
-        returned. A case whose process dies is tried once more in a fresh one, so that a process which somebody else
-        killed costs nothing; a case that hangs, or breaks another limit, is not.
+        returned. A case whose process dies is tried once more in a fresh one, and up to four times where the process
+        was killed, so that what somebody else killed costs nothing; a case that hangs, or breaks another limit, is not.
 
         Args:
             cases: to run, at least one.
@@ -70,11 +81,14 @@ class Lane:
         with self._lock:
             self._busy = True
         try:
-            for _ in range(ATTEMPTS):
+            deaths = kills = 0
+            while deaths < ATTEMPTS and kills < KILLS:
                 answer = self._exchange(self._ready(), cases)
-                if not isinstance(answer, int):
+                if not isinstance(answer, Death):
                     return list(answer)
-                cases = cases[answer : answer + 1]
+                cases = cases[answer.place : answer.place + 1]
+                deaths += not answer.killed
+                kills += answer.killed
             return [Outcome(cases[0].index, Status.CRASH, "the worker process died")]
         finally:
             with self._lock:
@@ -91,10 +105,10 @@ class Lane:
             if not self._busy:
                 self._end()
 
-    def _exchange(self, jail: Jail, cases: Sequence[Case]) -> Sequence[Outcome] | int:
-        """Return outcomes; when the process died, the place in the batch of the case that was running."""
+    def _exchange(self, jail: Jail, cases: Sequence[Case]) -> Sequence[Outcome] | Death:
+        """Return outcomes; when the process died, of what."""
         limit = self._assignment.time_limit + (BATCH_TIME if len(cases) > 1 else 0.0)
-        reason = "protocol"
+        reason, killed = "protocol", False
         try:
             message = jail.call(cases, limit, LARGEST_ANSWER)
             answer = read_answer(message, cases, self._assignment.columns)
@@ -103,7 +117,7 @@ class Lane:
                     self._discard()
                 return answer.outcomes
         except ChildError as error:
-            reason = error.reason
+            reason, killed = error.reason, error.reason == "signal" and error.code == signal.SIGKILL
         except SimulationError:  # it had no memory left to answer with
             reason = "exit"
         place = min(finished_cases(jail.scratch / "tmp"), len(cases) - 1)
@@ -111,11 +125,11 @@ class Lane:
         self._discard()
         if reason == "time":
             return [Outcome(index, Status.TIME_LIMIT, f"took more than {self._assignment.time_limit:g} s")]
-        return [Outcome(index, Status.CRASH, _BEYOND[reason])] if reason in _BEYOND else place
+        return [Outcome(index, Status.CRASH, _BEYOND[reason])] if reason in _BEYOND else Death(place, killed)
 
     def _ready(self) -> Jail:
         said = ""
-        for _ in range(ATTEMPTS):
+        for _ in range(KILLS):
             if self._jail is not None:
                 return self._jail
             try:

@@ -115,7 +115,7 @@ def _by_pint(text: str) -> RecordUnit | None:
             ):
                 return RecordUnit(kind, float(quantity.to(si).magnitude))
         root = quantity.to_root_units()
-    except (pint.PintError, ValueError, TypeError, AttributeError, OverflowError, RecursionError):
+    except (pint.PintError, ValueError, TypeError, AttributeError, OverflowError, RecursionError, AssertionError):
         return None
     angular = {"radian": "angle", "radian / second": "speed"}.get(str(root.units))
     return None if angular is None else RecordUnit(angular, float(root.magnitude))

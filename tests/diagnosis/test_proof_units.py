@@ -6,6 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from orchestrator.diagnosis import proof
 from orchestrator.diagnosis.proof.free_run import free_run, simulate
 from orchestrator.diagnosis.proof.misfit import held_out_misfit, segments
 from tests.support.short_records import (
@@ -125,7 +126,8 @@ def test_a_run_that_does_not_come_close_is_sought_over_growing_parts() -> None:
     assert grown.rms[0] < 0.7 * once.rms[0]
     worse = msgspec.structs.replace(alone, growing=(0.05,), close=1.0)
     kept = free_run(AXIS, p, guess, signals, slice(0, 200), worse)
-    assert kept.rms[0] <= once.rms[0] * (1.0 + 1e-9) or kept.outputs.shape[0] == 10
+    assert kept.rms[0] <= once.rms[0] * (1.0 + 1e-9)
+    assert kept.outputs.shape[0] == 200  # the whole part, whatever the last share is
 
 
 def test_segments_cover_the_part() -> None:
@@ -167,11 +169,40 @@ def test_a_start_that_needs_several_steps_gets_them() -> None:
     assert once.rms[0] > 1.5 * found.rms[0]
 
 
-def test_growing_parts_are_shares_of_the_part() -> None:
+@pytest.mark.parametrize(("growing", "lengths"), [((0.2,), [150, 30, 150]), ((0.01, 0.4, 1.0), [150, 10, 60, 150])])
+def test_growing_parts_are_shares_of_the_part(monkeypatch, growing: tuple[float, ...], lengths: list[int]) -> None:
     likelihood, p = axis_likelihood(200, effects__coulomb_friction__motor__torque=3.0)
-    once = msgspec.structs.replace(FREE_RUN, iterations=1, growing=(0.2,), close=1.0)
+    sought, closest = [], proof.free_run._closest
+    monkeypatch.setattr(proof.free_run, "_closest", lambda *words: sought.append(words[4]) or closest(*words))
+    quick = msgspec.structs.replace(FREE_RUN, iterations=1, growing=growing, close=1.0)
     guess = np.array([5.0, -40.0, 0, 0, 0, 0, 0, 0])
-    found = free_run(AXIS, p, guess, likelihood.signals, slice(50, 200), once)
-    assert found.outputs.shape[0] in (30, 150)
-    longer = free_run(AXIS, p, guess, likelihood.signals, slice(50, 200), msgspec.structs.replace(once, growing=(0.4,)))
-    assert {found.outputs.shape[0], longer.outputs.shape[0]} <= {30, 60, 150}
+    found = free_run(AXIS, p, guess, likelihood.signals, slice(50, 200), quick)
+    assert [part.stop - part.start for part in sought] == lengths
+    assert {part.start for part in sought} == {50}
+    assert found.outputs.shape[0] == 150
+
+
+@pytest.mark.parametrize("side", [-1.0, 0.0])
+def test_each_angle_counts_by_its_own_noise(side: float) -> None:
+    """A model that cannot follow both angles follows the one that is measured well, wherever it begins."""
+    likelihood, _ = drivetrain_likelihood(60, k=1000.0)
+    part, p, whole = slice(0, 60), likelihood.nominal, msgspec.structs.replace(FREE_RUN, close=1e9)
+    well, badly = 1e-4, 3e-2
+    other = replace(likelihood.signals, noise=np.array([well, badly]))
+    guess = free_run(DRIVETRAIN, p, np.zeros(8), other, part, whole).start  # follows the motor
+    guess[[0, 2]] += side * 0.02
+    signals = replace(likelihood.signals, noise=np.array([badly, well]))
+    run = free_run(DRIVETRAIN, p, guess, signals, part, whole)
+
+    def cost(start: np.ndarray) -> float:
+        errors = simulate(DRIVETRAIN, p, start, signals, part) - signals.y[part]
+        return float(np.sum((errors / signals.noise) ** 2))
+
+    least = cost(run.start)
+    assert least == pytest.approx(len(run.outputs) * float(np.sum((run.rms / signals.noise) ** 2)))
+    assert least < 0.9 * cost(guess)
+    for place in (0, 1, 2, 3):
+        for step in (-1e-3, 1e-3):
+            moved = run.start.copy()
+            moved[place] += step
+            assert cost(moved) > (1.0 - 1e-3) * least

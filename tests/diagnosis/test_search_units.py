@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
-from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder, parameter_count
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, ladder, parameter_count
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor
 from orchestrator.diagnosis.search.model_space import in_metres
 from orchestrator.diagnosis.search.scene import scene_of
@@ -236,6 +236,32 @@ def test_superfluous_effects_are_taken_out(friction) -> None:
     assert labels(reduced.effects) == {FRICTION.label}
     needed = search.candidate((FRICTION, PLAIN), double.fit)
     assert labels(search.prune(needed, base).effects) == labels(both)
+
+
+def test_an_effect_is_judged_against_the_best_fit_without_it(friction) -> None:
+    """A poor fit of the model before must not lend its gain to an effect that only led the fit out of it."""
+    search, _, base, best, _ = friction
+    scene = scene_of(search.likelihood, best.fit)
+    both = (*best.effects, PLAIN)
+    start = PLAIN.put(AXIS, best.fit.p, {"torque": 1e-3}, ())
+    spare = search.candidate(
+        both, annealed(search.likelihood, start, best.fit.q, search.free(both, scene), PARTS, both)
+    )
+    poor = search.candidate(
+        best.effects, replace(best.fit, fitted=best.fit.fitted - 200.0, validated=best.fit.validated - 90.0)
+    )
+    assert search.earns(spare, poor, base)
+    taken = search.against_its_like(ForwardStep(poor, (spare,), True), base)
+    assert not taken.accepted
+    assert taken.before.score >= best.score  # what the search has met counts, too
+    right = search.steps[0]
+    kept = search.against_its_like(right, base)
+    assert kept.accepted
+    assert kept.before.score == pytest.approx(base.score, abs=0.1)
+    refused = replace(right, accepted=False)
+    assert search.against_its_like(refused, base) is refused
+    assert search.known(best.effects)
+    assert not search.known((FRICTION, STRIBECK))
 
 
 def test_a_law_that_contains_another_is_tried_where_that_pays(friction) -> None:

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from orchestrator.diagnosis.fit.fitting import Free, Parts, fit
+from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
+from orchestrator.diagnosis.passes import _is_weak, honest
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.verdict.chance import torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
@@ -20,6 +21,7 @@ from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.model_file import default_model
 from orchestrator.shared.inference.long_run import long_run_covariance
 from tests.support.short_records import SETTINGS, axis_likelihood, drivetrain_likelihood
+from tests.support.small_search import search_of
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.8])
@@ -47,15 +49,19 @@ def test_an_interval_holds_what_free_runs_ask_for() -> None:
     place = likelihood.plant.index("b")
     free, part = (Free(place, 0.01, 0.0, 10.0),), slice(10, likelihood.stop)
     long = fit(likelihood, likelihood.nominal, 1e-5, free, Parts(part, part, part), most=0)
-    same = with_model_error(likelihood, long, part, (0.3, 1e-5))
+    same = with_model_error(likelihood, long, part, (), (0.3, 1e-5))
     assert same.standard_error(place) == pytest.approx(long.standard_error(place), rel=0.1)
     off = replace(long, p=long.p + 0.5 * (np.arange(long.p.size) == place))
-    wide = with_model_error(likelihood, off, part, (0.3, 1e-5))
+    wide = with_model_error(likelihood, off, part, (), (0.3, 1e-5))
     low, high = wide.interval(place)
     assert low < long.p[place] < off.p[place] < high
     assert np.array_equal(wide.p, off.p)
+    parts = Parts(slice(10, 150), slice(150, 200), slice(200, likelihood.stop))
+    assert honest(likelihood, long, (), parts) is long  # predicted almost to the encoder's noise
+    far = replace(long, p=long.p + 20.0 * (np.arange(long.p.size) == place))
+    assert honest(likelihood, far, (), parts).standard_error(place) > 1e3 * far.standard_error(place)
     nothing = replace(long, free=())
-    assert with_model_error(likelihood, nothing, part, (1e-5,)) is nothing
+    assert with_model_error(likelihood, nothing, part, (), (1e-5,)) is nothing
 
 
 def horizons(errors: list[float], squares: np.ndarray | None = None) -> Horizons:
@@ -83,6 +89,68 @@ def test_harm_of_many_starts_must_stand_out_of_their_scatter() -> None:
     worse = [1.02, 1.02, 1.02, 1.0]
     assert horizons(worse, small).harm_over(horizons(errors, noisy)) == ()
     assert horizons(worse, large).harm_over(horizons(errors, noisy)) == ("one sample", "50 ms", "500 ms")
+
+
+def test_what_predicts_better_does_so_beyond_scatter_and_by_more_than_a_hair() -> None:
+    rng = np.random.default_rng(1)
+    noisy = rng.chisquare(1, (60, 1))
+    before = horizons([1.0, 1.0, 1.0, 1.0], noisy)
+    assert horizons([0.9, 0.995, 0.9, 0.1], 0.8 * noisy).surely_better_than(before) == ("one sample", "500 ms")
+    scattered = noisy + 5.0 * rng.standard_normal((60, 1)) - 1e-3
+    assert horizons([0.9, 0.9, 0.9, 0.1], scattered).surely_better_than(before) == ()
+    assert before.surely_better_than(before) == ()
+    away = horizons([np.nan, np.inf, 1.0, np.nan], np.where(np.arange(60)[:, None] == 3, np.nan, noisy))
+    assert before.surely_better_than(away) == ("one sample", "50 ms")
+    assert away.surely_better_than(before) == ()
+    assert before.harm_over(away) == ()
+    assert "one sample" in away.harm_over(before)
+
+
+@pytest.mark.parametrize(
+    ("deviations", "kept", "lost", "weak"),
+    [
+        (3.0, (), (), False),  # far from zero: nothing else is asked
+        (1.0, (), (), True),  # held-out predictions do not miss it
+        (1.0, ("50 ms",), (), False),
+        (1.0, ("50 ms",), ("500 ms",), True),  # better at one horizon, worse at another
+    ],
+)
+def test_a_size_that_may_be_zero_stands_where_predictions_miss_it(monkeypatch, deviations, kept, lost, weak) -> None:
+    likelihood, p = axis_likelihood()
+    effect = next(e for e in likelihood.plant.bank if e.label == "load_torque@load")
+    place = effect.places(likelihood.plant)["torque"]
+    p = p.copy()
+    p[place] = 0.01 * deviations
+    covariance, free = np.diag([1e-4]), (Free(place, 0.01, -1.0, 1.0),)
+    final = Fit(p, 1e-3, np.zeros((1, 1)), free, covariance, 0.0, 0.0)
+
+    class Errors:
+        def __init__(self, better: tuple[str, ...]) -> None:
+            self.better = better
+
+        def surely_better_than(self, other: "Errors") -> tuple[str, ...]:
+            return self.better
+
+    monkeypatch.setattr("orchestrator.diagnosis.passes.horizons", lambda *_: Errors(lost))
+    found = _is_weak(search_of(likelihood), effect, final, Errors(kept), 1e-3, Parts(*(slice(10, 100),) * 3))
+    assert found is weak
+
+
+def test_free_runs_are_asked_for_the_amplitude_of_a_wave_alone() -> None:
+    likelihood, _ = axis_likelihood()
+    ripple = next(e for e in likelihood.plant.bank if e.label == "torque_ripple@motor")
+    places = ripple.places(likelihood.plant)
+    p = likelihood.nominal.copy()
+    p[places["amplitude"]], p[places["cycles_per_rev"]] = 0.5, 3.0
+    free = tuple(Free(places[short], 0.1, 0.0, 10.0) for short in ("amplitude", "cycles_per_rev", "phase"))
+    part = slice(10, likelihood.stop)
+    found = replace(
+        fit(likelihood, p, 1e-5, (), Parts(part, part, part), most=0), free=free, covariance=np.eye(3) * 1e-6
+    )
+    wide = with_model_error(likelihood, found, part, (ripple,), (1e-5,))
+    assert wide.standard_error(places["amplitude"]) > 0.1  # there is none: free runs ask for zero
+    for short in ("cycles_per_rev", "phase"):
+        assert wide.standard_error(places[short]) == found.standard_error(places[short])
 
 
 def test_pulses_are_outweighed_by_skill_at_every_horizon_only() -> None:

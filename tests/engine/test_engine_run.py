@@ -77,10 +77,11 @@ def test_in_the_middle_of_a_batch_a_fault_is_still_its_own_row(tmp_path):
     assert {r["square"] for r in rows if r["status"] == "done"} == {"4.0"}
 
 
-def test_a_worker_that_somebody_kills_costs_nothing(tmp_path):
-    work = engine_work.work(engine_work.run_killed_once, marker=str(tmp_path / "marker"))
+@pytest.mark.parametrize("kills", [1, 4])
+def test_workers_that_somebody_kills_cost_nothing(tmp_path, kills):
+    work = engine_work.work(engine_work.run_killed, marker=str(tmp_path / "marker"), kills=kills)
     disturbed = table(tmp_path, SIZES, work)
-    assert (tmp_path / "marker").exists()
+    assert (tmp_path / "marker").stat().st_size == kills
     assert disturbed == table(tmp_path, SIZES, engine_work.work())
 
 

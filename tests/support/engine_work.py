@@ -89,11 +89,12 @@ def run_faulty(prepared: dict[str, Any], case: Case) -> dict[str, Any]:
     return result
 
 
-def run_killed_once(prepared: dict[str, Any], case: Case) -> dict[str, Any]:
-    """Die the first time that case 3 is tried; the file ``payload['marker']`` remembers."""
+def run_killed(prepared: dict[str, Any], case: Case) -> dict[str, Any]:
+    """Die as often as ``payload['kills']`` says when case 3 is tried; the file ``payload['marker']`` counts."""
     marker = Path(prepared["payload"]["marker"])
-    if case.index == 3 and not marker.exists():
-        marker.touch()
+    deaths = len(marker.read_bytes()) if marker.exists() else 0
+    if case.index == 3 and deaths < prepared["payload"]["kills"]:
+        marker.write_bytes(bytes(deaths + 1))
         os.kill(os.getpid(), signal.SIGKILL)
     return run(prepared, case)
 

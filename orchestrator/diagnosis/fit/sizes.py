@@ -70,7 +70,9 @@ def sized(
     return Sized(replace(robust, covariance=covariance, colour=colour), disputed)
 
 
-def with_model_error(likelihood: RecordLikelihood, found: Fit, part: slice, levels: Sequence[float]) -> Fit:
+def with_model_error(
+    likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect], levels: Sequence[float]
+) -> Fit:
     """Return a fit whose intervals hold what long predictions ask for, too.
 
     A right model has one set of values for predictions of a sample and for runs over all of a record. Where a law is
@@ -80,6 +82,7 @@ def with_model_error(likelihood: RecordLikelihood, found: Fit, part: slice, leve
         likelihood: of the record.
         found: the fit as it is reported.
         part: the samples that it was fitted to.
+        effects: of the model; of a wave, free runs are asked for the amplitude alone: they slip along the rest.
         levels: of process noise that the model may have, falling; at the last, predictions are nearly free runs.
 
     Returns:
@@ -88,7 +91,15 @@ def with_model_error(likelihood: RecordLikelihood, found: Fit, part: slice, leve
     if not found.free:
         return found
     parts = Parts(part, part, part)
-    long = fit(likelihood, found.p, levels[-1], found.free, parts, most=0)
+    slipping = {
+        place
+        for effect in effects
+        if effect.phase
+        for short, place in effect.places(likelihood.plant).items()
+        if short not in effect.amplitudes
+    }
+    asked = tuple(entry for entry in found.free if entry.place not in slipping)
+    long = fit(likelihood, found.p, levels[-1], asked, parts, most=0)
     if not np.all(np.isfinite(long.z)):
         return found
     places = [entry.place for entry in found.free]

@@ -104,6 +104,8 @@ def free_run(
         length = max(round(share * (end - begin)), settings.least_samples)
         run = _closest(plant, p, start, signals, slice(begin, begin + length), settings, history)
         start = run.start
+    if len(run.outputs) < len(first.outputs):
+        run = _closest(plant, p, start, signals, part, settings, history)
     cost, other = (float(np.sum((r.rms / signals.noise) ** 2)) for r in (first, run))
     return run if other < cost else first
 

@@ -5,7 +5,7 @@ over its horizon with the exact, event-located plant. Over two seconds, and over
 the one that lies closest. All models of a diagnosis are started by the same filter: they differ in physics alone.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,18 +59,43 @@ class Horizons:
             Their labels.
         """
         settings = self.settings
-        most = other.errors * (1.0 + settings.larger) + settings.of_noise * self.noise
+        most = (
+            np.where(np.isnan(other.errors), np.inf, other.errors) * (1.0 + settings.larger)
+            + settings.of_noise * self.noise
+        )
         worse = np.any(~(self.errors <= most), axis=1)
-        for row, (own, before) in enumerate(zip(self.squares, other.squares, strict=True)):
-            change = np.sum((own - before) / self.noise**2, axis=1)
-            spread = np.sqrt(long_run_covariance((change - np.mean(change))[:, None])[0, 0]) / change.size
-            worse[row] &= not np.mean(change) <= settings.sure * spread
+        for row, (change, spread) in enumerate(self._changes_over(other)):
+            worse[row] &= not change <= settings.sure * spread
         if chance is not None:
             for row, (mine, theirs) in enumerate(zip(self.runs, other.runs, strict=True), start=len(self.squares)):
                 if worse[row]:
                     allowed = other.errors[row] ** 2 + chance(mine, theirs)
                     worse[row] = bool(np.any(~(self.errors[row] ** 2 <= np.maximum(most[row] ** 2, allowed))))
         return tuple(label for label, bad in zip(self.labels, worse, strict=True) if bad)
+
+    def surely_better_than(self, other: "Horizons") -> tuple[str, ...]:
+        """Return the horizons of many starts at which this model predicts better than another, beyond chance.
+
+        Args:
+            other: of the other model, over the same part.
+
+        Returns:
+            Their labels.
+        """
+        settings = self.settings
+        less = np.any(~(other.errors <= self.errors * (1.0 + settings.larger)), axis=1)
+        changes = zip(self.labels, less, self._changes_over(other), strict=False)
+        return tuple(label for label, enough, (mean, spread) in changes if enough and mean < -settings.sure * spread)
+
+    def _changes_over(self, other: "Horizons") -> Iterator[tuple[float, float]]:
+        """Yield, for each horizon of many starts, the mean change of the squared error and its standard error."""
+        for own, before in zip(self.squares, other.squares, strict=True):
+            if not np.all(np.isfinite(own)) or not np.all(np.isfinite(before)):  # a prediction has run away
+                yield (-np.inf if np.all(np.isfinite(own)) else np.inf), 0.0
+                continue
+            change = np.sum((own - before) / self.noise**2, axis=1)
+            mean = float(np.mean(change))
+            yield mean, float(np.sqrt(long_run_covariance((change - mean)[:, None])[0, 0]) / change.size)
 
     @property
     def long(self) -> int:

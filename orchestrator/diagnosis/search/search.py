@@ -76,13 +76,13 @@ class Search(ModelSpace):
         current = base
         try:
             self.hidden = self.hidden_gap(base)
-            while len(current.effects) < self.most:
-                step = self.step(current, base)
+            while len(current.effects) < self.most and len(self.steps) < self.settings.most_steps:
+                step = self.against_its_like(self.step(current, base), base)
                 self.steps.append(step)
-                if not step.accepted:
+                base = base if step.before.effects else step.before
+                if not step.accepted and step.before is current:
                     break
-                current = step.candidates[0]
-                current = self.prune(current, base)
+                current = self.prune(step.candidates[0], base) if step.accepted else step.before
         except TimeUpError:
             self.stopped = True
         return base, current
@@ -146,13 +146,59 @@ class Search(ModelSpace):
         found = self._each(lambda candidate: self.rescued(candidate, current, base), found)
         found = self.possible(found, scene)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
-        accepted = bool(found) and found[0].pays_over(current, base) and found[0].holds_over(current)
-        if not accepted:
-            shown = next((c for c in found if c.nearly_pays_over(current) and self.predicts(c, current)), None)
-            if shown is not None:
-                found.remove(shown)
-                return ForwardStep(current, (shown, *found), True)
-        return ForwardStep(current, tuple(found), accepted)
+        if found and self.earns(found[0], current, base):
+            return ForwardStep(current, tuple(found), True)
+        shown = next((c for c in found if self.shows(c, current)), None)
+        first = [] if shown is None else [shown]
+        return ForwardStep(current, (*first, *(c for c in found if c is not shown)), bool(first))
+
+    def against_its_like(self, step: ForwardStep, base: Candidate) -> ForwardStep:
+        """Return an accepted step judged against the model before it, fitted again from where its effect has led.
+
+        An effect that does nothing itself may lead a fit out of a poor optimum, and must not be named for that.
+
+        Args:
+            step: as it was taken.
+            base: the model without effects.
+
+        Returns:
+            The step; on top of the better fit, and accepted if its effect earns its place over that one too.
+        """
+        before = step.before
+        if not step.accepted or step.candidates[0].effects[:-1] != before.effects:
+            return step
+        first = step.candidates[0]
+        again = self.reduced(first, scene_of(self.likelihood, first.fit), first.effects[-1])
+        if again.gain_over(before) < self.likelihood.settings.fit.enough:
+            return step
+        own = base if before.effects else again
+        return ForwardStep(again, step.candidates, self.earns(first, again, own) or self.shows(first, again))
+
+    @staticmethod
+    def earns(candidate: Candidate, current: Candidate, base: Candidate) -> bool:
+        """Tell whether a candidate gains enough over the model before it, where it was fitted and where it was not.
+
+        Args:
+            candidate: a fitted model.
+            current: the model before.
+            base: the model without effects.
+
+        Returns:
+            True when it does.
+        """
+        return candidate.pays_over(current, base) and candidate.holds_over(current)
+
+    def shows(self, candidate: Candidate, current: Candidate) -> bool:
+        """Tell whether a candidate that gains less predicts so much better that it may be named for that.
+
+        Args:
+            candidate: a fitted model.
+            current: the model before.
+
+        Returns:
+            True when it does.
+        """
+        return candidate.nearly_pays_over(current) and self.predicts(candidate, current)
 
     def possible(self, found: Sequence[Candidate], scene: Scene) -> list[Candidate]:
         """Return the candidates whose last effect has a size that a machine may have; note the others.
@@ -393,7 +439,7 @@ class Search(ModelSpace):
         return current
 
     def reduced(self, current: Candidate, scene: Scene, effect: Effect) -> Candidate:
-        """Return ``current`` without one of its effects, fitted again.
+        """Return ``current`` without one of its effects: fitted again from there, or as it was found on the way.
 
         Args:
             current: the model to build on.
@@ -407,7 +453,20 @@ class Search(ModelSpace):
         p = self.without(current.fit.p, effect)
         fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
         self._tick(f"without {effect.label}")
-        return self.candidate(kept, fitted)
+        return max((self.candidate(kept, fitted), *self.known(kept)), key=lambda candidate: candidate.score)
+
+    def known(self, effects: Sequence[Effect]) -> list[Candidate]:
+        """Return the models with the same effects, in whatever order, that the search has met.
+
+        Args:
+            effects: of the bank.
+
+        Returns:
+            The candidates.
+        """
+        met = (candidate for step in self.steps for candidate in (step.before, *step.candidates))
+        labels = {effect.label for effect in effects}
+        return [one for one in met if {effect.label for effect in one.effects} == labels]
 
     def _each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
         """Return ``function`` of each item, in order, computed in threads."""
