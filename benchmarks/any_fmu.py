@@ -21,7 +21,7 @@ from benchmarks.any_fmu_plants import INSIDE, PLANTS, Case, Maker, Plant
 from orchestrator.api.any_fmu import FmuDiagnosisResult
 from orchestrator.api.diagnose import diagnose
 from orchestrator.errors import OrchestratorError
-from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
+from tests.support.box_fmu import DOMAINS, coupled_record, record, write_fmu, write_map, write_record, write_scenario
 
 SAME = {"input_offset": "load", "load": "input_offset"}
 LEAST, MOST = 3.0, 60.0
@@ -55,6 +55,10 @@ def cases(args: argparse.Namespace, plants: list[Plant]) -> Iterator[tuple[str, 
 EXAMPLES = {"Spring": ("coulomb_friction",), "Tanks": ("input_saturation",), "Circuit": ()}
 
 
+GAP = 0.006
+"""Gap between the two FMUs of the last example [rad]."""
+
+
 def write_examples(folder: Path) -> None:
     """Write the FMUs, maps and records of the documentation's examples."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -65,6 +69,9 @@ def write_examples(folder: Path) -> None:
             write_map(folder / f"{domain.name}.toml", domain)
             write_record(folder / f"{domain.name}.csv", case)
             print(f"{domain.name}: hidden {dict(zip(case.names, case.sizes, strict=True))}, values {case.parameters}")
+    write_scenario(folder)
+    coupled_record(folder / "loop.csv", np.random.default_rng(3), 700, gap=GAP)
+    print(f"loop: hidden backlash {GAP:g} rad")
 
 
 def right(kind: str, names: tuple[str, ...], found: FmuDiagnosisResult) -> str:

@@ -1,18 +1,20 @@
 """An effect attached to an FMU: the same arithmetic as in the loop that fitted it, one communication step at a time.
 
-``AttachedEffect`` stands between a signal and an input (or behind an output), or adds the force of a law of
-:mod:`port_laws` to it. It is built with PythonFMU into each corrected system.
+``AttachedEffect`` stands between a signal and an input (or behind an output), adds the force of a law of
+:mod:`port_laws` to it, lies in a connection between two FMUs, or sets a parameter that changes.
+It is built with PythonFMU into each corrected system.
 """
 
 from math import exp
 
 from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
-from .port_laws import built_up, distance_of, has_memory, resistance
+from .port_laws import across, built_up, cuts, distance_of, has_memory, resistance
 
 FEEDBACK = "feedback"
 SERIES = (
-    "gain", "offset", "delay", "lag", "saturation", "dead_zone", "rate_limit", "quantisation",
+    "gain", "offset", "delay", "lag", "saturation", "dead_zone", "rate_limit", "quantisation", "drift", "dependence",
+    "connection",
 )  # fmt: skip
 
 
@@ -47,11 +49,13 @@ class AttachedEffect(Fmi2Slave):
     def _forget(self) -> None:
         self._steps, self._built, self._x, self._v, self._held = 0, 0.0, 0.0, 0.0, 0.0
         self._past: list[float] = []
+        self._fed = (0.0, 0.0)
 
     def exit_initialization_mode(self) -> None:
         """Start anew."""
         self._forget()
-        self.result = self.signal
+        changes = self.series >= 0 and SERIES[self.series] in ("drift", "dependence")
+        self.result = self.q1 if changes else self.signal
 
     def do_step(self, time: float, step: float) -> bool:
         """Compute what arrives over this step from what is sent at its start.
@@ -63,12 +67,32 @@ class AttachedEffect(Fmi2Slave):
         Returns:
             True: done.
         """
-        if self.series < 0:
+        kind = FEEDBACK if self.series < 0 else SERIES[self.series]
+        if kind == FEEDBACK and cuts(self.law):
+            self.result = across(self.law, self.signal, self._ahead(self.position), self.sign, self.q0)
+        elif kind == FEEDBACK:
             self.result = self.signal - self.sign * self._force(step)
+        elif kind == "connection":
+            self.result = self.q0 * self._ahead(self._current()) + self.q1
+        elif kind == "drift":
+            self.result = self.q1 + self.q0 * (time + 0.5 * step - self.q2)
         else:
             self.result = self._through(self.signal, step)
         self._steps += 1
         return True
+
+    def _current(self) -> float:
+        """Return what is handed on as it is now: it depends by ``q2`` on what was fed for the step before."""
+        fed, self._fed = self._fed, (self.position, self._fed[0])
+        if self._steps < 2:
+            return self.signal
+        return self.signal + self.q2 * 0.5 * (self.position - fed[0])
+
+    def _ahead(self, x: float) -> float:
+        """Return a value extrapolated by ``lead`` steps."""
+        before = self._x if self._steps > 0 else x
+        self._x = x
+        return x + self.lead * (x - before)
 
     def _force(self, step: float) -> float:
         x = self.position
@@ -94,6 +118,8 @@ class AttachedEffect(Fmi2Slave):
             self._past = [0.0] if self.at_rest else []
         if kind == "gain":
             return u * (1.0 + value)
+        if kind == "dependence":
+            return self.q1 + value * (u - self.q2)
         if kind == "offset":
             return u + value
         if kind == "saturation":

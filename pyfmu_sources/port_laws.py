@@ -1,4 +1,4 @@
-"""Laws of effects that act around an FMU at its ports: a force against the motion, of position and speed.
+"""Laws of effects that act around an FMU: a force against the motion at its ports, a gap or a spring between two.
 
 Each is a plain function of floats. The loop that fits them compiles this very source; the effect FMU of a corrected
 system runs it. ``x`` and ``v`` are position and speed of the port, in the middle of a step.
@@ -7,7 +7,7 @@ system runs it. ``x`` and ``v`` are position and speed of the port, in the middl
 from math import cos, exp, sin
 
 COULOMB, STRIBECK, QUADRATIC, VISCOUS, SPRING, HARDENING, GRAVITY, RIPPLE, LOAD, DIRECTIONAL, INERTIA = range(1, 12)
-HYSTERESIS = 12
+HYSTERESIS, BACKLASH, COMPLIANCE = 12, 13, 14
 
 
 def built_up(kind: int, z: float, v: float, distance: float, time: float) -> float:
@@ -99,3 +99,34 @@ def resistance(kind: int, x: float, v: float, a: float, z: float, q0: float, q1:
     if kind == DIRECTIONAL:
         return q0 * abs(v)
     return q0 * a
+
+
+def cuts(kind: int) -> bool:
+    """Tell whether a law stands in a connection between two FMUs, and not at a port.
+
+    Args:
+        kind: number of the law.
+
+    Returns:
+        True when it does.
+    """
+    return kind in (BACKLASH, COMPLIANCE)
+
+
+def across(kind: int, near: float, other: float, sign: float, q0: float) -> float:
+    """Return the position that arrives beyond a cut.
+
+    Args:
+        kind: one of the constants above.
+        near: position before it.
+        other: of a gap, the position of what lies beyond; of a spring, the effort that goes through it.
+        sign: of an effort that drives what lies beyond.
+        q0: width of the gap, or how far an effort of 1 winds the spring.
+
+    Returns:
+        The position, in the unit of ``near``.
+    """
+    if kind == COMPLIANCE:
+        return near - q0 * sign * other
+    between = near - other
+    return near - min(max(between, -0.5 * q0), 0.5 * q0)

@@ -19,13 +19,13 @@ from orchestrator.diagnosis.blackbox.diagnose import diagnose as diagnosing
 from orchestrator.diagnosis.blackbox.draft import drafted
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, validated
 from orchestrator.diagnosis.blackbox.figures import draw_signals
-from orchestrator.diagnosis.blackbox.mapping import Map, read_map
+from orchestrator.diagnosis.blackbox.mapping import read_map
 from orchestrator.diagnosis.blackbox.problem import Data
 from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
 from orchestrator.diagnosis.blackbox.search import counted
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
+from orchestrator.diagnosis.blackbox.subject import subject_of
 from orchestrator.diagnosis.blackbox.trust import SECOND, doubts, harm, statement
-from orchestrator.fmi.model_description import read_description
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Trust
@@ -68,7 +68,6 @@ class FmuDiagnosisResult(Result):
     Attributes:
         outcome: verdict, effects, parameters, misfit and what is left.
         data: the record's columns.
-        fmu: the FMU.
         delivered: the corrected system, once it has been written.
         validation: misfit on a second record, if one was given.
         settings: thresholds that were used.
@@ -78,7 +77,6 @@ class FmuDiagnosisResult(Result):
     command: ClassVar[str] = "diagnose"
     outcome: BoxOutcome
     data: Data
-    fmu: Path
     arguments: Mapping[str, Any] = field(default_factory=dict)
     delivered: list[Delivered] = field(default_factory=list)
     validation: tuple[OutputMisfit, ...] = ()
@@ -199,7 +197,7 @@ class FmuDiagnosisResult(Result):
         write_signals(folder / "diagnose.csv", self.outcome, self.data)
         draw_signals(folder / "diagnose_signals.png", self.outcome, self.data)
         if self.outcome.verdict != "unknown":
-            self.delivered[:] = [deliver(folder / "corrected.ssp", self.fmu, self.outcome)]
+            self.delivered[:] = [deliver(folder / "corrected.ssp", self.outcome)]
 
     def close(self) -> None:
         """End the child processes now; else they end with the result."""
@@ -239,7 +237,7 @@ def of_a_box(
 
     Args:
         record: CSV file with the columns that the map names.
-        fmu: any FMI 2.0 co-simulation FMU; it runs in a child process.
+        fmu: any FMI 2.0 co-simulation FMU, or a scenario file of several; they run in a child process.
         map: TOML file: columns, uncertain parameters, ports.
         validate: a second record of the same columns, to show the misfit on; nothing is fitted to it.
         settings: thresholds, or the path of a TOML file of them.
@@ -253,11 +251,11 @@ def of_a_box(
         SimulationError: the FMU fails again and again.
     """
     used = chosen_settings(settings, BoxSettings)
-    description = read_description(Path(fmu))
-    given = read_map(Path(map), description)
-    data = read_data(Path(record), given)
-    second = None if validate is None else read_data(Path(validate), given)
-    outcome = diagnosing(Path(fmu), given, data, units_of(given, description), used, progress)
+    subject = subject_of(Path(fmu))
+    given = read_map(Path(map), subject)
+    data = read_data(Path(record), given, used.read)
+    second = None if validate is None else read_data(Path(validate), given, used.read)
+    outcome = diagnosing(subject, given, data, used, progress)
     try:
         models = (outcome.problem.nominal, outcome.refitted, outcome.model)
         shown = () if second is None else validated(outcome.problem, models, second)
@@ -266,23 +264,9 @@ def of_a_box(
         raise
     files = {"record": record, "fmu": fmu, "map": map, "validate": validate}
     arguments = {name: str(path) for name, path in files.items() if path is not None}
-    result = FmuDiagnosisResult(outcome, data, Path(fmu), arguments, validation=shown, settings=used)
+    result = FmuDiagnosisResult(outcome, data, arguments, validation=shown, settings=used)
     weakref.finalize(result, outcome.problem.runner.close)  # child processes end with the result, or at exit
     return result
-
-
-def units_of(given: Map, description: Any) -> dict[str, str]:
-    """Return the unit of every variable that has one.
-
-    Args:
-        given: the map of the record.
-        description: of the FMU.
-
-    Returns:
-        Unit by variable.
-    """
-    del given
-    return {v.name: v.unit for v in description.model.variables.values() if v.unit}
 
 
 def draft_map(record: Path | str, fmu: Path | str) -> str:
@@ -302,7 +286,7 @@ def draft_map(record: Path | str, fmu: Path | str) -> str:
         >>> "[ports.port_1]" in oc.draft_map("axis.csv", "axis.fmu")
         True
     """
-    return drafted(read_description(Path(fmu)), columns_of(Path(record)))
+    return drafted(subject_of(Path(fmu)), columns_of(Path(record)))
 
 
 @dataclass(frozen=True, repr=False)
@@ -376,8 +360,8 @@ def calibrate(
         >>> [p.name for p in fit.calibration.parameters], fit.calibration.explained
         (['J', 'b'], False)
     """
-    description = read_description(Path(fmu))
-    given = read_map(Path(map), description)
+    subject = subject_of(Path(fmu))
+    given = read_map(Path(map), subject)
     data = read_data(Path(record), given)
-    found = calibrating(Path(fmu), given, data, units_of(given, description), progress)
+    found = calibrating(subject, given, data, progress)
     return CalibrationResult(found, {"record": str(record), "fmu": str(fmu), "map": str(map)})

@@ -34,6 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fmu", type=Path, metavar="ANY.fmu", help="any FMI 2.0 co-simulation FMU instead of a model of ours"
     )
     parser.add_argument(
+        "--scenario", type=Path, metavar="LOOP.toml", help="several FMUs that a scenario connects, instead of one"
+    )
+    parser.add_argument(
         "--map", type=Path, metavar="MAP.toml", help="with an FMU: columns, uncertain parameters, ports"
     )
     parser.add_argument(
@@ -63,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         ScenarioError: options that do not belong together.
     """
-    if args.fmu is not None:
+    if args.fmu is not None or args.scenario is not None:
         return _any_fmu(args)
     if args.map is not None or args.draft_map:
         raise ScenarioError("`map` and `draft_map` must come with an FMU, but none is given", "map", "draft_map")
@@ -100,18 +103,21 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _any_fmu(args: argparse.Namespace) -> int:
-    """Diagnose an FMU that is not ours, or draft its map."""
+    """Diagnose an FMU that is not ours, or several, or draft the map."""
     from orchestrator.api.any_fmu import draft_map
 
     if len(args.records) > 1:
         raise ScenarioError("`records` must be one with an FMU of others", "records")
     (path,) = args.records
+    if args.scenario is not None and (args.fmu is not None or args.scenario.suffix.lower() != ".toml"):
+        raise ScenarioError("`scenario` must be a TOML file, without `fmu`, but is not", "scenario", "fmu")
+    fmu = args.fmu if args.scenario is None else args.scenario
     for name in ("model", "time_limit"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
     note_missing_walls()
     if args.draft_map:
-        text = draft_map(path, args.fmu)
+        text = draft_map(path, fmu)
         with staged(args.out) as folder:
             (folder / "map.toml").write_text(text, encoding="utf-8")
         print_blocks([f"Written to {args.out / 'map.toml'}: look it over, and give it with --map"])
@@ -120,7 +126,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
         raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
     with staged(args.out) as folder:
         found = diagnose(
-            path, args.fmu, args.map, validate=args.validate, settings=args.settings,
+            path, fmu, args.map, validate=args.validate, settings=args.settings,
             progress=lambda done, expected, what: say(what),
         )  # fmt: skip
         try:

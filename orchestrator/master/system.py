@@ -334,7 +334,8 @@ class System:
         variable = self.variable(address)
         if variable is None:
             return [Problem(path, self._unknown(address), mismatch=True)]
-        if variable.causality != causality:
+        tuned = causality == "input" and variable.causality == "parameter" and variable.variability == "tunable"
+        if variable.causality != causality and not tuned:
             text = f"must be an {causality}, but {address} is of causality {variable.causality}"
             return [Problem(path, text, mismatch=True)]
         if variable.type not in NUMERIC:

@@ -42,8 +42,8 @@ def test_no_threshold_lies_about_in_the_room() -> None:
     shown = {"figures.py", "settings.py"}  # looks, and the settings themselves
     arithmetic = {"STEADY", "SHORTEST_ONSET", "SMOOTHED"}  # of arithmetic, no thresholds
     room = ROOT / "orchestrator" / "diagnosis"
-    # Tables of starts; what a process of others may cost; how an FMU and its surrogate are measured.
-    measures = {"bank", "binding", "draft", "mapping", "probing", "problem", "reading", "runner", "whitening"}
+    # Tables of starts; formats of files, and what files may hold; a fact of the normal distribution.
+    measures = {"bank", "binding", "draft", "mapping", "probing", "reading", "runner"}
     measuring = {room / "blackbox" / f"{name}.py" for name in measures}
     for path in sorted(set(room.rglob("*.py")) - measuring):
         if path.name in shown:

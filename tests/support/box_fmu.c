@@ -32,6 +32,22 @@ static void f(const double *x, const double *u, const double *p, double *d) {
 }
 static void g(const double *x, double *y) { y[0] = x[0]; y[1] = x[1]; }
 static const double LONGEST = 0.25;
+#elif MODEL == 4 /* a motor: torque and load torque in, angle and speed out */
+enum { NP = 2, NU = 2, NX = 2, NY = 2 };
+static const double P0[NP] = {0.02, 0.04};
+static void f(const double *x, const double *u, const double *p, double *d) {
+    d[0] = x[1]; d[1] = (u[0] - u[1] - p[1] * x[1]) / p[0];
+}
+static void g(const double *x, double *y) { y[0] = x[0]; y[1] = x[1]; }
+static const double LONGEST = 5e-4;
+#elif MODEL == 5 /* a load behind a shaft: angle in, its own angle and the shaft's torque out */
+enum { NP = 3, NU = 1, NX = 2, NY = 2 };
+static const double P0[NP] = {0.05, 60.0, 0.4};
+static void f(const double *x, const double *u, const double *p, double *d) {
+    d[0] = x[1]; d[1] = (p[1] * (u[0] - x[0]) - p[2] * x[1]) / p[0];
+}
+static void g(const double *x, double *y) { y[0] = x[0]; y[1] = 0.0; }
+static const double LONGEST = 5e-4;
 #else /* a mass on a spring: force, position and speed */
 enum { NP = 3, NU = 1, NX = 2, NY = 2 };
 static const double P0[NP] = {1.0, 20.0, 0.8};
@@ -104,6 +120,9 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, 
     C *m = c;
     double y[NY];
     g(m->x, y);
+#if MODEL == 5
+    y[1] = m->p[1] * (m->u[0] - m->x[0]);
+#endif
     for (size_t i = 0; i < n; i++) {
         unsigned k = r[i];
         if (k < NP) v[i] = m->p[k];
@@ -129,6 +148,9 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, 
         if (k < NP) {
 #ifdef FAULT_parameters_ignored
             continue;
+#endif
+#ifdef FAULT_read_once
+            if (m->steps > 0) continue;
 #endif
             m->p[k] = v[i];
         } else if (k < NP + NU) {

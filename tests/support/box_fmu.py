@@ -37,6 +37,7 @@ class Domain:
     units: dict = field(default_factory=dict)
     effects: tuple = ()
     offset: float = 0.0
+    further: tuple = ()  # a second input
 
 
 SERIES = ("input_delay", "input_saturation", "input_dead_zone", "input_lag")
@@ -55,7 +56,12 @@ DOMAINS = (
            ("qin", "m3/s"), (("h1", "m"), ("h2", "m")), ("qin", "h1", None), 2.0, 0.02, (1e-3, 1e-3),
            effects=("input_delay", "input_saturation", "input_lag"), offset=1.0),
 )  # fmt: skip
-ALL_OUTPUTS = {0: ("x", "v"), 1: ("phi1", "phi2"), 2: ("q", "i"), 3: ("h1", "h2")}
+MOTOR = Domain(4, "Motor", {"J": (0.02, "kg.m2"), "b": (0.04, "N.m.s/rad")}, ("M", "N.m"),
+               (("phi", "rad"), ("w", "rad/s")), ("M", "phi", None), 0.005, 0.7, (3e-4,),
+               further=("T", "N.m"))  # fmt: skip
+LOAD = Domain(5, "Load", {"J": (0.05, "kg.m2"), "k": (60.0, "N.m/rad"), "d": (0.4, "N.m.s/rad")}, ("phi_in", "rad"),
+              (("phi", "rad"), ("T", "N.m")), ("phi_in", "phi", None), 0.005, 0.7, (3e-4,))  # fmt: skip
+ALL_OUTPUTS = {0: ("x", "v"), 1: ("phi1", "phi2"), 2: ("q", "i"), 3: ("h1", "h2"), 4: ("phi", "w"), 5: ("phi", "T")}
 
 
 @functools.cache
@@ -72,7 +78,8 @@ def library(number: int, fault: str = "") -> bytes:
 
 def write_fmu(path: Path, domain: Domain, fault: str = "") -> Path:
     """Write an FMU of a domain."""
-    units = {u for _, u in domain.parameters.values()} | {domain.input[1]} | {u for _, u in domain.outputs}
+    inputs = [domain.input, *([domain.further] if domain.further else [])]
+    units = {u for _, u in domain.parameters.values()} | {u for _, u in inputs} | {u for _, u in domain.outputs}
     lines = ['<?xml version="1.0" encoding="UTF-8"?>']
     lines.append(
         f'<fmiModelDescription fmiVersion="2.0" modelName="{domain.name}" guid="{{{domain.name}}}" '
@@ -86,24 +93,25 @@ def write_fmu(path: Path, domain: Domain, fault: str = "") -> Path:
     reference = 0
     for name, (value, unit) in domain.parameters.items():
         lines.append(
-            f'<ScalarVariable name="{name}" valueReference="{reference}" causality="parameter" variability="fixed" '
+            f'<ScalarVariable name="{name}" valueReference="{reference}" causality="parameter" variability="tunable" '
             f'initial="exact"><Real unit="{unit}" start="{value}"/></ScalarVariable>'
         )
         reference += 1
-    name, unit = domain.input
-    lines.append(
-        f'<ScalarVariable name="{name}" valueReference="{reference}" causality="input"><Real unit="{unit}" start="0"/>'
-        "</ScalarVariable>"
-    )
+    for name, unit in inputs:
+        lines.append(
+            f'<ScalarVariable name="{name}" valueReference="{reference}" causality="input">'
+            f'<Real unit="{unit}" start="0"/></ScalarVariable>'
+        )
+        reference += 1
     shown = dict(domain.outputs)
     for name in ALL_OUTPUTS[domain.number]:
-        reference += 1
         unit = f' unit="{shown[name]}"' if name in shown else ""
         lines.append(
             f'<ScalarVariable name="{name}" valueReference="{reference}" causality="output"><Real{unit}/>'
             "</ScalarVariable>"
         )
-    count = len(domain.parameters) + 2
+        reference += 1
+    count = len(domain.parameters) + len(inputs) + 1
     unknowns = "".join(f'<Unknown index="{count + k}"/>' for k in range(len(ALL_OUTPUTS[domain.number])))
     lines.append(
         f"</ModelVariables><ModelStructure><Outputs>{unknowns}</Outputs></ModelStructure></fmiModelDescription>"
@@ -307,4 +315,111 @@ def write_record(path: Path, case: Case) -> Path:
     header = ",".join(["time", case.domain.input[0], *(name for name, _ in case.domain.outputs)])
     table = np.column_stack([case.time, case.u, case.y])
     np.savetxt(path, table, fmt="%.10g", delimiter=",", header=header, comments="")
+    return path
+
+
+SCENARIO = """
+stop = 1.0
+record = ["motor.phi"]
+master = { algorithm = "gauss_seidel", step = 1e-3 }
+[instances.motor]
+fmu = "Motor.fmu"
+[instances.load]
+fmu = "Load.fmu"
+[[connections]]
+from = "motor.phi"
+to = "load.phi_in"
+[[connections]]
+from = "load.T"
+to = "motor.T"
+"""
+SCENARIO_MAP = """
+[inputs]
+"motor.M" = { column = "M" }
+[outputs]
+"motor.phi" = { column = "phi_m", noise = 3e-4 }
+"load.phi" = { column = "phi_l", noise = 3e-4 }
+[parameters]
+"motor.J" = { uncertainty = "5 %" }
+"motor.b" = { uncertainty = "5 %" }
+"load.J" = { uncertainty = "5 %" }
+"load.d" = { uncertainty = "5 %" }
+[ports.motor]
+input = "motor.M"
+position = "motor.phi"
+[cuts.coupling]
+input = "load.phi_in"
+far = "load.phi"
+effort = "load.T"
+"""
+
+
+def write_scenario(folder: Path) -> tuple[Path, Path]:
+    """Write two FMUs, a motor and a load behind a shaft, the scenario that connects them, and a map."""
+    for domain in (MOTOR, LOAD):
+        write_fmu(folder / f"{domain.name}.fmu", domain)
+    (folder / "loop.toml").write_text(SCENARIO, encoding="utf-8")
+    (folder / "loop_map.toml").write_text(SCENARIO_MAP, encoding="utf-8")
+    return folder / "loop.toml", folder / "loop_map.toml"
+
+
+@numba.njit(cache=True)
+def _coupled(p, u, h, per, gap, soft):
+    """Motor and load in midpoint steps; between them a gap, and a spring in series with the shaft's."""
+    x, out = np.zeros(4), np.zeros((len(u), 4))
+    stiffness = 1.0 / (1.0 / p[3] + soft)
+    step = h / per
+    for k in range(len(u) - 1):
+        for _ in range(per):
+            w = x.copy()
+            for share in (0.5, 1.0):
+                twist = w[0] - w[2]
+                t = stiffness * (twist - min(max(twist, -0.5 * gap), 0.5 * gap))
+                d = np.array([w[1], (u[k] - t - p[1] * w[1]) / p[0], w[3], (t - p[4] * w[3]) / p[2]])
+                w = x + share * step * d
+            x = w
+        out[k + 1] = x
+    return out
+
+
+def coupled_record(path: Path, rng, n: int, gap: float = 0.0, soft: float = 0.0) -> Path:
+    """Write a record of motor and load, coupled with a gap [rad] or a compliance [rad/N.m]."""
+    nominal = [v for domain in (MOTOR, LOAD) for v, _ in domain.parameters.values()]
+    p = np.array(nominal) * (1.0 + np.array([*rng.uniform(-0.05, 0.05, 3), 0.0, *rng.uniform(-0.05, 0.05, 1)]))
+    u = excitation(MOTOR, rng, n)
+    x = _coupled(p, u, MOTOR.h, 8 * FINE, gap, soft)
+    y = x[:, (0, 2)] + 3e-4 * rng.standard_normal((n, 2))
+    np.savetxt(path, np.column_stack([np.arange(n) * MOTOR.h, u, y]), fmt="%.10g", delimiter=",",
+               header="time,M,phi_m,phi_l", comments="")  # fmt: skip
+    return path
+
+
+@numba.njit(cache=True)
+def _changing(p, u, h, per, rate, slope, warmth):
+    """A mass on a spring that changes with time or with a signal, in midpoint steps."""
+    x, out = np.zeros(2), np.zeros((len(u), 2))
+    step = h / per
+    for k in range(len(u) - 1):
+        for j in range(per):
+            w = x.copy()
+            for share in (0.5, 1.0):
+                time = k * h + (j + 1.0 - share) * step
+                stiffness = p[1] + rate * time + slope * warmth[k]
+                d = np.array([w[1], (u[k] - stiffness * w[0] - p[2] * w[1]) / p[0]])
+                w = x + share * step * d
+            x = w
+        out[k + 1] = x
+    return out
+
+
+def changing_record(path: Path, rng, n: int, rate: float = 0.0, slope: float = 0.0) -> Path:
+    """Write a record of the mass on a spring, whose stiffness changes; ``T`` is a temperature above 20 degrees."""
+    domain = DOMAINS[0]
+    p = np.array([v * (1.0 + rng.uniform(-0.05, 0.05)) for v, _ in domain.parameters.values()])
+    u = excitation(domain, rng, n)
+    warmth = 10.0 * (1.0 - np.exp(-np.arange(n) / (0.3 * n))) + 3.0 * np.sin(np.arange(n) * 9.0 / n)
+    x = _changing(p, u, domain.h, FINE, rate, slope, warmth)
+    y = x[:, 0] + domain.noise[0] * rng.standard_normal(n)
+    np.savetxt(path, np.column_stack([np.arange(n) * domain.h, u, y, 20.0 + warmth]), fmt="%.10g", delimiter=",",
+               header="time,F,x,T", comments="")  # fmt: skip
     return path

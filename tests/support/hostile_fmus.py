@@ -79,12 +79,15 @@ budget = 1
 """
 IMPATIENT = """
 import sys
-from orchestrator.diagnosis.blackbox import runner
-runner.LOADING = runner.PATIENCE = float(sys.argv.pop(1))
+from pathlib import Path
+seconds = sys.argv.pop(1)
+if "diagnose" in sys.argv:
+    Path("impatient.toml").write_text(f"[process]\\nloading = {seconds}\\npatience = {seconds}\\n")
+    sys.argv += ["--settings", "impatient.toml"]
 from orchestrator.__main__ import run
 run()
 """
-"""``diagnose`` has no option for the seconds that a run may take; its own are far more than an idle machine needs."""
+"""The seconds that a run may take are settings; their defaults are far more than an idle machine needs."""
 
 
 def hostile_fmu(folder: Path, place: str, action: str, target: str = "-", port: int = 0, at: int = 3) -> Path:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pyfmu_sources import port_laws as laws
 
 Array = NDArray[np.float64]
-INPUT, OUTPUT, PORT = "input", "output", "port"
+INPUT, OUTPUT, PORT, PARAMETER, CUT = "input", "output", "port", "parameter", "cut"
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,9 @@ class Surroundings:
         position: rms of the position about zero; span: from the smallest to the largest.
         speed: rms of the speed.
         angular: the position is an angle.
+        effort: rms of what goes through a cut, negative where it acts against the twist.
         cycles: wavenumbers of ripples over the position, in order, told apart within its span.
+        once, long: thresholds that tell ripples from gravity, and hysteresis from friction.
     """
 
     h: float
@@ -38,14 +40,15 @@ class Surroundings:
     speed: float = 1.0
     acceleration: float = 1.0
     angular: bool = False
+    effort: float = 1.0
     cycles: tuple[float, ...] = ()
+    once: float = 0.0
+    long: float = 0.0
 
 
 Values = tuple[float, ...]
 REMEMBERS = ("input_delay", "input_lag", "input_rate_limit")
 """Effects in series with an input for which it matters what the signal was before the record."""
-STARTS_OFF = 1e-3
-"""Share of its rms by which a signal starts away from zero, so that this makes a difference."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +57,10 @@ class Kind:
 
     Attributes:
         name: of the effect.
-        where: in series at an ``input`` or an ``output``, or as feedback at a ``port``.
+        where: in series at an ``input`` or an ``output``, as feedback at a ``port``, in the value of a ``parameter``,
+            or in the ``cut`` between two FMUs.
         parameters: their names, in the order of the values.
-        units: of each: "effort", "flow" and "s" stand for the units at the place where it acts.
+        units: of each: "effort", "flow", "signal" and "s" stand for the units at the place where it acts.
         scales: scene -> what counts as a small change of each.
         starts: scene -> values to try.
         linear: the response is proportional to all values (found from one small change of each).
@@ -148,16 +152,8 @@ def _small(share: float) -> Callable[[Surroundings], Values]:
     return lambda s: (share * s.size,)
 
 
-ONCE = 0.03
-"""How far from 1 a ripple's wavenumber over an angle is at least: gravity is what comes once a turn."""
-
-
-LONG = 0.04
-"""Share of the motion over which hysteresis builds up at least: over less of it, it is dry friction."""
-
-
 def _once_a_turn(values: Values, scene: Surroundings) -> bool:
-    return scene.angular and abs(values[2] - 1.0) < ONCE
+    return scene.angular and abs(values[2] - 1.0) < scene.once
 
 
 def _positive(values: Values, scene: Surroundings) -> bool:
@@ -214,7 +210,7 @@ _FEEDBACK = (
          lambda s: (0.01 * s.size, 0.02 * s.span),
          lambda s: tuple((0.05 * s.size, f * s.span) for f in (0.08, 0.25, 0.8)),
          law=laws.HYSTERESIS, lower=(0.0, 1e-300), amplitudes=1,
-         plausible=lambda v, s: 0.0 < v[0] < 10.0 * s.peak and LONG * s.span < v[1] < 3.0 * s.span),
+         plausible=lambda v, s: 0.0 < v[0] < 10.0 * s.peak and s.long * s.span < v[1] < 3.0 * s.span),
     Kind("load", PORT, ("effort",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True, laws.LOAD),
     Kind("directional_friction", PORT, ("difference",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
          lambda s: ((0.01 * s.size / s.speed,),), True, laws.DIRECTIONAL),
@@ -222,25 +218,42 @@ _FEEDBACK = (
          lambda s: ((0.003 * s.size / s.acceleration,),), True, laws.INERTIA),
 )  # fmt: skip
 
-BANK: Mapping[str, Kind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK)}
+_INSIDE = (
+    Kind("parameter_drift", PARAMETER, ("rate",), ("effort/s",), lambda s: (0.05 * s.size / s.span,),
+         lambda s: ((0.1 * s.size / s.span,),), True),
+    Kind("parameter_dependence", PARAMETER, ("slope",), ("effort/signal",), lambda s: (0.05 * s.size / s.span,),
+         lambda s: ((0.1 * s.size / s.span,),), True),
+)  # fmt: skip
+
+_BETWEEN = (
+    Kind("backlash", CUT, ("width",), ("flow",), lambda s: (0.02 * s.size,),
+         lambda s: tuple((f * s.size,) for f in (0.1, 0.4, 1.5, 6.0, 25.0)), law=laws.BACKLASH, lower=(0.0,),
+         shrinks=True, plausible=lambda v, s: 0.0 < v[0] < 0.5 * s.span),
+    Kind("compliance", CUT, ("compliance",), ("flow/effort",), lambda s: (0.01 * s.size / s.effort,),
+         lambda s: ((0.01 * s.size / s.effort,),), True, law=laws.COMPLIANCE, plausible=_positive),
+)  # fmt: skip
+
+BANK: Mapping[str, Kind] = {kind.name: kind for kind in (*_SERIES, *_FEEDBACK, *_INSIDE, *_BETWEEN)}
 
 
 @dataclass(frozen=True)
 class BoxEffect:
-    """An effect of the bank at a place: the name of an input, an output or a port of the map.
+    """An effect of the bank at a place: the name of an input, an output, a parameter, a port or a cut of the map.
 
-    ``at_rest``: a signal with memory was zero before the record, and not what it was at first.
+    ``at_rest``: a signal with memory was zero before the record, and not what it was at first. ``signal``: what a
+    parameter depends on.
     """
 
     kind: Kind
     place: str
     scene: Surroundings = field(compare=False, repr=False)
     at_rest: bool = False
+    signal: str = ""
 
     @property
     def label(self) -> str:
         """Return name and place."""
-        return f"{self.kind.name}@{self.place}"
+        return f"{self.kind.name}@{self.place}" + (f"({self.signal})" if self.signal else "")
 
     def scales(self, values: Array) -> Values:
         """Return what counts as a small change of each value.

@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from orchestrator.diagnosis.blackbox.fitting import parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.problem import Data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
+from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.verdict import rest_of
 from orchestrator.errors import ScenarioError
 
@@ -41,15 +41,14 @@ class BoxCalibration:
 
 
 def calibrate(
-    path: Path, given: Map, data: Data, units: dict[str, str], progress: Callable[[str], None] = lambda what: None
+    subject: Subject, given: Map, data: Data, progress: Callable[[str], None] = lambda what: None
 ) -> BoxCalibration:
-    """Return the parameters of the FMU at ``path`` that explain ``data``; arguments as of ``diagnose``.
+    """Return the parameters of an FMU, or of several, that explain ``data``; arguments as of ``diagnose``.
 
     Args:
-        path: of the FMU.
+        subject: the FMU, or several.
         given: the map.
         data: the record.
-        units: of the FMU's variables, by name.
         progress: called with what is being done.
 
     Returns:
@@ -64,7 +63,7 @@ def calibrate(
         raise ScenarioError(f"{given.source}: $.parameters must give an uncertainty to at least one, but gives none")
     begun = time.monotonic()
     progress("probing")
-    problem, probe = prepared(path, given, data, units)
+    problem, probe = prepared(subject, given, data)
     try:
         with np.errstate(all="ignore"):
             parts = parts_of(problem.n)
@@ -82,7 +81,7 @@ def calibrate(
             seen = slice(0, parts.seen)
             fit = fitter.fit(fit.model, fit.level, None, seen) or fit
             covariance = fitter.covariance(fit, seen)
-            parameters, _ = estimates_of(problem, fit.model, covariance)
+            parameters, _ = estimates_of(problem, fit.model, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
             before, after = problem.must_simulate(problem.nominal), problem.must_simulate(fit.model)
             stages = (before, after, after)
             rest = rest_of(fitter, replace(fit, y=stages[1]), slice(0, problem.n))

@@ -13,7 +13,8 @@ from lxml import etree
 
 import pyfmu_sources
 from orchestrator.building.archive import write_archive
-from orchestrator.diagnosis.blackbox.bank import INPUT, OUTPUT, PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.binding import owned
 from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
 from orchestrator.diagnosis.blackbox.problem import series_of
 from orchestrator.errors import FmuError, OrchestratorError
@@ -34,11 +35,24 @@ BUILD = (
 
 @dataclass(frozen=True)
 class Part:
-    """One effect FMU of the system: its name, the effect, and the values it is given."""
+    """One effect FMU of the system: its name, the effect, and the values it is given.
+
+    Without an effect it hands a value from one FMU to another, extrapolated as in the fit.
+    """
 
     name: str
-    effect: BoxEffect
+    effect: BoxEffect | None
     values: dict[str, float | int | bool]
+
+    @property
+    def where(self) -> str:
+        """Where it acts; empty: between two FMUs, with no effect."""
+        return "" if self.effect is None else self.effect.kind.where
+
+    @property
+    def place(self) -> str:
+        """The input, output, port, parameter or cut that it acts at."""
+        return "" if self.effect is None else self.effect.place
 
 
 @dataclass(frozen=True)
@@ -63,7 +77,10 @@ class Delivered:
         Returns:
             Plain data.
         """
-        parts = [{"name": p.name, "effect": p.effect.label, "values": p.values} for p in self.parts]
+        parts = [
+            {"name": p.name, "effect": "connection" if p.effect is None else p.effect.label, "values": p.values}
+            for p in self.parts
+        ]
         return {"file": self.path.name, "parts": parts, "difference_over_noise": self.difference, "note": self.note}
 
 
@@ -99,27 +116,43 @@ def parts_of(outcome: BoxOutcome) -> tuple[Part, ...]:
         outcome: of the diagnosis.
 
     Returns:
-        The parts, in the order of the effects.
+        The parts: what hands values from one FMU to another, then the effects in their order.
+
+    Raises:
+        FmuError: what an FMU hands on depends at once on several connections.
     """
     problem = outcome.problem
     found = []
-    for k, (effect, values) in enumerate(zip(outcome.model.effects, outcome.model.values, strict=True)):
-        given: dict[str, float | int | bool] = {f"q{n}": float(v) for n, v in enumerate(values)}
+    for k, c in enumerate(problem.runner.subject.connections):
+        at_once = [t for t in problem.runner.through if t.wire == k]
+        if len(at_once) > 1:
+            raise FmuError(f"what {c.source} hands on must depend at once on one connection at most to be delivered")
+        gain = sum(t.gain for t in at_once)
+        values = {"series": SERIES.index("connection"), "q0": c.factor, "q1": c.offset, "q2": gain, "lead": 0.5}
+        found.append(Part(f"connection_{k + 1}", None, values))
+    for k, (effect, fitted) in enumerate(zip(outcome.model.effects, outcome.model.values, strict=True)):
+        given: dict[str, float | int | bool] = {f"q{n}": float(v) for n, v in enumerate(fitted)}
         if effect.kind.where == PORT:
             given |= {"series": -1, "law": effect.kind.law, "sign": problem.sign.get(effect.place, 1.0), "lead": 0.5}
             given["has_velocity"] = problem.map.ports[effect.place].velocity is not None
+        elif effect.kind.where == CUT:
+            given |= {"series": -1, "law": effect.kind.law, "sign": problem.sign.get(effect.place, 1.0), "lead": 0.5}
+        elif effect.kind.where == PARAMETER:
+            given |= {"series": SERIES.index(effect.kind.name.partition("_")[2])}
+            given |= {"q1": problem.starts(outcome.model)[effect.place], "q2": float(problem.data.time[0])}
+            if effect.signal:
+                given["q2"] = problem.map.signals[effect.signal].reference
         else:
             given |= {"series": SERIES.index(effect.kind.name.partition("_")[2]), "law": 0, "at_rest": effect.at_rest}
         found.append(Part(f"{effect.kind.name}_{k + 1}", effect, given))
     return tuple(found)
 
 
-def deliver(path: Path, fmu: Path, outcome: BoxOutcome) -> Delivered:
+def deliver(path: Path, outcome: BoxOutcome) -> Delivered:
     """Write the corrected system as SSP 1.0, and compare its run with the fit.
 
     Args:
         path: the SSP file.
-        fmu: the original.
         outcome: of the diagnosis.
 
     Returns:
@@ -129,17 +162,19 @@ def deliver(path: Path, fmu: Path, outcome: BoxOutcome) -> Delivered:
         FmuError: the effect FMU cannot be built.
     """
     parts = parts_of(outcome)
-    members = {f"resources/{fmu.name}": fmu.read_bytes()}
+    subject = outcome.problem.runner.subject
+    members = {f"resources/{fmu.name}": fmu.read_bytes() for fmu in subject.members.values()}
     attachment = ""
     if parts:
         with tempfile.TemporaryDirectory() as folder:
             built = _effect_fmu(Path(folder))
             attachment = f"AttachedEffect_{hashlib.sha256(built.read_bytes()).hexdigest()[:8]}.fmu"
             members[f"resources/{attachment}"] = built.read_bytes()
-    members[f"resources/{PLANT}.ssv"] = _values(_plant_values(outcome))
+    for name in subject.members:
+        members[f"resources/{name or PLANT}.ssv"] = _values(_given_to(name, outcome))
     for part in parts:
         members[f"resources/{part.name}.ssv"] = _values(part.values)
-    members[STRUCTURE] = _structure(outcome, parts, fmu.name, attachment)
+    members[STRUCTURE] = _structure(outcome, parts, attachment)
     write_archive(path, members)
     try:
         return Delivered(path, parts, difference(path, outcome))
@@ -166,13 +201,17 @@ def difference(path: Path, outcome: BoxOutcome, jacobi: bool = False) -> float:
     step = problem.h / problem.m
     table = series_of(problem, problem.n)
     start = float(problem.data.time[0])
-    signals = {f"{name}_in": Samples(table[:, k], step, start) for k, name in enumerate(problem.inputs)}
+    signals = {_system(name, "in"): Samples(table[:, k], step, start) for k, name in enumerate(problem.inputs)}
+    for name in _followed(parts_of(outcome)):
+        at = list(problem.map.signals).index(name)
+        values = problem.data.signals[:-1, at] + problem.map.signals[name].reference
+        signals[_system(name, "in")] = Samples(np.repeat(values, problem.m), step, start)
     worst = 0.0
     with opened_ssp(path, signals, step, jacobi) as scenario:
         result = simulate(scenario, Safety())
     for k, name in enumerate(problem.outputs):
-        last = [p.name for p in parts_of(outcome) if p.effect.kind.where == OUTPUT and p.effect.place == name]
-        signal = f"{last[-1]}.result" if last else f"{PLANT}.{name}"
+        last = [p.name for p in parts_of(outcome) if p.where == OUTPUT and p.place == name]
+        signal = f"{last[-1]}.result" if last else ".".join(_at(outcome, name))
         y = result[signal][:: problem.m][: problem.n]
         rows = slice(problem.n // 20, None)
         rms = float(np.sqrt(np.mean((y[rows] - fitted[: len(y), k][rows]) ** 2)))
@@ -180,11 +219,17 @@ def difference(path: Path, outcome: BoxOutcome, jacobi: bool = False) -> float:
     return worst
 
 
-def _plant_values(outcome: BoxOutcome) -> dict[str, float | int | bool]:
+def _given_to(member: str, outcome: BoxOutcome) -> dict[str, float | int | bool]:
+    """Return start values of one of the FMUs, by its own names."""
     problem = outcome.problem
-    values: dict[str, float | int | bool] = dict(problem.map.fixed)
-    values |= {u.name: float(v) for u, v in zip(problem.map.uncertain, outcome.model.p, strict=True)}
-    return values
+    placed = {owned(n, problem.runner.subject.members): v for n, v in problem.starts(outcome.model).items()}
+    return {variable: value for (name, variable), value in placed.items() if name == member}
+
+
+def _at(outcome: BoxOutcome, variable: str) -> tuple[str, str]:
+    """Return component and connector of a variable of an FMU."""
+    member, name = owned(variable, outcome.problem.runner.subject.members)
+    return member or PLANT, name
 
 
 def _values(values: dict[str, float | int | bool]) -> bytes:
@@ -203,36 +248,49 @@ def _values(values: dict[str, float | int | bool]) -> bytes:
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 
 
-def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], fmu: str, attachment: str) -> bytes:
-    problem = outcome.problem
+def _system(name: str, way: str) -> str:
+    """Return what a signal is called at the border of the system."""
+    return f"{name.replace('.', '_')}_{way}"
+
+
+def _followed(parts: tuple[Part, ...]) -> list[str]:
+    """Return the signals that parameters depend on."""
+    return list(dict.fromkeys(p.effect.signal for p in parts if p.effect is not None and p.effect.signal))
+
+
+def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], attachment: str) -> bytes:
+    problem, members = outcome.problem, outcome.problem.runner.subject.members
     spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp")}
     root = etree.Element(tag("ssd", "SystemStructureDescription"), nsmap=spaces, version="1.0", name="corrected")
     root.set("generationTool", "backlash-cosim")
     root.set("generationDateAndTime", DATE)
     system = etree.SubElement(root, tag("ssd", "System"), name="system")
     connectors = etree.SubElement(system, tag("ssd", "Connectors"))
-    for name in problem.inputs:
-        _connector(connectors, f"{name}_in", "input")
+    for name in (*problem.inputs, *_followed(parts)):
+        _connector(connectors, _system(name, "in"), "input")
     for name in problem.outputs:
-        _connector(connectors, f"{name}_out", "output")
+        _connector(connectors, _system(name, "out"), "output")
     elements = etree.SubElement(system, tag("ssd", "Elements"))
     # Effects before the FMU: where a master runs one after the other, they come first within a step.
-    ahead = [p for p in parts if p.effect.kind.where != OUTPUT]
-    behind = [p for p in parts if p.effect.kind.where == OUTPUT]
+    # What depends at once on what was fed looks at that before it changes.
+    ahead = sorted((p for p in parts if p.where != OUTPUT), key=lambda p: not (p.effect is None and p.values["q2"]))
+    behind = [p for p in parts if p.where == OUTPUT]
+    wired = _wires(outcome, parts)
     for part in ahead:
-        _component(
-            elements,
-            part.name,
-            attachment,
-            ["signal", "position", "velocity"] if _fed(part) else ["signal"],
-            ["result"],
-        )
-    fed = list(dict.fromkeys([*problem.inputs, *(problem.map.ports[p.effect.place].input for p in ahead if _fed(p))]))
-    _component(elements, PLANT, fmu, fed, list(problem.runner.reads))
+        taken = [connector for _, (name, connector) in wired if name == part.name]
+        _component(elements, part.name, attachment, {"input": taken, "output": ["result"]})
+    for name, fmu in members.items():
+        mine = {"input": [], "parameter": [], "output": []}  # type: dict[str, list[str]]
+        ends = dict.fromkeys([end for _, end in wired] + [_at(outcome, v) for v in problem.runner.reads])
+        for owner, variable in ends:
+            if owner == (name or PLANT):
+                full = f"{name}.{variable}" if name else variable
+                mine[problem.runner.subject.model.variables[full].causality].append(variable)
+        _component(elements, name or PLANT, fmu.name, mine)
     for part in behind:
-        _component(elements, part.name, attachment, ["signal"], ["result"])
+        _component(elements, part.name, attachment, {"input": ["signal"], "output": ["result"]})
     wires = etree.SubElement(system, tag("ssd", "Connections"))
-    for start, end in _wires(outcome, parts, fed):
+    for start, end in wired:
         given = (
             dict(zip(("startElement", "startConnector"), start, strict=True))
             if start[0]
@@ -251,47 +309,68 @@ def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], fmu: str, attachmen
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 
 
-def _fed(part: Part) -> bool:
-    return part.effect.kind.where == PORT
+Joined = tuple[tuple[str, str], tuple[str, str]]
 
 
-def _wires(
-    outcome: BoxOutcome, parts: tuple[Part, ...], fed: list[str]
-) -> list[tuple[tuple[str, str], tuple[str, str]]]:
+def _wires(outcome: BoxOutcome, parts: tuple[Part, ...]) -> list[Joined]:
     """Return the connections; an empty element is the system itself."""
     problem = outcome.problem
-    found = []
-    for name in fed:
-        at: tuple[str, str] | None = ("", f"{name}_in") if name in problem.inputs else None
-        series = [p for p in parts if p.effect.kind.where == INPUT and p.effect.place == name]
-        feedback = [p for p in parts if _fed(p) and problem.map.ports[p.effect.place].input == name]
-        for part in (*series, *feedback):
+    found: list[Joined] = []
+    handed = dict(zip([c.target for c in problem.runner.subject.connections], parts, strict=False))
+    ports = [problem.map.ports[p.place].input for p in parts if p.where == PORT]
+    for name in dict.fromkeys([*problem.inputs, *ports, *handed]):
+        at: tuple[str, str] | None = ("", _system(name, "in")) if name in problem.inputs else None
+        series = [p for p in parts if p.where == INPUT and p.place == name]
+        cuts = [p for p in parts if p.where == CUT and problem.map.cuts[p.place].input == name]
+        feedback = [p for p in parts if p.where == PORT and problem.map.ports[p.place].input == name]
+        for part in (*series, *([handed[name]] if name in handed else []), *cuts, *feedback):
             if at is not None:
                 found.append((at, (part.name, "signal")))
             at = (part.name, "result")
         assert at is not None
-        found.append((at, (PLANT, name)))
+        found.append((at, _at(outcome, name)))
+    for connected, part in zip(problem.runner.subject.connections, parts, strict=False):
+        found.append((_at(outcome, connected.source), (part.name, "signal")))
+    for t in problem.runner.through:
+        target = _at(outcome, problem.runner.subject.connections[t.by].target)
+        fed = next(start for start, end in found if end == target)
+        found.append((fed, (parts[t.wire].name, "position")))
     for part in parts:
-        if _fed(part):
-            port = problem.map.ports[part.effect.place]
-            found.append(((PLANT, port.position), (part.name, "position")))
-            if port.velocity is not None:
-                found.append(((PLANT, port.velocity), (part.name, "velocity")))
+        found += _read(outcome, part)
     for name in problem.outputs:
-        at = (PLANT, name)
+        at = _at(outcome, name)
         for part in parts:
-            if part.effect.kind.where == OUTPUT and part.effect.place == name:
+            if part.where == OUTPUT and part.place == name:
                 found.append((at, (part.name, "signal")))
                 at = (part.name, "result")
-        found.append((at, ("", f"{name}_out")))
+        found.append((at, ("", _system(name, "out"))))
     return found
 
 
-def _component(parent: etree._Element, name: str, source: str, inputs: list[str], outputs: list[str]) -> None:
+def _read(outcome: BoxOutcome, part: Part) -> list[Joined]:
+    """Return what an effect reads beside the signal that it stands in, and the parameter that it sets."""
+    found: list[Joined] = []
+    if part.effect is None:
+        return found
+    if part.where == PORT:
+        port = outcome.problem.map.ports[part.place]
+        found.append((_at(outcome, port.position), (part.name, "position")))
+        if port.velocity is not None:
+            found.append((_at(outcome, port.velocity), (part.name, "velocity")))
+    elif part.where == CUT:
+        found.append((_at(outcome, outcome.problem.beyond(part.effect)), (part.name, "position")))
+    elif part.where == PARAMETER:
+        found.append(((part.name, "result"), _at(outcome, part.place)))
+        if part.effect.signal:
+            found.append((("", _system(part.effect.signal, "in")), (part.name, "signal")))
+    return found
+
+
+def _component(parent: etree._Element, name: str, source: str, variables: dict[str, list[str]]) -> None:
     given = {"name": name, "type": "application/x-fmu-sharedlibrary", "source": f"resources/{source}"}
     component = etree.SubElement(parent, tag("ssd", "Component"), given | {"implementation": "CoSimulation"})
     connectors = etree.SubElement(component, tag("ssd", "Connectors"))
-    for kind, names in (("input", inputs), ("output", outputs)):
+    for kind, names in variables.items():
         for variable in names:
             _connector(connectors, variable, kind)
     bindings = etree.SubElement(component, tag("ssd", "ParameterBindings"))

@@ -3,22 +3,30 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, estimates_of, misfits
+from orchestrator.diagnosis.blackbox.estimates import (
+    FoundEffect,
+    OutputMisfit,
+    ValueEstimate,
+    errors_of,
+    estimates_of,
+    misfits,
+)
 from orchestrator.diagnosis.blackbox.fitting import BoxFit, BoxParts, Fitter, Ladder, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
-from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data, effects_of
+from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
+from orchestrator.diagnosis.blackbox.sites import effects_of
+from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.verdict import (
     Rest,
     beginning_of,
-    family_of,
+    families_of,
     predicted,
     recovered,
     rest_of,
@@ -74,21 +82,21 @@ Progress = Callable[[str], None]
 
 
 def prepared(
-    path: Path,
+    subject: Subject,
     given: Map,
     data: Data,
-    units: dict[str, str],
     workers: int | None = None,
     progress: Progress = lambda what: None,
+    settings: BoxSettings = DEFAULT,
 ) -> tuple[BoxProblem, Probe]:
     """Return a probed problem without what does nothing, its noise known.
 
     Args:
-        path: of the FMU.
+        subject: the FMU, or several.
         given: the map.
         data: the record.
-        units: of the FMU's variables, by name.
         workers: child processes.
+        settings: thresholds.
 
     Returns:
         The problem, whose children the caller ends, and what the FMU was found to be.
@@ -96,8 +104,8 @@ def prepared(
     Raises:
         FmuError: the FMU cannot be used.
     """
-    problem, probe = opened(path, given, data, workers, progress)
-    problem.units = units
+    problem, probe = opened(subject, given, data, workers, progress, settings)
+    problem.units = subject.units
     problem.map = reduced(given, probe)
     problem.sign = probe.sign
     y = problem.must_simulate(problem.nominal)
@@ -119,27 +127,25 @@ def fitters(problem: BoxProblem, parts: BoxParts, settings: BoxSettings = DEFAUL
     """
     surrogate, drive = problem.impulses(problem.nominal, max(problem.n // 2, 16))
     return [
-        Fitter(problem, Ladder(surrogate, drive, problem.n, off), parts, settings)
+        Fitter(problem, Ladder(surrogate, drive, problem.n, off, settings.noise), parts, settings)
         for off in (0.0, settings.start.spread)
     ]
 
 
 def diagnose(
-    path: Path,
+    subject: Subject,
     given: Map,
     data: Data,
-    units: dict[str, str],
     settings: BoxSettings = DEFAULT,
     progress: Progress = lambda what: None,
     workers: int | None = None,
 ) -> BoxOutcome:
-    """Return what ``data`` says of the FMU at ``path``.
+    """Return what ``data`` says of an FMU, or of several.
 
     Args:
-        path: of the FMU.
+        subject: the FMU, or several.
         given: the map.
         data: the record.
-        units: of the FMU's variables, by name.
         settings: thresholds.
         progress: called with what is being done.
         workers: child processes.
@@ -153,7 +159,7 @@ def diagnose(
     """
     begun = time.monotonic()
     progress("probing")
-    problem, probe = prepared(path, given, data, units, workers, progress)
+    problem, probe = prepared(subject, given, data, workers, progress, settings)
     try:
         with np.errstate(all="ignore"):
             return _diagnosed(problem, probe, settings, progress, begun)
@@ -272,19 +278,16 @@ def _judged(
     else:
         as_given = rest_of(fitter, nominal, slice(0, problem.n), settings).explained
         verdict = ("none" if as_given else "parameters") if fine else "unknown"
-    covariance = fitter.covariance(last, seen)
-    parameters, values = estimates_of(problem, last.model, covariance)
+    parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen))
     named: tuple[FoundEffect, ...] = ()
     if verdict == "effects":
-        family = family_of(search, best)
-        n = len(best.model.effects)
+        families = families_of(search, best)
         named = tuple(
-            FoundEffect(e, values[k], best.total - base.total, family if k == n - 1 else ())
-            for k, e in enumerate(last.model.effects)
+            FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
         )
     suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
     if suspects:
-        suspects += family_of(search, best)
+        suspects += tuple(dict.fromkeys(label for family in families_of(search, best) for label in family))
     model = last.model if verdict != "unknown" else base.model
     where = _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else ()
     return BoxOutcome(

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from orchestrator.fmi.model_description import FmuDescription
+from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.master.protocol import Unit, Variable
 
 CONJUGATE = (
@@ -14,20 +14,21 @@ SPREAD = "5 %"
 MOST_PARAMETERS = 12
 
 
-def drafted(description: FmuDescription, columns: Sequence[str], time: str = "time") -> str:
+def drafted(subject: Subject, columns: Sequence[str], time: str = "time") -> str:
     """Return a map as TOML, to be looked over by its user.
 
     Args:
-        description: of the FMU.
+        subject: the FMU, or several.
         columns: of the record.
         time: name of the column with the time.
 
     Returns:
         The text.
     """
-    model = description.model
+    model = subject.model
     reals = [v for v in model.variables.values() if v.type == "Real"]
-    inputs = [v for v in reals if v.causality == "input"]
+    taken = {c.target for c in subject.connections}
+    inputs = [v for v in reals if v.causality == "input" and v.name not in taken]
     outputs = [v for v in reals if v.causality == "output"]
     lines = [f"# Draft for {model.name}: look over columns, uncertainties and ports.", "[inputs]"]
     found = {v.name: _column(v, columns, time) for v in (*inputs, *outputs)}

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import PORT, BoxEffect
-from orchestrator.diagnosis.blackbox.fitting import Rows
+from orchestrator.diagnosis.blackbox.bank import CUT, PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter, Rows
 from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
 from orchestrator.errors import FmuError
-from orchestrator.shared.inference.normal import interval_95
+from orchestrator.shared.inference.normal import NORMAL_95, interval_95
 
 Array = NDArray[np.float64]
 
@@ -79,20 +79,51 @@ def misfits(problem: BoxProblem, stages: Sequence[Array], rows: Rows) -> tuple[O
     )
 
 
+def errors_of(fitter: Fitter, fit: BoxFit, rows: Rows) -> Array:
+    """Return the standard errors of all values.
+
+    What acts in steps (a quantum) has a likelihood with many teeth, of which derivatives see one: its interval holds
+    every value nearby that does as well.
+
+    Args:
+        fitter: gives the filters and the FMU.
+        fit: whose Jacobian is known over ``rows``.
+        rows: samples that were fitted.
+
+    Returns:
+        Shape (values,).
+    """
+    own, problem = fitter.settings.fit, fitter.problem
+    errors = np.sqrt(np.maximum(np.diag(fitter.covariance(fit, rows)), 0.0))
+    best = fitter.likelihood(fitter.whitened(fit.y, fit.level), fit.level, rows)
+    z, at = fit.model.vector, len(fit.model.p)
+    shares = np.geomspace(own.alike_from, own.alike_to, own.alike_tried)
+    for effect, values in zip(fit.model.effects, fit.model.values, strict=True):
+        if effect.kind.finer is not None:
+            offsets = z[at] * np.concatenate([-shares, shares])
+            models = [fit.model.moved(np.concatenate([z[:at], [z[at] + d], z[at + 1 :]])) for d in offsets]
+            runs = problem.simulate(models, len(fit.y))
+            found = [-np.inf if y is None else fitter.likelihood(fitter.whitened(y, fit.level), fit.level, rows)
+                     for y in runs]  # fmt: skip
+            alike = np.abs(offsets)[np.array(found) > best - own.alike]
+            errors[at] = max(errors[at], float(np.max(alike, initial=0.0)) / NORMAL_95)
+        at += len(values)
+    return errors
+
+
 def estimates_of(
-    problem: BoxProblem, model: BoxModel, covariance: Array
+    problem: BoxProblem, model: BoxModel, errors: Array
 ) -> tuple[tuple[ValueEstimate, ...], list[tuple[ValueEstimate, ...]]]:
     """Return estimates of the parameters, and of the values of each effect.
 
     Args:
         problem: the FMU and the record.
         model: the final one.
-        covariance: (values, values) of all that was fitted.
+        errors: (values,) standard errors of all that was fitted.
 
     Returns:
         Both, with 95 % intervals.
     """
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
     def one(name: str, value: float, error: float, unit: str, nominal: float | None = None) -> ValueEstimate:
         return ValueEstimate(name, value, error, interval_95(value, error), unit, nominal)
@@ -118,9 +149,12 @@ def _units_at(problem: BoxProblem, effect: BoxEffect) -> tuple[str, ...]:
     if effect.kind.where == PORT:
         port = problem.map.ports[effect.place]
         names = {"effort": problem.units.get(port.input, ""), "flow": problem.units.get(port.position, "")}
+    elif effect.kind.where == CUT:
+        cut = problem.map.cuts[effect.place]
+        names = {"effort": problem.units.get(cut.effort or "", ""), "flow": problem.units.get(cut.input, "")}
     else:
         unit = problem.units.get(effect.place, "")
-        names = {"effort": unit, "flow": unit}
+        names = {"effort": unit, "flow": unit, "signal": effect.signal}
     found = []
     for unit in effect.kind.units:
         shown = unit

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
-from orchestrator.diagnosis.blackbox.whitening import SHARES, Ladder
+from orchestrator.diagnosis.blackbox.whitening import Ladder
 
 Array = NDArray[np.float64]
 
@@ -367,7 +367,7 @@ class Fitter:
         if J is None:
             k = self.best_level(y, rows)
         # What cannot be led to the end is left where it keeps close the longest: others start from there.
-        lost = stop < self.settings.fit.lost * reach and self.ladder.share(k) >= SHARES[-2]
+        lost = stop < self.settings.fit.lost * reach and self.ladder.share(k) >= self.ladder.shares[-2]
         return self.fit(model, k, J, held=held, y=y, iterations=0 if lost else None)
 
     def settled(self, fit: BoxFit, rows: Rows | None = None, until: int | None = None) -> BoxFit:
@@ -423,7 +423,7 @@ class Fitter:
         """Return the free run that is likeliest once all other values follow, and the level at which it is."""
         rows, found = self.parts.fitted, []
         block = np.concatenate([J, *(self.problem.residual(y)[:, :, None] for y in runs)], axis=2)
-        for k in range(min(len(SHARES), self.ladder.size)):
+        for k in range(min(len(self.ladder.shares), self.ladder.size)):
             white = self.ladder[k].whiten(block)[rows].reshape(-1, block.shape[2])
             columns, e = white[:, : J.shape[2]], white[:, J.shape[2] :]
             Q, _ = np.linalg.qr(columns / np.maximum(np.sqrt(np.sum(columns * columns, axis=0)), 1e-300))
@@ -446,7 +446,7 @@ class Fitter:
         """
         again: BoxFit | None = fit
         often = self.settings.fit.annealed
-        for k in range(len(SHARES) - 1, -1, -1):
+        for k in range(len(self.ladder.shares) - 1, -1, -1):
             if k < self.ladder.size and self.ladder.share(k) < self.ladder.share(fit.level) and again is not None:
                 again = self.fit(again.model, k, y=again.y, held=often, iterations=often)
         return None if again is None else self.fit(again.model, again.level, again.J, y=again.y)

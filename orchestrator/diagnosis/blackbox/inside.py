@@ -3,7 +3,6 @@
 import os
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,10 +17,10 @@ Answer = list[Any]
 
 
 def opened(request: Load) -> Callable[[Batch], Answer]:
-    """Return what runs batches of the FMU that ``request`` names.
+    """Return what runs batches of the FMUs that ``request`` names.
 
     Args:
-        request: path, inputs and outputs of the FMU.
+        request: the FMUs, their inputs and outputs.
 
     Returns:
         Called with a batch, it gives results, reasons of failures and the time taken [s].
@@ -29,7 +28,7 @@ def opened(request: Load) -> Callable[[Batch], Answer]:
     _use_compiled()
     from orchestrator.diagnosis.blackbox.binding import Box
 
-    box = Box(Path(request.path), request.inputs, request.reads, request.tolerance, request.fresh)
+    box = Box(request)
 
     def run(batch: Batch) -> Answer:
         begun = time.monotonic()
@@ -39,7 +38,7 @@ def opened(request: Load) -> Callable[[Batch], Answer]:
             rows: Array | None = None
             reason = ""
             try:
-                rows = box.run(job, batch.tables[job.table], batch.start, batch.step, batch.per_row, batch.lead)
+                rows = box.run(job, batch)
                 if not np.all(np.isfinite(rows)):
                     rows, reason = None, "it returned values that are not finite"
             except OrchestratorError as error:

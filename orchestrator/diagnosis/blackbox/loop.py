@@ -1,7 +1,8 @@
-"""The inner loop of a black box: the FMU's own functions called by address, effects at its ports between them.
+"""The inner loop of a black box: the FMUs' own functions called by address, effects at ports and cuts between them.
 
-The signal that is fed back is extrapolated to the middle of the coming step: feedback is then of order two in the
-step, where the plain value is of order one and looks like physics (a sampled spring is a negative damper).
+A signal that is fed back, or handed from FMU to FMU, is extrapolated to the middle of the coming step: the loop is then
+of order two in the step, where the plain value is of order one and looks like physics (a sampled spring is a negative
+damper).
 """
 
 from typing import Any
@@ -17,22 +18,99 @@ _built_up: Any = _laws.built_up
 _has_memory: Any = _laws.has_memory
 _distance: Any = _laws.distance_of
 _resistance: Any = _laws.resistance
+_cuts: Any = _laws.cuts
+_across: Any = _laws.across
 
 SET, STEP, GET = 1, 2, 3
 """The call that failed, as ``run_loop`` returns it."""
 
 
 @kept()
-def run_loop(calls, counts, where, sent, read, table, grid, ports, sign, q, lead, out):  # type: ignore[no-untyped-def]
-    """Run one record; return ``(status, call, step)``, status at most 1 when all went well.
+def _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, handed, lead):  # type: ignore[no-untyped-def]
+    """Add to inputs what other FMUs hand to them, extrapolated."""
+    now = np.zeros(len(wires))
+    for w in range(len(wires)):
+        now[w] = read[outof[wires[w, 1]]]
+    if k > 1:
+        for t in range(len(passing)):
+            now[passing[t, 0]] += passed[t] * lead * (fed[passing[t, 1], 0] - fed[passing[t, 1], 1])
+    for w in range(len(wires)):
+        before = handed[w] if k > 0 else now[w]
+        sent[into[wires[w, 0]]] += gains[w, 0] * (now[w] + lead * (now[w] - before)) + gains[w, 1]
+        handed[w] = now[w]
+
+
+@kept()
+def _act(k, sent, read, into, outof, ports, sign, q, last, built, step, lead):  # type: ignore[no-untyped-def]
+    """Let the effects at ports and cuts act on the inputs."""
+    for e in range(len(ports)):
+        kind, target = ports[e, 1], into[ports[e, 0]]
+        x = read[outof[ports[e, 2]]]
+        before = last[e, 0] if k > 0 else x
+        place = x + lead * (x - before)
+        last[e, 0] = x
+        if _cuts(kind):
+            sent[target] = _across(kind, sent[target], place, sign[e], q[e, 0])
+            continue
+        if ports[e, 3] >= 0:
+            v = read[outof[ports[e, 3]]]
+            ahead = lead
+        else:
+            v = (x - before) / step
+            ahead = lead + 0.5
+        known = k > 0 if ports[e, 3] >= 0 else k > 1
+        old = last[e, 1] if known else v
+        a = (v - old) / step
+        middle = v + ahead * (v - old)
+        if _has_memory(kind):
+            distance = _distance(kind, q[e, 1], q[e, 3])
+            half = _built_up(kind, built[e], middle, distance, 0.5 * step)
+            built[e] = _built_up(kind, built[e], middle, distance, step)
+        else:
+            half = 0.0
+        sent[target] -= sign[e] * _resistance(kind, place, middle, a, half, q[e, 0], q[e, 1], q[e, 2])
+        last[e, 1] = v
+
+
+@kept()
+def _step(calls, counts, where, time, step):  # type: ignore[no-untyped-def]
+    """Set, step and read all FMUs; return ``(status, call, member)``."""
+    for n in range(len(calls)):
+        if counts[n, 0] > 0:
+            status = call_transfer(calls[n, 1], calls[n, 0], where[n, 0], counts[n, 0], where[n, 1])
+            if status > 1:
+                return status, SET, n
+    for n in range(len(calls)):
+        status = call_step(calls[n, 2], calls[n, 0], time, step)
+        if status > 1:
+            return status, STEP, n
+    for n in range(len(calls)):
+        if counts[n, 1] > 0:
+            status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
+            if status > 1:
+                return status, GET, n
+    return np.int32(0), GET, 0
+
+
+@kept()
+def run_loop(  # type: ignore[no-untyped-def]
+    calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, sign, q, lead, out
+):
+    """Run one record; return ``(status, call, step, member)``, status at most 1 when all went well.
 
     Args:
-        calls: component, fmi2SetReal, fmi2DoStep, fmi2GetReal.
-        counts: number of inputs, number of variables read.
-        where: addresses of references and values of inputs, of references and values of what is read.
+        calls: (members, 4) component, fmi2SetReal, fmi2DoStep, fmi2GetReal.
+        counts: (members, 2) number of inputs, number of variables read.
+        where: (members, 4) addresses of references and values of inputs, of references and values of what is read.
         sent, read: the buffers at those addresses.
-        table: (steps, inputs) values held over each step.
+        into: (columns,) place of each column of the table in ``sent``.
+        outof: (variables read,) place of each in ``read``.
+        table: (steps, columns) values held over each step.
         grid: start time, step, steps per row of ``out``.
+        wires: (wires, 2) column that is fed, variable that feeds it.
+        gains: (wires, 2) factor and offset.
+        passing: (pairs, 2) a wire whose source depends at once on what another feeds: both places.
+        passed: (pairs,) how much. What is read was computed from what was fed, the middle of the step before.
         ports: (effects, 4) input, law, place of the position, place of the speed (-1: differentiated).
         sign: (effects,) direction in which the input pushes.
         q: (effects, 4) parameters.
@@ -40,50 +118,27 @@ def run_loop(calls, counts, where, sent, read, table, grid, ports, sign, q, lead
         out: (rows, variables read), row 0 the initial values.
     """
     start, step, per_row = grid[0], grid[1], int(grid[2])
-    effects = len(ports)
-    last = np.zeros((effects, 3))
-    built = np.zeros(effects)
-    status = call_transfer(calls[3], calls[0], where[2], counts[1], where[3])
-    if status > 1:
-        return status, GET, 0
-    out[0] = read
+    last, built = np.zeros((len(ports), 2)), np.zeros(len(ports))
+    fed, handed = np.zeros((len(wires), 2)), np.zeros(len(wires))
+    for n in range(len(calls)):
+        status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
+        if status > 1:
+            return status, GET, 0, n
+    for i in range(len(outof)):
+        out[0, i] = read[outof[i]]
     for k in range(len(table)):
-        for i in range(counts[0]):
-            sent[i] = table[k, i]
-        for e in range(effects):
-            kind = ports[e, 1]
-            x = read[ports[e, 2]]
-            before = last[e, 0] if k > 0 else x
-            if ports[e, 3] >= 0:
-                v = read[ports[e, 3]]
-                ahead = lead
-            else:
-                v = (x - before) / step
-                ahead = lead + 0.5
-            known = k > 0 if ports[e, 3] >= 0 else k > 1
-            old = last[e, 1] if known else v
-            a = (v - old) / step
-            middle = v + ahead * (v - old)
-            place = x + lead * (x - before)
-            if _has_memory(kind):
-                distance = _distance(kind, q[e, 1], q[e, 3])
-                half = _built_up(kind, built[e], middle, distance, 0.5 * step)
-                built[e] = _built_up(kind, built[e], middle, distance, step)
-            else:
-                half = 0.0
-            force = _resistance(kind, place, middle, a, half, q[e, 0], q[e, 1], q[e, 2])
-            sent[ports[e, 0]] -= sign[e] * force
-            last[e, 0] = x
-            last[e, 1] = v
-        status = call_transfer(calls[1], calls[0], where[0], counts[0], where[1])
+        for i in range(len(into)):
+            sent[into[i]] = table[k, i]
+        _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, handed, lead)
+        _act(k, sent, read, into, outof, ports, sign, q, last, built, step, lead)
+        for w in range(len(wires)):
+            fed[w, 1] = fed[w, 0]
+            fed[w, 0] = sent[into[wires[w, 0]]]
+        status, call, n = _step(calls, counts, where, start + k * step, step)
         if status > 1:
-            return status, SET, k
-        status = call_step(calls[2], calls[0], start + k * step, step)
-        if status > 1:
-            return status, STEP, k
-        status = call_transfer(calls[3], calls[0], where[2], counts[1], where[3])
-        if status > 1:
-            return status, GET, k
+            return status, call, k, n
         if (k + 1) % per_row == 0:
-            out[(k + 1) // per_row] = read
-    return np.int32(0), GET, 0
+            row = (k + 1) // per_row
+            for i in range(len(outof)):
+                out[row, i] = read[outof[i]]
+    return np.int32(0), GET, 0, 0

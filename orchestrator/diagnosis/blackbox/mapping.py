@@ -14,6 +14,12 @@ A map is TOML::
     input = "M_B"                             # what effects at the port add to
     position = "phiA"                         # any readable variable
     velocity = "wA"                           # absent: differentiated
+    [signals]
+    warmth = { column = "T", reference = 20 }  # what parameters may depend on
+    [cuts.coupling]                           # with a scenario of several FMUs
+    input = "load.phi_in"                     # the position that one hands to another
+    far = "load.phi"                          # the position beyond it: for a gap
+    effort = "load.tau"                       # what goes through it: for a spring
     [options]
     tolerance = 1e-8                          # of the FMU's own solver
 """
@@ -24,8 +30,8 @@ from typing import Any
 
 import msgspec
 
+from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.errors import ScenarioError
-from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.master.protocol import Variable
 from orchestrator.records.model_file import ModelParameter
 
@@ -63,6 +69,22 @@ class PortEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     velocity: str | None = None
 
 
+class SignalEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A column that parameters may depend on, and its value at which they are what the map says."""
+
+    column: str = ""
+    reference: float = 0.0
+    factor: float = 1.0
+
+
+class CutEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A connection between two FMUs that carries a position: what lies beyond it, and what goes through it."""
+
+    input: str
+    far: str | None = None
+    effort: str | None = None
+
+
 class Options(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What else can be said."""
 
@@ -82,6 +104,8 @@ class MapFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     parameters: dict[str, ParameterEntry] = {}
     start: dict[str, ParameterEntry] = {}
     ports: dict[str, PortEntry] = {}
+    signals: dict[str, SignalEntry] = {}
+    cuts: dict[str, CutEntry] = {}
     options: Options = Options()
 
 
@@ -89,9 +113,10 @@ class Map(msgspec.Struct, frozen=True):
     """A map that has been checked against its FMU.
 
     Attributes:
-        inputs, outputs, ports, options: as written, with columns filled in.
+        inputs, outputs, ports, signals, cuts, options: as written, with columns filled in.
         uncertain: what is re-fitted.
         fixed: values by name of what is set and not re-fitted.
+        tunable: those of what is re-fitted that their FMU says may change within a run.
         source: file name, for messages.
     """
 
@@ -102,14 +127,17 @@ class Map(msgspec.Struct, frozen=True):
     fixed: dict[str, float]
     options: Options
     source: str
+    signals: dict[str, SignalEntry] = {}
+    cuts: dict[str, CutEntry] = {}
+    tunable: tuple[str, ...] = ()
 
 
-def read_map(path: Path, description: FmuDescription) -> Map:
+def read_map(path: Path, subject: Subject) -> Map:
     """Read and check a map.
 
     Args:
         path: a TOML file.
-        description: of the FMU.
+        subject: the FMU, or several.
 
     Returns:
         The map.
@@ -127,15 +155,15 @@ def read_map(path: Path, description: FmuDescription) -> Map:
         written = msgspec.toml.decode(data, type=MapFile)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise ScenarioError(f"{path}: {error}") from None
-    return checked(written, description, str(path))
+    return checked(written, subject, str(path))
 
 
-def checked(written: MapFile, description: FmuDescription, source: str) -> Map:
-    """Check a map against an FMU.
+def checked(written: MapFile, subject: Subject, source: str) -> Map:
+    """Check a map against an FMU, or several.
 
     Args:
         written: what the file says.
-        description: of the FMU.
+        subject: the FMU, or several.
         source: the file's name, for messages.
 
     Returns:
@@ -144,7 +172,7 @@ def checked(written: MapFile, description: FmuDescription, source: str) -> Map:
     Raises:
         ScenarioError: see ``read_map``.
     """
-    look = _Look(description.model.variables, source)
+    look = _Look(subject.model.variables, source)
     if not written.inputs:
         raise ScenarioError(f"{source}: $.inputs must name at least one input with a column, but names none")
     if not written.outputs:
@@ -164,14 +192,21 @@ def checked(written: MapFile, description: FmuDescription, source: str) -> Map:
         look.up(f"$.ports.{name}.position", port.position, ("output", "local"))
         if port.velocity is not None:
             look.up(f"$.ports.{name}.velocity", port.velocity, ("output", "local"))
+    for name, signal in written.signals.items():
+        look.factor(f"$.signals.{name}.factor", signal.factor)
+        if not math.isfinite(signal.reference):
+            raise ScenarioError(f"{source}: $.signals.{name}.reference must be finite, but is {signal.reference!r}")
+    _check_connections(written, subject, look)
     if not 1 <= written.options.substeps <= 1000:
         raise ScenarioError(f"{source}: $.options.substeps must be 1 to 1000, but is {written.options.substeps}")
-    uncertain, fixed = [], {}
+    uncertain: list[ModelParameter] = []
+    fixed = dict(subject.given)
     for table, entries in (("parameters", written.parameters), ("start", written.start)):
         for name, entry in entries.items():
-            found = look.uncertain(f"$.{table}.{name}", name, entry)
+            found = look.uncertain(f"$.{table}.{name}", name, entry, subject.given.get(name))
             if found.uncertainty > 0.0:
                 uncertain.append(found)
+                fixed.pop(name, None)
             else:
                 fixed[name] = found.value
     return Map(
@@ -182,14 +217,41 @@ def checked(written: MapFile, description: FmuDescription, source: str) -> Map:
         fixed,
         written.options,
         source,
+        {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.signals.items()},
+        written.cuts,
+        tuple(u.name for u in uncertain if subject.model.variables[u.name].variability == "tunable"),
     )
+
+
+def _check_connections(written: MapFile, subject: Subject, look: "_Look") -> None:
+    """Refuse cuts where nothing is handed on, and inputs that are fed from elsewhere.
+
+    Raises:
+        ScenarioError: see ``read_map``.
+    """
+    targets = {c.target for c in subject.connections}
+    for name, cut in written.cuts.items():
+        look.up(f"$.cuts.{name}.input", cut.input, ("input",))
+        if cut.input not in targets:
+            raise ScenarioError(
+                f"{look.source}: $.cuts.{name}.input must be what one FMU of a scenario hands to another, but "
+                f"{cut.input!r} is not connected"
+            )
+        if cut.far is None and cut.effort is None:
+            raise ScenarioError(f"{look.source}: $.cuts.{name} must have `far`, `effort` or both, but has neither")
+        for key, variable in (("far", cut.far), ("effort", cut.effort)):
+            if variable is not None:
+                look.up(f"$.cuts.{name}.{key}", variable, ("output", "local"))
+    for name in subject.fed:
+        if name not in written.inputs:
+            raise ScenarioError(f"{look.source}: $.inputs must give {name!r} a column: the scenario feeds it")
 
 
 class _Look:
     """Looks names up, and says where one is wrong."""
 
     def __init__(self, variables: Any, source: str) -> None:
-        self._variables, self._source = variables, source
+        self._variables, self.source = variables, source
 
     def up(self, where: str, name: str, causalities: tuple[str, ...]) -> Variable:
         """Return a variable of type Real."""
@@ -198,31 +260,31 @@ class _Look:
         if name not in self._variables:
             near = difflib.get_close_matches(name, self._variables, 1)
             hint = f" (did you mean {near[0]!r}?)" if near else ""
-            raise ScenarioError(f"{self._source}: {where} must be a variable of the FMU, but {name!r} is not{hint}")
+            raise ScenarioError(f"{self.source}: {where} must be a variable of the FMU, but {name!r} is not{hint}")
         variable: Variable = self._variables[name]
         if variable.type != "Real":
-            raise ScenarioError(f"{self._source}: {where} must be of type Real, but is {variable.type}")
+            raise ScenarioError(f"{self.source}: {where} must be of type Real, but is {variable.type}")
         if variable.causality not in causalities:
             wanted = " or ".join(causalities)
-            raise ScenarioError(f"{self._source}: {where} must be of causality {wanted}, but is {variable.causality}")
+            raise ScenarioError(f"{self.source}: {where} must be of causality {wanted}, but is {variable.causality}")
         return variable
 
     def factor(self, where: str, factor: float) -> None:
         """Refuse a factor that cannot be one."""
         if not (math.isfinite(factor) and factor != 0.0):
-            raise ScenarioError(f"{self._source}: {where} must be finite and not 0, but is {factor!r}")
+            raise ScenarioError(f"{self.source}: {where} must be finite and not 0, but is {factor!r}")
 
-    def uncertain(self, where: str, name: str, entry: ParameterEntry) -> ModelParameter:
+    def uncertain(self, where: str, name: str, entry: ParameterEntry, given: float | None) -> ModelParameter:
         """Return a parameter with its uncertainty as a number."""
         variable = self.up(where, name, ("parameter", "local", "output", "input"))
-        value = entry.value if entry.value is not None else variable.start
+        value = next((v for v in (entry.value, given) if v is not None), variable.start)
         if not isinstance(value, int | float) or not math.isfinite(value):
-            raise ScenarioError(f"{self._source}: {where}.value must be given: the FMU states no start value")
-        spread = _spread(f"{self._source}: {where}.uncertainty", entry.uncertainty, float(value))
+            raise ScenarioError(f"{self.source}: {where}.value must be given: the FMU states no start value")
+        spread = _spread(f"{self.source}: {where}.uncertainty", entry.uncertainty, float(value))
         low = -math.inf if variable.minimum is None else float(variable.minimum)
         high = math.inf if variable.maximum is None else float(variable.maximum)
         if not low <= value <= high:
-            raise ScenarioError(f"{self._source}: {where}.value must be {low:g} to {high:g}, but is {value:g}")
+            raise ScenarioError(f"{self.source}: {where}.value must be {low:g} to {high:g}, but is {value:g}")
         return ModelParameter(name, float(value), spread, variable.unit or "", low, high)
 
 

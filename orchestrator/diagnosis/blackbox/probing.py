@@ -2,31 +2,24 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.problem import IMPULSE, BoxModel, BoxProblem, Data, series_of
+from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data, series_of
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
+from orchestrator.diagnosis.blackbox.subject import Subject
+from orchestrator.diagnosis.blackbox.wire import Through
 from orchestrator.errors import FmuError
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
 
-STUCK = 0.15
-"""Share of communication steps in which nothing moves, from which an FMU is taken to have a coarser grid of its own."""
-REPEATS = 1e-3
-"""Largest difference between two runs of one model, as a share of the noise."""
-FEWEST, FEWEST_EACH = 20, 6
-"""Runs that the probes and the first fit take, and for each uncertain value."""
-SLOW = 0.5
-"""Seconds of a run from which the user is told."""
 TRIMMED = 0.7767
 """Mean magnitude of Gaussian noise of variance 1 without the largest hundredth."""
-MOVES = 1e-9
-"""Share of a variable's size by which a parameter must change something."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +30,7 @@ class Probe:
         fresh: the FMU does not come back by a reset: it is made anew for every run.
         sign: of each port, the direction in which its input pushes.
         dead: parameters that change nothing.
+        tunable: parameters that can be changed within a run.
         blind: ports whose input moves nothing.
         solver_error: (outputs,) usual difference between runs at the step chosen and at half of it.
         step_cost: seconds of one step.
@@ -50,25 +44,35 @@ class Probe:
     solver_error: Array
     step_cost: float
     notes: tuple[str, ...]
+    tunable: tuple[str, ...] = ()
 
 
-def _names_of(given: Map) -> tuple[list[str], list[str]]:
+def _names_of(given: Map, subject: Subject) -> tuple[list[str], list[str]]:
     """Return the inputs that are set and the variables that are read, those of the record first."""
-    inputs = list(dict.fromkeys([*given.inputs, *(p.input for p in given.ports.values())]))
-    ports = [name for p in given.ports.values() for name in (p.position, p.velocity) if name is not None]
-    return inputs, list(dict.fromkeys([*given.outputs, *ports]))
+    connected = subject.connections
+    inputs = [*given.inputs, *(p.input for p in given.ports.values()), *(c.target for c in connected)]
+    ports = [name for p in given.ports.values() for name in (p.position, p.velocity)]
+    cuts = [name for c in given.cuts.values() for name in (c.far, c.effort)]
+    reads = [*given.outputs, *ports, *(c.source for c in connected), *cuts]
+    return list(dict.fromkeys(inputs)), [name for name in dict.fromkeys(reads) if name is not None]
 
 
 def opened(
-    path: Path, given: Map, data: Data, workers: int | None = None, progress: Progress = lambda what: None
+    subject: Subject,
+    given: Map,
+    data: Data,
+    workers: int | None = None,
+    progress: Progress = lambda what: None,
+    settings: BoxSettings = DEFAULT,
 ) -> tuple[BoxProblem, Probe]:
     """Return a problem ready to be fitted, and what its FMU was found to be.
 
     Args:
-        path: of the FMU.
+        subject: the FMU, or several.
         given: the map.
         data: the record.
         workers: child processes.
+        settings: thresholds.
 
     Returns:
         The problem, whose children the caller ends, and what the FMU was found to be.
@@ -76,22 +80,64 @@ def opened(
     Raises:
         FmuError: the FMU cannot be used: it does not load, run or repeat.
     """
-    inputs, reads = _names_of(given)
-    runner = Runner(path, inputs, reads, given.options.tolerance, workers=workers)
+    inputs, reads = _names_of(given, subject)
+    runner = Runner(
+        subject, inputs, reads, given.tunable, given.options.tolerance, workers=workers, settings=settings.process
+    )
     try:
         rough = noise_of(given, data.outputs, data.outputs)
-        problem = BoxProblem(data, given, runner, _affordable(runner, given, data, progress), rough)
+        runner.through = through = _passing(runner, given, data, settings)
+        problem = BoxProblem(
+            data, given, runner, _affordable(runner, given, data, progress, settings), rough, settings=settings
+        )
         fresh = _repeats(problem)
         if fresh:
             runner.close()
-            runner = Runner(path, inputs, reads, given.options.tolerance, fresh=True, workers=workers)
+            runner = Runner(
+                subject, inputs, reads, given.tunable, given.options.tolerance, True, workers, settings.process
+            )
+            runner.through = through
             problem.runner = runner
             if _repeats(problem):
-                raise FmuError(f"{path}: must give the same outputs for the same inputs, but does not")
+                raise FmuError(f"{subject.path}: must give the same outputs for the same inputs, but does not")
         return problem, _pushed(problem, fresh)
     except BaseException:
         runner.close()
         raise
+
+
+def _passing(runner: Runner, given: Map, data: Data, settings: BoxSettings) -> list[Through]:
+    """Return what FMUs hand on that depends at once on what they are handed, measured over one step.
+
+    Raises:
+        SlaveError: they do not run.
+    """
+    connected = runner.subject.connections
+    if not connected:
+        return []
+    problem = BoxProblem(data, given, runner, given.options.substeps, np.ones(len(given.outputs)))
+    own = settings.probe
+    plan = problem.starts(problem.nominal)
+    plain = series_of(problem, 2)[:1]
+    pushed = [plain.copy() for _ in connected]
+    for table, c in zip(pushed, connected, strict=True):
+        table[0, runner.inputs.index(c.target)] += own.pushed
+    gains = []
+    for step in (problem.h / problem.m, problem.h / problem.m / own.shorter):
+        runs = runner.run([Plan(plan, table) for table in (plain, *pushed)], float(data.time[0]), step, 1)
+        rows = [y[-1] for y in runs if y is not None]
+        if len(rows) < len(runs):
+            raise problem.does_not_run()
+        gains.append((np.array(rows[1:]).reshape(len(connected), -1) - rows[0]) / own.pushed)
+    # What depends at once does not shrink with the step; what the step brings falls out of this mean.
+    at_once = (own.shorter * gains[1] - gains[0]) / (own.shorter - 1.0)
+    found = []
+    for k in range(len(connected)):
+        for n, source in enumerate(connected):
+            at = runner.reads.index(source.source)
+            if abs(at_once[k, at]) > own.at_once * abs(gains[0][k, at]):
+                found.append(Through(n, k, float(at_once[k, at])))
+    return found
 
 
 def noise_of(given: Map, outputs: Array, residual: Array) -> Array:
@@ -117,19 +163,19 @@ def noise_of(given: Map, outputs: Array, residual: Array) -> Array:
     return np.array(found)
 
 
-def _affordable(runner: Runner, given: Map, data: Data, progress: Progress) -> int:
+def _affordable(runner: Runner, given: Map, data: Data, progress: Progress, settings: BoxSettings) -> int:
     """Return how many communication steps a sample has, fewer where the FMU is too slow for as many.
 
     Raises:
         FmuError: it does not run, or even the fewest runs take longer than the budget of the map.
     """
-    m, budget = _steps_in_a_sample(runner, given, data), given.options.budget
+    m, budget = _steps_in_a_sample(runner, given, data, settings.probe.stuck), given.options.budget
     short = BoxProblem(data, given, runner, m, np.ones(len(given.outputs)))
     plan = Plan(short.starts(short.nominal), series_of(short, min(len(data.time), 100)))
     for _ in range(3):  # the first answer of a child is not timed
         if runner.step_cost == 0.0:
             runner.run([plan], float(data.time[0]), data.step / m, m)
-    runs = FEWEST + FEWEST_EACH * len(given.uncertain)
+    runs = settings.probe.fewest + settings.probe.fewest_each * len(given.uncertain)
     while m > 1 and runner.step_cost * len(data.time) * m * runs > budget:
         m //= 2
     one = runner.step_cost * len(data.time) * m
@@ -138,12 +184,12 @@ def _affordable(runner: Runner, given: Map, data: Data, progress: Progress) -> i
             f"{runner.path}: must run {runs} times within the {budget:g} s of `budget`, but a run takes about "
             f"{one:.2g} s: shorten the record or raise `budget`"
         )
-    if one > SLOW:
+    if one > settings.probe.slow:
         progress(f"a run takes about {one:.2g} s, the search up to {budget:g} s")
     return m
 
 
-def _steps_in_a_sample(runner: Runner, given: Map, data: Data) -> int:
+def _steps_in_a_sample(runner: Runner, given: Map, data: Data, stuck: float) -> int:
     """Return how many communication steps a sample has: as the map says, but none in which the FMU stands still.
 
     An FMU with a fixed step of its own that is longer stands still in some, and takes two at once in others.
@@ -162,7 +208,7 @@ def _steps_in_a_sample(runner: Runner, given: Map, data: Data) -> int:
         moves = np.any(np.diff(y, axis=0) != 0.0, axis=1)
         samples = moves[: len(moves) // m * m].reshape(-1, m)
         moving = samples[np.any(samples, axis=1)]
-        if not len(moving) or float(np.mean(~moving)) < STUCK:
+        if not len(moving) or float(np.mean(~moving)) < stuck:
             break
         m = m // 2
     return m
@@ -179,7 +225,7 @@ def _repeats(problem: BoxProblem) -> bool:
     if first is None or again is None:
         raise problem.does_not_run()
     count = len(problem.outputs)
-    return bool(np.max(np.abs(again - first)[:, :count] / problem.noise) > REPEATS)
+    return bool(np.max(np.abs(again - first)[:, :count] / problem.noise) > problem.settings.probe.repeats)
 
 
 def _pushed(problem: BoxProblem, fresh: bool) -> Probe:
@@ -198,11 +244,11 @@ def _pushed(problem: BoxProblem, fresh: bool) -> Probe:
     for name, port in problem.map.ports.items():
         place = problem.runner.inputs.index(port.input)
         pushed = plain.copy()
-        pushed[: 4 * problem.m, place] += IMPULSE * problem.drive([place])[0]
+        pushed[: 4 * problem.m, place] += problem.settings.probe.impulse * problem.drive([place])[0]
         y = problem.runner.run([Plan(problem.starts(problem.nominal), pushed)], start, step, problem.m)[0]
         at = problem.runner.reads.index(port.position)
         moved = None if y is None else (y - base)[:, at]
-        if moved is None or np.max(np.abs(moved)) < MOVES * size[at]:
+        if moved is None or np.max(np.abs(moved)) < problem.settings.probe.moves * size[at]:
             blind.append(name)
             notes.append(f"port {name}: `{port.input}` does not move `{port.position}`: left out")
             continue
@@ -213,6 +259,12 @@ def _pushed(problem: BoxProblem, fresh: bool) -> Probe:
             notes.append(f"port {name}: `{port.input}` pushes against `{port.position}`: turned round")
     dead = _dead(problem, base, size)
     notes += [f"parameter `{name}` changes nothing: left out" for name in dead]
+    tunable = _tunable(problem, base)
+    notes += [
+        f"parameter `{name}` is called tunable, but does not change within a run: it is not looked at for drift"
+        for name in problem.map.tunable
+        if name not in (*tunable, *dead)
+    ]
     problem.sign = sign
     coarse = problem.m
     problem.m = 2 * coarse
@@ -221,7 +273,29 @@ def _pushed(problem: BoxProblem, fresh: bool) -> Probe:
     # The median of the first quarter: where motion is chaotic, two solutions part for no fault of a solver.
     early = np.abs(fine - base)[: max(len(base) // 4, 8), : len(problem.outputs)]
     error = 1.4826 * np.median(early, axis=0)
-    return Probe(fresh, sign, tuple(dead), tuple(blind), error, problem.runner.step_cost, tuple(notes))
+    return Probe(fresh, sign, tuple(dead), tuple(blind), error, problem.runner.step_cost, tuple(notes), tunable)
+
+
+def _tunable(problem: BoxProblem, base: Array) -> tuple[str, ...]:
+    """Return the parameters that, changed in the middle of a run, act from there on, and only there."""
+    runner, found = problem.runner, []
+    half, plain = (problem.n // 2) * problem.m, series_of(problem, problem.n)
+    values = problem.starts(problem.nominal)
+    start, step, count = float(problem.data.time[0]), problem.h / problem.m, len(problem.outputs)
+    for place, name in enumerate(runner.tunables):
+        table = np.hstack([plain, np.tile([values[n] for n in runner.tunables], (len(plain), 1))])
+        spread = next(u.standard_deviation for u in problem.map.uncertain if u.name == name)
+        table[half:, len(runner.inputs) + place] += spread
+        lost = runner.lost
+        y = runner.run([Plan(values, table)], start, step, problem.m)[0]
+        if runner.lost > lost:  # it does not stand being asked
+            break
+        if y is None:
+            continue
+        moved = np.max(np.abs(y - base)[:, :count] / problem.noise, axis=1)
+        if np.max(moved[: problem.n // 2]) < problem.settings.probe.repeats < np.max(moved[problem.n // 2 :]):
+            found.append(name)
+    return tuple(found)
 
 
 def _dead(problem: BoxProblem, base: Array, size: Array) -> list[str]:
@@ -234,7 +308,7 @@ def _dead(problem: BoxProblem, base: Array, size: Array) -> list[str]:
     return [
         u.name
         for u, y in zip(problem.map.uncertain, runs, strict=True)
-        if y is not None and np.max(np.abs(y - base) / size) < MOVES
+        if y is not None and np.max(np.abs(y - base) / size) < problem.settings.probe.moves
     ]
 
 
@@ -250,4 +324,6 @@ def reduced(given: Map, probe: Probe) -> Map:
     """
     uncertain = tuple(u for u in given.uncertain if u.name not in probe.dead)
     ports = {name: port for name, port in given.ports.items() if name not in probe.blind}
-    return Map(given.inputs, given.outputs, ports, uncertain, given.fixed, given.options, given.source)
+    tunable = tuple(name for name in probe.tunable if name not in probe.dead)
+    fixed = given.fixed | {u.name: u.value for u in given.uncertain if u.name in probe.dead}
+    return msgspec.structs.replace(given, ports=ports, uncertain=uncertain, tunable=tunable, fixed=fixed)

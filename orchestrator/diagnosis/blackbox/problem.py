@@ -7,33 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox import series
-from orchestrator.diagnosis.blackbox.bank import (
-    BANK,
-    INPUT,
-    OUTPUT,
-    PORT,
-    REMEMBERS,
-    STARTS_OFF,
-    BoxEffect,
-    Surroundings,
-)
+from orchestrator.diagnosis.blackbox.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
 from orchestrator.diagnosis.blackbox.wire import Feedback
 from orchestrator.errors import SlaveError
+from pyfmu_sources.port_laws import COMPLIANCE
 
 Array = NDArray[np.float64]
-
-ANGLES = ("rad", "deg", "")
-GROWS = 2.5
-"""How much larger than at the start a response within the record may be: beyond, its motion is not stable."""
-LEAST_PHASE = 4.0
-"""Radians of a ripple within the span of the motion, from which it is no spring."""
-MOST_CYCLES = 500
-"""Wavenumbers that are looked through."""
-IMPULSE = 0.5
-"""Size of the pulse that measures a response, as a share of the drive."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +28,14 @@ class Data:
         inputs: (n, inputs) in the order of the map.
         outputs: (n, outputs).
         source: file name, for messages.
+        signals: (n, signals), off their references.
     """
 
     time: Array
     inputs: Array
     outputs: Array
     source: str
+    signals: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def step(self) -> float:
@@ -121,6 +106,9 @@ class BoxProblem:
         runner: the FMU.
         m: communication steps in a sample.
         noise: (outputs,) standard deviations.
+        sign: of each port and cut, the direction in which its effort acts.
+        units: of the variables that have one.
+        settings: thresholds.
     """
 
     data: Data
@@ -129,6 +117,8 @@ class BoxProblem:
     m: int
     noise: Array
     sign: dict[str, float] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    settings: BoxSettings = DEFAULT
     _from_inputs: Surrogate | None = field(init=False, default=None, repr=False)
     _tables: dict[tuple[int, int], Array] = field(init=False, default_factory=dict, repr=False)
 
@@ -307,11 +297,19 @@ class BoxProblem:
             plain: (steps, inputs) recorded inputs over every communication step.
 
         Returns:
-            Shape (steps, inputs); ``plain`` itself where no effect acts on an input.
+            Shape (steps, inputs); ``plain`` itself where no effect acts on an input. Further columns are those of
+            parameters that may change within a run, where one does.
         """
         table = plain
         step = self.h / self.m
+        if any(effect.kind.where == PARAMETER for effect in model.effects):
+            starts = self.starts(model)
+            constant = np.tile([starts[name] for name in self.runner.tunables], (len(plain), 1))
+            table = np.hstack([plain, constant])
         for effect, values in zip(model.effects, model.values, strict=True):
+            if effect.kind.where == PARAMETER:
+                column = len(self.runner.inputs) + self.runner.tunables.index(effect.place)
+                table[:, column] += float(values[0]) * self._follows(effect, len(plain))
             if effect.kind.where != INPUT:
                 continue
             if table is plain:
@@ -320,19 +318,44 @@ class BoxProblem:
             table[:, column] = at_input(effect, table[:, column], step, float(values[0]))
         return table
 
+    def _follows(self, effect: BoxEffect, steps: int) -> Array:
+        """Return what a parameter follows in every communication step: the time [s], or a signal."""
+        if not effect.signal:
+            return np.asarray((np.arange(steps) + 0.5) * (self.h / self.m))
+        signal = self.data.signals[:, list(self.map.signals).index(effect.signal)]
+        return np.repeat(signal[: steps // self.m], self.m)
+
     def _feedback(self, model: BoxModel) -> tuple[Feedback, ...]:
         found = []
         for effect, values in zip(model.effects, model.values, strict=True):
+            reads = self.runner.reads
+            q = [float(v) for v in values] + [0.0] * (4 - len(values))
+            if effect.kind.where == CUT:
+                place = self.runner.inputs.index(self.map.cuts[effect.place].input)
+                other = reads.index(self.beyond(effect))
+                found.append(Feedback(place, effect.kind.law, other, -1, self.sign.get(effect.place, 1.0), q))
             if effect.kind.where != PORT:
                 continue
             port = self.map.ports[effect.place]
-            reads = self.runner.reads
             velocity = -1 if port.velocity is None else reads.index(port.velocity)
-            q = [float(v) for v in values] + [0.0] * (4 - len(values))
             place = self.runner.inputs.index(port.input)
             sign = self.sign.get(effect.place, 1.0)
             found.append(Feedback(place, effect.kind.law, reads.index(port.position), velocity, sign, q))
         return tuple(found)
+
+    def beyond(self, effect: BoxEffect) -> str:
+        """Return what an effect in a cut needs beside the position that is handed on.
+
+        Args:
+            effect: a gap or a spring.
+
+        Returns:
+            The variable: the position beyond the gap, or the effort through the spring.
+        """
+        cut = self.map.cuts[effect.place]
+        name = cut.effort if effect.kind.law == COMPLIANCE else cut.far
+        assert name is not None
+        return name
 
     def _measured(self, fine: Array, model: BoxModel) -> Array:
         """Return the outputs at the samples, from what is read after every communication step.
@@ -369,8 +392,12 @@ class BoxProblem:
         later = min(self.n // 4, self.n - length)
         within = self._responses(model, later, length, places)
         first = self._responses(model, 0, length, places)
-        chosen = within if float(np.max(np.abs(within))) < GROWS * float(np.max(np.abs(first))) else first
-        return realised(chosen), np.ones(len(places))
+        chosen = (
+            within
+            if float(np.max(np.abs(within))) < self.settings.probe.grows * float(np.max(np.abs(first)))
+            else first
+        )
+        return realised(chosen, self.settings.noise), np.ones(len(places))
 
     def input_surrogate(self) -> Surrogate:
         """Return the surrogate from the recorded inputs to the outputs, measured when first asked for.
@@ -389,14 +416,14 @@ class BoxProblem:
         tables = [plain]
         for place, size in zip(places, self.drive(places), strict=True):
             pulsed = plain.copy()
-            pulsed[at * self.m : (at + 1) * self.m, place] += IMPULSE * size
+            pulsed[at * self.m : (at + 1) * self.m, place] += self.settings.probe.impulse * size
             tables.append(pulsed)
         plans = [Plan(self.starts(model), t, self._feedback(model)) for t in tables]
         rows = [None if y is None else self._measured(y, model) for y in self._runs(plans)]
         base = rows[0]
         if base is None or any(y is None for y in rows):
             raise self.does_not_run()
-        responses = [(y - base)[at + 1 :] / self.noise / IMPULSE for y in rows[1:] if y is not None]
+        responses = [(y - base)[at + 1 :] / self.noise / self.settings.probe.impulse for y in rows[1:] if y is not None]
         return np.stack(responses, axis=2)
 
     @property
@@ -426,8 +453,6 @@ class BoxProblem:
         same = [float(s) for name, s in zip(self.inputs, sizes, strict=True)
                 if self.units.get(name) == self.units.get(self.runner.inputs[place])]  # fmt: skip
         return max(same, default=0.0)
-
-    units: dict[str, str] = field(default_factory=dict)
 
 
 def series_of(problem: BoxProblem, rows: int) -> Array:
@@ -488,47 +513,3 @@ def _at_output(name: str, rows: Array, h: float, value: float) -> Array:
     if name == "output_lag":
         return np.asarray(series.smoothed(rows, h, value))
     return series.quantised(rows, value)
-
-
-def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
-    """Return every effect that could act, given all that is read of the nominal run (n, reads).
-
-    Args:
-        problem: the FMU and the record.
-        nominal: the nominal run.
-
-    Returns:
-        The effects, each at a place.
-    """
-    found = []
-    h, runner = problem.h, problem.runner
-    for k, name in enumerate(problem.inputs):
-        u = problem.data.inputs[:, k]
-        if float(np.ptp(u)) == 0.0:
-            continue
-        scene = Surroundings(h, _rms(u), float(np.max(np.abs(u))), u)
-        found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
-        if abs(u[0]) > STARTS_OFF * scene.size:
-            found += [BoxEffect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
-    for k, name in enumerate(problem.outputs):
-        y = problem.data.outputs[:, k]
-        scene = Surroundings(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
-        found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
-    for name, port in problem.map.ports.items():
-        x = nominal[:, runner.reads.index(port.position)]
-        v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]
-        effort = float(problem.drive([runner.inputs.index(port.input)])[0])
-        angular = problem.units.get(port.position, "") in ANGLES
-        a = _rms(np.gradient(v, h))
-        span = float(np.ptp(x)) or 1.0
-        # From two thirds of a cycle within the span to what the samples still follow, half a radian of it apart.
-        top = 0.5 * np.pi / max(float(np.quantile(np.abs(v), 0.8)) * h, 1e-300)
-        cycles = tuple((LEAST_PHASE + 0.5 * k) / span for k in range(MOST_CYCLES) if LEAST_PHASE + 0.5 * k < top * span)
-        scene = Surroundings(h, effort, effort, x, 0.0, _rms(x) or 1.0, span, _rms(v) or 1.0, a or 1.0, angular, cycles)
-        kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
-        found += [BoxEffect(kind, name, scene) for kind in kinds]
-    return found
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.problem import Data
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, ReadSettings
 from orchestrator.errors import RecordError
 
 Array = NDArray[np.float64]
 
 MOST_BYTES = 500_000_000
-LEAST_ROWS = 100
 LARGEST = 1e15
-UNEVEN = 0.01
-"""Share of a sample by which a time may be off."""
 
 
 def columns_of(path: Path) -> list[str]:
@@ -35,7 +33,7 @@ def columns_of(path: Path) -> list[str]:
     return _split(path)[0]
 
 
-def read_data(path: Path, given: Map) -> Data:
+def read_data(path: Path, given: Map, settings: ReadSettings = DEFAULT.read) -> Data:
     """Return the columns that a map names.
 
     Args:
@@ -43,18 +41,18 @@ def read_data(path: Path, given: Map) -> Data:
         given: the map.
 
     Returns:
-        Times (n,) [s], inputs (n, inputs), outputs (n, outputs).
+        Times (n,) [s], inputs (n, inputs), outputs (n, outputs), signals (n, signals) off their references.
 
     Raises:
         RecordError: the file is missing or unreadable, a column is not there, or its values cannot be used.
     """
     header, rows = _split(path)
     time = _column(path, header, rows, given.options.time, "$.options.time")
-    if len(time) < LEAST_ROWS:
-        raise RecordError(f"{path}: must have at least {LEAST_ROWS} rows, but has {len(time)}")
+    if len(time) < settings.least_rows:
+        raise RecordError(f"{path}: must have at least {settings.least_rows} rows, but has {len(time)}")
     step = (time[-1] - time[0]) / (len(time) - 1)
     off = np.abs(time - time[0] - step * np.arange(len(time)))
-    if not step > 0.0 or float(off.max()) > UNEVEN * step * np.sqrt(len(time)):
+    if not step > 0.0 or float(off.max()) > settings.uneven * step * np.sqrt(len(time)):
         row = int(np.argmax(off)) + 1
         raise RecordError(
             f"{path}: row {row}: time must grow by {step:.6g} s from row to row, but is {time[row - 1]:g}"
@@ -72,7 +70,12 @@ def read_data(path: Path, given: Map) -> Data:
     if all(float(np.ptp(values)) == 0.0 for values in inputs):
         raise RecordError(f"{path}: at least one input must change, but none does")
     even = time[0] + step * np.arange(len(time))
-    return Data(even, np.column_stack(inputs), np.column_stack(outputs), str(path))
+    signals = [
+        e.factor * _column(path, header, rows, e.column, f"$.signals.{name}.column") - e.reference
+        for name, e in given.signals.items()
+    ]
+    others = np.column_stack(signals) if signals else np.zeros((len(even), 0))
+    return Data(even, np.column_stack(inputs), np.column_stack(outputs), str(path), others)
 
 
 def _split(path: Path) -> tuple[list[str], list[list[str]]]:

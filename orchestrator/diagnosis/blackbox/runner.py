@@ -4,13 +4,14 @@ import threading
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Job, Load
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, ProcessSettings
+from orchestrator.diagnosis.blackbox.subject import Subject
+from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Job, Load, Through, Wire
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
@@ -20,20 +21,8 @@ from orchestrator.shared.isolation.scratch import Scratch
 
 Array = NDArray[np.float64]
 
-LOADING = 60.0
-"""Seconds that loading an FMU may take: some unpack a whole tool."""
-PATIENCE = 20.0
-"""Seconds that a batch may take beyond what it is expected to."""
-SLOWER = 20.0
-"""How many times as long as expected a batch may take."""
-MOST_LOST = 5
-"""Processes that an FMU may cost."""
-CHUNK = 3
-"""Runs that are sent to a child at a time."""
-TOTAL = 86_400.0
-"""Seconds that a child may live."""
-MEMORY = 4096 * MEBIBYTE
 SLACK = 1 << 20
+"""Bytes of an answer beside its values."""
 
 
 @dataclass(frozen=True)
@@ -55,14 +44,16 @@ Grid = tuple[float, float, int, float]
 
 
 class Runner:
-    """An FMU in child processes behind walls.
+    """An FMU, or several, in child processes behind walls.
 
     Args:
-        path: of the FMU.
+        subject: the FMU, or several.
         inputs, reads: what is set before and read after every step.
+        tunables: parameters that are set at every step in runs that ask for it.
         tolerance: of the FMU's own solver; None: its own.
         fresh: make a new instance for every run instead of a reset.
         workers: children (default: one a core, two at most).
+        settings: how long it is waited for, and what it may take.
 
     Raises:
         FmuError: the FMU cannot be loaded.
@@ -71,37 +62,43 @@ class Runner:
 
     def __init__(
         self,
-        path: Path,
+        subject: Subject,
         inputs: Sequence[str],
         reads: Sequence[str],
+        tunables: Sequence[str] = (),
         tolerance: float | None = None,
         fresh: bool = False,
         workers: int | None = None,
+        settings: ProcessSettings = DEFAULT.process,
     ) -> None:
-        self.path = path
-        self.inputs, self.reads = tuple(inputs), tuple(reads)
+        self.path, self.subject, self.settings = subject.path, subject, settings
+        self.inputs, self.reads, self.tunables = tuple(inputs), tuple(reads), tuple(tunables)
         self.fresh, self.tolerance = fresh, tolerance
         self.step_cost = 0.0  # s, of one step, measured
         self.runs = 0
         self.lost = 0
+        self.through: list[Through] = []  # measured
         self.reason = ""  # why the last run that failed did
         self._jails: dict[int, Jail] = {}
         self._warm: set[int] = set()
         self._lock = threading.Lock()
         self._scratch = Scratch("box")
-        self._folder = self._scratch.path / "fmu"
+        self._folders = {name: self._scratch.path / f"fmu_{k}" for k, name in enumerate(subject.members)}
         # A jail dies with the thread that made it: the threads live as long as this.
         self._pool = ThreadPoolExecutor(min(2, usable_cores()) if workers is None else workers)
         try:
             _compile_loop()
-            unpack(path, self._folder)
+            for name, folder in self._folders.items():
+                unpack(subject.members[name], folder)
             self._pool.submit(self._jail).result()
         except ChildError as error:
             self.close()
-            raise SlaveError(f"{path}: must load and instantiate, but {_worded(error, LOADING)}") from None
+            raise SlaveError(
+                f"{self.path}: must load and instantiate, but {_worded(error, self.settings.loading)}"
+            ) from None
         except OrchestratorError as error:
             self.close()
-            raise FmuError(str(error).replace(str(self._folder), str(path))) from None
+            raise FmuError(self._named(error)) from None
         except BaseException:
             self.close()
             raise
@@ -135,8 +132,9 @@ class Runner:
         if not plans:
             return results
         self.runs += len(plans)
-        size = CHUNK if len(plans) >= 2 * CHUNK else 1
-        if together or len(plans) * self.step_cost * len(plans[0].table) < SMALL:
+        own = self.settings
+        size = own.chunk if len(plans) >= 2 * own.chunk else 1
+        if together or len(plans) * self.step_cost * len(plans[0].table) < own.small:
             size = len(plans)  # the latter: not worth a second child
         chunks = [list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size)]
         grid = (start, step, per_row, lead)
@@ -172,11 +170,20 @@ class Runner:
         """Return this thread's jail, its FMU loaded."""
         mine = threading.get_ident()
         if mine not in self._jails:
-            request = Load(str(self._folder), list(self.inputs), list(self.reads), self.tolerance, self.fresh)
-            limits = Limits(time=LOADING, memory=MEMORY, total=TOTAL)
-            jail = Jail("orchestrator.diagnosis.blackbox.inside:opened", request, read=[self._folder], limits=limits)
+            members = {name: str(folder) for name, folder in self._folders.items()}
+            wires = [
+                Wire(self.reads.index(c.source), self.inputs.index(c.target), c.factor, c.offset)
+                for c in self.subject.connections
+            ]
+            request = Load(
+                members, list(self.inputs), list(self.reads), self.tolerance, self.fresh, list(self.tunables), wires
+            )
+            own = self.settings
+            limits = Limits(time=own.loading, memory=own.memory * MEBIBYTE, total=own.total)
+            folders = list(self._folders.values())
+            jail = Jail("orchestrator.diagnosis.blackbox.inside:opened", request, read=folders, limits=limits)
             try:
-                jail.start(LOADING)
+                jail.start(own.loading)
             except BaseException:
                 jail.close()
                 raise
@@ -186,11 +193,14 @@ class Runner:
     def _chunk(self, chunk: list[int], plans: Sequence[Plan], grid: Grid, results: list[Array | None]) -> None:
         """Run some of the plans in this thread's jail; where that is lost, each of them alone in a new one."""
         steps = sum(len(plans[k].table) for k in chunk)
-        allowed = PATIENCE + SLOWER * steps * self.step_cost + (LOADING if self.step_cost == 0.0 else 0.0)
+        own = self.settings
+        allowed = own.patience + own.slower * steps * self.step_cost + (own.loading if self.step_cost == 0.0 else 0.0)
         count = (len(plans[chunk[0]].table) // grid[2] + 1) * len(self.reads)
         try:
             jail = self._jail()
-            answer = jail.call(_batch(chunk, plans, grid), time=allowed, most=8 * count * len(chunk) + SLACK)
+            answer = jail.call(
+                _batch(chunk, plans, grid, self.through), time=allowed, most=8 * count * len(chunk) + SLACK
+            )
         except ChildError as error:
             self._lose(_worded(error, allowed))
             if len(chunk) > 1:  # one of them was the culprit
@@ -198,7 +208,7 @@ class Runner:
                     self._chunk([k], plans, grid, results)
             return
         except OrchestratorError as error:
-            raise SlaveError(str(error).replace(str(self._folder), str(self.path))) from None
+            raise SlaveError(self._named(error)) from None
         self._take(answer, chunk, plans, grid, results, steps)
 
     def _take(
@@ -215,11 +225,18 @@ class Runner:
             if isinstance(rows, np.ndarray) and rows.shape == shape and rows.dtype == np.float64:
                 results[k] = rows
             elif isinstance(reason, str) and reason:
-                self.reason = reason.replace(str(self._folder), str(self.path))
+                self.reason = self._named(reason)
         mine = threading.get_ident()
         if mine in self._warm:  # the first answer of a child includes what it loads
             self.step_cost = max(0.5 * self.step_cost, seconds / max(steps, 1))
         self._warm.add(mine)
+
+    def _named(self, error: object) -> str:
+        """Return a message with FMUs in place of the folders that they lie in here."""
+        text = str(error)
+        for name, folder in reversed(self._folders.items()):
+            text = text.replace(str(folder), str(self.subject.members[name]))
+        return text
 
     def _lose(self, reason: str) -> None:
         """Close this thread's jail.
@@ -234,15 +251,11 @@ class Runner:
         with self._lock:
             self.reason = reason
             self.lost += 1
-            if self.lost > MOST_LOST:
+            if self.lost > self.settings.most_lost:
                 raise SlaveError(f"{self.path}: must run, but {reason}; given up after {self.lost} processes")
 
 
-SMALL = 0.01
-"""Seconds of work below which a second child is not asked."""
-
-
-def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid) -> Batch:
+def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid, through: list[Through]) -> Batch:
     tables: list[Array] = []
     places: dict[int, int] = {}
     jobs = []
@@ -254,7 +267,7 @@ def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid) -> Batch:
         starts = {name: float(value) for name, value in plan.starts.items()}
         jobs.append(Job(starts, places[id(plan.table)], list(plan.effects)))
     start, step, per_row, lead = grid
-    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead))
+    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through)
 
 
 def _worded(error: ChildError, allowed: float) -> str:
@@ -278,7 +291,8 @@ def _compile_loop() -> None:
 
     whole, real = numba.int64, numba.float64
     run_loop.compile(
-        (whole[::1], whole[::1], whole[::1], real[::1], real[::1], real[:, ::1], real[::1], whole[:, ::1], real[::1],
-         real[:, ::1], real, real[:, ::1])
+        (whole[:, ::1], whole[:, ::1], whole[:, ::1], real[::1], real[::1], whole[::1], whole[::1], real[:, ::1],
+         real[::1], whole[:, ::1], real[:, ::1], whole[:, ::1], real[::1], whole[:, ::1], real[::1], real[:, ::1], real,
+         real[:, ::1])
     )  # fmt: skip
     _compiled.append(True)

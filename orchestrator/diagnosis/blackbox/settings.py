@@ -31,6 +31,9 @@ class BoxSearchSettings(Settings, frozen=True):
     beam: Annotated[int, setting("models that are carried on", ge=1)] = 2
     near: Annotated[float, share("of what the best model gains, by which another may be behind to be carried on")] = 0.3
     family: Annotated[float, setting("log-likelihood within which a record does not tell two effects apart")] = 6.0
+    rivals: Annotated[
+        int, setting("effects that are put in the place of each that is named, to see whether they do as well", ge=0)
+    ] = 2
     noise_margin: Annotated[
         float, setting("standard deviations of pure noise's log-likelihood within which a record is explained")
     ] = 4.0
@@ -77,6 +80,12 @@ class FitterSettings(Settings, frozen=True):
     ] = 4.0
     combs: Annotated[int, setting("combs, one within the other", ge=0)] = 3
     teeth: Annotated[int, setting("values of each: their distance is that of the next comb's width", ge=3)] = 25
+    alike: Annotated[
+        float, setting("log-likelihood within which another quantum does as well: that of a 95 % interval")
+    ] = 1.92
+    alike_from: Annotated[float, share("of a quantum, the nearest other that is tried")] = 1e-6
+    alike_to: Annotated[float, share("of a quantum, the farthest")] = 0.03
+    alike_tried: Annotated[int, setting("others that are tried on either side", ge=2)] = 30
     finer: Annotated[float, share("width of a comb over that of the one before")] = 0.1
 
 
@@ -127,6 +136,82 @@ class RestSettings(Settings, frozen=True):
     ] = 1.2
 
 
+class ProbeSettings(Settings, frozen=True):
+    """What an FMU is asked before it is believed."""
+
+    stuck: Annotated[
+        float, share("of communication steps in which nothing moves, from which an FMU has a coarser grid of its own")
+    ] = 0.15
+    repeats: Annotated[float, share("of the noise by which two runs of one model may differ")] = 1e-3
+    fewest: Annotated[int, setting("runs that the probes and the first fit take", ge=1)] = 20
+    fewest_each: Annotated[int, setting("further runs for each uncertain value", ge=0)] = 6
+    slow: Annotated[float, setting("seconds of a run from which the user is told")] = 0.5
+    moves: Annotated[float, share("of a variable's size by which a parameter or a port must change it")] = 1e-9
+    impulse: Annotated[float, share("of the drive: the pulse that measures a response")] = 0.5
+    grows: Annotated[
+        float,
+        setting("times its size at the start that a response may have within the record: beyond, motion is unstable"),
+    ] = 2.5
+    pushed: Annotated[float, setting("by how much what is handed from FMU to FMU is moved, to see what follows")] = 1e-3
+    shorter: Annotated[float, setting("how many times shorter the second such step is", gt=1.0)] = 4.0
+    at_once: Annotated[float, share("of a response that the shorter step must leave, to depend at once")] = 0.5
+
+
+class PlaceSettings(Settings, frozen=True):
+    """Which effects a place offers, and what tells kin apart."""
+
+    starts_off: Annotated[float, share("of its rms by which an input starts away from zero to be tried from both")] = (
+        1e-3
+    )
+    least_phase: Annotated[float, setting("radians of a ripple within the motion, from which it is no spring")] = 4.0
+    most_cycles: Annotated[int, setting("wavenumbers that are looked through", ge=1)] = 500
+    once: Annotated[float, share("of a turn by which a ripple must differ from gravity, which comes once a turn")] = (
+        0.03
+    )
+    long: Annotated[float, share("of the motion over which hysteresis builds up at least: below, it is friction")] = (
+        0.04
+    )
+
+
+class PortNoiseSettings(Settings, frozen=True):
+    """Noise at the ports, and the surrogate that whitens."""
+
+    shares: Annotated[tuple[float, ...], note("levels of port noise over the drive, from none upwards")] = (
+        0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1.8e-3, 3e-3, 5.5e-3, 1e-2, 1.4e-2, 2e-2, 2.8e-2, 4e-2, 0.1, 0.3, 1.0
+    )  # fmt: skip
+    colours: Annotated[tuple[float, ...], note("correlations of it from sample to sample that are tried")] = (
+        0.0,
+        0.7,
+        0.9,
+    )
+    most_order: Annotated[
+        int, setting("states of the surrogate at most: what is measured determines no more", ge=1)
+    ] = 6
+    least_singular: Annotated[float, share("of the largest singular value from which a state is kept")] = 1e-4
+    blocks: Annotated[int, setting("rows and columns of blocks of the Hankel matrix, about", ge=4)] = 40
+    reach: Annotated[int, setting("samples over which efforts may have led to the start of the record", ge=1)] = 400
+
+
+class ProcessSettings(Settings, frozen=True):
+    """How long the FMU's process is waited for, and what it may take."""
+
+    loading: Annotated[float, setting("seconds that loading may take: some FMUs unpack a whole tool", gt=0.0)] = 60.0
+    patience: Annotated[float, setting("seconds that a batch of runs may take beyond what is expected")] = 20.0
+    slower: Annotated[float, setting("how many times as long as expected a batch may take", ge=1)] = 20.0
+    most_lost: Annotated[int, setting("processes that an FMU may cost", ge=0)] = 5
+    chunk: Annotated[int, setting("runs that are sent to a process at a time", ge=1)] = 3
+    small: Annotated[float, setting("seconds of work below which a second process is not asked")] = 0.01
+    total: Annotated[float, setting("seconds that a process may live", gt=0.0)] = 86_400.0
+    memory: Annotated[int, setting("MiB that a process may use", ge=1)] = 4096
+
+
+class ReadSettings(Settings, frozen=True):
+    """What a record must be."""
+
+    least_rows: Annotated[int, setting("rows that a record must have: half of them are fitted", ge=8)] = 100
+    uneven: Annotated[float, share("of a sample by which a time may be off")] = 0.01
+
+
 class CalibrationSettings(Settings, frozen=True):
     """What is said of parameters that are fitted alone."""
 
@@ -142,6 +227,11 @@ class BoxSettings(Settings, frozen=True):
     fit: Annotated[FitterSettings, note("each fit")] = FitterSettings()
     start: Annotated[StartSettings, note("the start")] = StartSettings()
     rest: Annotated[RestSettings, note("what is left")] = RestSettings()
+    probe: Annotated[ProbeSettings, note("the probes of the FMU")] = ProbeSettings()
+    place: Annotated[PlaceSettings, note("the effects that places offer")] = PlaceSettings()
+    noise: Annotated[PortNoiseSettings, note("noise at the ports")] = PortNoiseSettings()
+    process: Annotated[ProcessSettings, note("the FMU's processes")] = ProcessSettings()
+    read: Annotated[ReadSettings, note("the record")] = ReadSettings()
     calibration: Annotated[CalibrationSettings, note("parameters alone")] = CalibrationSettings()
 
 

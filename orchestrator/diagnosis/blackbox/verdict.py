@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
 from orchestrator.diagnosis.blackbox.search import BoxSearch, labels
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
@@ -153,31 +154,43 @@ def predicted(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest
     return max(together, float(np.max(alone)))
 
 
-def family_of(search: BoxSearch, best: BoxFit) -> tuple[str, ...]:
-    """Return labels of effects that the record does not tell from the last one of the best model.
+def families_of(search: BoxSearch, best: BoxFit) -> tuple[tuple[str, ...], ...]:
+    """Return labels of effects that the record does not tell from each one of the best model.
+
+    What stood beside an effect in the step that brought it is put in its place, and fitted with all the others.
 
     Args:
         search: that found it.
         best: fit of the best model.
 
     Returns:
-        The labels.
+        The labels, for each effect in its order.
     """
-    if not best.model.effects:
-        return ()
-    last = best.model.effects[-1]
-    others: list[str] = []
-    kept = labels(best) - {last.label}
+    return tuple(_family_of(search, best, effect) for effect in best.model.effects)
+
+
+def _family_of(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> tuple[str, ...]:
+    """Return labels of effects that the record does not tell from one of the best model."""
+    kept = labels(best) - {effect.label}
+    near: dict[str, float] = {}
+    rivals: list[BoxFit] = []
     for step in search.steps:
+        beside = any(fit.model.effects[-1].label == effect.label for fit in step.tried)
         for fit in step.tried:
-            if fit is best or len(fit.model.effects) != len(best.model.effects):
+            other = fit.model.effects[-1]
+            if other.label in labels(best) or other.kind.needs == effect.kind.name:  # what contains it is no other
                 continue
-            mine = labels(fit)
-            near = best.total - fit.total < search.settings.family
-            contains = fit.model.effects[-1].kind.needs == last.kind.name  # what contains it is no other
-            if mine != labels(best) and kept <= mine and near and not contains:
-                others += sorted(mine - labels(best))
-    return tuple(dict.fromkeys(others))
+            if labels(fit) == kept | {other.label}:
+                near[other.label] = max(near.get(other.label, -np.inf), fit.total)
+            elif beside:
+                rivals.append(fit)
+    rivals.sort(key=search.score, reverse=True)
+    for fit in [r for r in rivals if r.model.effects[-1].label not in near][: search.settings.rivals]:
+        model = best.model.without(effect.label).extended(fit.model.effects[-1], fit.model.values[-1])
+        again = search.fitter.fit(model, best.level)
+        if again is not None:
+            near.setdefault(fit.model.effects[-1].label, search.fitter.settled(again).total)
+    return tuple(label for label, total in near.items() if best.total - total < search.settings.family)
 
 
 def recovered(base: BoxFit, best: BoxFit, outputs: int, rows: int) -> float:

@@ -11,18 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, PortNoiseSettings
 from orchestrator.shared.numba_cache import kept
 
 Array = NDArray[np.float64]
-
-SHARES = (0.0, 1e-5, 1e-4, 3e-4, 1e-3, 1.8e-3, 3e-3, 5.5e-3, 1e-2, 1.4e-2, 2e-2, 2.8e-2, 4e-2, 0.1, 0.3, 1.0)
-"""Port noise, as a share of the drive, that is held over a sample."""
-COLOURS = (0.0, 0.7, 0.9)
-MOST_ORDER = 6
-LEAST_SINGULAR = 1e-4
-"""Share of the largest singular value below which an order is not kept."""
-BLOCKS = 40
-"""About how many rows and columns of blocks the Hankel matrix has."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +48,12 @@ class Surrogate:
         return found
 
 
-def realised(impulses: Array) -> Surrogate:
+def realised(impulses: Array, settings: PortNoiseSettings = DEFAULT.noise) -> Surrogate:
     """Return a surrogate of impulse responses.
 
     Args:
         impulses: (length, outputs, ports) response to a pulse one sample long, from the sample after it begins.
+        settings: its order, and how it is found.
 
     Returns:
         The surrogate.
@@ -71,12 +64,12 @@ def realised(impulses: Array) -> Surrogate:
         return Surrogate(np.zeros((0, 0)), np.zeros((0, ports)), np.zeros((outputs, 0)))
     # Dense where fast modes live, then wider and wider: slow ones hardly change from sample to sample.
     half = (length - 2) // 2
-    spaced = np.geomspace(1.0, half, BLOCKS).astype(int)
-    places = np.unique(np.concatenate([np.arange(min(BLOCKS // 2, half)), spaced]))
+    spaced = np.geomspace(1.0, half, settings.blocks).astype(int)
+    places = np.unique(np.concatenate([np.arange(min(settings.blocks // 2, half)), spaced]))
     hankel = np.block([[impulses[i + j] for j in places] for i in places])
     shifted = np.block([[impulses[i + j + 1] for j in places] for i in places])
     U, s, Vt = np.linalg.svd(hankel, full_matrices=False)
-    order = int(np.sum(s[:MOST_ORDER] > LEAST_SINGULAR * s[0]))
+    order = int(np.sum(s[: settings.most_order] > settings.least_singular * s[0]))
     root = np.sqrt(s[:order])
     A = (U[:, :order] / root).T @ shifted @ (Vt[:order].T / root)
     B = (root[:, None] * Vt[:order])[:, :ports]
@@ -120,7 +113,10 @@ class NoiseLevel:
         return np.asarray(_filtered(self.A, self.C, self.K, self.R, np.ascontiguousarray(columns)))
 
 
-def level(surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, spread: float = 0.0) -> NoiseLevel:
+def level(
+    surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, spread: float = 0.0,
+    reach: int = DEFAULT.noise.reach,
+) -> NoiseLevel:  # fmt: skip
     """Return the filter for port noise over ``n`` samples.
 
     Args:
@@ -129,6 +125,7 @@ def level(surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, s
         colour: its correlation from sample to sample.
         n: samples.
         spread: how far the state that the FMU starts from may be off, as seen at the outputs, in units of their noise.
+        reach: samples over which efforts may have led to that state.
 
     Returns:
         The filter.
@@ -142,31 +139,27 @@ def level(surrogate: Surrogate, q: float, colour: float, drive: Array, n: int, s
     if colour == 0.0:
         A, C = surrogate.A, surrogate.C
         Q = (surrogate.B * sd**2) @ surrogate.B.T
-        start = _start(surrogate, spread)
+        start = _start(surrogate, spread, reach)
     else:
         A = np.block([[surrogate.A, surrogate.B], [np.zeros((ports, order)), colour * np.eye(ports)]])
         C = np.hstack([surrogate.C, np.zeros((outputs, ports))])
         Q = np.zeros_like(A)
         Q[order:, order:] = np.diag((1.0 - colour**2) * sd**2)
         start = np.zeros_like(A)
-        start[:order, :order] = _start(surrogate, spread)
+        start[:order, :order] = _start(surrogate, spread, reach)
         start[order:, order:] = np.diag(sd**2)
     A, C, Q, start = (np.ascontiguousarray(a) for a in (A, C, Q, start))
     K, R, half_log = _gains(A, C, Q, start, n)
     return NoiseLevel(q, colour, A, C, K, R, half_log)
 
 
-REACH = 400
-"""Samples over which efforts at the ports may have led to the state that the record starts from."""
-
-
-def _start(surrogate: Surrogate, spread: float) -> Array:
+def _start(surrogate: Surrogate, spread: float, reach: int) -> Array:
     """Return the covariance of the initial state: what port noise before the record would have led to."""
     total = np.zeros_like(surrogate.A)
     if spread == 0.0:
         return total
     step = surrogate.B.copy()
-    for _ in range(REACH):
+    for _ in range(reach):
         total += step @ step.T
         step = surrogate.A @ step
     seen = float(np.max(np.diag(surrogate.C @ total @ surrogate.C.T), initial=0.0))
@@ -181,12 +174,18 @@ class Ladder:
     drive: Array
     n: int
     spread: float = 0.0
+    settings: PortNoiseSettings = DEFAULT.noise
     made: dict[int, NoiseLevel] = field(default_factory=dict)
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Return the levels of port noise, none first, without regard to their correlation."""
+        return self.settings.shares
 
     @property
     def size(self) -> int:
         """Return the number of levels."""
-        return 1 if self.surrogate.order == 0 else 1 + (len(SHARES) - 1) * len(COLOURS)
+        return 1 if self.surrogate.order == 0 else 1 + (len(self.shares) - 1) * len(self.settings.colours)
 
     def share(self, k: int) -> float:
         """Return the port noise of level ``k`` as a share of the drive.
@@ -197,7 +196,7 @@ class Ladder:
         Returns:
             The share.
         """
-        return SHARES[0 if k == 0 else 1 + (k - 1) % (len(SHARES) - 1)]
+        return self.shares[0 if k == 0 else 1 + (k - 1) % (len(self.shares) - 1)]
 
     def colour(self, k: int) -> float:
         """Return the correlation from sample to sample at level ``k``.
@@ -208,7 +207,7 @@ class Ladder:
         Returns:
             The correlation.
         """
-        return COLOURS[0 if k == 0 else (k - 1) // (len(SHARES) - 1)]
+        return self.settings.colours[0 if k == 0 else (k - 1) // (len(self.shares) - 1)]
 
     def near(self, k: int) -> list[int]:
         """Return the levels around ``k``, of both colours, and that of no noise.
@@ -221,14 +220,16 @@ class Ladder:
         """
         if self.size == 1:
             return [0]
-        count = len(SHARES) - 1
+        count = len(self.shares) - 1
         place = 0 if k == 0 else (k - 1) % count
         around = [j for j in range(place - 3, place + 4) if 0 <= j < count]
-        return [0, *(1 + j + c * count for c in range(len(COLOURS)) for j in around)]
+        return [0, *(1 + j + c * count for c in range(len(self.settings.colours)) for j in around)]
 
     def __getitem__(self, k: int) -> NoiseLevel:
         if k not in self.made:
-            self.made[k] = level(self.surrogate, self.share(k), self.colour(k), self.drive, self.n, self.spread)
+            self.made[k] = level(
+                self.surrogate, self.share(k), self.colour(k), self.drive, self.n, self.spread, self.settings.reach
+            )
         return self.made[k]
 
 

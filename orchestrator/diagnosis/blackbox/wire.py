@@ -1,6 +1,6 @@
 """What the owner of a black box asks of its child processes: plain data and arrays."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,19 +9,44 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Load:
-    """Load the FMU at ``path``; set ``inputs``, read ``reads``; ``fresh``: a new instance for every run, no reset."""
+class Wire:
+    """Between two FMUs: ``inputs[target] += factor * reads[source] + offset``, by places in the lists of a load."""
 
-    path: str
+    source: int
+    target: int
+    factor: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Through:
+    """What wire ``wire`` hands on depends at once, by ``gain``, on what wire ``by`` feeds."""
+
+    wire: int
+    by: int
+    gain: float
+
+
+@dataclass(frozen=True)
+class Load:
+    """Load the FMUs; set ``inputs``, read ``reads``; ``fresh``: a new instance for every run, no reset.
+
+    ``members``: folder by name; variables of a member are called ``name.variable``, those of a lone FMU, whose name is
+    empty, as they are. ``tunables``: parameters that runs with further columns in their table set at every step.
+    """
+
+    members: dict[str, str]
     inputs: list[str]
     reads: list[str]
     tolerance: float | None = None
     fresh: bool = False
+    tunables: list[str] = field(default_factory=list)
+    wires: list[Wire] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class Feedback:
-    """One effect at a port: places in the lists of inputs and of what is read, law, direction, parameters."""
+    """One effect at a port or a cut: places in the lists of inputs and of what is read, law, direction, parameters."""
 
     input: int
     law: int
@@ -50,3 +75,4 @@ class Batch:
     tables: list[Array]
     jobs: list[Job]
     lead: float = 0.5
+    through: list[Through] = field(default_factory=list)

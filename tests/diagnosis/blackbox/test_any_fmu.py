@@ -10,6 +10,7 @@ import pytest
 from orchestrator.api.any_fmu import calibrate, draft_map
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
+from orchestrator.diagnosis.blackbox.settings import BoxSettings, ProcessSettings
 from orchestrator.errors import InputError, OrchestratorError
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
@@ -129,8 +130,7 @@ def test_an_fmu_that_misbehaves_mildly_is_diagnosed_all_the_same(made, fault):
     ["instantiate_null", "instantiate_crashes", "exits", "init_refused", "nan", "random", "get_refused",
      "input_refused", "step_crashes", "step_refused", "fatal", "stop_time", "output_stuck", "input_ignored"],
 )  # fmt: skip
-def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault, monkeypatch):
-    monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.LOADING", 8.0)
+def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault):
     _, *files = made(SPRING, rows=300, fault=fault)
     if fault in ("output_stuck", "input_ignored"):
         found = diagnose(*files)
@@ -138,19 +138,16 @@ def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault, monkeypa
         assert found.verdict == "unknown"
         return
     with pytest.raises(OrchestratorError) as caught:
-        diagnose(*files)
+        diagnose(*files, settings=BoxSettings(process=ProcessSettings(loading=8.0)))
     assert "\n" not in str(caught.value)
     assert "Spring.fmu" in str(caught.value)
 
 
 @pytest.mark.parametrize("fault", ["step_hangs", "instantiate_hangs", "reset_hangs"])
-def test_an_fmu_that_hangs_is_ended(made, fault, monkeypatch):
-    monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.LOADING", 3.0)
-    monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.PATIENCE", 2.0)
-    monkeypatch.setattr("orchestrator.diagnosis.blackbox.runner.MOST_LOST", 1)
+def test_an_fmu_that_hangs_is_ended(made, fault):
     _, *files = made(SPRING, rows=300, fault=fault)
     with pytest.raises(OrchestratorError, match="hangs"):
-        diagnose(*files)
+        diagnose(*files, settings=BoxSettings(process=ProcessSettings(loading=3.0, patience=2.0, most_lost=1)))
 
 
 def test_an_fmu_that_is_too_slow_for_its_budget_is_refused_with_an_estimate(made):

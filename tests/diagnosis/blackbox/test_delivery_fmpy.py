@@ -26,7 +26,7 @@ def test_fmpy_reproduces_the_fit_within_a_tenth_of_the_noise(tmp_path):
         problem, outcome = found.outcome.problem, found.outcome
         assert [f.effect.kind.name for f in outcome.effects] == ["quadratic_drag"]
         path = tmp_path / "corrected.ssp"
-        deliver(path, fmu, outcome)
+        deliver(path, outcome)
         fitted = problem.simulate([outcome.model])[0]
         coarse = problem.h / problem.m
         step = coarse / FINER
