@@ -5,7 +5,7 @@ The laws and their guards are those of :mod:`smooth_mode`; here they are without
 
 from .drivetrain_parameters import P_LIMIT, P_OFFSET_L, P_OFFSET_M, P_RES_J
 from .dry_friction import NEVER, shaft_torque
-from .effects import saturated
+from .effects import UNASKED, saturated
 from .equations import Mode, Parameters, State
 from .smooth_mode import guard, guard_room, mode_rates, settled
 
@@ -114,4 +114,6 @@ def after_events(
     Returns:
         The three.
     """
+    if x[11] == UNASKED:  # the drive has settled at what is asked first
+        x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
     return settled(x, mode, 0 if quiet else events, p, u, T_l)

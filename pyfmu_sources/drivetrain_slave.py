@@ -284,6 +284,10 @@ class Drivetrain(SlaveBase):
         self._events = events
         self._write()
 
+    def observe(self) -> None:
+        """Write the outputs at the inputs of the moment, for model exchange."""
+        self._write()
+
     def _write(self) -> None:
         real = self.real
         x = self._x

@@ -487,6 +487,29 @@ def held(x: State, p: Parameters, u: float, T_l: float, h: float) -> State:
     return (x[0], 0.0, x[2] + share * (u - x[2]), x[3], x[4])
 
 
+def breaking_time(x: State, p: Parameters, u: float, T_l: float, h: float) -> float:
+    """Return when within ``h`` [s] the growing torque of the drive breaks an axis away that sticks (bisection).
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+
+    Returns:
+        The time [s].
+    """
+    low, high = 0.0, h
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if slip_at_rest(held(x, p, u, T_l, middle), p, u, T_l) == 0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
 def settled(x: State, p: Parameters) -> int:
     """Return the direction of sliding of an axis whose bristle has settled, or 0.
 
@@ -602,7 +625,11 @@ def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h:
         if dry and not bends and mode == 0:
             mode = slip_at_rest(x, p, u, T_l)
             if mode == 0:
-                x = held(x, p, u, T_l, step)
+                stays = held(x, p, u, T_l, step)
+                if slip_at_rest(stays, p, u, T_l) != 0:
+                    step = breaking_time(x, p, u, T_l, step)
+                    stays = held(x, p, u, T_l, step)
+                x = stays
                 elapsed += step
                 continue
         moved = smooth_step(x, mode, p, u, T_l, step)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Callable
+from typing import Annotated, Any, ClassVar
 
 from . import servo_axis
 from .dead_time import MOST_REQUESTS, ROUNDING, Requests, is_new, request_at
@@ -10,7 +11,8 @@ from .drivetrain_parameters import BIG
 from .effects import saturated
 from .fmu_variables import LARGEST, FmuVariable
 from .servo_axis import State
-from .servo_axis_parameters import COUNT, P_DELAY, P_LIMIT, P_OFFSET, PARAMETERS
+from .servo_axis_modes import UNDECIDED, Indicators, after_events, decided, indicators, rates_and_outputs
+from .servo_axis_parameters import COUNT, P_DELAY, P_LIMIT, P_OFFSET, P_RATE, PARAMETERS
 from .slave_base import TOO_STIFF, SlaveBase, StepRefusedError
 
 U, T_L, THETA_M, OMEGA_M, T_M = range(5)
@@ -18,7 +20,6 @@ FIRST_PARAMETER = T_M + 1
 FIRST_START = FIRST_PARAMETER + len(PARAMETERS)
 
 Values = Annotated[tuple[float, ...], COUNT]
-UNDECIDED = 2  # direction of sliding before the first step, whose request decides
 
 _OFFSET = "effects.sensor_offset.motor.offset"
 
@@ -43,7 +44,25 @@ class ServoAxis(SlaveBase):
     _mode: int
     _p: Values
     _acting: float
+    _end_stop: int
     _requests: Requests
+
+    # The hidden attribute that model exchange integrates, and its items: name, unit, nominal value, meaning.
+    state_attribute: ClassVar[str] = "_x"
+    continuous_states: ClassVar[tuple[tuple[str, str, float, str], ...]] = (
+        ("state.theta_m", "rad", 1.0, "Position"),
+        ("state.omega_m", "rad/s", 10.0, "Speed"),
+        ("state.T_m", "N.m", 100.0, "Torque behind the drive's lag"),
+        ("state.z", "rad", 1e-3, "Bristles of the friction"),
+        ("state.y", "N.m", 100.0, "Filtered torque request"),
+    )
+
+    # What directional derivatives are of: a function of hidden attributes and inputs by their names, which returns the
+    # derivatives of the states and these outputs.
+    response: ClassVar[Callable[..., Any]] = rates_and_outputs
+    response_outputs: ClassVar[tuple[str, ...]] = ("theta_m", "omega_m", "T_m")
+    # Outputs that follow inputs at once in model exchange; in co-simulation they follow at the end of a step.
+    exchange_depends_on: ClassVar[dict[str, tuple[str, ...]]] = {"T_m": ("u",)}
 
     def initialise(self) -> None:
         """Read the parameters and start at the initial state."""
@@ -51,6 +70,7 @@ class ServoAxis(SlaveBase):
         real = self.real
         self._x = servo_axis.start(real[FIRST_START], real[FIRST_START + 1], real[FIRST_START + 2], self._p)
         self._mode = UNDECIDED
+        self._end_stop = 0
         self._requests = []
         self._acting = 0.0
         self._write()
@@ -111,6 +131,50 @@ class ServoAxis(SlaveBase):
         self._x = x
         self._mode = mode
         self._acting = acting
+        self._write()
+
+    def derivatives(self) -> State:
+        """Return the derivatives of the state, for model exchange.
+
+        Returns:
+            The derivatives, in the order of the state.
+        """
+        u = saturated(self.real[U], self._p[P_LIMIT])
+        mode = decided(self._x, self._mode, self._p, u)
+        return servo_axis.mode_rates(self._x, mode, self._p, u, self.real[T_L])
+
+    def indicators(self) -> Indicators:
+        """Return the event indicators, for model exchange.
+
+        Returns:
+            The indicators.
+        """
+        u = saturated(self.real[U], self._p[P_LIMIT])
+        return indicators(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
+
+    def update(self, time: float) -> None:
+        """Settle state and mode at an event, for model exchange.
+
+        Args:
+            time: [s].
+
+        Raises:
+            ValueError: an effect is on that model exchange does not have.
+        """
+        if self._p[P_DELAY] > 0.0:
+            raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
+        if self._p[P_RATE] < BIG:
+            raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
+        u = saturated(self.real[U], self._p[P_LIMIT])
+        x, mode, stop = after_events(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
+        self._x = x
+        self._mode = mode
+        self._end_stop = stop
+        self.observe()
+
+    def observe(self) -> None:
+        """Write the outputs at the inputs of the moment, for model exchange."""
+        self._acting = saturated(self.real[U], self._p[P_LIMIT])
         self._write()
 
     def _write(self) -> None:

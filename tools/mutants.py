@@ -39,11 +39,17 @@ RENAMED = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum
 
 @dataclass(frozen=True)
 class Room:
-    """Modules whose mutants are made, and the tests that should notice."""
+    """Modules whose mutants are made, and the tests that should notice.
+
+    Attributes:
+        compiled: numba compiles the modules. Its machine code of callers would outlive the change, so it is switched
+            off; elsewhere it makes the tests quick.
+    """
 
     name: str
     modules: tuple[str, ...]
     tests: tuple[str, ...]
+    compiled: bool = False
 
 
 ROOMS = (
@@ -87,6 +93,7 @@ ROOMS = (
         "contact",
         ("pyfmu_sources/contact.py", "pyfmu_sources/equations.py"),
         ("tests/plants/test_contact.py", "tests/plants/test_effects_in_equations.py"),
+        compiled=True,
     ),
     Room("journal", ("orchestrator/engine/journal.py",), ("tests/engine/test_engine_journal.py",)),
     Room(
@@ -208,18 +215,23 @@ def sample(root: Path, count: int, seed: int) -> list[tuple[Mutant, str]]:
     return [(m, changed((root / m.module).read_text(encoding="utf-8"), node, number)) for m, node, number in chosen]
 
 
-def outcome(root: Path, tests: tuple[str, ...]) -> str:
+def outcome(root: Path, tests: tuple[str, ...], compiled: bool = False) -> str:
     """Run tests in a copy of the project.
 
     Args:
         root: of the copy.
         tests: files, from there.
+        compiled: as in :class:`Room`.
 
     Returns:
         ``"survived"``; ``"caught"`` where a test fails or a module cannot be imported; ``"no end"`` where the run was
         ended by its limit of time or by another signal: nothing is known then.
     """
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(root), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = os.environ | {
+        "NUMBA_DISABLE_JIT": str(int(compiled)),
+        "PYTHONPATH": str(root),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *tests]
     run = subprocess.run(
         command, cwd=root, env=environment, capture_output=True, check=False,
@@ -242,13 +254,13 @@ def main() -> int:
     part, parts = (int(word) for word in options.slice.split("/"))
     results = json.loads(options.out.read_text()) if options.out.exists() else []
     known = {(r["module"], r["line"], r["change"], r["text"]) for r in results}
-    tests = {room.name: room.tests for room in ROOMS}
+    rooms = {room.name: room for room in ROOMS}
     begun = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder) / "copy"
-        shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".venv", ".git", "__pycache__", "fmus"))
+        shutil.copytree(ROOT, root, ignore=shutil.ignore_patterns(".venv", ".git", "fmus"))
         for room in ROOMS:
-            if options.room in (None, room.name) and outcome(root, room.tests) != "survived":
+            if options.room in (None, room.name) and outcome(root, room.tests, room.compiled) != "survived":
                 sys.exit(f"the tests of {room.name} fail without any change")
         for mutant, source in sample(root, options.count, options.seed)[part - 1 :: parts]:
             key = (mutant.module, mutant.line, mutant.change, mutant.text)
@@ -258,7 +270,7 @@ def main() -> int:
                 break
             original = (root / mutant.module).read_text(encoding="utf-8")
             (root / mutant.module).write_text(source, encoding="utf-8")
-            found = outcome(root, tests[mutant.room])
+            found = outcome(root, rooms[mutant.room].tests, rooms[mutant.room].compiled)
             (root / mutant.module).write_text(original, encoding="utf-8")
             results.append(asdict(mutant) | {"outcome": found})
             options.out.write_text(json.dumps(results, indent=1))

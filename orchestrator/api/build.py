@@ -11,6 +11,7 @@ from orchestrator.building.launcher import find_toolchain
 from orchestrator.building.native_build import ensure_native, native_directory, native_remark
 from orchestrator.building.sources import catalogue
 from orchestrator.errors import FmuError, OutputError
+from orchestrator.shared.results import BuildFound
 
 PLATFORMS = ("all", "here")
 
@@ -38,9 +39,9 @@ class BuildResult(Result):
         lines = [f"{n:<20}{shown(p)}  {p.stat().st_size / 1024:.0f} kB" for n, p in self.paths.items()]
         return lines if self.remark is None else [*lines, f"note: {self.remark}"]
 
-    def results(self, place: Path) -> dict[str, Any]:
+    def results(self, place: Path) -> BuildFound:
         """Return what ``build.json`` says."""
-        return {"fmus": {name: str(path) for name, path in self.paths.items()}, "remark": self.remark}
+        return BuildFound(fmus={name: str(path) for name, path in self.paths.items()}, remark=self.remark)
 
 
 def shown(path: Path) -> str:

@@ -24,6 +24,16 @@ from orchestrator.estimation.inspection.starter import assumed_columns, starter
 from orchestrator.estimation.inspection.sufficiency import SEEN, SIZES, Sufficiency, sufficiency
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.record import Record
+from orchestrator.shared.results.estimate import ExcitationFound, RecordFound
+from orchestrator.shared.results.inspect import (
+    BandFound,
+    ChannelFound,
+    EffectShown,
+    GapShown,
+    InspectFound,
+    LagFound,
+    ReversalsFound,
+)
 
 STARTER = "model.toml"
 SHOWN_EXPERIMENTS = 3
@@ -148,36 +158,27 @@ class InspectResult(Result):
             )
         return said
 
-    def results(self, place: Path | None = None) -> dict[str, Any]:
+    def results(self, place: Path | None = None) -> InspectFound:
         """Return what ``inspect.json`` says."""
         r, found = self.record, self.sufficiency
-        return {
-            "record": {
-                "source": r.source,
-                "rows": r.size,
-                "step": r.step,
-                "missing": r.missing,
-                "notes": list(r.notes),
-            },
-            "channels": [dict(vars(c)) for c in self.channels],
-            "excitation": [dict(vars(b)) for b in self.excitation],
-            "reversals": {"torque": self.reversals[0], "motor_speed": self.reversals[1]},
-            "delay": None
-            if self.delay is None
-            else {"value": self.delay[0], "standard_error": self.delay[1], "unit": "s"},
-            "smallest_gap": found.smallest if math.isfinite(found.smallest) else None,
-            "gaps": [
-                {"half_gap": size, "bound": bound if math.isfinite(bound) else None, "seen": bound < SEEN * size}
+        return InspectFound(
+            record=RecordFound(r.size, r.step, r.source, r.missing, tuple(r.notes)),
+            channels=tuple(ChannelFound(**vars(c)) for c in self.channels),
+            excitation=tuple(BandFound(**vars(b)) for b in self.excitation),
+            reversals=ReversalsFound(*self.reversals),
+            delay=None if self.delay is None else LagFound(*self.delay),
+            smallest_gap=found.smallest if math.isfinite(found.smallest) else None,
+            gaps=tuple(
+                GapShown(size, bound if math.isfinite(bound) else None, bound < SEEN * size)
                 for size, bound in found.bounds
-            ],
-            "effects": [{"name": name, "smallest": size, "unit": unit} for name, size, unit in self.effects],
-            "better_experiments": [
-                {"name": c.name, "bound": c.bound, "peak_torque": c.torque, "peak_motor_speed": c.speed}
-                for c in found.better[:SHOWN_EXPERIMENTS]
-            ],
-            "assumed": list(self.assumed),
-            "verdict": self.verdict(),
-        }
+            ),
+            effects=tuple(EffectShown(*effect) for effect in self.effects),
+            better_experiments=tuple(
+                ExcitationFound(c.name, c.bound, c.torque, c.speed) for c in found.better[:SHOWN_EXPERIMENTS]
+            ),
+            assumed=tuple(self.assumed),
+            verdict=tuple(self.verdict()),
+        )
 
     def write_files(self, folder: Path) -> None:
         """Write the model file to start from, and the picture."""

@@ -11,7 +11,7 @@ from orchestrator.engine import DesignCases, Row, Status, Sweep, parse_design
 from orchestrator.scenarios.isolated import Safety, described
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.sweep import SUMMARIES, scenario_work
-from orchestrator.shared.results import SweepFound, SweptScenario
+from orchestrator.shared.results import SweepFound, SweptScenario, WallsFound
 
 
 @dataclass(frozen=True, repr=False)
@@ -34,7 +34,7 @@ class ScenarioSweepResult(AnySweepResult):
     seed: int | None = 0
     parquet: bool = False
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    isolation: Mapping[str, Any] = field(default_factory=dict)
+    isolation: WallsFound | None = None
 
     def blocks(self) -> Sequence[Block]:
         """Return the table of the first cases."""
@@ -54,7 +54,7 @@ class ScenarioSweepResult(AnySweepResult):
             failed=self.failed,
             columns=self.columns(),
             scenario=SweptScenario(self.scenario.name, list(self.scenario.record), self.scenario.stop),
-            isolation=dict(self.isolation),
+            isolation=self.isolation,
         )
 
     def write_files(self, folder: Path) -> None:

@@ -17,7 +17,7 @@ from orchestrator.scenarios import scenario as scenarios
 from orchestrator.scenarios.isolated import Safety, described
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.read import opened_ssp
-from orchestrator.shared.results import SignalFound, SignalsFound
+from orchestrator.shared.results import SignalFound, SignalsFound, WallsFound
 
 Array = NDArray[np.float64]
 HEAD = ("signal", "unit", "first", "last", "smallest", "largest")
@@ -37,7 +37,7 @@ class SimulationResult(Result):
 
     run: master.Recording
     title: str
-    isolation: Mapping[str, Any] = field(default_factory=dict)
+    isolation: WallsFound | None = None
     command: str = "simulate"  # type: ignore[misc]
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
@@ -112,7 +112,7 @@ class SimulationResult(Result):
     def results(self, place: Path | None = None) -> SignalsFound:
         """Return what the JSON file says of the run."""
         signals = [SignalFound(*row) for row in self._rows()]
-        return SignalsFound(signals=signals, steps=self.steps, isolation=dict(self.isolation))
+        return SignalsFound(signals=signals, steps=self.steps, isolation=self.isolation)
 
     def write_files(self, folder: Path) -> None:
         """Write the signals as CSV; of ``simulate`` also the figure."""
@@ -176,8 +176,8 @@ def _run(
 ) -> SimulationResult:
     safety = safety or Safety()
     walls = described(scenario.system, safety)
-    if walls["not_enforced"] and tell is not None:
-        tell(f"FMUs that are not ours run with limits, but {walls['not_enforced']}")
+    if walls.not_enforced and tell is not None:
+        tell(f"FMUs that are not ours run with limits, but {walls.not_enforced}")
     result = scenarios.simulate(scenario if stop is None else replace(scenario, stop=stop), safety)
     return SimulationResult(result, title, walls, command, given)
 

@@ -233,7 +233,7 @@ def sweep(
     check_parameters(loop_system(plan.experiment, fmus, (MACHINE,)), cases, OWN_PARAMETERS)
     calibrations = plan.calibrations(tell, calibrated)
     done = options.run(cases, sweep_work(plan, fmus, calibrations))
-    given: dict[str, Any] = {"experiment": chosen.name, "backlash_model": chosen.backlash_model, "sizes": text}
+    given: dict[str, object] = {"experiment": chosen.name, "backlash_model": chosen.backlash_model, "sizes": text}
     given |= {"noise": ",".join(f"{level:g}" for level in levels), "seeds": seeds, "vary": list(words)}
     return SweepResult(plan, cases, done, fmus, calibrations, options.parquet, given, builds.kind)
 

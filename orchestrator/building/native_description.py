@@ -58,9 +58,12 @@ def _states(root: Element, cls: Any) -> None:
     outputs, initial = structure.find("Outputs"), structure.find("InitialUnknowns")
     assert outputs is not None
     assert initial is not None
+    names = [variable.name for variable in cls.table]
+    at_once = getattr(cls, "exchange_depends_on", {})
     for unknown in outputs:
-        given = [int(word) for word in unknown.attrib["dependencies"].split()]
-        unknown.set("dependencies", _words(given + states))
+        given = {int(word) for word in unknown.attrib["dependencies"].split()}
+        given |= {index[name] for name in at_once.get(names[int(unknown.attrib["index"]) - 1], ())}
+        unknown.set("dependencies", _words([*given, *states]))
     derivatives = Element("Derivatives")
     structure.insert(1, derivatives)
     parameters = sorted(index[variable.name] for variable in cls.table if variable.causality == "parameter")

@@ -167,7 +167,7 @@ class _Watcher:
         if rest and (self.stopped or self.probe == "load"):
             self._add("run.skipped", f"not carried out after that: {', '.join(rest)}")
 
-    def _left_behind(self, before: dict[str, Any], jail: Jail, left: bool) -> None:
+    def _left_behind(self, before: dict[str, tuple[int, int]], jail: Jail, left: bool) -> None:
         self.probe = "afterwards"
         written = _files(jail.scratch, "tmp")
         if written:
@@ -210,7 +210,7 @@ def _files(folder: Path, left_out: str) -> list[str]:
     return sorted(found)
 
 
-def _snapshot(folder: Path) -> dict[str, Any]:
+def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:
     """Size and time of every file, byte code left out."""
     found = {}
     for name in _files(folder, ""):

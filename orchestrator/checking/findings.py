@@ -9,6 +9,9 @@ from orchestrator.checking.rules import RULES, Severity
 SEVERITIES: tuple[Severity, ...] = ("error", "warning", "info")
 MOST_PER_RULE = 100
 
+Facts = dict[str, str | int | list[str]]
+"""What is known about an FMU, by name: model, version, tool, interfaces, number of variables, platforms."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -53,7 +56,7 @@ class FmuFindings:
     fmu: str
     findings: tuple[Finding, ...]
     executed: bool = False
-    facts: dict[str, object] = field(default_factory=dict)
+    facts: Facts = field(default_factory=dict)
 
     def count(self, severity: str) -> int:
         """Number of findings of one severity.

@@ -7,7 +7,7 @@ from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import ArchiveLimits, FmuFiles, open_fmu
 from orchestrator.checking.binaries import SUFFIXES, check_binaries
 from orchestrator.checking.description import Description, read_description
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Facts, Finding
 from orchestrator.checking.layered import ReferenceResult, check_files, check_layered
 from orchestrator.checking.rules_model import check_model
 from orchestrator.checking.rules_variables import check_variables
@@ -27,7 +27,7 @@ class StaticResult:
     files: FmuFiles | None = None
     description: Description | None = None
     references: list[ReferenceResult] = field(default_factory=list)
-    facts: dict[str, object] = field(default_factory=dict)
+    facts: Facts = field(default_factory=dict)
 
 
 def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
@@ -49,7 +49,7 @@ def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
     if root is None:
         return StaticResult(findings, files)
     version = root.get("fmiVersion", "")
-    facts: dict[str, object] = {"modelName": root.get("modelName", ""), "fmiVersion": version}
+    facts: Facts = {"modelName": root.get("modelName", ""), "fmiVersion": version}
     if version != "2.0":
         findings += _other_version(path, version, root)
         return StaticResult(findings, files, facts=facts)
@@ -78,7 +78,7 @@ def _other_version(path: Path, version: str, root: "xml_reading.etree._Element")
     return [Finding("model.not-covered", where, message), *check_with_fmpy(path)]
 
 
-def _facts(d: Description, files: FmuFiles) -> dict[str, object]:
+def _facts(d: Description, files: FmuFiles) -> Facts:
     names = files.names()
     return {
         "generationTool": d.root.get("generationTool", ""),

@@ -87,7 +87,6 @@ def diagnose(
     gain = None if verdict in ("none", "unknown") else gain_of(model, chosen.p, settings.verdict)
     untouched = replace(base_fit, p=nominal)
     before = missing_torque(likelihood, untouched if verdict in ("none", "parameters") else base_fit)
-    after = missing_torque(likelihood, chosen)
     where = places(before, signals.h, settings.places)
     far = far_off(model, chosen.p, settings.verdict)
     unnamed = replace(found.proof, final=found.proof.base) if unknown else found.proof
@@ -110,7 +109,7 @@ def diagnose(
         horizons=table(named_stages, (found.proof.base, found.proof.final)[: len(named_stages)]),
         analysis=analysis.found(),
         settings=settings,
-        workings=Workings(likelihood, parts, base_fit, chosen, best, tuple(search.steps), before, after),
+        workings=Workings(likelihood, parts, base_fit, chosen, best, tuple(search.steps)),
         records=by_record(likelihood, chosen.q, ends, parts.held_out, position),
         repeats=repeats(likelihood.signals, plant.encoders, settings.proof),
         learned=learned_law(likelihood, chosen, parts, position) if learning else None,

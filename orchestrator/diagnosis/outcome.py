@@ -10,7 +10,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.remainder import Remainder
-from orchestrator.diagnosis.verdict.where import Missing, Place
+from orchestrator.diagnosis.verdict.where import Place
 from orchestrator.plants.description import Plant
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
@@ -147,8 +147,6 @@ class Workings:
     final: Fit
     best: Candidate
     steps: tuple[ForwardStep, ...]
-    missing_before: Missing
-    missing_after: Missing
 
     @property
     def plant(self) -> Plant:

@@ -172,7 +172,7 @@ def _proven(search: Search, whole: Parts, base: Candidate, plain: Fit, best: Can
 
     An effect is withdrawn when its size, within what the model's error leaves open, is not far from zero, or when with
     it the model predicts worse, at any horizon and by more than chance, than without it or than re-fitted parameters
-    alone.
+    alone, or its misfit on held-out data is larger than theirs.
     """
     likelihood = search.likelihood
     levels = likelihood.settings.levels
@@ -190,6 +190,7 @@ def _proven(search: Search, whole: Parts, base: Candidate, plain: Fit, best: Can
         fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
         if weak is None and not harm and fewer.effects:
             harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
+        harm = harm or _larger_misfit(likelihood, sized_base.fit, final.fit, whole)
         if weak is None and not harm:
             return _Proven(best, efficient, sized_base, final, Proof(before, after), tuple(notes))
         why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
@@ -246,6 +247,13 @@ def _harm_over_fewer(
     again = annealed(likelihood, fewer.fit.p, fewer.fit.q, fewer.fit.free, whole, fewer.effects)
     levels = ladder(likelihood.settings.levels, fewer.effects, again.q)
     return harm(sized(likelihood, again, whole, fewer.effects, levels).fit.p)
+
+
+def _larger_misfit(likelihood: RecordLikelihood, base: Fit, final: Fit, whole: Parts) -> tuple[str, ...]:
+    """Return the signals whose misfit on held-out data, as it is reported, is larger with effects than without."""
+    stages = [("parameters", base.p), ("final", final.p)]
+    found = held_out_misfit(likelihood, final.q, stages, whole.held_out, "")
+    return tuple(f"the misfit of {one.signal}" for one in found if not one.after <= one.before)
 
 
 def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: float, whole: Parts) -> bool:

@@ -6,7 +6,6 @@ Each record has an initial state of its own, and an angle between its encoders' 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -94,7 +93,7 @@ def by_record(estimate: Estimate, records: Sequence[Record]) -> Estimate:
     return replace(estimate, curves=curves, diagnostics=diagnostics)
 
 
-def _evidence(record: Record, estimate: Estimate, start: int, stop: int) -> dict[str, Any]:
+def _evidence(record: Record, estimate: Estimate, start: int, stop: int) -> dict[str, object]:
     """Return how often a record traverses the gap, and how well the common values explain it."""
     flanks = estimate.curves["contacts"][start:stop]
     flanks = flanks[flanks != 0]

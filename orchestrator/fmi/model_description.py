@@ -3,7 +3,6 @@
 import math
 import zipfile
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,9 +28,6 @@ class FmuDescription:
         identifier: name of the shared library.
         python: the FMU runs Python in this very process.
         once: only one instance per process is allowed.
-        needs_tool: a further program must be installed.
-        default_step: communication step of the default experiment [s], if there is one.
-        default_stop: stop time of the default experiment [s], if there is one.
     """
 
     model: ModelInterface
@@ -39,9 +35,6 @@ class FmuDescription:
     identifier: str
     python: bool
     once: bool
-    needs_tool: bool
-    default_step: float | None
-    default_stop: float | None
 
 
 def read_description(path: Path) -> FmuDescription:
@@ -136,26 +129,17 @@ def _description(root: etree._Element, cosimulation: etree._Element, origin: str
         can_save_state=_flag(cosimulation, "canGetAndSetFMUstate"),
         can_vary_step=_flag(cosimulation, "canHandleVariableCommunicationStepSize"),
     )
-    experiment = root.find("DefaultExperiment")
     return FmuDescription(
         model=model,
         guid=root.attrib["guid"],
         identifier=identifier,
         python=python or "PythonFMU" in (root.get("generationTool") or ""),
         once=_flag(cosimulation, "canBeInstantiatedOnlyOncePerProcess"),
-        needs_tool=_flag(cosimulation, "needsExecutionTool"),
-        default_step=_number(experiment, "stepSize", float) if experiment is not None else None,
-        default_stop=_number(experiment, "stopTime", float) if experiment is not None else None,
     )
 
 
 def _flag(element: etree._Element, name: str) -> bool:
     return element.get(name) in {"true", "1"}
-
-
-def _number(element: etree._Element, name: str, kind: Callable[[str], float]) -> float | None:
-    text = element.get(name)
-    return None if text is None else kind(text)
 
 
 def _units(root: etree._Element) -> dict[str, Unit]:

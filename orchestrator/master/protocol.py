@@ -13,7 +13,6 @@ Value = float | int | bool | str
 Transfer = Callable[[], None]
 Signals = NDArray[np.float64]
 
-SETTABLE = frozenset({"parameter", "input"})
 READABLE = frozenset({"output", "local", "input", "parameter", "calculatedParameter", "independent"})
 NUMERIC = frozenset({"Real", "Integer", "Boolean", "Enumeration"})
 

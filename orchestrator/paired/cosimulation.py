@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +33,7 @@ RECORDED = {
 MACHINE, TWIN = "", "twin_"
 
 
-LoopValues = Mapping[str, Mapping[str, Any]]
+LoopValues = Mapping[str, Mapping[str, float | str]]
 """Parameters by name, for each of the three ``FMUS``."""
 
 
@@ -70,7 +69,7 @@ def loop_system(
 
 
 @cache
-def loop_values(experiment: Experiment) -> dict[str, dict[str, Any]]:
+def loop_values(experiment: Experiment) -> dict[str, Mapping[str, float | str]]:
     """Return the parameters of a loop without a gap, designed once for each experiment.
 
     Args:
@@ -87,14 +86,14 @@ def loop_values(experiment: Experiment) -> dict[str, dict[str, Any]]:
         "u_max": e.torque_limit,
         "sample_time": e.sample_time,
     }
-    plant: dict[str, Any] = {
+    plant: dict[str, float | str] = {
         "J_m": v.J_m, "J_l": v.J_l, "k": v.k, "c": v.c, "b_m": v.b_m, "b_l": v.b_l, "i": v.i, "tau": v.tau,
         "alpha": 0.0, "backlash_model": "none",
     }  # fmt: skip
     return dict(zip(FMUS, (plant, _estimator_parameters(e.estimator()), controller), strict=True))
 
 
-def _estimator_parameters(estimator: KalmanFilter) -> dict[str, Any]:
+def _estimator_parameters(estimator: KalmanFilter) -> dict[str, float]:
     """Return the parameters of ``KalmanEstimator`` for a designed filter."""
     rows = range(6)
     return (

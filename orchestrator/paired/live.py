@@ -54,7 +54,7 @@ def pair_system(experiment: Experiment, alpha: float, seed: int, start: Mapping[
         for fmu, part in zip(FMUS, PARTS, strict=True):
             name = f"{prefix}{part}"
             own = {k.partition(".")[2]: v for k, v in given.items() if k.partition(".")[0] == name}
-            instances.append(LiveInstance(name, fmu, values[fmu] | own))
+            instances.append(LiveInstance(name, fmu, {**values[fmu], **own}))
         connections += loop_connections(prefix)
     angle, speed = experiment.reference()
     signals = {}

@@ -6,7 +6,6 @@ from collections.abc import Set
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import jinja2
 from markupsafe import Markup
@@ -159,8 +158,9 @@ def _live_plot(plot: LivePlot) -> Markup:
     return _plot_data(Plot(plot.title, "time [s]", plot.y_label, series))
 
 
-def _series_data(series: Series) -> dict[str, Any]:
-    data: dict[str, Any] = {"name": series.name, "kind": series.kind, "x": _rounded(series.x), "y": _rounded(series.y)}
+def _series_data(series: Series) -> dict[str, object]:
+    data: dict[str, object] = {"name": series.name, "kind": series.kind}
+    data |= {"x": _rounded(series.x), "y": _rounded(series.y)}
     if series.low is not None and series.high is not None:
         data |= {"low": _rounded(series.low), "high": _rounded(series.high)}
     if series.labels is not None:

@@ -26,6 +26,7 @@ from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
 from orchestrator.shared.isolation.scratch import Scratch
 from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.results import WallsFound
 
 DEFAULT_TIME_LIMIT = 300.0
 DEFAULT_MEMORY_LIMIT = 2048 * MEBIBYTE
@@ -64,7 +65,7 @@ def foreign_fmus(system: System) -> list[Path]:
     return [path for path in dict.fromkeys(paths) if not is_ours(path)]
 
 
-def described(system: System, safety: Safety) -> dict[str, Any]:
+def described(system: System, safety: Safety) -> WallsFound:
     """Return what a result file says of the walls around a run of ``system``.
 
     Args:
@@ -72,17 +73,17 @@ def described(system: System, safety: Safety) -> dict[str, Any]:
         safety: how far its FMUs are trusted, and the limits.
 
     Returns:
-        Plain data.
+        The walls.
     """
     foreign = foreign_fmus(system)
-    walls = support()
-    return {
-        "foreign_fmus": [str(path) for path in foreign],
-        "own_process": bool(foreign) and not safety.trust,
-        "landlock": walls.landlock if foreign and not safety.trust else None,
-        "seccomp": walls.seccomp if foreign and not safety.trust else None,
-        "not_enforced": walls.missing if foreign and not safety.trust else "",
-    }
+    walls, behind = support(), bool(foreign) and not safety.trust
+    return WallsFound(
+        foreign_fmus=tuple(str(path) for path in foreign),
+        own_process=behind,
+        landlock=walls.landlock if behind else None,
+        seccomp=walls.seccomp if behind else None,
+        not_enforced=walls.missing if behind else "",
+    )
 
 
 def run_safely(scenario: Scenario, safety: Safety) -> Recording:

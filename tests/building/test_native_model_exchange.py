@@ -4,16 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
 
 from orchestrator.building.compilers import find_compiler
 from orchestrator.building.native_build import ensure_native
 from pyfmu_sources import drivetrain
 from pyfmu_sources.drivetrain_parameters import parameters
+from tests.support.model_exchange import END, STEP, event_times, request, stepped_and_exchanged
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
 
-STEP, END = 1e-2, 2.0
 CASES = {
     "none": {"backlash_model": 1},
     "dead_zone": {"alpha": 0.02},
@@ -41,45 +40,10 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return ensure_native(["Drivetrain"], tmp_path_factory.mktemp("native"), here=True)["Drivetrain"]
 
 
-def request(n: int) -> float:
-    """The torque [N.m] held over step ``n``."""
-    return float(20.0 * np.sign(np.sin(2.0 * np.pi * 0.9 * n * STEP + 0.3)))
-
-
-def exchanged(plant: Path, start: dict[str, float], tolerance: float, events: bool) -> np.ndarray:
-    """Integrate by CVode; inputs jump where the co-simulation's do."""
-    rows = [(t, request(n)) for n in range(round(END / STEP)) for t in (n * STEP, (n + 1) * STEP)]
-    signals = np.array(rows, dtype=[("time", float), ("u", float)])
-    return simulate_fmu(
-        str(plant),
-        fmi_type="ModelExchange",
-        solver="CVode",
-        stop_time=END,
-        output_interval=STEP,
-        relative_tolerance=tolerance,
-        start_values=start,
-        input=signals,
-        output=OUTPUTS,
-        record_events=events,
-    )
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_the_motion_is_that_of_the_cosimulation(plant: Path, name: str) -> None:
-    count = round(END / STEP)
-    held = np.array([(n * STEP, request(n)) for n in range(count)], dtype=[("time", float), ("u", float)])
-    stepped = simulate_fmu(
-        str(plant),
-        fmi_type="CoSimulation",
-        stop_time=END,
-        step_size=STEP,
-        output_interval=STEP,
-        start_values=CASES[name],
-        input=held,
-        output=OUTPUTS,
-    )
-    integrated = exchanged(plant, CASES[name], 1e-12, events=False)
-    assert len(integrated) == len(stepped) == count + 1
+    stepped, integrated = stepped_and_exchanged(plant, CASES[name], OUTPUTS)
+    assert len(integrated) == len(stepped) == round(END / STEP) + 1
     assert np.count_nonzero(np.diff(stepped["contact"])) >= 1
     assert np.max(np.abs(integrated["theta_l"] - stepped["theta_l"])) < 1e-6
     assert np.max(np.abs(integrated["theta_m"] - stepped["theta_m"])) < 1e-6
@@ -104,10 +68,7 @@ def test_events_are_met_at_their_time(plant: Path, model: str, number: float) ->
         middle = 0.5 * (low + high)
         after, mode_after = drivetrain.advance(x, mode, p, request(n), 0.0, middle, drivetrain.prepare(p, middle))
         low, high = (low, middle) if touched(after, mode_after, x) else (middle, high)
-    rows = exchanged(plant, CASES[model], 1e-12, events=True)
-    doubled = rows["time"][1:][np.diff(rows["time"]) == 0.0]
-    inside = [t for t in doubled if abs(t / STEP - round(t / STEP)) > 1e-6]
-    assert inside[0] == pytest.approx(n * STEP + high, abs=1e-9)
+    assert event_times(plant, CASES[model])[0] == pytest.approx(n * STEP + high, abs=1e-9)
 
 
 def touched(x: tuple[float, ...], mode: tuple[int, int, int], before: tuple[float, ...]) -> bool:

@@ -126,6 +126,18 @@ def test_which_effects_may_be_added() -> None:
     assert "gravity_load@load" not in labels(replace(search, model=metric).eligible(BASE))
 
 
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(("back", "alone"), [(0.5, True), (2.0, False)])
+def test_a_motor_that_hardly_turns_back_turns_one_way(sign: float, back: float, alone: bool) -> None:
+    search = search_of(axis_likelihood()[0])
+    angle = np.linspace(0.03, 0.13, 240)
+    angle[60] = angle[59] - 0.1 * back * search.settings.one_way
+    signals = replace(search.likelihood.signals, y=np.column_stack([sign * angle, 0.0 * angle]))
+    search.likelihood = replace(search.likelihood, signals=signals)
+    assert search.one_way is alone
+    assert ("load_torque@load" in labels(search.eligible(BASE))) is not alone
+
+
 def test_offsets_between_encoders_need_both() -> None:
     for channels, seen in ((1, False), (2, True)):
         likelihood, _ = drivetrain_likelihood(40, channels=channels)
@@ -270,8 +282,10 @@ def test_a_law_that_contains_another_is_tried_where_that_pays(friction) -> None:
     tried = search.refined((), best, base, scene)
     assert all(labels(c.effects) == {STRIBECK.label} for c in tried)
     assert search.refined((), base, base, scene) == []
-    found = search.refine(best, FRICTION, STRIBECK, scene)
-    assert found is None or found.fit.p[AXIS.index("effects.coulomb_friction.motor.torque")] == 0.0
+    found = search.refine(best, FRICTION, replace(STRIBECK, plausible=lambda values: True), scene)
+    assert labels(found.effects) == {STRIBECK.label}
+    assert found.fit.p[AXIS.index("effects.coulomb_friction.motor.torque")] == 0.0
+    assert found.fit.fitted > best.fit.fitted - 20.0  # it holds what it takes the place of
     implausible = replace(STRIBECK, plausible=lambda values: False)
     assert search.refine(best, FRICTION, implausible, scene) is None
 

@@ -10,7 +10,7 @@ from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
-from orchestrator.diagnosis.passes import _is_weak, honest
+from orchestrator.diagnosis.passes import _is_weak, _larger_misfit, honest
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.verdict.chance import torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
@@ -104,6 +104,16 @@ def test_what_predicts_better_does_so_beyond_scatter_and_by_more_than_a_hair() -
     assert away.surely_better_than(before) == ()
     assert before.harm_over(away) == ()
     assert "one sample" in away.harm_over(before)
+
+
+def test_a_larger_misfit_of_held_out_data_is_harm() -> None:
+    likelihood, p = axis_likelihood()
+    parts = Parts(slice(10, 120), slice(120, 160), slice(160, likelihood.stop))
+    right = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
+    wrong = replace(right, p=p + 0.5 * (np.arange(p.size) == likelihood.plant.index("b")))
+    assert _larger_misfit(likelihood, right, wrong, parts) == ("the misfit of theta_m",)
+    assert _larger_misfit(likelihood, wrong, right, parts) == ()
+    assert _larger_misfit(likelihood, right, right, parts) == ()
 
 
 @pytest.mark.parametrize(

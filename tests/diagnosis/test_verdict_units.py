@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from orchestrator.diagnosis import verdict
 from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit, split
 from orchestrator.diagnosis.outcome import Named
 from orchestrator.diagnosis.passes import _growth, _left, passes
@@ -339,3 +340,17 @@ def test_what_shows_on_the_last_part_alone_is_sought_with_the_first_held_out() -
     easy = passed(quick(least_missing=1e9, grown=1e9), moved)
     assert not easy.unknown
     assert not easy.floor_off
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_the_heaviest_tail_counts_wherever_it_is(monkeypatch, place: int) -> None:
+    """One row in a hundred differs: excess kurtosis (1 - 6 p q) / (p q); signs that alternate have -2."""
+    columns = np.tile(np.array([1.0, -1.0]), 50)[:, None].repeat(3, axis=1)
+    columns[:, place] = np.eye(1, 100, 7)[0]
+    monkeypatch.setattr(verdict.remainder, "error_response", lambda likelihood, model: None)
+    monkeypatch.setattr(verdict.remainder, "back_propagated", lambda response, raw: columns[:, 2:])
+    likelihood = SimpleNamespace(innovations=lambda p, q: (columns, None), signals=SimpleNamespace(channels=2))
+    white = SimpleNamespace(white=lambda z, part: z[part])
+    fitted = SimpleNamespace(p=None, q=0.0, z=columns[:, :2], colour=white)
+    found = verdict.remainder.tails(likelihood, fitted, slice(0, 100))
+    assert found == pytest.approx((1.0 - 6.0 * 0.01 * 0.99) / (0.01 * 0.99))

@@ -180,7 +180,7 @@ static void recompute(Instance *s, Fault *fault)
         initialise(s, fault);
 #ifdef CONTINUOUS_STATES
     else if (s->course.type == MODEL_EXCHANGE)
-        slave_write(&s->slave, fault);
+        slave_observe(&s->slave, fault);
 #endif
     else if (FEEDTHROUGH && s->course.phase == STEPPING)
         refresh(s, fault);

@@ -7,7 +7,7 @@ from typing import Any
 
 from orchestrator.building.translation.definitions import Function, Owner
 from orchestrator.building.translation.functions import translate
-from orchestrator.building.translation.kinds import REAL, Kind, Tuple, Values
+from orchestrator.building.translation.kinds import REAL, WHOLE, Kind, Tuple, Values
 from orchestrator.building.translation.program import Program
 from orchestrator.errors import FmuError
 
@@ -80,6 +80,8 @@ def _argument(program: Program, owner: Owner, name: str, kind: Kind, first_state
             f"for (int n = 0; n < {count}; n++)",
             f"    {local}.v[n] = (Pair){{{attribute}.v[n], {seed}}};",
         ]
+    if own == kind == WHOLE:
+        return [f"const {program.names.c(kind)} {local} = {attribute};"]
     if own == kind and isinstance(kind, Tuple) and REAL not in kind.items:
         return [f"{program.names.c(kind)} {local};", f"memcpy(&{local}, &{attribute}, sizeof {local});"]
     raise FmuError(f"`{name}` of `{cls.__name__}.response` must be of floats alone, or of none")

@@ -23,7 +23,7 @@ _SAMPLED = {
     "correct": ("", True),
 }
 # Hooks of a slave with continuous states; those with a kind return it.
-_CONTINUOUS = {"derivatives": "", "indicators": "", "update": ", double time", "_write": ""}
+_CONTINUOUS = {"derivatives": "", "indicators": "", "update": ", double time", "observe": ""}
 _ARGUMENTS = {"advance": "time, step", "update": "time"}
 _CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER", "local": "LOCAL"}
 
@@ -133,15 +133,14 @@ def _continuous(program: Program, cls: Any) -> str:
 
 
 def _state_hook(program: Program, name: str, function: Function) -> str:
-    plain = name.lstrip("_")
     arguments = [a for a in ("self", _ARGUMENTS.get(name), "fault" if function.faults else None) if a]
     call = f"{function.c}({', '.join(arguments)})"
     unused = "" if function.faults else "    (void)fault;\n"
     if function.returns == NOTHING:
-        head = f"static void slave_{plain}({program.owner_name} *self{_CONTINUOUS[name]}, Fault *fault)"
+        head = f"static void slave_{name}({program.owner_name} *self{_CONTINUOUS[name]}, Fault *fault)"
         return f"{head}\n{{\n{unused}    {call};\n}}"
     c = program.names.c(function.returns)
-    head = f"static void slave_{plain}({program.owner_name} *self, double values[], Fault *fault)"
+    head = f"static void slave_{name}({program.owner_name} *self, double values[], Fault *fault)"
     return f"{head}\n{{\n{unused}    const {c} found = {call};\n    memcpy(values, found.v, sizeof found.v);\n}}"
 
 

@@ -111,10 +111,11 @@ class Horizons:
         Returns:
             The share; negative where this model is worse.
         """
-        return self._least_skill(other, self.long)
+        own, before = (np.mean((h.errors[self.long :] / self.noise) ** 2, axis=1) for h in (self, other))
+        return float(np.min(1.0 - own / before))
 
     def even_skill_over(self, other: "Horizons") -> float:
-        """Return the smallest share of the other model's squared error removed, at every horizon but one sample.
+        """Return the smallest share removed of the other model's squared error, noise apart, beyond one sample.
 
         Args:
             other: prediction errors of another model on the same samples.
@@ -122,11 +123,7 @@ class Horizons:
         Returns:
             The share; negative where this model is worse.
         """
-        return self._least_skill(other, 1)
-
-    def _least_skill(self, other: "Horizons", first: int) -> float:
-        own, before = (np.mean((h.errors[first:] / self.noise) ** 2, axis=1) for h in (self, other))
-        return float(np.min(1.0 - own / before))
+        return float(np.min(self._removed(other, 1)))
 
     def skill_over(self, other: "Horizons") -> float:
         """Return the largest share of the other's squared error that this one removes, at horizons beyond noise.
@@ -137,8 +134,12 @@ class Horizons:
         Returns:
             The share; minus infinity where there is no such horizon.
         """
-        own, before = (np.mean((h.errors[self.long :] / self.noise) ** 2, axis=1) - 1.0 for h in (self, other))
-        return float(np.max(1.0 - np.maximum(own, 0.0) / np.maximum(before, 1e-9), initial=-np.inf))
+        return float(np.max(self._removed(other, self.long), initial=-np.inf))
+
+    def _removed(self, other: "Horizons", first: int) -> Array:
+        """Return, from horizon ``first`` on, the share removed of what the other's squared error has beyond noise."""
+        own, before = (np.mean((h.errors[first:] / self.noise) ** 2, axis=1) - 1.0 for h in (self, other))
+        return np.asarray(1.0 - np.maximum(own, 0.0) / np.maximum(before, 1e-9))
 
     def is_hopeless(self, share: float) -> bool:
         """Tell whether the model predicts hardly better than a motion at constant speed, and not the whole part.

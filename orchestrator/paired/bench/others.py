@@ -101,7 +101,7 @@ def pyfmi(job: BenchJob) -> Prepared:
     connections = [(models[a], b, models[c], d) for a, b, c, d in job.connections]
     master = Master(list(models.values()), connections)
     options = master.simulate_options()
-    wanted: dict[str, Any] = {"step_size": job.step, "extrapolation_order": 0, "error_controlled": False}
+    wanted: dict[str, object] = {"step_size": job.step, "extrapolation_order": 0, "error_controlled": False}
     wanted |= {"linear_correction": False, "block_initialization": True, "result_handling": None}
     for key, value in wanted.items():
         options[key] = value

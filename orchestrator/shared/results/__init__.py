@@ -47,6 +47,13 @@ class GapFound(msgspec.Struct, frozen=True):
     upper: float | None
 
 
+class BuildFound(Found, frozen=True, kw_only=True):
+    """``build``: path by name, and what this machine cannot give an FMU."""
+
+    fmus: dict[str, str]
+    remark: str | None = None
+
+
 class PairFound(Found, frozen=True, kw_only=True):
     """``simulate``: both loops. ``alpha`` and ``S`` in rad; ``experiment`` as the class of that name."""
 
@@ -55,7 +62,7 @@ class PairFound(Found, frozen=True, kw_only=True):
     estimate: GapFound | None = None
     no_estimate: str = ""
     crossings: int | None = None
-    play: dict[str, Any] = {}
+    play: dict[str, Sizes | None] = {}
     experiment: dict[str, Any] = {}
 
 
@@ -71,6 +78,16 @@ class LiveFound(msgspec.Struct, frozen=True):
     values: dict[str, float] = {}
     rows: list[int] = []
     starts: list[dict[str, float]] = []
+
+
+class WallsFound(msgspec.Struct, frozen=True):
+    """The walls around a run: whose FMUs are not ours, what holds them, and what the system could not enforce."""
+
+    foreign_fmus: tuple[str, ...] = ()
+    own_process: bool = False
+    landlock: int | None = None
+    seccomp: bool | None = None
+    not_enforced: str = ""
 
 
 class SignalFound(msgspec.Struct, frozen=True):
@@ -89,7 +106,7 @@ class SignalsFound(Found, frozen=True, kw_only=True):
 
     signals: list[SignalFound] = []
     steps: int | None = None
-    isolation: dict[str, Any] = {}
+    isolation: WallsFound | None = None
 
 
 class ColumnFound(msgspec.Struct, frozen=True):
@@ -145,8 +162,8 @@ class SweepFound(Found, frozen=True, kw_only=True):
     fmus: dict[str, str] | None = None
     fmu_kind: str | None = None
     scenario: SweptScenario | None = None
-    play: dict[str, Any] = {}
-    isolation: dict[str, Any] | None = None
+    play: dict[str, Sizes] = {}
+    isolation: WallsFound | None = None
 
 
 class FindingFound(msgspec.Struct, frozen=True):
@@ -166,7 +183,7 @@ class CheckedFmu(msgspec.Struct, frozen=True):
     ok: bool
     executed: bool = False
     counts: dict[str, int] = {}
-    facts: dict[str, Any] = {}
+    facts: dict[str, str | int | list[str]] = {}
     findings: list[FindingFound] = []
 
 

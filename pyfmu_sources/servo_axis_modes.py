@@ -1,0 +1,194 @@
+"""The single axis as model exchange sees it: state derivatives, event indicators, what follows at an event.
+
+The laws are those of :mod:`servo_axis`; here they are without its integrator, which is the host's. Between events the
+direction of sliding and the end stop that is touched do not change.
+"""
+
+from .drivetrain_parameters import BIG
+from .effects import UNASKED, saturated
+from .servo_axis import (
+    Parameters,
+    State,
+    builds_up,
+    capacity,
+    drive_torque,
+    initial_mode,
+    leaves_sliding,
+    mode_rates,
+    past_stop,
+    reach,
+    rest,
+    sliding_torque,
+    slip_at_rest,
+)
+from .servo_axis_parameters import P_LIMIT, P_OFFSET, P_STOP_LOWER, P_STOP_UPPER, P_WAVY
+
+Indicators = tuple[float, float]
+Outputs = tuple[float, float, float]
+
+# Direction of sliding before the first request, which decides.
+UNDECIDED = 2
+# An indicator turns negative when it is this many roundings below zero, so that the event update, which wants one,
+# surely finds the mode at its end.
+ROOMS = 2.0
+
+
+def decided(x: State, mode: int, p: Parameters, u: float) -> int:
+    """Return the direction of sliding, from the state and the request if nothing has decided it yet.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, or ``UNDECIDED``.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+
+    Returns:
+        -1, 0 or 1.
+    """
+    if mode == UNDECIDED:
+        mode = initial_mode(x, p, u)
+    return 1 if mode == 0 and not is_dry(p) else mode
+
+
+def is_dry(p: Parameters) -> bool:
+    """Tell whether the axis has dry friction.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        True when it has.
+    """
+    return rest(p) + abs(p[P_WAVY]) > 0.0
+
+
+def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) -> tuple[State, Outputs]:
+    """Return the derivatives, and the outputs theta_m, omega_m and T_m.
+
+    Args:
+        x: state.
+        mode: direction of sliding, which is held.
+        p: parameters.
+        u: requested torque [N.m].
+        T_l: load torque [N.m].
+
+    Returns:
+        Both, SI units.
+    """
+    asked = saturated(u, p[P_LIMIT])
+    outputs = (x[0] + p[P_OFFSET], x[1], drive_torque(x, p, asked))
+    return (mode_rates(x, mode, p, asked, T_l), outputs)
+
+
+def slipping_room(x: State, mode: int) -> float:
+    """Return how far below zero the friction's indicator may fall by rounding.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+
+    Returns:
+        The room: N.m of an axis that sticks, rad/s of one that slides.
+    """
+    return 1e-12 * (1.0 + abs(x[2])) if mode == 0 else 1e-14
+
+
+def slipping(x: State, mode: int, p: Parameters, u: float, T_l: float) -> float:
+    """Return how far dry friction is from the end of its mode, in N.m (it sticks) or rad/s (it slides).
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        The distance; 1 where the mode cannot end: no dry friction, or a bristle that bends.
+    """
+    if not is_dry(p) or (mode == 0 and builds_up(p)):
+        return 1.0
+    if mode == 0:
+        return capacity(x, p) - abs(sliding_torque((x[0], 0.0, x[2], x[3], x[4]), p, u, T_l))
+    return x[1] * mode - leaves_sliding(p)
+
+
+def stop_room(x: State) -> float:
+    """Return how far below zero the end stops' indicator may fall by rounding [rad].
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+
+    Returns:
+        The room.
+    """
+    return 1e-14 * (1.0 + abs(x[0]))
+
+
+def to_stop(x: State, stop: int, p: Parameters) -> float:
+    """Return how far [rad] the axis is from reaching an end stop, or from leaving the one at which it is.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        stop: at which it is: -1, 0 (none) or 1.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The distance; 1 without end stops.
+    """
+    if p[P_STOP_UPPER] >= BIG and p[P_STOP_LOWER] <= -BIG:
+        return 1.0
+    if stop == 1:
+        return x[0] - p[P_STOP_UPPER]
+    if stop == -1:
+        return p[P_STOP_LOWER] - x[0]
+    return min(p[P_STOP_UPPER] - x[0], x[0] - p[P_STOP_LOWER])
+
+
+def indicators(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: float) -> Indicators:
+    """Return both event indicators: dry friction and end stops; the mode ends when one turns negative.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        stop: end stop at which the axis is: -1, 0 (none) or 1.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        The indicators.
+    """
+    return (
+        slipping(x, mode, p, u, T_l) + ROOMS * slipping_room(x, mode),
+        to_stop(x, stop, p) + ROOMS * stop_room(x),
+    )
+
+
+def after_events(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: float) -> tuple[State, int, int]:
+    """Return state, direction of sliding and end stop once none of them is at its end.
+
+    Args:
+        x: state at the event.
+        mode: direction of sliding, or ``UNDECIDED``.
+        stop: end stop.
+        p: parameters.
+        u: requested torque [N.m], saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        The three.
+    """
+    if x[4] == UNASKED:
+        x = (x[0], x[1], x[2], x[3], u)
+    mode = decided(x, mode, p, u)
+    if slipping(x, mode, p, u, T_l) < -slipping_room(x, mode):
+        if builds_up(p):
+            x = (x[0], x[1], x[2], mode * reach(x, p), x[4])
+            mode = 0
+        else:
+            x = (x[0], 0.0, x[2], x[3], x[4])
+            mode = slip_at_rest(x, p, u, T_l)
+    if to_stop(x, stop, p) < -stop_room(x):
+        stop = past_stop(x, p) if stop == 0 else 0
+    return (x, mode, stop)

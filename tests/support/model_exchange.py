@@ -1,0 +1,55 @@
+"""Model exchange of native FMUs by FMPy's CVode beside their own co-simulation; used by tests."""
+
+from pathlib import Path
+
+import numpy as np
+from fmpy import simulate_fmu
+
+STEP, END = 1e-2, 2.0
+TOLERANCE = 1e-12
+
+
+def request(n: int) -> float:
+    """The torque [N.m] held over step ``n``."""
+    return float(20.0 * np.sign(np.sin(2.0 * np.pi * 0.9 * n * STEP + 0.3)))
+
+
+def exchanged(fmu: Path, start: dict[str, float], outputs: list[str], events: bool = False) -> np.ndarray:
+    """Integrate by CVode; inputs jump where the co-simulation's do."""
+    rows = [(t, request(n), 0.0) for n in range(round(END / STEP)) for t in (n * STEP, (n + 1) * STEP)]
+    signals = np.array(rows, dtype=[("time", float), ("u", float), ("T_l", float)])
+    return simulate_fmu(
+        str(fmu),
+        fmi_type="ModelExchange",
+        solver="CVode",
+        stop_time=END,
+        output_interval=STEP,
+        relative_tolerance=TOLERANCE,
+        start_values=start,
+        input=signals,
+        output=outputs,
+        record_events=events,
+    )
+
+
+def stepped_and_exchanged(fmu: Path, start: dict[str, float], outputs: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the outputs at the communication points of a co-simulation, and by CVode."""
+    rows = [(n * STEP, request(n), 0.0) for n in range(round(END / STEP))]
+    stepped = simulate_fmu(
+        str(fmu),
+        fmi_type="CoSimulation",
+        stop_time=END,
+        step_size=STEP,
+        output_interval=STEP,
+        start_values=start,
+        input=np.array(rows, dtype=[("time", float), ("u", float), ("T_l", float)]),
+        output=outputs,
+    )
+    return stepped, exchanged(fmu, start, outputs)
+
+
+def event_times(fmu: Path, start: dict[str, float]) -> list[float]:
+    """Return the times [s] of the events between communication points, which only the model can have caused."""
+    times = exchanged(fmu, start, [], events=True)["time"]
+    doubled = times[1:][np.diff(times) == 0.0]
+    return [float(t) for t in doubled if abs(t / STEP - round(t / STEP)) > 1e-6]
