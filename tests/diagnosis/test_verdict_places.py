@@ -167,3 +167,14 @@ def test_the_load_of_a_drivetrain_is_told_from_its_motor() -> None:
     assert np.array_equal(regimes["twist"], DRIVETRAIN.twist(model.p, x[20:]))
     assert np.array_equal(regimes["angle"], np.mod(x[20:, 2], 2.0 * np.pi))
     assert p.size == likelihood.nominal.size
+
+
+def test_a_shaft_without_stiffness_misses_no_torque() -> None:
+    likelihood, _ = drivetrain_likelihood(300, effects__coulomb_friction__load__torque=15.0)
+    model = fit(likelihood, likelihood.nominal, 0.05, (), Parts(slice(10, 300), slice(200, 300), slice(0)))
+    p = model.p.copy()
+    p[DRIVETRAIN.names.index("k")] = 0.0
+    found = missing_torque(likelihood, replace(model, p=p, z=likelihood.whitened(p, model.q)))
+    assert not np.any(found.torque["torque of the shaft"])
+    assert all(np.all(np.isfinite(values)) for values in found.torque.values())
+    assert sum(found.weights.values()) == pytest.approx(1.0)

@@ -82,8 +82,9 @@ def missing_torque(likelihood: RecordLikelihood, model: Fit, plain: bool = False
     scales = [variance]
     if plant.shaft is not None:
         k, ratio = plant.value(model.p, plant.shaft.stiffness), plant.ratio(model.p)
-        # A shaft torque shows at both ends; the two estimates weigh the same, hence the half.
-        scales += [0.5 * variance * ratio**2 / k, variance * ratio**2]
+        # A shaft torque shows at both ends; the two estimates weigh the same, hence the half. Without stiffness (a fit
+        # may end there) no torque is the shaft's.
+        scales += [0.5 * variance * ratio**2 / k if k > 0.0 else 0.0, variance * ratio**2]
     settled = slice(settings.likelihood.settled, None)
     torque, energy, regimes = {}, {}, {}
     for column, (site, scale) in enumerate(zip(plant.sites, scales, strict=True)):
