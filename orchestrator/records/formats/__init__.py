@@ -11,6 +11,7 @@ from orchestrator.records.formats.source import MAXIMUM_BYTES, RecordSource
 
 # First bytes of a file (and where they stand) and the module that reads it.
 _MAGIC = (
+    (0, b"PK\x03\x04", "numpy_file"),
     (0, b"PAR1", "parquet"),
     (0, b"MDF     ", "mdf"),
     (0, b"UnFinMF ", "mdf"),
@@ -52,8 +53,6 @@ def open_source(path: Path) -> Iterator[RecordSource]:
     head = _first_bytes(path)
     if not head:
         raise RecordError(f"{path}: a record must have a header and rows, but the file is empty")
-    if head.startswith(b"PK\x03\x04"):
-        head = b"\x93NUMPY"
     for start, what in _OTHERS:
         if head.startswith(start):
             raise RecordError(f"{path}: must be {FORMATS}, but {what}")

@@ -20,7 +20,7 @@ from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS,
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import Limits
 
-FORMATS = {"mat": "MAT", "hdf5": "HDF5", "parquet": "Parquet", "mdf": "MDF"}
+NAMES = {"mat": "MAT", "hdf5": "HDF5", "parquet": "Parquet", "mdf": "MDF"}
 # Arrays, their copies on the way, and what a library makes of a file: some times what may be unpacked.
 _LIMITS = Limits(time=300.0, memory=8 * MAXIMUM_BYTES, output=2 * MAXIMUM_BYTES, total=3600.0, disk=2 * MAXIMUM_BYTES)
 _Opened = tuple[list[tuple[str, str, str, int, str]], str, float | None]
@@ -67,7 +67,7 @@ def opened_apart(module: str, path: Path) -> Iterator[RecordSource]:
     """
     file = path.resolve()
     with Jail(f"{__name__}:reader", (module, str(file)), read=[file], limits=_LIMITS) as jail:
-        yield _Apart(jail, FORMATS[module], file, path)
+        yield _Apart(jail, NAMES[module], file, path)
 
 
 class _Apart(RecordSource):
