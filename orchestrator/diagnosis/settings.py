@@ -304,8 +304,7 @@ class ProofSettings(Settings, frozen=True):
 class CycleSettings(Settings, frozen=True):
     """The search for what comes again and again in time."""
 
-    bins: Annotated[int, setting("parts of a cycle: a torque that lasts a thirtieth of it shows", ge=8)] = 32
-    least_samples: Annotated[int, setting("samples of the shortest cycle", ge=8)] = 20
+    bins: Annotated[int, setting("parts of a cycle, of two samples at least: shorter pulses still show", ge=8)] = 24
     repeats: Annotated[int, setting("cycles of the fitted part at least: fewer are a trend", ge=2)] = 4
     sure: Annotated[
         float, setting("variance of the mean cycle over that of unlike ones from which it repeats; chance: 1", gt=1)

@@ -45,7 +45,7 @@ def cycle_of(torque: Array, request: Array, time: Array, knots: int, settings: C
         The cycle; None: nothing repeats beyond chance, or the request does so too.
     """
     h, span = float(time[1] - time[0]), float(time[-1] - time[0])
-    shortest, longest = settings.least_samples * h, span / settings.repeats
+    shortest, longest = 2 * settings.bins * h, span / settings.repeats
     if shortest >= longest:
         return None
     best, at = 0.0, 0.0
