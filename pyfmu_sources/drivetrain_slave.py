@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
 from . import drivetrain
-from .dead_time import MOST_REQUESTS, ROUNDING, Requests, is_new, request_at
 from .drivetrain import Mode, State, Table
 from .drivetrain_modes import QUIET, Indicators, after_events, indicators, rates_and_outputs, state_rates
 from .drivetrain_parameters import (
@@ -24,7 +23,8 @@ from .drivetrain_parameters import (
 )
 from .effects import saturated
 from .fmu_variables import LARGEST, FmuVariable
-from .slave_base import TOO_STIFF, SlaveBase, StepRefusedError
+from .plant_slave import PlantSlave
+from .slave_base import TOO_STIFF, StepRefusedError
 
 U, T_L, THETA_M, THETA_L, OMEGA_M, OMEGA_L, T_M, T_SHAFT, CONTACT = range(9)
 FIRST_PARAMETER = CONTACT + 1
@@ -85,7 +85,7 @@ def _output(name: str, unit: str, description: str, nominal: float, starts_from:
     )
 
 
-class Drivetrain(SlaveBase):
+class Drivetrain(PlantSlave):
     """Motor with lag, gear with play, elastic shaft and load; the inputs are held over a communication step."""
 
     title = "Geared drivetrain with backlash: motor with lag, gear with play, elastic shaft, load"
@@ -119,7 +119,6 @@ class Drivetrain(SlaveBase):
     _x: State
     _mode: Mode
     _p: Values
-    _requests: Requests
     _events: int
     _event_time: float
     _known: KnownSteps
@@ -162,46 +161,13 @@ class Drivetrain(SlaveBase):
         self._event_time = 0.0
         self._write()
 
-    def advance(self, time: float, step: float) -> None:
-        """Integrate with the inputs held; a dead time splits the step where an older request takes over.
+    def _request(self) -> float:
+        """Return the requested torque within its limit [N.m]."""
+        return saturated(self.real[U], self._p[P_LIMIT])
 
-        Args:
-            time: [s].
-            step: [s].
-        """
-        u = saturated(self.real[U], self._p[P_LIMIT])
-        if self._p[P_DELAY] == 0.0:
-            x, mode = self._moved(self._x, self._mode, u, time, step)
-            self._take(x, mode, step)
-        else:
-            self._advance_delayed(u, time, step)
-
-    def _advance_delayed(self, u: float, time: float, step: float) -> None:
-        """Advance piece by piece; before the first request acts, the torque is zero."""
-        x, mode = self._x, self._mode
-        new = is_new(self._requests, u)
-        count = len(self._requests) + new
-        if count > MOST_REQUESTS:
-            raise StepRefusedError(f"at most {MOST_REQUESTS} requests may be under way, but this one is one more")
-        end = time + step
-        least = ROUNDING * step
-        begin, acting, first = time, 0.0, 0
-        for n in range(count):
-            asked, value = request_at(self._requests, n, u, time)
-            change = asked + self._p[P_DELAY]
-            if change >= end - least:
-                break
-            if change <= time + least:
-                first = n
-            else:
-                x, mode = self._moved(x, mode, acting, time, change - begin)
-                begin = change
-            acting = value
-        x, mode = self._moved(x, mode, acting, time, end - begin)
-        self._take(x, mode, step)
-        if new:
-            self._requests.append((time, u))
-        del self._requests[:first]
+    def _dead_time(self) -> float:
+        """Return how late a request acts [s]."""
+        return self._p[P_DELAY]
 
     def _moved(self, x: State, mode: Mode, u: float, time: float, step: float) -> tuple[State, Mode]:
         """Return state and mode after a piece of a step."""
@@ -209,7 +175,7 @@ class Drivetrain(SlaveBase):
         known = self._known
         return drivetrain.advance(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
 
-    def _take(self, x: State, mode: Mode, step: float) -> None:
+    def _take(self, x: State, mode: Mode, acting: float, step: float) -> None:
         """Take over a state that is finite and not too far away to be told from its neighbours, or refuse the step."""
         if x[0] != x[0]:
             raise StepRefusedError(f"the step of {step!r} s {TOO_STIFF}")
@@ -249,7 +215,7 @@ class Drivetrain(SlaveBase):
         Returns:
             The derivatives, in the order of the state.
         """
-        u = saturated(self.real[U], self._p[P_LIMIT])
+        u = self._request()
         return state_rates(self._x, self._mode, self._p, u, self.real[T_L])
 
     def indicators(self) -> Indicators:
@@ -258,7 +224,7 @@ class Drivetrain(SlaveBase):
         Returns:
             The indicators.
         """
-        u = saturated(self.real[U], self._p[P_LIMIT])
+        u = self._request()
         return indicators(self._x, self._mode, self._p, u, self.real[T_L])
 
     def update(self, time: float) -> None:
@@ -274,7 +240,7 @@ class Drivetrain(SlaveBase):
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
         if self._p[P_RATE] < BIG:
             raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
-        u = saturated(self.real[U], self._p[P_LIMIT])
+        u = self._request()
         quiet = time - self._event_time > QUIET
         x, mode, events = after_events(self._x, self._mode, self._events, quiet, self._p, u, self.real[T_L])
         if events > 0:

@@ -1,12 +1,10 @@
 """The single axis as model exchange sees it: state derivatives, event indicators, what follows at an event.
 
-The laws are those of :mod:`servo_axis`; here they are without its integrator, which is the host's. Between events the
-direction of sliding and the end stop that is touched do not change.
+The laws are those of :mod:`axis_equations`; here they are without its integrator, which is the host's. Between events
+the direction of sliding and the end stop that is touched do not change.
 """
 
-from .drivetrain_parameters import BIG
-from .effects import UNASKED, saturated
-from .servo_axis import (
+from .axis_equations import (
     Parameters,
     State,
     builds_up,
@@ -21,6 +19,8 @@ from .servo_axis import (
     sliding_torque,
     slip_at_rest,
 )
+from .drivetrain_parameters import BIG
+from .effects import UNASKED, saturated
 from .servo_axis_parameters import P_LIMIT, P_OFFSET, P_STOP_LOWER, P_STOP_UPPER, P_WAVY
 
 Indicators = tuple[float, float]

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from typing import Annotated, Any, ClassVar
 
 from . import servo_axis
-from .dead_time import MOST_REQUESTS, ROUNDING, Requests, is_new, request_at
 from .drivetrain_parameters import BIG
 from .effects import saturated
 from .fmu_variables import LARGEST, FmuVariable
+from .plant_slave import PlantSlave
 from .servo_axis import State
 from .servo_axis_modes import UNDECIDED, Indicators, after_events, decided, indicators, rates_and_outputs
 from .servo_axis_parameters import COUNT, P_DELAY, P_LIMIT, P_OFFSET, P_RATE, PARAMETERS
-from .slave_base import TOO_STIFF, SlaveBase, StepRefusedError
+from .slave_base import TOO_STIFF, StepRefusedError
 
 U, T_L, THETA_M, OMEGA_M, T_M = range(5)
 FIRST_PARAMETER = T_M + 1
@@ -24,7 +24,7 @@ Values = Annotated[tuple[float, ...], COUNT]
 _OFFSET = "effects.sensor_offset.motor.offset"
 
 
-class ServoAxis(SlaveBase):
+class ServoAxis(PlantSlave):
     """One inertia behind the lag of its drive; the inputs are held over a communication step."""
 
     title = "Single axis: one inertia behind the torque lag of its drive"
@@ -45,7 +45,6 @@ class ServoAxis(SlaveBase):
     _p: Values
     _acting: float
     _end_stop: int
-    _requests: Requests
 
     # The hidden attribute that model exchange integrates, and its items: name, unit, nominal value, meaning.
     state_attribute: ClassVar[str] = "_x"
@@ -75,48 +74,15 @@ class ServoAxis(SlaveBase):
         self._acting = 0.0
         self._write()
 
-    def advance(self, time: float, step: float) -> None:
-        """Integrate with the inputs held; a dead time splits the step where an older request takes over.
+    def _request(self) -> float:
+        """Return the requested torque within its limit [N.m]."""
+        return saturated(self.real[U], self._p[P_LIMIT])
 
-        Args:
-            time: [s].
-            step: [s].
-        """
-        u = saturated(self.real[U], self._p[P_LIMIT])
-        if self._p[P_DELAY] == 0.0:
-            x, mode = self._moved(self._x, self._mode, u, step)
-            self._take(x, mode, u, step)
-        else:
-            self._advance_delayed(u, time, step)
+    def _dead_time(self) -> float:
+        """Return how late a request acts [s]."""
+        return self._p[P_DELAY]
 
-    def _advance_delayed(self, u: float, time: float, step: float) -> None:
-        """Advance piece by piece; before the first request acts, the torque is zero."""
-        x, mode = self._x, self._mode
-        new = is_new(self._requests, u)
-        count = len(self._requests) + new
-        if count > MOST_REQUESTS:
-            raise StepRefusedError(f"at most {MOST_REQUESTS} requests may be under way, but this one is one more")
-        end = time + step
-        least = ROUNDING * step
-        begin, acting, first = time, 0.0, 0
-        for n in range(count):
-            asked, value = request_at(self._requests, n, u, time)
-            change = asked + self._p[P_DELAY]
-            if change >= end - least:
-                break
-            if change <= time + least:
-                first = n
-            else:
-                x, mode = self._moved(x, mode, acting, change - begin)
-                begin = change
-            acting = value
-        x, mode = self._moved(x, mode, acting, end - begin)
-        self._take(x, mode, acting, step)
-        if new:
-            self._requests.append((time, u))
-        del self._requests[:first]
-
-    def _moved(self, x: State, mode: int, u: float, step: float) -> tuple[State, int]:
+    def _moved(self, x: State, mode: int, u: float, time: float, step: float) -> tuple[State, int]:
         """Return state and direction of sliding after a piece of a step."""
         if mode == UNDECIDED:
             mode = servo_axis.initial_mode(x, self._p, u)
@@ -139,7 +105,7 @@ class ServoAxis(SlaveBase):
         Returns:
             The derivatives, in the order of the state.
         """
-        u = saturated(self.real[U], self._p[P_LIMIT])
+        u = self._request()
         mode = decided(self._x, self._mode, self._p, u)
         return servo_axis.mode_rates(self._x, mode, self._p, u, self.real[T_L])
 
@@ -149,7 +115,7 @@ class ServoAxis(SlaveBase):
         Returns:
             The indicators.
         """
-        u = saturated(self.real[U], self._p[P_LIMIT])
+        u = self._request()
         return indicators(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
 
     def update(self, time: float) -> None:
@@ -165,7 +131,7 @@ class ServoAxis(SlaveBase):
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
         if self._p[P_RATE] < BIG:
             raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
-        u = saturated(self.real[U], self._p[P_LIMIT])
+        u = self._request()
         x, mode, stop = after_events(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
         self._x = x
         self._mode = mode
@@ -174,7 +140,7 @@ class ServoAxis(SlaveBase):
 
     def observe(self) -> None:
         """Write the outputs at the inputs of the moment, for model exchange."""
-        self._acting = saturated(self.real[U], self._p[P_LIMIT])
+        self._acting = self._request()
         self._write()
 
     def _write(self) -> None:

@@ -1,8 +1,8 @@
-"""What any FMU misses, and its parameters, from a measured record."""
+"""What any FMU misses, from a measured record."""
 
 import csv
 import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,8 +11,6 @@ import numpy as np
 
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.diagnosis.blackbox.calibrate import BoxCalibration
-from orchestrator.diagnosis.blackbox.calibrate import calibrate as calibrating
 from orchestrator.diagnosis.blackbox.deliver import Delivered, deliver
 from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
 from orchestrator.diagnosis.blackbox.diagnose import diagnose as diagnosing
@@ -27,38 +25,33 @@ from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.subject import subject_of
 from orchestrator.diagnosis.blackbox.trust import SECOND, doubts, harm, statement
 from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.results.any_fmu import BoxDiagnosisFound, BoxStepFound, BoxTriedFound, LeftFound, OutputFound
+from orchestrator.shared.results.diagnose import EffectFound, ParameterFound, ValueFound
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Trust
 
 Progress = Callable[[str], None]
 
 
-def _estimate(e: ValueEstimate) -> dict[str, Any]:
-    found: dict[str, Any] = {"value": e.value, "standard_error": e.standard_error, "interval": list(e.interval)}
-    return found | {"unit": e.unit} | ({} if e.nominal is None else {"nominal": e.nominal})
+def fitted_values(estimates: Sequence[ValueEstimate]) -> dict[str, ParameterFound]:
+    """Return re-fitted parameters as result files have them.
+
+    Args:
+        estimates: of the parameters.
+
+    Returns:
+        The parameters by name.
+    """
+    return {e.name: ParameterFound(e.nominal, e.value, e.standard_error, e.interval, e.unit) for e in estimates}
 
 
-def _found(f: FoundEffect) -> dict[str, Any]:
-    return {
-        "name": f.effect.kind.name,
-        "site": f.effect.place,
-        "parameters": {e.name: _estimate(e) for e in f.estimates},
-        "score": f.gain,
-        "family": list(f.family),
-    }
+def _effect(f: FoundEffect) -> EffectFound:
+    values = {e.name: ValueFound(e.value, e.standard_error, e.interval, e.unit) for e in f.estimates}
+    return EffectFound(f.effect.kind.name, f.effect.place, values, f.gain, family=tuple(f.family))
 
 
-def _misfits(misfit: Sequence[OutputMisfit]) -> dict[str, Any]:
-    return {
-        m.output: {
-            "nominal": m.nominal,
-            "refitted": m.refitted,
-            "corrected": m.corrected,
-            "noise": m.noise,
-            "unit": m.unit,
-        }
-        for m in misfit
-    }
+def _outputs(misfit: Sequence[OutputMisfit]) -> dict[str, OutputFound]:
+    return {m.output: OutputFound(m.nominal, m.refitted, m.corrected, m.noise, m.unit) for m in misfit}
 
 
 @dataclass(frozen=True, repr=False)
@@ -139,58 +132,47 @@ class FmuDiagnosisResult(Result):
             lines.append(f"Corrected system: {d.path.name}; differs from the fit by {d.difference:.2g} of the noise")
         return lines
 
-    def results(self, place: Path) -> dict[str, Any]:
+    def results(self, place: Path) -> BoxDiagnosisFound:
         """Return what goes into ``diagnose.json``."""
         o = self.outcome
-        return {
-            "kind": "fmu",
-            "verdict": o.verdict,
-            "statement": self.statement,
-            "trust": {"level": self.trust.level.word, "reasons": list(self.trust.reasons)},
-            "effects": [_found(f) for f in o.effects],
-            "suspects": list(o.suspects),
-            "parameters": {e.name: _estimate(e) for e in o.parameters},
-            "misfit": _misfits(o.misfit),
-            "validation": _misfits(self.validation),
-            "remainder": {
-                "explained": o.rest.explained,
-                "disturbance": o.rest.share if o.rest.disturbed else None,
-                "reasons": list(o.rest.reasons),
-                "power": o.rest.blocks.tolist(),
-            },
-            "where": list(o.where),
-            "warnings": [*o.warnings, *self.harm],
-            "settings": as_tables(self.settings),
-            "candidates": self._candidates(),
-            "model": None if not self.delivered else str(place / self.delivered[0].path.name),
-            "delivery": [d.as_json() for d in self.delivered],
-            "step_cost": o.probe.step_cost,
-            "walls": support().in_words,
-            "runs": o.runs,
-            "seconds": o.seconds,
-        }
+        share = o.rest.share if o.rest.disturbed else None
+        return BoxDiagnosisFound(
+            verdict=o.verdict,
+            statement=self.statement,
+            trust=self.trust.found(),
+            effects=tuple(_effect(f) for f in o.effects),
+            suspects=tuple(o.suspects),
+            parameters=fitted_values(o.parameters),
+            misfit=_outputs(o.misfit),
+            validation=_outputs(self.validation),
+            remainder=LeftFound(o.rest.explained, share, o.rest.reasons, tuple(map(tuple, o.rest.blocks.tolist()))),
+            where=tuple(o.where),
+            warnings=(*o.warnings, *self.harm),
+            settings=as_tables(self.settings),
+            candidates=tuple(self._candidates()),
+            model=None if not self.delivered else str(place / self.delivered[0].path.name),
+            delivery=tuple(d.found() for d in self.delivered),
+            step_cost=o.probe.step_cost,
+            walls=support().in_words,
+            runs=o.runs,
+            seconds=o.seconds,
+        )
 
-    def _candidates(self) -> list[dict[str, Any]]:
+    def _candidates(self) -> Iterator[BoxStepFound]:
         search = self.outcome.search
-        if search is None:
-            return []
-        return [
-            {
-                "on_top_of": [e.label for e in step.before.model.effects],
-                "accepted": step.accepted,
-                "tried": [
-                    {
-                        "effect": fit.model.effects[-1].label,
-                        "values": fit.model.values[-1].tolist(),
-                        "gain": search.score(fit) - search.score(step.before),
-                        "decided": fit.decided - step.before.decided,
-                        "parameters": counted(fit.model),
-                    }
-                    for fit in step.tried
-                ],
-            }
-            for step in search.steps
-        ]
+        for step in () if search is None else search.steps:
+            assert search is not None
+            tried = tuple(
+                BoxTriedFound(
+                    fit.model.effects[-1].label,
+                    search.score(fit) - search.score(step.before),
+                    tuple(fit.model.values[-1].tolist()),
+                    fit.decided - step.before.decided,
+                    counted(fit.model),
+                )
+                for fit in step.tried
+            )
+            yield BoxStepFound(tuple(e.label for e in step.before.model.effects), step.accepted, tried)
 
     def write_files(self, folder: Path) -> None:
         """Write the held-out part, a figure and the corrected system."""
@@ -287,81 +269,3 @@ def draft_map(record: Path | str, fmu: Path | str) -> str:
         True
     """
     return drafted(subject_of(Path(fmu)), columns_of(Path(record)))
-
-
-@dataclass(frozen=True, repr=False)
-class CalibrationResult(Result):
-    """Parameters of an FMU from a record.
-
-    Attributes:
-        calibration: values, intervals, what the record does not determine, misfit.
-        arguments: what was asked for.
-    """
-
-    command: ClassVar[str] = "calibrate"
-    calibration: BoxCalibration
-    arguments: Mapping[str, Any] = field(default_factory=dict)
-
-    def blocks(self) -> Sequence[Block]:
-        """Return parameters and misfit."""
-        c = self.calibration
-        rows = [
-            (e.name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.interval[0]:.6g} to {e.interval[1]:.6g}",
-             f"{100.0 * c.learned[e.name]:.0f} %", e.unit)
-            for e in c.parameters
-        ]  # fmt: skip
-        head = ("name", "nominal", "value", "95 % interval", "learned", "unit")
-        lines: list[Block] = [f"Parameters {'explain' if c.explained else 'do not explain'} the record to its noise"]
-        lines.append(table("Parameters", head, rows))
-        lines += [f"Note: {text}" for text in c.warnings]
-        found = [(m.output, f"{m.nominal:.3f}", f"{m.refitted:.3f}", f"{m.noise:.3g} {m.unit}") for m in c.misfit]
-        lines.append(table("Misfit over noise, held-out quarter", ("output", "nominal", "calibrated", "noise"), found))
-        return lines
-
-    def results(self, place: Path) -> dict[str, Any]:
-        """Return what goes into ``calibrate.json``."""
-        del place
-        c = self.calibration
-        return {
-            "explained": c.explained,
-            "parameters": {e.name: _estimate(e) | {"learned": c.learned[e.name]} for e in c.parameters},
-            "not_told_apart": [list(pair) for pair in c.confounded],
-            "misfit": {m.output: {"nominal": m.nominal, "calibrated": m.refitted, "noise": m.noise} for m in c.misfit},
-            "warnings": list(c.warnings),
-            "seconds": c.seconds,
-            "walls": support().in_words,
-        }
-
-
-def calibrate(
-    record: Path | str,
-    fmu: Path | str,
-    map: Path | str,  # noqa: A002 - as on the command line
-    *,
-    progress: Progress = lambda what: None,
-) -> CalibrationResult:
-    """Return the parameters of an FMU that explain a record, with intervals.
-
-    Args:
-        record: path of the log.
-        fmu: path of the FMU.
-        map: path of the map.
-        progress: called with what is done.
-
-    Returns:
-        The parameters with their intervals.
-
-    Raises:
-        InputError: record, FMU or map cannot be used.
-        SimulationError: the FMU fails again and again.
-
-    Example:
-        >>> fit = oc.calibrate("axis.csv", "axis.fmu", "axis_map.toml")
-        >>> [p.name for p in fit.calibration.parameters], fit.calibration.explained
-        (['J', 'b'], False)
-    """
-    subject = subject_of(Path(fmu))
-    given = read_map(Path(map), subject)
-    data = read_data(Path(record), given)
-    found = calibrating(subject, given, data, progress)
-    return CalibrationResult(found, {"record": str(record), "fmu": str(fmu), "map": str(map)})

@@ -19,7 +19,7 @@ SOURCES = Path(pyfmu_sources.__file__).parent
 HERE = Path(__file__).parent
 SUFFIX = "_slave"
 # Not themselves slaves, although their names end so.
-BASES = ("sampled_slave",)
+BASES = ("plant_slave", "sampled_slave")
 DATA_FILES = tuple(sorted(path for path in (HERE / "data").glob("*") if path.is_file()))
 
 

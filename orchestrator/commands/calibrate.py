@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.api.any_fmu import calibrate
+from orchestrator.api.calibrate import calibrate
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._safety import note_missing_walls
 from orchestrator.shared.output import staged
@@ -18,6 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("record", type=Path, metavar="DATA.csv", help="measured record")
     parser.add_argument("--fmu", type=Path, required=True, metavar="ANY.fmu", help="any FMI 2.0 co-simulation FMU")
     parser.add_argument("--map", type=Path, required=True, metavar="MAP.toml", help="columns and uncertain parameters")
+    parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -31,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     """
     note_missing_walls()
     with staged(args.out) as folder:
-        found = calibrate(args.record, args.fmu, args.map, progress=say)
+        found = calibrate(args.record, args.fmu, args.map, settings=args.settings, progress=say)
         found.write(folder, args.out)
         print_blocks(found.blocks())
     print_blocks([f"Written to {args.out}: report.html, calibrate.json"])

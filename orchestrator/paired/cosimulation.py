@@ -69,7 +69,7 @@ def loop_system(
 
 
 @cache
-def loop_values(experiment: Experiment) -> dict[str, Mapping[str, float | str]]:
+def loop_values(experiment: Experiment) -> LoopValues:
     """Return the parameters of a loop without a gap, designed once for each experiment.
 
     Args:

@@ -13,7 +13,7 @@ from orchestrator.building.compilers import find_compiler
 from orchestrator.building.native_build import ensure_native
 from pyfmu_sources import servo_axis
 from pyfmu_sources.servo_axis_parameters import DEFAULTS, NAMES
-from tests.support.model_exchange import END, STEP, event_times, request, stepped_and_exchanged
+from tests.support.model_exchange import END, STEP, event_times, first_time, request, stepped_and_exchanged
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
 
@@ -77,13 +77,8 @@ def test_events_are_met_at_their_time(axis: Path, start: dict[str, float], kind:
             break
         slides = slides or mode_after == 1
         x, mode, n = after, mode_after, n + 1
-    low, high = 0.0, STEP
-    while high - low > 1e-13:
-        middle = 0.5 * (low + high)
-        low, high = (
-            (low, middle) if reached(*servo_axis.advance(x, mode, p, request(n), 0.0, middle)) else (middle, high)
-        )
-    assert min(abs(t - (n * STEP + high)) for t in event_times(axis, start)) < 1e-9
+    event = n * STEP + first_time(lambda h: reached(*servo_axis.advance(x, mode, p, request(n), 0.0, h)))
+    assert min(abs(t - event) for t in event_times(axis, start)) < 1e-9
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -9,7 +9,7 @@ from orchestrator.building.compilers import find_compiler
 from orchestrator.building.native_build import ensure_native
 from pyfmu_sources import drivetrain
 from pyfmu_sources.drivetrain_parameters import parameters
-from tests.support.model_exchange import END, STEP, event_times, request, stepped_and_exchanged
+from tests.support.model_exchange import END, STEP, event_times, first_time, request, stepped_and_exchanged
 
 pytestmark = pytest.mark.skipif(find_compiler(here=True) is None, reason="no C compiler")
 
@@ -63,12 +63,11 @@ def test_events_are_met_at_their_time(plant: Path, model: str, number: float) ->
         if touched(after, mode_after, x):
             break
         x, mode, n = after, mode_after, n + 1
-    low, high = 0.0, STEP
-    while high - low > 1e-13:
-        middle = 0.5 * (low + high)
-        after, mode_after = drivetrain.advance(x, mode, p, request(n), 0.0, middle, drivetrain.prepare(p, middle))
-        low, high = (low, middle) if touched(after, mode_after, x) else (middle, high)
-    assert event_times(plant, CASES[model])[0] == pytest.approx(n * STEP + high, abs=1e-9)
+
+    def reached(h: float) -> bool:
+        return touched(*drivetrain.advance(x, mode, p, request(n), 0.0, h, drivetrain.prepare(p, h)), x)
+
+    assert event_times(plant, CASES[model])[0] == pytest.approx(n * STEP + first_time(reached), abs=1e-9)
 
 
 def touched(x: tuple[float, ...], mode: tuple[int, int, int], before: tuple[float, ...]) -> bool:

@@ -1,6 +1,9 @@
 """The map from S to the gap: monotone, disjoint from tests, refusing what it does not cover."""
 
+import ast
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +14,8 @@ from orchestrator.paired.calibration import calibrate, estimate_gap, load_or_cal
 from orchestrator.paired.compiled_loop import compiled_loop
 from orchestrator.paired.experiment import Experiment, named_experiment, thesis_experiment
 from orchestrator.paired.metric import difference_sum, error_statistics
+
+PLANTS = "orchestrator.plants.design"
 
 NOISY = replace(Experiment(), encoder_noise=1e-4)
 
@@ -100,6 +105,19 @@ def test_the_calibration_that_comes_with_the_package_is_that_of_these_sources(ex
         total = difference_sum(loop.run(float(np.exp(calibration.log_alpha[n])), zero)[:, 2], twin)
         bound = 1e-9 if experiment.encoder_noise == 0.0 else 0.01
         assert np.log(total) == pytest.approx(calibration.log_sum[n], abs=bound)
+
+
+def test_a_calibration_is_made_anew_when_a_module_changes_that_its_numbers_come_from():
+    sources = set(module._sources())
+    used = {
+        node.module
+        for path in sources
+        for node in ast.walk(ast.parse(path.read_bytes()))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("orchestrator.paired.", PLANTS))
+    }
+    # The compiled loop runs the slaves' own sources where there is no native FMU.
+    files = {Path(import_module(name).__file__) for name in used - {"orchestrator.paired.compiled_loop"}}
+    assert files <= sources
 
 
 def test_statistics():

@@ -196,6 +196,8 @@ def test_the_page_of_a_calibration_says_whether_the_parameters_suffice(tmp_path)
         write_result(tmp_path, "calibrate", {}, None, results | {"explained": explained})
         report = report_from_directory(tmp_path)
         assert report.badge[0] == badge
+    write_result(tmp_path, "calibrate", {}, None, results | {"trust": {"level": "amber", "reasons": ["why"]}})
+    assert report_from_directory(tmp_path).badge == ("warn", "amber: the parameters do not explain the record")
     rows = {t.title: t.rows for t in sections(report, ReportTable)}
     assert rows["Parameters"] == (("J", 1.0, 1.05, 0.01, 1.03, 1.07, "kg.m2", 80.0),)
 

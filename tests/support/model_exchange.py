@@ -1,5 +1,6 @@
 """Model exchange of native FMUs by FMPy's CVode beside their own co-simulation; used by tests."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,15 @@ TOLERANCE = 1e-12
 def request(n: int) -> float:
     """The torque [N.m] held over step ``n``."""
     return float(20.0 * np.sign(np.sin(2.0 * np.pi * 0.9 * n * STEP + 0.3)))
+
+
+def first_time(reached: Callable[[float], bool]) -> float:
+    """Return when [s] within a step something is reached that stays so, by halving."""
+    low, high = 0.0, STEP
+    while high - low > 1e-13:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if reached(middle) else (middle, high)
+    return high
 
 
 def exchanged(fmu: Path, start: dict[str, float], outputs: list[str], events: bool = False) -> np.ndarray:

@@ -11,9 +11,9 @@ from orchestrator.diagnosis.blackbox.estimates import OutputMisfit, ValueEstimat
 from orchestrator.diagnosis.blackbox.fitting import parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.problem import Data
-from orchestrator.diagnosis.blackbox.settings import DEFAULT
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.subject import Subject
-from orchestrator.diagnosis.blackbox.verdict import rest_of
+from orchestrator.diagnosis.blackbox.verdict import Rest, rest_of
 from orchestrator.errors import ScenarioError
 
 
@@ -26,7 +26,7 @@ class BoxCalibration:
         learned: name -> share of the granted uncertainty that the record has removed, 0 to 1.
         confounded: pairs that the record hardly tells apart.
         misfit: of each output; ``corrected`` is that of the calibrated model too.
-        explained: nothing but noise (and at most a small disturbance) is left.
+        rest: what the calibrated model leaves.
         warnings: sentences.
         seconds: wall time.
     """
@@ -35,13 +35,22 @@ class BoxCalibration:
     learned: dict[str, float]
     confounded: tuple[tuple[str, str], ...]
     misfit: tuple[OutputMisfit, ...]
-    explained: bool
+    rest: Rest
     warnings: tuple[str, ...]
     seconds: float
 
+    @property
+    def explained(self) -> bool:
+        """Whether nothing but noise, and at most a small disturbance, is left."""
+        return self.rest.explained or self.rest.disturbed
+
 
 def calibrate(
-    subject: Subject, given: Map, data: Data, progress: Callable[[str], None] = lambda what: None
+    subject: Subject,
+    given: Map,
+    data: Data,
+    progress: Callable[[str], None] = lambda what: None,
+    settings: BoxSettings = DEFAULT,
 ) -> BoxCalibration:
     """Return the parameters of an FMU, or of several, that explain ``data``; arguments as of ``diagnose``.
 
@@ -50,6 +59,7 @@ def calibrate(
         given: the map.
         data: the record.
         progress: called with what is being done.
+        settings: thresholds.
 
     Returns:
         The parameters with intervals, and how much they explain.
@@ -63,18 +73,18 @@ def calibrate(
         raise ScenarioError(f"{given.source}: $.parameters must give an uncertainty to at least one, but gives none")
     begun = time.monotonic()
     progress("probing")
-    problem, probe = prepared(subject, given, data)
+    problem, probe = prepared(subject, given, data, settings=settings)
     try:
         with np.errstate(all="ignore"):
             parts = parts_of(problem.n)
             best = None
-            for fitter in fitters(problem, parts):
+            for fitter in fitters(problem, parts, settings):
                 progress("parameters")
                 fit = fitter.grown(problem.nominal, 0)
                 if fit is None:
                     raise problem.does_not_run()
                 fit = fitter.settled(fit)
-                if best is None or fit.total > best[1].total + DEFAULT.start.pays:
+                if best is None or fit.total > best[1].total + settings.start.pays:
                     best = (fitter, fit)
             assert best is not None
             fitter, fit = best
@@ -96,16 +106,16 @@ def calibrate(
         (names[i], names[j])
         for i in range(len(names))
         for j in range(i)
-        if abs(correlation[i, j]) > DEFAULT.calibration.confounded
+        if abs(correlation[i, j]) > settings.calibration.confounded
     )
-    explained = rest.explained or rest.disturbed
     warnings = [*probe.notes]
     warnings += [
         f"`{n}` is hardly determined: excite what it acts on"
         for n, share in learned.items()
-        if share < DEFAULT.calibration.learned
+        if share < settings.calibration.learned
     ]
     warnings += [f"`{a}` and `{b}` are hardly told apart: excite them at other frequencies" for a, b in pairs]
-    if not explained:
+    if not (rest.explained or rest.disturbed):
         warnings.append("something else is missing: `diagnose` says what")
-    return BoxCalibration(parameters, learned, pairs, found, explained, tuple(warnings), time.monotonic() - begun)
+    seconds = time.monotonic() - begun
+    return BoxCalibration(parameters, learned, pairs, found, rest, tuple(warnings), seconds)

@@ -6,7 +6,6 @@ import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from lxml import etree
@@ -23,6 +22,7 @@ from orchestrator.scenarios.isolated import Safety
 from orchestrator.scenarios.scenario import simulate
 from orchestrator.scenarios.ssp.common import OSP, SPACES, STRUCTURE, require_valid, tag
 from orchestrator.scenarios.ssp.read import opened_ssp
+from orchestrator.shared.results.any_fmu import DeliveredFound, PartFound
 from pyfmu_sources.attachment import SERIES
 
 DATE = "2026-01-01T00:00:00Z"
@@ -71,17 +71,16 @@ class Delivered:
     difference: float
     note: str = ""
 
-    def as_json(self) -> dict[str, Any]:
+    def found(self) -> DeliveredFound:
         """Return what ``diagnose.json`` says of it.
 
         Returns:
-            Plain data.
+            The corrected system.
         """
-        parts = [
-            {"name": p.name, "effect": "connection" if p.effect is None else p.effect.label, "values": p.values}
-            for p in self.parts
-        ]
-        return {"file": self.path.name, "parts": parts, "difference_over_noise": self.difference, "note": self.note}
+        parts = tuple(
+            PartFound(p.name, "connection" if p.effect is None else p.effect.label, p.values) for p in self.parts
+        )
+        return DeliveredFound(self.path.name, parts, self.difference, self.note)
 
 
 def _effect_fmu(folder: Path) -> Path:

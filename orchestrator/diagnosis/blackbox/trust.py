@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from orchestrator.diagnosis.blackbox.calibrate import BoxCalibration
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
 from orchestrator.diagnosis.blackbox.verdict import Rest
@@ -95,6 +96,21 @@ def doubts(
     if late:
         found.append(Reason(Level.AMBER, "the search was cut short: not all effects were tried"))
     return trust_of(found)
+
+
+def calibration_doubts(found: BoxCalibration, settings: RestSettings = DEFAULT.rest) -> Trust:
+    """Return how far calibrated parameters can be trusted.
+
+    Args:
+        found: the calibration.
+        settings: where green ends.
+
+    Returns:
+        Level and reasons.
+    """
+    if not found.explained:
+        return trust_of([Reason(Level.RED, "something is missing that no parameter explains, so that all are biased")])
+    return trust_of(Reason(Level.AMBER, text) for text in _not_shown((), found.rest, found.misfit, (), settings))
 
 
 def _not_shown(

@@ -1,13 +1,16 @@
 """The page of a diagnosis of any FMU: what is missing around it, how far the misfit shrinks, what is left."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping
+
+import msgspec
 
 from orchestrator.reporting.model import Badge, Cell, Facts, Picture, Report, Section, Text
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import ResultDocument, table_of, words
 from orchestrator.reporting.trust import trust_badge, trust_section
-from orchestrator.shared.results import TrustFound, read
+from orchestrator.shared.results import read
+from orchestrator.shared.results.any_fmu import BoxDiagnosisFound, DeliveredFound, LeftFound
+from orchestrator.shared.results.diagnose import EffectFound
 
 VERDICTS: Mapping[str, tuple[Badge, str]] = {
     "none": ("good", "nothing is missing"),
@@ -15,10 +18,7 @@ VERDICTS: Mapping[str, tuple[Badge, str]] = {
     "effects": ("neutral", "effects are missing"),
     "unknown": ("bad", "unexplained"),
 }
-MADE = {"walls": "walls", "runs": "runs of the FMU", "seconds": "time taken [s]"}
-SAID = ("kind", "verdict", "statement", "trust", "where", "warnings")
-SHOWN = ("effects", "suspects", "parameters", "misfit", "candidates")
-PLACED = frozenset((*SAID, *SHOWN, *MADE, "settings", "delivery", "remainder", "model", "step_cost"))
+KNOWN = frozenset(BoxDiagnosisFound.__struct_fields__)
 
 
 def build(source: ResultDocument) -> Report:
@@ -29,87 +29,109 @@ def build(source: ResultDocument) -> Report:
 
     Returns:
         The report.
+
+    Raises:
+        ValueError: the results are not those of `diagnose` for any FMU.
     """
-    results = source.results
-    badge, label = VERDICTS[results["verdict"]]
-    said = results.get("statement") or label  # files of older versions have none
+    found = read(source.results, BoxDiagnosisFound)
+    badge, label = VERDICTS.get(found.verdict, ("neutral", found.verdict))
+    said = found.statement or label  # files of older versions have none
     sentence = f"{said[:1].upper()}{said[1:]}."
-    trust = read(results["trust"], TrustFound) if results.get("trust") else None
-    sections: list[Section] = trust_section(trust)
-    if results["effects"]:
-        rows = [
-            {
-                "effect": words(effect["name"]),
-                "at": effect["site"],
-                "parameter": name,
-                "value": value["value"],
-                "95 % interval": f"{value['interval'][0]:.6g} to {value['interval'][1]:.6g}",
-                "unit": value["unit"],
-                "not told from": ", ".join(effect["family"]),
-            }
-            for effect in results["effects"]
-            for name, value in effect["parameters"].items()
-        ]
-        sections.append(table_of("What is missing", rows))
-    if results["suspects"]:
-        sections.append(Text("Nearest, and not it", tuple(results["suspects"])))
-    reasons = () if trust is None else trust.reasons
-    for title, key in (("Where", "where"), ("Take note", "warnings")):
-        lines = tuple(str(text) for text in results[key] if text not in reasons)
-        if lines:
-            sections.append(Text(title, lines))
-    misfit = [{"output": name, **values} for name, values in results["misfit"].items()]
-    sections.append(table_of("Misfit over noise on the held-out quarter", misfit))
-    name = "diagnose_signals.png"
-    if (source.directory / name).is_file():
-        sections.append(Picture("Measured and simulated", source.directory / name, "Shaded: the held-out quarter."))
-    parameters = [{"parameter": name, **values} for name, values in results["parameters"].items()]
-    if parameters:
-        sections.append(table_of("Parameters", parameters))
-    tried = [
-        {"on top of": ", ".join(step["on_top_of"]) or "parameters", "effect": c["effect"], "gain": c["gain"]}
-        for step in results["candidates"]
-        for c in step["tried"][:5]
-    ]
-    if tried:
-        sections.append(table_of("Candidates", tried))
-    sections += [*_left(results.get("remainder") or {}), *_delivered(results.get("delivery") or ())]
-    sections += sections_of("More", {k: v for k, v in results.items() if k not in PLACED})
-    found = ", ".join(f"{words(e['name'])} at {e['site']}" for e in results["effects"])
+    names = ", ".join(f"{words(e.name)} at {e.site}" for e in found.effects)
+    made = (("walls", found.walls), ("runs of the FMU", found.runs), ("time taken [s]", found.seconds))
     return Report(
         title="Diagnosis of an FMU",
-        summary=f"{sentence} It lacks {found}." if found else sentence,
-        badge=trust_badge(trust, label, badge),
-        sections=tuple(sections),
-        origin=(
-            *source.origin(),
-            *((name, results[key]) for key, name in MADE.items() if results.get(key) is not None),
+        summary=f"{sentence} It lacks {names}." if names else sentence,
+        badge=trust_badge(found.trust, label, badge),
+        sections=(
+            *trust_section(found.trust),
+            *_said(found),
+            *_misfit(found, source),
+            *_searched(found),
+            *sections_of("More", {k: v for k, v in source.results.items() if k not in KNOWN}),
         ),
+        origin=(*source.origin(), *((name, value) for name, value in made if value not in (None, ""))),
         downloads=source.downloads(),
     )
 
 
-def _left(remainder: Mapping[str, Any]) -> list[Section]:
+def _said(found: BoxDiagnosisFound) -> list[Section]:
+    """Return the effects, the suspects, and what is said in sentences."""
+    sections: list[Section] = []
+    if found.effects:
+        sections.append(table_of("What is missing", [row for effect in found.effects for row in _rows(effect)]))
+    if found.suspects:
+        sections.append(Text("Nearest, and not it", found.suspects))
+    reasons = () if found.trust is None else found.trust.reasons
+    for title, texts in (("Where", found.where), ("Take note", found.warnings)):
+        lines = tuple(text for text in texts if text not in reasons)
+        if lines:
+            sections.append(Text(title, lines))
+    return sections
+
+
+def _rows(effect: EffectFound) -> list[dict[str, object]]:
+    return [
+        {
+            "effect": words(effect.name),
+            "at": effect.site,
+            "parameter": name,
+            "value": value.value,
+            "95 % interval": "" if value.interval is None else "{:.6g} to {:.6g}".format(*value.interval),
+            "unit": value.unit,
+            "not told from": ", ".join(effect.family),
+        }
+        for name, value in effect.parameters.items()
+    ]
+
+
+def _misfit(found: BoxDiagnosisFound, source: ResultDocument) -> list[Section]:
+    """Return the misfit as a table and as a picture."""
+    rows = [{"output": name, **msgspec.structs.asdict(values)} for name, values in found.misfit.items()]
+    sections: list[Section] = [table_of("Misfit over noise on the held-out quarter", rows)]
+    picture = source.directory / "diagnose_signals.png"
+    if picture.is_file():
+        sections.append(Picture("Measured and simulated", picture, "Shaded: the held-out quarter."))
+    return sections
+
+
+def _searched(found: BoxDiagnosisFound) -> list[Section]:
+    """Return parameters, candidates, what is left, and the corrected system."""
+    sections: list[Section] = []
+    parameters = [{"parameter": name, **msgspec.structs.asdict(p)} for name, p in found.parameters.items()]
+    if parameters:
+        sections.append(table_of("Parameters", parameters))
+    tried = [
+        {"on top of": ", ".join(step.on_top_of) or "parameters", "effect": c.effect, "gain": c.gain}
+        for step in found.candidates
+        for c in step.tried[:5]
+    ]
+    if tried:
+        sections.append(table_of("Candidates", tried))
+    return [*sections, *_left(found.remainder), *_delivered(found.delivery)]
+
+
+def _left(remainder: LeftFound | None) -> list[Section]:
     """Return what the final model leaves, in the words of the statement above it."""
-    if not remainder:
+    if remainder is None:
         return []
-    if remainder["explained"]:
+    if remainder.explained:
         return [Facts("What is left", (("kind", "measurement noise"),))]
-    if remainder.get("disturbance"):
-        share = ("disturbance, share of the drive [%]", 100.0 * remainder["disturbance"])
+    if remainder.disturbance:
+        share = ("disturbance, share of the drive [%]", 100.0 * remainder.disturbance)
         return [Facts("What is left", (("kind", "measurement noise and a disturbance"), share))]
-    why: list[tuple[str, Cell]] = [("why", "; ".join(remainder["reasons"]))] if remainder.get("reasons") else []
+    why: list[tuple[str, Cell]] = [("why", "; ".join(remainder.reasons))] if remainder.reasons else []
     return [Facts("What is left", (("kind", "more than noise"), *why))]
 
 
-def _delivered(files: Sequence[Mapping[str, Any]]) -> list[Section]:
+def _delivered(files: tuple[DeliveredFound, ...]) -> list[Section]:
     """Return the corrected system, or why there is none."""
     rows = [
         {
-            "file": one.get("file"),
-            "effects": ", ".join(part["effect"] for part in one.get("parts") or ()),
-            "differs from the fit by [noise]": one.get("difference_over_noise"),
-            "note": one.get("note"),
+            "file": one.file,
+            "effects": ", ".join(part.effect for part in one.parts),
+            "differs from the fit by [noise]": one.difference_over_noise,
+            "note": one.note,
         }
         for one in files
     ]

@@ -1,12 +1,10 @@
 """The page of ``calibrate``: the parameters of an FMU, what the record says of each, and the misfit."""
 
-from collections.abc import Mapping
-from typing import Any
-
-from orchestrator.reporting.model import Badge, Report, ReportTable, Section, TableColumn, Text
+from orchestrator.reporting.model import Report, ReportTable, Section, TableColumn, Text
 from orchestrator.reporting.source import ResultDocument
-
-Json = Mapping[str, Any]
+from orchestrator.reporting.trust import trust_badge, trust_section
+from orchestrator.shared.results import read
+from orchestrator.shared.results.any_fmu import BoxCalibrationFound
 
 
 def build(source: ResultDocument) -> Report:
@@ -17,22 +15,27 @@ def build(source: ResultDocument) -> Report:
 
     Returns:
         The report.
+
+    Raises:
+        ValueError: the results are not those of `calibrate`.
     """
-    results = source.results
-    explained = bool(results["explained"])
-    badge: tuple[Badge, str] = ("good", "the parameters explain the record")
+    found = read(source.results, BoxCalibrationFound)
+    label = "the parameters explain the record"
     summary = "With these parameters the FMU explains the record to its noise."
-    if not explained:
-        badge = ("bad", "the parameters do not explain the record")
+    if not found.explained:
+        label = "the parameters do not explain the record"
         summary = "No parameters make the FMU explain the record: something else is missing, so the values are biased."
-    sections: list[Section] = []
-    if results["warnings"]:
-        sections.append(Text("Take note", tuple(f"{str(w)[:1].upper()}{str(w)[1:]}." for w in results["warnings"])))
-    sections += [_parameters(results["parameters"]), _misfit(results["misfit"])]
+    sections: list[Section] = trust_section(found.trust)
+    reasons = () if found.trust is None else found.trust.reasons
+    notes = tuple(f"{text[:1].upper()}{text[1:]}." for text in found.warnings if text not in reasons)
+    if notes:
+        sections.append(Text("Take note", notes))
+    sections += [_parameters(found), _misfit(found)]
+    badge = trust_badge(found.trust, label, "good" if found.explained else "bad")
     return Report("Calibration of an FMU", summary, tuple(sections), badge, source.origin(), source.downloads())
 
 
-def _parameters(parameters: Json) -> ReportTable:
+def _parameters(found: BoxCalibrationFound) -> ReportTable:
     columns = (
         TableColumn("parameter"),
         TableColumn("nominal", "", 6),
@@ -44,15 +47,23 @@ def _parameters(parameters: Json) -> ReportTable:
         TableColumn("learned", "%", 3),
     )
     rows = tuple(
-        (name, p["nominal"], p["value"], p["standard_error"], *p["interval"], p["unit"], 100.0 * p["learned"])
-        for name, p in parameters.items()
+        (
+            name,
+            p.nominal,
+            p.value,
+            p.standard_error,
+            *(p.interval or (None, None)),
+            p.unit,
+            None if p.learned is None else 100.0 * p.learned,
+        )
+        for name, p in found.parameters.items()
     )
     note = "Lower and upper: ends of the 95 % interval. Learned: how much of its stated uncertainty the record removes."
     return ReportTable("Parameters", columns, rows, note)
 
 
-def _misfit(misfit: Json) -> ReportTable:
+def _misfit(found: BoxCalibrationFound) -> ReportTable:
     columns = (TableColumn("output"), TableColumn("nominal"), TableColumn("calibrated"), TableColumn("noise"))
-    rows = tuple((name, m["nominal"], m["calibrated"], m["noise"]) for name, m in misfit.items())
+    rows = tuple((name, m.nominal, m.calibrated, m.noise) for name, m in found.misfit.items())
     note = "Nominal and calibrated: root mean square of the residual over the noise, on the held-out quarter."
     return ReportTable("Misfit over noise", columns, rows, note)

@@ -7,11 +7,14 @@ import shutil
 import numpy as np
 import pytest
 
-from orchestrator.api.any_fmu import calibrate, draft_map
+from orchestrator.api.any_fmu import draft_map
+from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
 from orchestrator.diagnosis.blackbox.settings import BoxSettings, ProcessSettings
 from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.shared.results import read
+from orchestrator.shared.results.any_fmu import BoxCalibrationFound, BoxDiagnosisFound
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 
@@ -82,14 +85,17 @@ def test_the_command_delivers_a_system_that_reproduces_the_fit(made, tmp_path):
     assert main(words) == 0
     results = json.loads((out / "diagnose.json").read_text())["results"]
     assert [e["name"] for e in results["effects"]] == ["quadratic_drag"]
+    assert set(results) == set(BoxDiagnosisFound.__struct_fields__)
     assert results["delivery"][0]["difference_over_noise"] < 0.1
     assert {p.name for p in out.iterdir()} >= {"corrected.ssp", "report.html", "diagnose.csv", "diagnose_signals.png"}
 
 
 def test_calibration_finds_the_parameters_within_their_intervals(made):
     case, *files = made(TWO_MASS)
-    found = calibrate(*files).calibration
+    result = calibrate(*files)
+    found = result.calibration
     assert found.explained
+    assert str(result.trust) == "green"
     for value, estimate in zip(case.parameters, found.parameters, strict=True):
         assert abs(value - estimate.value) < 4.5 * estimate.standard_error
         assert found.learned[estimate.name] > 0.5
@@ -101,6 +107,21 @@ def test_parameters_that_act_as_one_are_named(made, tmp_path):
     map_path.write_text(text.replace('m = { uncertainty = "5 %" }', "").replace('c = { uncertainty = "5 %" }', ""))
     found = calibrate(record_path, fmu, map_path).calibration
     assert [e.name for e in found.parameters] == ["k"]
+
+
+def test_a_calibration_of_what_misses_an_effect_is_red_and_its_file_is_of_its_type(made, tmp_path):
+    _, record_path, fmu, map_path = made(SPRING, ("quadratic_drag",))
+    (tmp_path / "settings.toml").write_text("[calibration]\nlearned = 0.99\n")
+    out = tmp_path / "out"
+    words = ["calibrate", str(record_path), "--fmu", str(fmu), "--map", str(map_path), "--out", str(out)]
+    assert main([*words, "--settings", str(tmp_path / "settings.toml")]) == 0
+    written = json.loads((out / "calibrate.json").read_text())["results"]
+    found = read(written, BoxCalibrationFound)
+    assert set(written) == set(BoxCalibrationFound.__struct_fields__)
+    assert not found.explained
+    assert found.trust.level == "red"
+    assert found.settings["calibration"]["learned"] == 0.99
+    assert any("hardly determined" in text for text in found.warnings)
 
 
 def test_a_drafted_map_can_be_used_as_it_is(made, tmp_path):

@@ -1,0 +1,231 @@
+"""A single axis between its events: steps of a Runge-Kutta method, and when within one of them an event falls."""
+
+from math import exp, sqrt
+
+from .axis_equations import (
+    Parameters,
+    State,
+    builds_up,
+    falls,
+    filtered,
+    mode_rates,
+    past_stop,
+    reach,
+    rest,
+    slip_at_rest,
+)
+from .drivetrain_parameters import TINY
+from .servo_axis_parameters import (
+    P_B,
+    P_BREAKAWAY,
+    P_BRISTLE_C,
+    P_DIRECTION,
+    P_DRAG,
+    P_FILTER,
+    P_J,
+    P_J_WAVE,
+    P_J_WAVE_N,
+    P_PRESLIDING,
+    P_RIPPLE,
+    P_RIPPLE_2,
+    P_RIPPLE_3,
+    P_RIPPLE_N,
+    P_SPRING,
+    P_SPRING_ANGLE,
+    P_SPRING_CUBIC,
+    P_STOP_D,
+    P_STOP_K,
+    P_STRIBECK,
+    P_STRIBECK_SPEED,
+    P_TAU,
+    P_WAVY,
+    P_WAVY_N,
+)
+
+
+def longest_step(x: State, mode: int, p: Parameters, h: float) -> float:
+    """Return a step [s] that resolves all rates well (a Runge-Kutta step errs by its 5th power).
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        p: parameters, in the order of the FMU's table.
+        h: length of the step [s].
+
+    Returns:
+        The step, at most ``h``.
+    """
+    rate = (p[P_B] + abs(p[P_DIRECTION]) + 2.0 * p[P_DRAG] * abs(x[1])) / p[P_J]
+    if p[P_TAU] > 0.0:
+        rate = max(rate, 1.0 / p[P_TAU])
+    if p[P_RIPPLE] != 0.0:
+        rate = max(rate, p[P_RIPPLE_N] * (abs(x[1]) + sqrt(abs(p[P_RIPPLE]) / (p[P_RIPPLE_N] * p[P_J] + TINY))))
+    if falls(p):
+        rate = max(rate, abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / (p[P_STRIBECK_SPEED] * p[P_J]))
+    return min(h, 0.05 / (max(rate, further_rate(x, mode, p)) + TINY))
+
+
+def further_rate(x: State, mode: int, p: Parameters) -> float:
+    """Return the fastest rate [1/s] of bristle, filter, harmonics, spring, end stops and varying inertia.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The rate.
+    """
+    rate = 0.0
+    if mode == 0 and builds_up(p):
+        stiffness = rest(p) / p[P_PRESLIDING]
+        rate = max(sqrt(stiffness / p[P_J]), p[P_BRISTLE_C] / p[P_J]) + abs(x[1]) / (reach(x, p) + TINY)
+    if p[P_FILTER] > 0.0:
+        rate = max(rate, 1.0 / p[P_FILTER])
+    if p[P_RIPPLE_2] != 0.0 or p[P_RIPPLE_3] != 0.0:
+        torque = abs(p[P_RIPPLE_2]) + abs(p[P_RIPPLE_3])
+        rate = max(rate, 3.0 * p[P_RIPPLE_N] * (abs(x[1]) + sqrt(torque / (p[P_RIPPLE_N] * p[P_J] + TINY))))
+    if p[P_SPRING] != 0.0 or p[P_SPRING_CUBIC] != 0.0:
+        way = x[0] - p[P_SPRING_ANGLE]
+        rate = max(rate, sqrt((abs(p[P_SPRING]) + 3.0 * abs(p[P_SPRING_CUBIC]) * way * way) / p[P_J]))
+    if past_stop(x, p) != 0:
+        rate = max(rate, sqrt(p[P_STOP_K] * (1.0 + p[P_STOP_D] * abs(x[1])) / p[P_J]))
+    if p[P_J_WAVE] != 0.0:
+        rate = max(rate, p[P_J_WAVE_N] * abs(x[1]))
+    if p[P_WAVY] != 0.0:
+        rate = max(rate, p[P_WAVY_N] * (abs(x[1]) + sqrt(abs(p[P_WAVY]) / (p[P_WAVY_N] * p[P_J] + TINY))))
+    return rate
+
+
+def along(x: State, h: float, r: State) -> State:
+    """Return ``x + h r``.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        h: length of the step [s].
+        r: derivative.
+
+    Returns:
+        The state.
+    """
+    return (x[0] + h * r[0], x[1] + h * r[1], x[2] + h * r[2], x[3] + h * r[3], x[4] + h * r[4])
+
+
+def smooth_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> State:
+    """Return the state after one classical Runge-Kutta step in one direction of sliding.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+
+    Returns:
+        The state.
+    """
+    a = mode_rates(x, mode, p, u, T_l)
+    b = mode_rates(along(x, 0.5 * h, a), mode, p, u, T_l)
+    c = mode_rates(along(x, 0.5 * h, b), mode, p, u, T_l)
+    d = mode_rates(along(x, h, c), mode, p, u, T_l)
+    w = h / 6.0
+    return (
+        x[0] + w * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]),
+        x[1] + w * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]),
+        x[2] + w * (a[2] + 2.0 * b[2] + 2.0 * c[2] + d[2]),
+        x[3] + w * (a[3] + 2.0 * b[3] + 2.0 * c[3] + d[3]),
+        x[4] + w * (a[4] + 2.0 * b[4] + 2.0 * c[4] + d[4]),
+    )
+
+
+def slowing_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float, least: float) -> float:
+    """Return when within ``h`` [s] an axis that slides falls to the speed ``least`` [rad/s] (bisection).
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+        least: [rad/s].
+
+    Returns:
+        The time [s].
+    """
+    low, high = 0.0, h
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if smooth_step(x, mode, p, u, T_l, middle)[1] * mode > least:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def held(x: State, p: Parameters, u: float, T_l: float, h: float) -> State:
+    """Return the state after ``h`` [s] at rest: the drive's torque alone moves.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+
+    Returns:
+        The state.
+    """
+    if filtered(p):
+        return smooth_step((x[0], 0.0, x[2], x[3], x[4]), 0, p, u, T_l, h)
+    share = 1.0 - exp(-h / p[P_TAU]) if p[P_TAU] > 0.0 else 0.0
+    return (x[0], 0.0, x[2] + share * (u - x[2]), x[3], x[4])
+
+
+def breaking_time(x: State, p: Parameters, u: float, T_l: float, h: float) -> float:
+    """Return when within ``h`` [s] the growing torque of the drive breaks an axis away that sticks (bisection).
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+
+    Returns:
+        The time [s].
+    """
+    low, high = 0.0, h
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if slip_at_rest(held(x, p, u, T_l, middle), p, u, T_l) == 0:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def stop_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> float:
+    """Return when within ``h`` [s] an axis reaches or leaves an end stop (bisection).
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+
+    Returns:
+        The time [s].
+    """
+    low, high = 0.0, h
+    begin = past_stop(x, p)
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        if past_stop(smooth_step(x, mode, p, u, T_l, middle), p) == begin:
+            low = middle
+        else:
+            high = middle
+    return high
