@@ -92,20 +92,6 @@ def build_variant(
     return _ensure(recipe, default_directory() if directory is None else directory)
 
 
-def is_stale(name: str, directory: Path | None = None) -> bool:
-    """Tell whether the FMU ``name`` is missing or older than what it is made from.
-
-    Args:
-        name: of the FMU.
-        directory: where it is (default: :func:`default_directory`).
-
-    Returns:
-        True when it has to be built.
-    """
-    folder = default_directory() if directory is None else directory
-    return stamp_of(folder / f"{name}.fmu") != fingerprint(recipe_of(name), find_toolchain().identity)
-
-
 def _start_numbers(values: Mapping[str, float | str]) -> dict[str, float]:
     """Return start values as numbers, an enumeration's item as its own.
 

@@ -308,6 +308,16 @@ class ProofSettings(Settings, frozen=True):
     first_guess: Annotated[int, setting("samples after which the filter's state is a fair first guess", ge=1)] = 20
 
 
+class CycleSettings(Settings, frozen=True):
+    """The search for what comes again and again in time."""
+
+    bins: Annotated[int, setting("parts of a cycle, of two samples at least: shorter pulses still show", ge=8)] = 24
+    repeats: Annotated[int, setting("cycles of the fitted part at least: fewer are a trend", ge=2)] = 4
+    sure: Annotated[
+        float, setting("variance of the mean cycle over that of unlike ones from which it repeats; chance: 1", gt=1)
+    ] = 4.0
+
+
 class LearnedSettings(Settings, frozen=True):
     """A law learned from what no effect explains."""
 
@@ -319,6 +329,11 @@ class LearnedSettings(Settings, frozen=True):
     formula: Annotated[float, setting("mean square in standard errors up to which a formula runs within the band")] = (
         1.5
     )
+    starts: Annotated[
+        int, setting("times at which a law may begin that are screened, and as many near the best", ge=0)
+    ] = 5
+    refined: Annotated[int, setting("such times among which a fitted law is moved to the likeliest", ge=2)] = 300
+    cycle: CycleSettings = CycleSettings()
 
 
 class InverseSettings(Settings, frozen=True):

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import CalibrationError, ScenarioError
+from orchestrator.errors import ScenarioError
 from orchestrator.plants.design import (
     DrivetrainValues,
     KalmanFilter,
@@ -126,21 +126,6 @@ class Experiment:
             return np.zeros(shape), np.zeros(shape)
         draws = np.random.default_rng(seed).normal(0.0, self.encoder_noise, (2, shape))
         return draws[0], draws[1]
-
-    def require_size(self, alpha: float) -> None:
-        """Raise a CalibrationError unless ``alpha`` is zero or a size that the experiment claims.
-
-        Args:
-            alpha: half-gap [rad].
-
-        Raises:
-            CalibrationError: it is neither 0 nor within what the experiment claims.
-        """
-        if alpha != 0.0 and not self.smallest <= alpha <= self.largest:
-            raise CalibrationError(
-                f"`alpha` must be 0 or within the calibrated {self.smallest:g} to {self.largest:g} rad of the "
-                f"{self.name} experiment, but is {alpha:g}"
-            )
 
     def digest(self) -> str:
         """Return a hash of all values, by which calibrations are stored.

@@ -50,19 +50,6 @@ def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
         raise FmuError(f"{scenario.origin}: {error}" if scenario.origin else str(error)) from None
 
 
-def run_scenario(scenario: Scenario | Path | str, safety: Safety | None = None) -> Recording:
-    """Run a scenario, or the file that describes one; raises as ``load_scenario`` and ``simulate`` do.
-
-    Args:
-        scenario: what to run, or its file.
-        safety: how far its FMUs are trusted (default: not at all).
-
-    Returns:
-        The recorded signals.
-    """
-    return simulate(scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario)), safety)
-
-
 # What a file may hold ---------------------------------------------------------------------------------------------
 
 

@@ -94,18 +94,16 @@ def test_two_builds_in_different_folders_are_the_same_bytes(tmp_path: Path) -> N
 
 def test_what_is_up_to_date_is_left_alone_and_what_is_not_is_built(tmp_path: Path, fmus: dict[str, Path]) -> None:
     path = Path(shutil.copy(fmus["Drivetrain"], tmp_path))
-    assert not build.is_stale("Drivetrain", tmp_path)
     before = path.stat().st_mtime_ns
     build.ensure_built(["Drivetrain"], tmp_path)
     assert path.stat().st_mtime_ns == before
     members = read_archive(path)
     stamp = members["modelDescription.xml"].replace(b'fingerprint="', b'fingerprint="0')[:-1]
     write_archive(path, members | {"modelDescription.xml": stamp})
-    assert build.is_stale("Drivetrain", tmp_path)
-    path.write_bytes(b"no zip")
-    assert build.is_stale("Drivetrain", tmp_path)
-    build.ensure_built(["Drivetrain"], tmp_path)
-    assert path.read_bytes() == fmus["Drivetrain"].read_bytes()
+    for stale in (path.read_bytes(), b"no zip"):
+        path.write_bytes(stale)
+        build.ensure_built(["Drivetrain"], tmp_path)
+        assert path.read_bytes() == fmus["Drivetrain"].read_bytes()
 
 
 def test_the_fingerprint_sees_sources_start_values_and_compiler() -> None:

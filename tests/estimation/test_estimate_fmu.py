@@ -9,7 +9,7 @@ from orchestrator.building.build import ensure_built
 from orchestrator.estimation.methods import ekf
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import Record, record_from_columns
-from orchestrator.scenarios.scenario import run_scenario
+from orchestrator.scenarios.scenario import load_scenario, simulate
 from pyfmu_sources.backlash_estimator import FILTERS, SIZE, NoiseSettings, covariance
 from pyfmu_sources.backlash_estimator_slave import (
     ALPHA_DEVIATION,
@@ -124,7 +124,7 @@ def test_a_running_loop_estimates_its_own_gap(alpha: float, seed: int, tmp_path:
     changed = text.replace("alpha = 0.02", f"alpha = {alpha}").replace("seed = 1", f"seed = {seed}")
     path = tmp_path / "loop.toml"
     path.write_text(changed, encoding="utf-8")
-    result = run_scenario(path)
+    result = simulate(load_scenario(path))
     estimate, deviation = result["estimator.alpha_hat"][-1], result["estimator.alpha_deviation"][-1]
     assert result.time[-1] == 2.0
     assert estimate == pytest.approx(alpha, rel=0.05)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from orchestrator.master.result import Recording
-from orchestrator.scenarios.scenario import load_scenario, run_scenario
+from orchestrator.scenarios.scenario import load_scenario, simulate
 from tests.support.two_mass import TORQUE, solution
 
 SUPPORT = Path(__file__).resolve().parents[1] / "support"
@@ -64,7 +64,7 @@ def run(folder: Path, master: str, stop: float, alpha: float = 0.0) -> Recording
     path = folder / "halves.toml"
     text = SCENARIO.format(stop=stop, master=master, alpha=alpha, amplitude=TORQUE.amplitude, period=TORQUE.period)
     path.write_text(text)
-    return run_scenario(load_scenario(path))
+    return simulate(load_scenario(path))
 
 
 def error(result: Recording, alpha: float = 0.0) -> float:

@@ -9,7 +9,7 @@ import pytest
 from orchestrator.building.build import ensure_built
 from orchestrator.cli import main
 from orchestrator.errors import ConnectionMismatchError, FmuError, InputError, ScenarioError, SimulationError
-from orchestrator.scenarios.scenario import load_scenario, run_scenario
+from orchestrator.scenarios.scenario import load_scenario, simulate
 
 GOOD = """
 name = "open loop"
@@ -53,7 +53,7 @@ def write(folder: Path, text: str) -> Path:
 
 
 def test_scenario_runs_and_reports_units(tmp_path: Path) -> None:
-    result = run_scenario(write(tmp_path, GOOD))
+    result = simulate(load_scenario(write(tmp_path, GOOD)))
     assert len(result.time) == 51
     assert result.time[-1] == pytest.approx(0.05, abs=1e-15)
     assert result.units == {"plant.theta_m": "rad", "plant.theta_l": "rad", "plant.u": "N.m"}
@@ -68,7 +68,7 @@ def test_scenario_runs_and_reports_units(tmp_path: Path) -> None:
 def test_a_torque_without_meaning_is_refused_with_its_name_and_time(tmp_path: Path, compiled: str) -> None:
     text = GOOD.replace("step = 1e-3\n", f"step = 1e-3\ncompiled = {compiled}\n") + LATE
     with pytest.raises(SimulationError, match=r"^plant: \w+ at t = 0.019 s returned Discard: `T_l` must be within"):
-        run_scenario(write(tmp_path, text))
+        simulate(load_scenario(write(tmp_path, text)))
 
 
 def test_time_is_limited_for_fmus_of_ours_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,7 +113,7 @@ def test_what_is_wrong_is_named(tmp_path: Path, change: tuple[str, str], error: 
     assert change[0] in GOOD
     path = write(tmp_path, GOOD.replace(*change, 1))
     with pytest.raises(InputError) as caught:
-        run_scenario(path)
+        simulate(load_scenario(path))
     assert type(caught.value) is error
     assert expected in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -174,7 +174,7 @@ def test_table_and_noise_sources(tmp_path: Path) -> None:
         + table
         + noise
     )
-    first, second = (run_scenario(write(tmp_path, text)) for _ in range(2))
+    first, second = (simulate(load_scenario(write(tmp_path, text))) for _ in range(2))
     np.testing.assert_allclose(first["plant.u"][1:12], np.arange(11) * 0.5, atol=1e-12)
     assert first["plant.T_l"].std() == pytest.approx(1.0, abs=0.3)
     np.testing.assert_array_equal(first.values, second.values)
@@ -215,4 +215,4 @@ def test_an_fmu_that_is_corrupt_inside_is_named_with_its_scenario(tmp_path: Path
         '[instances.p]\nfmu = "bad.fmu"\n'
     )
     with pytest.raises(FmuError, match=r"bad.toml: \$.instances.p: `fmu` must be an intact zip archive"):
-        run_scenario(file)
+        simulate(load_scenario(file))

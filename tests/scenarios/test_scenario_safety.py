@@ -14,7 +14,7 @@ from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.fmi.ours import is_ours, record
 from orchestrator.scenarios.isolated import Safety, foreign_fmus
-from orchestrator.scenarios.scenario import load_scenario, run_scenario, simulate
+from orchestrator.scenarios.scenario import load_scenario, simulate
 from orchestrator.shared.isolation.archives import ArchiveLimits, unpack
 from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
 
@@ -90,14 +90,14 @@ def test_the_result_says_what_was_around_the_fmu(tmp_path: Path, capsys: pytest.
 @compiled
 def test_a_message_names_the_fmu_and_not_the_folder_where_it_ran(tmp_path: Path) -> None:
     with pytest.raises(FmuError, match=r"scenario.toml: .*MassSpring.fmu cannot be instantiated") as raised:
-        run_scenario(scenario(tmp_path, "instantiate_null"))
+        simulate(load_scenario(scenario(tmp_path, "instantiate_null")))
     assert "backlash-cosim-" not in str(raised.value)
 
 
 @compiled
 def test_time_is_limited(tmp_path: Path) -> None:
     with pytest.raises(SimulationError, match=r"MassSpring.fmu: the run must take at most 2 s"):
-        run_scenario(scenario(tmp_path, "hang_step"), Safety(time=2.0))
+        simulate(load_scenario(scenario(tmp_path, "hang_step")), Safety(time=2.0))
 
 
 @compiled

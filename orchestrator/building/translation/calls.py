@@ -125,7 +125,6 @@ def _math(scope: Scope, node: ast.Call, name: str) -> Code:
     if name in (*_TESTS, *_ROUNDED):  # which are the same for all derivatives
         codes = [value_of(scope, code) for code in codes]
     arguments = ", ".join(code.text for code in codes)
-    scope.program.uses_math = True
     if name in _TESTS:
         return Code(f"{name}({arguments})", TRUTH)
     if name in _ROUNDED:

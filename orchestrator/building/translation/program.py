@@ -53,12 +53,10 @@ class Program:
         self.names = KindNames(self._taken, self.paired)
         self.owner = owner
         self.owner_name = owner.cls.__name__ if owner is not None else ""
-        self.uses_math = False
         self._functions: dict[tuple[str, str], Function] = {}
         self._underway: list[tuple[str, str]] = []
         self._constants: dict[str, float | int] = {} if beside is None else dict(beside._constants)
         self._shared = frozenset(self._constants)
-        self._modules: list[str] = []
         self._sources: dict[str, ModuleSource] = {}
         self._largest_index = -1
 
