@@ -79,9 +79,24 @@ def judge(case: Case, diagnosis: Diagnosis) -> dict[str, Any]:
     row["nuisances"] = {n.name: e.value for n in diagnosis.nuisances for e in n.parameters.values()}
     row["misfits"] = [[misfit.before, misfit.after, misfit.noise] for misfit in diagnosis.misfit]
     row["harm"] = harmed(diagnosis)
+    if diagnosis.verdict == "unknown":
+        row["learned"] = learned(diagnosis)
     row["errors"] = errors(case, diagnosis)
     row["linear"] = linear_errors(case, diagnosis)
     return row
+
+
+def learned(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return what the learned law follows, and by how much it shrinks each signal's misfit; ``least`` is 1 without one.
+
+    ``lacking`` is the held-out misfit of re-fitted parameters over the noise: what there was to shrink.
+    """
+    law = diagnosis.learned
+    lacking = max(one.after / one.noise for one in diagnosis.misfit)
+    if law is None:
+        return {"law": "", "least": 1.0, "lacking": lacking, "left": lacking}
+    left = max(one.after / one.noise for one in law.misfit)
+    return {"law": f"{law.argument} ({law.site})", "least": law.shrinks, "lacking": lacking, "left": left}
 
 
 def errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, float, bool]]:
@@ -161,12 +176,13 @@ def report(rows: list[dict[str, Any]]) -> dict[str, Any]:
             "before_over_after_10": float(np.mean(np.array(ratio) >= 10.0)),
         }
         errors_ = [e for row in effects if row["group"] == "single" for e in row["errors"]]
-        figures["parameters"] = {
-            "relative_error_median": float(np.median([abs(e[1]) for e in errors_])),
-            "relative_error_90": float(np.quantile([abs(e[1]) for e in errors_], 0.9)),
-            "inside_95_percent_interval": float(np.mean([e[3] for e in errors_])),
-            "count": len(errors_),
-        }
+        figures["parameters"] = {"count": len(errors_)}
+        if errors_:
+            figures["parameters"] |= {
+                "relative_error_median": float(np.median([abs(e[1]) for e in errors_])),
+                "relative_error_90": float(np.quantile([abs(e[1]) for e in errors_], 0.9)),
+                "inside_95_percent_interval": float(np.mean([e[3] for e in errors_])),
+            }
         linear = [e for row in rows if row["group"] == "none" or row["right"] for e in row["linear"]]
         figures["linear"] = {
             "relative_error_median": float(np.median([abs(e[1]) for e in linear])),
@@ -195,6 +211,10 @@ def _rates(group: str, rows: list[dict[str, Any]]) -> dict[str, Any]:
     elif group == "unknown":
         rates["unknown"] = sum(row["verdict"] == "unknown" for row in rows)
         rates["missed"] = sum(row["verdict"] in ("none", "parameters") for row in rows)
+        laws = [row["learned"] for row in rows if "learned" in row]
+        rates["learned"] = sum(bool(law["law"]) for law in laws)
+        rates["shrunk_five_times"] = sum(law["least"] >= 5.0 for law in laws)
+        rates["shrunk_to_twice_the_noise"] = sum(law["left"] <= 2.0 for law in laws)
     else:
         if group == "one_encoder":
             off = [abs(e[1]) for row in rows for e in row["errors"] if e[0] == "alpha"]
@@ -239,7 +259,7 @@ def main() -> None:
         mark = "ok" if row["right"] or not (case.right or row["wrong"]) else "WRONG" if row["wrong"] else "miss"
         print(
             f"{mark:>5} {case.kind} {case.seed} {row['verdict']} {row['named']} {row['truth']} {row['errors']} "
-            f"{row['seconds']:.1f} s",
+            f"{row.get('learned', '')} {row['seconds']:.1f} s",
             flush=True,
         )
     figures = report(rows)

@@ -81,6 +81,9 @@ def passes(
     likelihood = RecordLikelihood(model.plant, signals, nominal, parts.validated.stop, settings)
     found = _search(model, likelihood, parts, parts, settings.search.most_effects, progress, deadline)
     first = int(size * (1.0 - settings.fit.looked_at))  # as many samples as are held out
+    if found.unknown and not found.search.stopped and time.monotonic() >= deadline:
+        note = f"a search with the record's parts exchanged was not begun after {limit:g} s"
+        found = replace(found, withdrawn=(note, *found.withdrawn))
     if found.unknown and not found.hopeless and time.monotonic() < deadline:
         # What shows on the deciding part alone (a limit that is reached once) must be fitted to be found.
         exchanged = Parts(slice(first, parts.validated.stop), slice(head, first), parts.held_out)
@@ -124,7 +127,11 @@ def _search(
         proof = Proof(horizons(likelihood, logged.p, plain.q, whole.held_out), proof.final)
     unknown = search.stopped or is_unknown(left, floor_off, proof, named, bool(far), verdict)
     if search.stopped:
-        withdrawn = (f"the search was stopped after {settings.search.time_limit:g} s: no name is sure", *withdrawn)
+        withdrawn = (
+            f"the search was stopped after {settings.search.time_limit:g} s, in step {len(search.steps) + 1}: "
+            "no name is sure, and not all of the library was tried",
+            *withdrawn,
+        )
     if proven.final.disputed and not unknown:
         withdrawn = (*withdrawn, _dispute(proven.final.disputed))
     return Pass(

@@ -47,6 +47,11 @@ class RateSettings(Settings, frozen=True):
     least_rows: Annotated[int, setting("rows that a record keeps in any case", ge=200)] = 500
     per_band: Annotated[float, setting("rate over the frequency below which nearly all motion lies", gt=2)] = 16.0
     per_mode: Annotated[float, setting("rate over the model's fastest oscillation", gt=2)] = 30.0
+    many_rows: Annotated[int, setting("rows from which on span counts for more than a fine rate", ge=500)] = 6000
+    long_per_band: Annotated[
+        float, setting("rate of so long a record over that frequency: filtered lines last", gt=2)
+    ] = 4.0
+    long_per_mode: Annotated[float, setting("and over the model's fastest oscillation", gt=2)] = 10.0
     shows: Annotated[float, setting("power over that of the noise from which motion shows", ge=1)] = 4.0
     most_above: Annotated[float, share("share of the squared speed that may lie above the band")] = 0.01
     pane: Annotated[int, setting("samples of a spectrum's pane at most", ge=64)] = 1024
@@ -66,7 +71,7 @@ class FitSettings(Settings, frozen=True):
     looked_at: Annotated[float, share("of the record that is fitted or decides; the rest is held out", le=0.95)] = 0.75
     most_fitted: Annotated[
         int, setting("rows that are fitted at most; half as many decide, the rest is held out", ge=500)
-    ] = 6000
+    ] = 3000
     strides: Annotated[tuple[int, ...], note("levels of noise at once, in the order in which they are tried")] = (
         4,
         2,
@@ -112,7 +117,9 @@ class ScanSettings(Settings, frozen=True):
 class SearchSettings(Settings, frozen=True):
     """Which candidates are fitted, what an effect must gain, and how far process noise may go."""
 
-    time_limit: Annotated[float, setting("time [s] after which it stops and nothing is named; 0: never", ge=0)] = 0.0
+    time_limit: Annotated[
+        float, setting("time [s] after which it stops and nothing is named: most take a tenth of it; 0: never", ge=0)
+    ] = 600.0
     most_noise: Annotated[float, setting("largest process noise, as a share of the drive's torque", gt=0)] = 3.0
     least_noise: Annotated[float, setting("smallest: predictions are nearly free runs there", gt=0)] = 1e-5
     noise_levels: Annotated[int, setting("levels of process noise, spaced evenly in the logarithm", ge=2)] = 23
@@ -301,6 +308,16 @@ class ProofSettings(Settings, frozen=True):
     first_guess: Annotated[int, setting("samples after which the filter's state is a fair first guess", ge=1)] = 20
 
 
+class CycleSettings(Settings, frozen=True):
+    """The search for what comes again and again in time."""
+
+    bins: Annotated[int, setting("parts of a cycle, of two samples at least: shorter pulses still show", ge=8)] = 24
+    repeats: Annotated[int, setting("cycles of the fitted part at least: fewer are a trend", ge=2)] = 4
+    sure: Annotated[
+        float, setting("variance of the mean cycle over that of unlike ones from which it repeats; chance: 1", gt=1)
+    ] = 4.0
+
+
 class LearnedSettings(Settings, frozen=True):
     """A law learned from what no effect explains."""
 
@@ -312,6 +329,11 @@ class LearnedSettings(Settings, frozen=True):
     formula: Annotated[float, setting("mean square in standard errors up to which a formula runs within the band")] = (
         1.5
     )
+    starts: Annotated[
+        int, setting("times at which a law may begin that are screened, and as many near the best", ge=0)
+    ] = 5
+    refined: Annotated[int, setting("such times among which a fitted law is moved to the likeliest", ge=2)] = 300
+    cycle: CycleSettings = CycleSettings()
 
 
 class InverseSettings(Settings, frozen=True):

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from orchestrator.estimation.innovations import Array, NoiseLevels
 from orchestrator.records.model_file import Encoder, Model
@@ -23,6 +24,7 @@ NOISE_SPREAD = 2.0  # prior standard deviation of a log noise level: a factor of
 # law is not the machine's is too sure of itself; a least noise of motor and load keeps both honest.
 LEAST_TORQUE_NOISE, LARGEST_TORQUE_NOISE = 1e-9, 30.0
 LEAST_WHERE_INEXACT = (1e-4, 1e-3)
+DRIVES = (3.0, 20.0)  # rms of the drive's torque [N.m] for which levels of torque noise hold as they are
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class GapProblem:
         unknowns: every unknown, in the order of the vector; free or not is decided per fit.
         outputs: (n, 1 or 2) measured angles [rad].
         noise: nominal noise levels, for those that are not among the unknowns.
+        torque_unit: by what levels of torque noise are to be multiplied for a drive as weak, or as strong, as this one.
     """
 
     record: Record
@@ -54,6 +57,7 @@ class GapProblem:
     unknowns: tuple[Unknown, ...]
     outputs: Array
     noise: NoiseLevels
+    torque_unit: float = 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -118,14 +122,23 @@ def make_problem(record: Record, model: Model) -> GapProblem:
         noises.append(
             Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0)
         )
-    least = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE) if both else LEAST_WHERE_INEXACT
+    unit = _torque_unit(record, model.parameters["tau"].value)
+    least = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE) if both else tuple(unit * level for level in LEAST_WHERE_INEXACT)
     for side, low in zip(("motor", "load"), least, strict=True):
         noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(LARGEST_TORQUE_NOISE)))
     if not both:
         levels.append(levels[0])
     return GapProblem(
-        record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0))
+        record, model.values, tuple(unknowns + noises), outputs, NoiseLevels((levels[0], levels[1]), (1.0, 1.0)), unit
     )
+
+
+def _torque_unit(record: Record, lag: float) -> float:
+    """Return the rms of the drive's torque, ``lag`` [s] behind the request, over the nearest of usual drives."""
+    pole = math.exp(-record.step / lag) if lag > 0.0 else 0.0
+    torque = lfilter([1.0 - pole], [1.0, -pole], record.u)
+    rms = max(float(np.sqrt(np.mean(torque**2))), 1e-12)
+    return rms / min(max(rms, DRIVES[0]), DRIVES[1])
 
 
 def _initial_state(record: Record, ratio: float) -> list[Unknown]:

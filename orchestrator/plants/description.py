@@ -380,7 +380,9 @@ class Plant:
         Returns:
             At least 1.
         """
-        modes = np.linalg.eigvals(self.jacobian(p))
+        # The drive's lag does not count: it is solved exactly, and moved by nothing else.
+        kept = [row for row, place in enumerate(self.states) if place != self.drive.torque]
+        modes = np.linalg.eigvals(self.jacobian(p)[np.ix_(kept, kept)])
         return max(1, math.ceil(h * float(np.max(np.abs(modes) / np.where(modes.imag == 0.0, FADING, STEP)))))
 
     def fastest(self, p: Array) -> float:

@@ -1,7 +1,8 @@
 """A plant with one more torque whose law is no formula: straight lines between knots over a signal of the plant.
 
 It is for what no effect of the bank explains. The torque acts at the site that its signal belongs to, and may grow with
-the speed of the driven body beside. Its knots and values are parameters of the predictor alone.
+the speed of the driven body beside. Its knots and values are parameters of the predictor alone. What comes again and
+again, whatever the machine does, follows a clock; what begins at some time follows its signal from then on.
 """
 
 from dataclasses import dataclass, replace
@@ -30,6 +31,7 @@ class Argument:
         site: where the torque acts.
         unit: of the signal, of an angle in radians.
         with_speed: the torque is the law's value times the speed of the last body, without its sign.
+        later: there is none before a time.
     """
 
     code: int
@@ -37,6 +39,12 @@ class Argument:
     site: str
     unit: str
     with_speed: bool = False
+    later: bool = False
+
+    @property
+    def kind(self) -> int:
+        """Return the code of the signal alone."""
+        return self.code % WITH_SPEED
 
     @property
     def words(self) -> str:
@@ -44,8 +52,10 @@ class Argument:
         return f"{self.signal}, times the load's speed" if self.with_speed else self.signal
 
 
-MOTOR_SPEED, LOAD_SPEED, LOAD_ANGLE, TWIST, DRIVE = range(1, 6)
-WITH_SPEED = 10  # added to the code
+MOTOR_SPEED, LOAD_SPEED, LOAD_ANGLE, TWIST, DRIVE, CYCLE_M, CYCLE_L = range(1, 8)
+WITH_SPEED, LATER = 10, 20  # added to the code
+CLOCK = 6  # the state that counts time: that of an added resonance, which a plant with a law has not
+SINCE, PERIOD = "law.since", "law.period"
 
 
 def arguments_of(plant: Plant) -> tuple[Argument, ...]:
@@ -73,6 +83,34 @@ def arguments_of(plant: Plant) -> tuple[Argument, ...]:
     return (*plain, *grown)
 
 
+def later_arguments_of(plant: Plant) -> tuple[Argument, ...]:
+    """Return what a law may be a function of that begins at some time.
+
+    Args:
+        plant: the plant.
+
+    Returns:
+        The arguments.
+    """
+    plain = (one for one in arguments_of(plant) if not one.with_speed)
+    return tuple(replace(one, code=one.code + LATER, later=True) for one in plain)
+
+
+def cycles_of(plant: Plant) -> tuple[Argument, ...]:
+    """Return the arguments of a law that comes again and again in time.
+
+    Args:
+        plant: the plant.
+
+    Returns:
+        One for each body that a torque may act on.
+    """
+    kinds = (CYCLE_M,) if plant.shaft is None else (CYCLE_M, CYCLE_L)
+    return tuple(
+        Argument(kind, "time within a cycle", body.name, "s") for kind, body in zip(kinds, plant.bodies, strict=True)
+    )
+
+
 def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Return the names of the law's parameters.
 
@@ -87,11 +125,12 @@ def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:
 
 
 @cache
-def with_law(plant: Plant) -> Plant:
+def with_law(plant: Plant, clocked: bool = False) -> Plant:
     """Return a plant with such a law, which is off until its argument is set.
 
     Args:
         plant: without it.
+        clocked: its law may depend on time; the plant then has no added resonance, whose state is the clock.
 
     Returns:
         The plant, with the law's parameters behind all others.
@@ -101,15 +140,18 @@ def with_law(plant: Plant) -> Plant:
         Parameter(code, "1", 0.0, 0.0, 100.0, "Argument of the learned law"),
         *(Parameter(name, "1", float(n), -BIG, BIG, "Knot of the learned law") for n, name in enumerate(knots)),
         *(Parameter(name, "N.m", 0.0, -BIG, BIG, "Value of the learned law") for name in values),
+        Parameter(SINCE, "s", 0.0, -BIG, BIG, "Time at which the learned law, or its first cycle, begins"),
+        Parameter(PERIOD, "s", 1.0, 0.0, BIG, "Period of its cycles"),
     )
     first = len(plant.names)
     extended = replace(plant, nuisances=(*plant.nuisances, *added), realised=np.asarray, _index={})
-    stage = cache(lambda: _stage(plant, first))
+    extended = replace(extended, followers=() if clocked else plant.followers, _index={})
+    stage = cache(lambda: _stage(plant, first, clocked))
     extended = replace(extended, stage=stage, _index={})
     return replace(extended, runner=cache(lambda: _runner(extended)), _index={})
 
 
-def _stage(plant: Plant, first: int) -> CompiledEquations:
+def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
     from numba import njit
 
     friction, rates, presliding = plant.stage()
@@ -118,7 +160,7 @@ def _stage(plant: Plant, first: int) -> CompiledEquations:
     ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
     speed_m, speed_l, angle_m, angle_l = motor.speed, last.speed, motor.angle, last.angle
     drive = plant.drive.torque
-    knot_at, value_at = first + 1, first + 1 + KNOTS
+    knot_at, value_at, since_at, period_at = (first + 1 + n for n in (0, KNOTS, 2 * KNOTS, 2 * KNOTS + 1))
 
     @njit(error_model="numpy")
     def law(s: float, p: Any) -> float:
@@ -144,19 +186,26 @@ def _stage(plant: Plant, first: int) -> CompiledEquations:
             s = x[angle_l]
         elif kind == TWIST:
             s = x[angle_m] / ratio - x[angle_l]
-        else:
+        elif kind == DRIVE:
             s = x[drive]
-        torque = law(s, p) * (abs(x[speed_l]) if code >= WITH_SPEED else 1.0)
+        else:
+            s = (x[CLOCK] - p[since_at]) % p[period_at]
+        torque = law(s, p)
+        if code >= LATER:
+            torque *= 1.0 if x[CLOCK] >= p[since_at] else 0.0
+        elif code >= WITH_SPEED:
+            torque *= abs(x[speed_l])
         on_motor, on_load = 0.0, 0.0
-        if kind in (MOTOR_SPEED, DRIVE) or ratio_at < 0:
+        if kind in (MOTOR_SPEED, DRIVE, CYCLE_M) or ratio_at < 0:
             on_motor = -torque / p[J_m]
         elif kind == TWIST:
             on_motor, on_load = -torque / ratio / p[J_m], torque / p[J_l]
         else:
             on_load = -torque / p[J_l]
+        a, b = (0.0, 1.0) if clocked else (r[5], r[6])
         if ratio_at < 0:
-            return (r[0], r[1] + on_motor, r[2], r[3], r[4], r[5], r[6], r[7])
-        return (r[0], r[1] + on_motor, r[2], r[3] + on_load, r[4], r[5], r[6], r[7])
+            return (r[0], r[1] + on_motor, r[2], r[3], r[4], a, b, r[7])
+        return (r[0], r[1] + on_motor, r[2], r[3] + on_load, r[4], a, b, r[7])
 
     return CompiledEquations(friction, with_torque, presliding)
 

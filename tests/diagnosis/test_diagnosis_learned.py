@@ -5,8 +5,21 @@ import pytest
 
 from orchestrator.diagnosis.fit.fitting import Free, Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.proof.clocked import cycle_of
 from orchestrator.diagnosis.proof.learned import formula_of, knots_of, learned_law
-from orchestrator.plants.learned import KNOTS, LOAD_SPEED, arguments_of, names, with_law
+from orchestrator.plants.learned import (
+    CYCLE_L,
+    KNOTS,
+    LATER,
+    LOAD_SPEED,
+    PERIOD,
+    SINCE,
+    arguments_of,
+    cycles_of,
+    later_arguments_of,
+    names,
+    with_law,
+)
 from tests.support.short_records import AXIS, DRIVETRAIN, SETTINGS, drivetrain_likelihood
 
 PARTS = Parts(slice(10, 500), slice(500, 750), slice(750, 1000))
@@ -47,6 +60,67 @@ def test_knots_lie_where_samples_are() -> None:
     assert np.all(np.diff(knots) > 0.0)
     assert np.diff(knots)[KNOTS // 2] < 0.2 * np.diff(knots)[0]
     assert knots_of(np.zeros(100)) is None
+
+
+def test_two_knots_of_a_speed_lie_where_friction_turns_round() -> None:
+    knots = knots_of(np.random.default_rng(0).standard_normal(4000), jump=True)
+    assert knots is not None
+    assert knots.size == KNOTS
+    assert np.all(np.diff(knots) > 0.0)
+    assert np.count_nonzero(np.abs(knots) < 0.01 * np.ptp(knots)) == 2
+    assert np.sum(knots < 0.0) > 2
+    assert np.sum(knots > 0.0) > 2
+
+
+def _law(codes: float, since: float, period: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return innovations without a law and with a constant one of 5 N.m, in 120 samples."""
+    likelihood, _ = drivetrain_likelihood(120)
+    plant = with_law(DRIVETRAIN, True)
+    p = plant.extended(likelihood.nominal[: len(DRIVETRAIN.table)])
+    wide = RecordLikelihood(plant, likelihood.signals, p, 120, SETTINGS)
+    before = wide.innovations(p, 0.01)[0]
+    code, knots, values = names()
+    with_it = p.copy()
+    with_it[plant.index(code)], with_it[plant.index(SINCE)], with_it[plant.index(PERIOD)] = codes, since, period
+    for knot, value, at in zip(knots, values, np.linspace(0.0, 0.1, KNOTS), strict=True):
+        with_it[plant.index(knot)] = at
+        with_it[plant.index(value)] = 5.0 if codes >= LATER or at > 0.06 else 0.0
+    return before, wide.innovations(with_it, 0.01)[0]
+
+
+def test_a_law_may_begin_at_a_time() -> None:
+    h = drivetrain_likelihood(120)[0].signals.h
+    before, after = _law(LATER + LOAD_SPEED, 60.5 * h)
+    changed = np.flatnonzero(np.any(np.abs(after - before) > 1e-12, axis=1))
+    assert changed[0] in (61, 62)
+    assert {argument.later for argument in later_arguments_of(DRIVETRAIN)} == {True}
+
+
+def test_a_law_may_come_again_and_again() -> None:
+    h = drivetrain_likelihood(120)[0].signals.h
+    before, after = _law(CYCLE_L, 0.0, 0.1)
+    changed = np.flatnonzero(np.any(np.abs(after - before) > 1e-12, axis=1))
+    assert changed[0] * h == pytest.approx(0.05, abs=3.0 * h)  # its line rises from there on
+    assert [argument.site for argument in cycles_of(DRIVETRAIN)] == ["motor", "load"]
+    assert [argument.site for argument in cycles_of(AXIS)] == ["motor"]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_comes_by_a_clock_is_found_and_nothing_else(seed: int) -> None:
+    rng, settings = np.random.default_rng(seed), SETTINGS.learned.cycle
+    time = 0.005 * np.arange(3000)
+    noise, request = rng.standard_normal(3000), rng.standard_normal(3000)
+    slow = np.convolve(rng.standard_normal(3040), np.ones(41) / 41**0.5, "valid")
+    period = rng.uniform(0.4, 1.5)
+    pulses = 4.0 * (np.mod(time - 0.13, period) < 0.04)
+    cycle = cycle_of(pulses + 0.5 * noise, request, time, KNOTS, settings)
+    assert cycle is not None
+    assert cycle.period == pytest.approx(period, rel=2e-3)
+    assert cycle.knots.size == KNOTS
+    assert np.all(np.diff(cycle.knots) > 0.0)
+    assert cycle_of(noise, request, time, KNOTS, settings) is None
+    assert cycle_of(slow, request, time, KNOTS, settings) is None
+    assert cycle_of(pulses, 0.1 * noise + pulses, time, KNOTS, settings) is None  # the request repeats
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.diagnosis import model_of
 from orchestrator.cli import main
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao
@@ -14,6 +15,7 @@ from orchestrator.estimation.design import SEARCHED, MachineLimits, design
 from orchestrator.estimation.innovations import NoiseLevels, affine_model, innovations, simulate
 from orchestrator.estimation.likelihood import Likelihood, maximise
 from orchestrator.estimation.methods import ekf
+from orchestrator.estimation.methods.maximum_likelihood import fit_record
 from orchestrator.estimation.methods.paired_sum import twin
 from orchestrator.estimation.problem import make_problem
 from orchestrator.estimation.protocol import METHODS, NotApplicableError, estimator
@@ -22,6 +24,7 @@ from orchestrator.records.record import Record, record_from_columns
 from orchestrator.shared.results import as_plain, read
 from orchestrator.shared.results.estimate import EstimateFound
 from pyfmu_sources.drivetrain_parameters import DEFAULTS, with_values
+from tests.support.hidden_effects import one_encoder_case
 from tests.support.independent_plant import make_record, write_csv
 from tests.support.online_loop import run_case
 
@@ -122,6 +125,16 @@ def test_the_motor_encoder_alone_is_enough() -> None:
     result = estimator("maximum_likelihood")(record.without_load_encoder(), MODEL)
     assert result.alpha == pytest.approx(0.03, rel=0.02)
     assert "i" not in result.diagnostics["parameters"]
+
+
+@pytest.mark.slow
+def test_the_motor_encoder_of_a_weak_drive_is_enough() -> None:
+    """A loop that asks for 0.3 N.m: torque noise that a strong drive hardly feels would hide all of the motion."""
+    case = one_encoder_case(715003, 15.0)
+    problem = make_problem(case.record, model_of(case))
+    assert problem.torque_unit == pytest.approx(0.1, rel=0.5)
+    fit = fit_record(Likelihood(problem))
+    assert fit.point.theta[problem.index("alpha")] == pytest.approx(case.truth["effects"]["alpha"], rel=0.02)
 
 
 def test_no_gap_is_called_no_gap() -> None:

@@ -128,9 +128,10 @@ def one_encoder_case(seed: int, duration: float = 30.0) -> Case:
     states = plain["states"]
     typical = float(np.sqrt(np.mean((states[:, 0] / nominal["i"] - states[:, 2]) ** 2)))
     share = float(np.exp(rng.uniform(*np.log(GAPS))))
-    columns, truth = make_record({"alpha": share * typical}, seed, duration, **ways)
+    noise = torque_noise_of(seed) if TORQUE_NOISE else 0.0
+    columns, truth = make_record({"alpha": share * typical}, seed, duration, torque_noise=noise, **ways)
     record = record_from_columns(columns, f"{machine}-{excitation}-{seed}").without_load_encoder()
-    truth |= {"torque_noise": 0.0, "shifts": (0.0, 0.0), "gain": 1.0}
+    truth |= {"torque_noise": noise, "shifts": (0.0, 0.0), "gain": 1.0}
     return Case(f"{machine}, {excitation}", seed, record, truth, (SINGLE["backlash"][2],), share)
 
 

@@ -141,7 +141,7 @@ def jacobian(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Fr
 @np.errstate(over="ignore", invalid="ignore")  # a step into instability is seen by its cost
 def fit(
     likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts,
-    iterations: int | None = None, most: int = ORDERS[-1],
+    iterations: int | None = None, most: int = ORDERS[-1], bar: float = -np.inf,
 ) -> Fit:  # fmt: skip
     """Maximise the likelihood of ``parts.fitted`` over the ``free`` parameters at process noise ``q``.
 
@@ -156,11 +156,12 @@ def fit(
         parts: parts of the record.
         iterations: most Levenberg-Marquardt steps; None: as in the settings.
         most: largest order of the autoregression; 0: innovations count as white.
+        bar: likelihood that the fit must reach: it is given up where steps as large as its last would not get there.
 
     Returns:
         The fit.
     """
-    return _descent(likelihood, start, q, free, parts, iterations, most)
+    return _descent(likelihood, start, q, free, parts, iterations, most, bar)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -191,7 +192,7 @@ Point = tuple[Array, Array]  # parameters, innovations
 
 def _descent(
     likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, iterations: int | None,
-    most: int,
+    most: int, bar: float = -np.inf,
 ) -> Fit:  # fmt: skip
     """Return the best point of a descent whose innovations are whitened by an autoregression of order ``most``."""
     settings, part = likelihood.settings.fit, parts.fitted
@@ -223,11 +224,14 @@ def _descent(
         cost = 0.5 * residual @ residual - log_prior(p, free)
         return Linearised(hessian, J.T @ residual + weight * pull, float(cost), moved)
 
+    def converged(gain: float, cost: float) -> bool:
+        return gain < settings.enough or seen[-1].fitted + settings.iterations * gain < bar
+
     damping = Damping(settings.damping, settings.damping, lambda hessian: settings.ridge, settings.patience)
     first = np.array(start, dtype=float)
     (p, z), _ = damped_fit(
         (first, likelihood.whitened(first, q)), linearise, damping,
-        settings.iterations if iterations is None else iterations, lambda gain, cost: gain < settings.enough,
+        settings.iterations if iterations is None else iterations, converged,
     )  # fmt: skip
     last = _fit_at(likelihood, p, q, z, free, parts, colour_of(z, part, most))
     seen.append(replace(last, covariance=seen[-1].covariance) if seen else last)
@@ -279,6 +283,7 @@ def anneal(
     """
     first = settled(likelihood, start, q, free, parts) if most else fit(likelihood, start, q, free, parts, most=0)
     at, best = list(levels).index(q), first
+    known = {at}
     settings = likelihood.settings.fit
     for stride in settings.strides:
         for direction in (1, -1):
@@ -286,7 +291,11 @@ def anneal(
             place, misses = at, 0
             while misses <= patience and 0 <= place + direction * stride < len(levels):
                 place += direction * stride
-                tried = fit(likelihood, best.p, levels[place], free, parts, most=most)
+                if place in known:  # it was no better on the way here
+                    misses += 1
+                    continue
+                known.add(place)
+                tried = fit(likelihood, best.p, levels[place], free, parts, most=most, bar=best.fitted)
                 if tried.fitted > best.fitted:
                     best, at, misses = tried, place, 0
                 else:

@@ -3,6 +3,7 @@
 A record that was interpolated goes back to the rows that were measured. One that was sampled far faster than anything
 in it moves is brought down behind one linear-phase filter for torque and angles alike, the torque then averaged over
 the new samples, which keeps its impulse. What is left out is noise; a diagnosis then says the same at any rate.
+A long record comes down further: averages, held over a sample, lose what is fast, which their filter makes up for.
 """
 
 import math
@@ -78,7 +79,11 @@ def analysed(
     reach = band(measured, own, settings.likelihood.noise_window)
     needed = max(own.least_rate, own.per_band * reach, own.per_mode * fastest)
     rows = max(1, measured.size // own.least_rows)
-    factor = max(1, min(math.floor(1.0 / measured.step / needed * (1.0 + own.rounding)), rows))
+    rate = 1.0 / measured.step * (1.0 + own.rounding)
+    factor = max(1, min(math.floor(rate / needed), rows))
+    # More of a long record counts for more than finer rows of a part of it.
+    enough = max(own.least_rate, own.long_per_band * reach, own.long_per_mode * fastest)
+    factor = max(factor, min(measured.size // own.many_rows, math.floor(rate / enough)))
     factor = factor if most is None else max(1, min(factor, most // native))
     return Analysis(decimated(measured, factor, own), factor * native, native)
 
@@ -165,7 +170,7 @@ def decimated(record: Record, factor: int, settings: RateSettings) -> Record:
     kernel = firwin(2 * half + 1, settings.cut_off / factor)
     size = (record.size - 1) // factor
 
-    def smooth(values: Array) -> Array:
+    def smooth(values: Array, kernel: Array = kernel) -> Array:
         mirrored = np.concatenate(
             [2 * values[0] - values[half:0:-1], values, 2 * values[-1] - values[-2 : -half - 2 : -1]]
         )
@@ -174,8 +179,20 @@ def decimated(record: Record, factor: int, settings: RateSettings) -> Record:
     def angle(values: Array | None) -> Array | None:
         return None if values is None else smooth(values)[::factor]
 
-    torque = smooth(record.u).reshape(size, factor).mean(axis=1)
+    torque = smooth(record.u, _made_up_for(kernel, factor)).reshape(size, factor).mean(axis=1)
     motor = angle(record.theta_m)
     assert motor is not None
     return replace(record, time=record.time[: size * factor : factor], u=torque, theta_m=motor,
                    theta_l=angle(record.theta_l), further={})  # fmt: skip
+
+
+def _made_up_for(kernel: Array, factor: int) -> Array:
+    """Return a filter's kernel with the gain that a torque loses where it is averaged over ``factor`` rows and held.
+
+    Both take a sinc of the frequency from it, beside that of the hold over a row which the machine has seen.
+    """
+    gain, size = np.fft.fft(np.fft.ifftshift(kernel)), kernel.size
+    frequency = np.abs(np.fft.fftfreq(size))
+    lost = (np.sinc(factor * frequency) / np.sinc(frequency)) ** 2
+    inside = frequency < 0.5 / factor
+    return np.fft.fftshift(np.fft.ifft(np.where(inside, gain / np.where(inside, lost, 1.0), 0.0)).real)

@@ -201,15 +201,16 @@ def _fit_one_encoder(likelihood: Likelihood, torque: list[int], others: list[int
     wide interval that it deserves.
     """
     found: list[tuple[GapFit, Likelihood]] = []
-    firsts, likelihood = _first_fits(likelihood.changed(soft=True), torque, others, np.log(BLURRED[0]))
+    blur = _levels(likelihood, BLURRED)
+    firsts, likelihood = _first_fits(likelihood.changed(soft=True), torque, others, np.log(blur[0]))
     for first in firsts[:2]:
         known = likelihood.information.copy()
         known[np.ix_(first.free, first.free)] = first.information
-        blurred, likelihood = _continue(likelihood.changed(soft=True, information=known), first, BLURRED[1:])
+        blurred, likelihood = _continue(likelihood.changed(soft=True, information=known), first, blur[1:])
         found.append((blurred, likelihood))
         sharp, likelihood = _sharpen(likelihood.changed(soft=False), blurred, torque, others)
         found.append((sharp, likelihood))
-        if likelihood.noise(sharp.point.theta).torque[1] <= likelihood.settings.fit.calm_torque_noise:
+        if _is_calm(likelihood, sharp):
             break
     return min(found, key=lambda entry: entry[0].point.objective)
 
@@ -222,15 +223,28 @@ def _sharpen(
     Where that is too far off for little torque noise, the filter loses the load's side; more noise holds it.
     """
     fits: list[GapFit] = []
+    levels = _levels(likelihood, MOTOR_ENCODER)
     for place in SHARP_STARTS:
         start = blurred.point.theta.copy()
-        start[torque] = np.log(MOTOR_ENCODER[place])
+        start[torque] = np.log(levels[place])
         first = maximise(likelihood, start, others, likelihood.settings.fit.steps_per_level, tolerance=0.5)
-        best, learnt = _continue(first.likelihood, first, MOTOR_ENCODER[place + 1 :])
+        best, learnt = _continue(first.likelihood, first, levels[place + 1 :])
         fits.append(best)
-        if likelihood.noise(fits[-1].point.theta).torque[1] <= likelihood.settings.fit.calm_torque_noise:
+        if _is_calm(likelihood, best):
             break
     return min(fits, key=lambda fit: fit.point.objective), learnt
+
+
+def _levels(likelihood: Likelihood, levels: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return levels of torque noise as the strength of the record's drive asks for."""
+    unit = likelihood.problem.torque_unit
+    return [(unit * motor, unit * load) for motor, load in levels]
+
+
+def _is_calm(likelihood: Likelihood, fit: GapFit) -> bool:
+    """Tell whether a fit of one encoder gets down to as little torque noise at the load as a right one does."""
+    most = likelihood.problem.torque_unit * likelihood.settings.fit.calm_torque_noise
+    return likelihood.noise(fit.point.theta).torque[1] <= most
 
 
 def _split(likelihood: Likelihood) -> tuple[list[int], list[int]]:
