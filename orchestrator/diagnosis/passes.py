@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import Sized, sized, with_model_error
 from orchestrator.diagnosis.proof.horizons import Horizons, horizons
 from orchestrator.diagnosis.proof.misfit import held_out_misfit

@@ -9,7 +9,8 @@ import pytest
 
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.fit.fitting import split
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, signals_of
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.signals import signals_of
 from orchestrator.diagnosis.fit.spread import widened
 from orchestrator.diagnosis.outcome import Diagnosis
 from orchestrator.diagnosis.proof.free_run import simulate

@@ -10,14 +10,8 @@ import pytest
 from scipy.linalg import expm
 
 from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal, decided, fit, jacobian, log_prior, split
-from orchestrator.diagnosis.fit.record_likelihood import (
-    RecordLikelihood,
-    Signals,
-    lagged_rms,
-    measurement_matrix,
-    noise_level,
-    signals_of,
-)
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, measurement_matrix
+from orchestrator.diagnosis.fit.signals import Signals, lagged_rms, noise_level, signals_of
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import record_from_columns
 from orchestrator.shared.inference.colour import colour_of

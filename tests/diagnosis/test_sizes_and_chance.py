@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
-from orchestrator.diagnosis.fit.record_likelihood import Signals
+from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.passes import _is_weak, _larger_misfit, honest

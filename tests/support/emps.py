@@ -65,7 +65,7 @@ def r_squared(simulated: Array, measured: Array) -> float:
 
 def open_loop(p: Array, which: str) -> float:
     """Return R2 of the free run over a whole record, driven by its force; the initial state lies closest to it."""
-    from orchestrator.diagnosis.fit.record_likelihood import signals_of
+    from orchestrator.diagnosis.fit.signals import signals_of
     from orchestrator.diagnosis.proof.free_run import free_run
     from orchestrator.diagnosis.settings import DiagnosisSettings
     from orchestrator.plants.known.servo_axis import PLANT

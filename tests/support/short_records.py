@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.plants.known import plants
 from pyfmu_sources import drivetrain, servo_axis

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.record_likelihood import noise_level
+from orchestrator.diagnosis.fit.signals import noise_level
 from orchestrator.diagnosis.settings import DiagnosisSettings, RateSettings
 from orchestrator.plants.description import Plant
 from orchestrator.records.record import Record

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Parts, split
 from orchestrator.diagnosis.fit.rate import Analysis, analysed
-from orchestrator.diagnosis.fit.record_likelihood import Signals, signals_of
 from orchestrator.diagnosis.fit.runs import Run, in_parts
+from orchestrator.diagnosis.fit.signals import Signals, signals_of
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import RecordError
 from orchestrator.plants.description import Plant

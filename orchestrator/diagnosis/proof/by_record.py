@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.runs import stretches
+from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.outcome import RecordEvidence
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.settings import ProofSettings

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.record_likelihood import Signals
 from orchestrator.diagnosis.fit.runs import in_time
+from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.settings import FreeRunSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.predictor import FINER, coarse_runner_of, runs_coarsely

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.proof.free_run import free_run
 from orchestrator.diagnosis.settings import ProofSettings

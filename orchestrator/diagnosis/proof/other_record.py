@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.rate import analysed
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals, signals_of
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.signals import Signals, signals_of
 from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Workings
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.proof.whole_record import r_squared, torque_error

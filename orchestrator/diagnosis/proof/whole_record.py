@@ -10,7 +10,8 @@ the measured one decimated by ten, the norm of their difference over that of the
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, Signals
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.proof.free_run import free_run
 from orchestrator.diagnosis.settings import InverseSettings
 from orchestrator.plants.description import Plant

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.record_likelihood import noise_level
+from orchestrator.diagnosis.fit.signals import noise_level
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.plants.description import STEP, Plant

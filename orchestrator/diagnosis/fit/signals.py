@@ -1,0 +1,169 @@
+"""The signals of a record as the predictor takes them: aligned in time, with their noise and sizes."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.runs import Run, stretches
+from orchestrator.diagnosis.settings import LikelihoodSettings
+from orchestrator.plants.description import Plant
+from orchestrator.plants.measurement import LEAD, SHIFT
+from orchestrator.records.record import Record, quantisation_step
+from orchestrator.shared.inference.noise import residual_noise
+
+Array = NDArray[np.float64]
+
+
+SMOOTHED = 9  # samples of the cubic that gives the motion within a sample
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The signals of a record as the predictor takes them.
+
+    Attributes:
+        y: (n, 2) measured angles; the second column is zero with one encoder.
+        u: (n,) requested torque.
+        h: sample time [s].
+        channels: number of encoders, 1 or 2.
+        noise: (channels,) standard deviation of the measurement noise, rounding included.
+        torque: rms of the drive's torque, the unit in which process noise is counted.
+        runs: the records, where there are several.
+    """
+
+    y: Array
+    u: Array
+    h: float
+    channels: int
+    noise: Array
+    torque: float
+    runs: tuple[Run, ...] = ()
+
+    def stretches(self, part: slice) -> list[slice]:
+        """Return the stretches of a part within which time goes on.
+
+        Args:
+            part: of the samples.
+
+        Returns:
+            Slices, in order.
+        """
+        return [rows for _, rows in stretches(self.runs, part, self.size)]
+
+    @property
+    def size(self) -> int:
+        """Return the number of samples."""
+        return int(self.u.size)
+
+    def aligned(self, plant: Plant, p: Array) -> "Signals":
+        """Return the signals as they were, from how the log has them: what is early put later, what is late earlier.
+
+        Args:
+            plant: the plant.
+            p: its parameters, those of the log among them.
+
+        Returns:
+            A copy, or these signals.
+        """
+        lead, late = (plant.value(p, name) if name in plant.names else 0.0 for name in (LEAD.name, SHIFT.name))
+        if lead == 0.0 and late == 0.0:
+            return self
+        u = self._each(self.u, lambda asked: _earlier(asked, lead / self.h))
+        return replace(self, u=u, y=self._earlier_load(late / self.h))
+
+    def _each(self, values: Array, function: Callable[[Array], Array]) -> Array:
+        """Return ``function`` of the values (n,) of each record in time, in their places."""
+        if not self.runs:
+            return function(values)
+        out = np.empty_like(values)
+        for run in self.runs:
+            out[run.rows] = function(values[run.rows])
+        return out
+
+    @cached_property
+    def _motion(self) -> tuple[Array, Array]:
+        """Return change (n,) and curvature (n,) of the load's angle per sample, by a sliding cubic."""
+        from scipy.signal import savgol_filter
+
+        def derived(angle: Array, order: int) -> Array:
+            window = min(SMOOTHED, (angle.size - 1) // 2 * 2 + 1)
+            return np.asarray(savgol_filter(angle, window, 3, deriv=order, mode="interp"))
+
+        return self._each(self.y[:, 1], lambda y: derived(y, 1)), self._each(self.y[:, 1], lambda y: derived(y, 2))
+
+    def _earlier_load(self, samples: float) -> Array:
+        """Return the angles (n, 2), the load's read ``samples`` later.
+
+        Whole samples are moved; the rest follows a smoothed motion, so that the noise of a sample stays as it is.
+        """
+        if samples == 0.0:
+            return self.y
+        whole = round(samples)
+        rest, (one, two) = samples - whole, self._motion
+        load = self.y[:, 1] + rest * one + 0.5 * rest**2 * two
+        load = self._each(load, lambda y: y[np.clip(np.arange(y.size) + whole, 0, y.size - 1)])
+        return np.ascontiguousarray(np.column_stack([self.y[:, 0], load]))
+
+
+def _earlier(u: Array, samples: float) -> Array:
+    """Return requests (n,), each held for a sample, that act ``samples`` earlier: their means over each sample."""
+    whole = math.floor(samples)
+    at = np.arange(u.size) + whole
+    first, second = (u[np.clip(at + n, 0, u.size - 1)] for n in (0, 1))
+    return np.asarray(first + (samples - whole) * (second - first))
+
+
+def signals_of(record: Record, tau: float, settings: LikelihoodSettings) -> Signals:
+    """Return the signals of a record for a plant whose torque lags by ``tau`` [s].
+
+    Args:
+        record: the record.
+        tau: lag of the drive [s].
+        settings: of the likelihood.
+
+    Returns:
+        Torque, angles, their noise and sizes.
+    """
+    one = record.theta_l is None
+    load = np.zeros(record.size) if record.theta_l is None else record.theta_l
+    y = np.ascontiguousarray(np.column_stack([record.theta_m, load]))
+    channels = 1 if one else 2
+    noise = np.array([noise_level(y[:, n], settings.noise_window) for n in range(channels)])
+    return Signals(
+        y, np.ascontiguousarray(record.u), record.step, channels, noise, lagged_rms(record.u, record.step, tau)
+    )
+
+
+def noise_level(values: Array, window: int) -> float:
+    """Return the standard deviation of an encoder's noise, at least the rounding error of its count.
+
+    Args:
+        values: (n,) angles.
+        window: samples of the sliding cubic whose residual is the noise.
+
+    Returns:
+        The standard deviation, in the unit of ``values``.
+    """
+    return residual_noise(values, quantisation_step(values), window)
+
+
+def lagged_rms(u: Array, h: float, tau: float) -> float:
+    """Return the rms [N.m] of ``u`` behind a lag of ``tau`` [s].
+
+    Args:
+        u: (n,) requested torque [N.m].
+        h: sample time [s].
+        tau: [s].
+
+    Returns:
+        The rms, positive.
+    """
+    from scipy.signal import lfilter
+
+    pole = math.exp(-h / tau) if tau > 0.0 else 0.0
+    torque = lfilter([1.0 - pole], [1.0, -pole], u)
+    return max(float(np.sqrt(np.mean(torque**2))), 1e-12)
