@@ -9,8 +9,8 @@ One line a record, then the rates. Seeds below 10000 were used in development.
 
 import argparse
 import json
+import resource
 import tempfile
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +26,8 @@ from tests.support.box_fmu import DOMAINS, coupled_record, record, write_fmu, wr
 SAME = {"input_offset": "load", "load": "input_offset"}
 LEAST, MOST = 3.0, 60.0
 """Sizes of effects: what they change at an output, over its noise."""
+TOLD = 0.5
+"""What an effect must change beyond what parameters and another effect take up, over the noise, to be counted apart."""
 
 
 def cases(args: argparse.Namespace, plants: list[Plant]) -> Iterator[tuple[str, Case]]:
@@ -92,12 +94,19 @@ def right(kind: str, names: tuple[str, ...], found: FmuDiagnosisResult) -> str:
     return "partly" if families[0] & set(names) else "wrong"
 
 
+def processor_time() -> float:
+    """Return the seconds that this process and its ended children have computed."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in used)
+
+
 @dataclass
 class Tally:
     """What came out."""
 
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
     trusts: dict[str, dict[str, int]] = field(default_factory=dict)
+    told: dict[str, dict[str, int]] = field(default_factory=dict)
     misfits: list[float] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
     z: list[float] = field(default_factory=list)
@@ -105,10 +114,14 @@ class Tally:
     seconds: list[float] = field(default_factory=list)
 
     def take(self, kind: str, verdict: str, names: tuple[str, ...], sizes: tuple[float, ...],
-             parameters: tuple[float, ...], found: FmuDiagnosisResult) -> None:  # fmt: skip
+             parameters: tuple[float, ...], found: FmuDiagnosisResult, told: float) -> None:  # fmt: skip
         """Count one record."""
         self.counts.setdefault(kind, {}).setdefault(verdict, 0)
         self.counts[kind][verdict] += 1
+        if names:
+            which = f"{kind}, told by {TOLD:g} of the noise at {'least' if told >= TOLD else 'most'}"
+            of_told = self.told.setdefault(which, {})
+            of_told[verdict] = of_told.get(verdict, 0) + 1
         of_level = self.trusts.setdefault(found.trust.level.word, {})
         of_level[verdict] = of_level.get(verdict, 0) + 1
         if verdict != "right" or kind == "unknown":
@@ -126,7 +139,7 @@ class Tally:
 
     def show(self) -> None:
         """Print the rates."""
-        for kind, counts in (*self.counts.items(), *self.trusts.items()):
+        for kind, counts in (*self.counts.items(), *self.told.items(), *self.trusts.items()):
             listed = ", ".join(f"{k} {n}" for k, n in sorted(counts.items()))
             print(f"{kind}: {sum(counts.values())} records; {listed}")
         if self.misfits:
@@ -138,13 +151,13 @@ class Tally:
             if z:
                 print(f"{name} within their 95 % intervals: {100 * np.mean(np.abs(z) < 1.96):.1f} % of {len(z)}")
         if self.seconds:
-            print(f"seconds a record: median {np.median(self.seconds):.1f}, most {max(self.seconds):.1f}")
+            print(f"processor time a record [s]: median {np.median(self.seconds):.1f}, most {max(self.seconds):.1f}")
 
 
 def judged(tally: Tally, kind: str, label: str, names: tuple[str, ...], sizes: tuple[float, ...],
-           parameters: tuple[float, ...], files: tuple[Path, Path, Path]) -> None:  # fmt: skip
+           parameters: tuple[float, ...], files: tuple[Path, Path, Path], told: float = np.inf) -> None:  # fmt: skip
     """Diagnose one record, print a line."""
-    begun = time.monotonic()
+    begun = processor_time()
     try:
         found = diagnose(*files)
     except OrchestratorError as error:
@@ -152,10 +165,10 @@ def judged(tally: Tally, kind: str, label: str, names: tuple[str, ...], sizes: t
         tally.counts.setdefault(kind, {}).setdefault("error", 0)
         tally.counts[kind]["error"] += 1
         return
-    tally.seconds.append(time.monotonic() - begun)
     found.close()
+    tally.seconds.append(processor_time() - begun)
     verdict = right(kind, names, found)
-    tally.take(kind, verdict, names, sizes, parameters, found)
+    tally.take(kind, verdict, names, sizes, parameters, found, told)
     o, level = found.outcome, found.trust.level.word
     shown = ", ".join(f"{f.effect.label}={f.estimates[0].value:.5g}" for f in found.effects)
     print(
@@ -194,7 +207,7 @@ def made_records(args: argparse.Namespace, tally: Tally) -> None:
             files = (case.write(folder / "record.csv"), fmus[case.plant.number], case.plant.map(folder / "map.toml"))
             label = (f"{case.plant.name[:14]:15s}{'closed' if case.closed else 'open':7s}{'+'.join(case.names):42s}"
                      f"{case.ratio:7.1f} {case.told:6.2f}")  # fmt: skip
-            judged(tally, kind, label, case.names, case.sizes, case.parameters, files)
+            judged(tally, kind, label, case.names, case.sizes, case.parameters, files, case.told)
 
 
 def main() -> None:

@@ -275,8 +275,8 @@ SPEEDS = {0: 1, 1: 1, 2: 1, 4: 1, 5: 1, 6: 2, 11: 1}
 
 @dataclass(frozen=True)
 class Case:
-    """A record and what is hidden in it; ``ratio``: what the effect changes, over the noise; ``told``: beyond what
-    parameters can take up."""
+    """A record and what is hidden in it; ``ratio``: what the effects change, over the noise; ``told``: the smallest of
+    what each changes beyond what parameters and the other's size can take up."""
 
     plant: Plant
     names: tuple[str, ...]
@@ -475,12 +475,31 @@ class Maker:
             p[k] *= 1.001
             columns.append(((self.run((), (), p)[1] - base) / self.sigma).ravel())
         J = np.column_stack(columns)
-        left = change.ravel() - J @ np.linalg.lstsq(J, change.ravel(), rcond=None)[0]
+        tolds = [self.told(given_one, J) for given_one in self.alone(names, given, base)]
         u, y = self.run(names, given, noisy=True)
         if not names:
             y = y if y.shape[1] == len(self.places) else y[:, self.places]
         ratio = float(np.max(np.sqrt(np.mean(change**2, axis=0))))
-        told = float(np.sqrt(np.mean(left**2) * change.shape[1]))
         sizes = tuple(self.size(n, s) for n, s in zip(names, given, strict=True))
         time = np.arange(self.n) * self.plant.h
+        told = min(tolds, default=0.0)
         return Case(self.plant, names, sizes, tuple(self.p), self.closed, ratio, told, time, u, y + self.noise)
+
+    def alone(self, names: tuple[str, ...], shares: tuple[float, ...], base: np.ndarray) -> list[np.ndarray]:
+        """Return what all effects change, and in further columns what the others do without each of them."""
+        whole = (self.run(names, shares)[1] - base) / self.sigma if names else np.zeros_like(base)
+        found = []
+        for at in range(len(names)):
+            rest = tuple(n for k, n in enumerate(names) if k != at)
+            left = tuple(share for k, share in enumerate(shares) if k != at)
+            without = [(self.run(rest, left)[1] - base) / self.sigma] if rest else []
+            found.append(np.stack([whole, *without], axis=2))
+        return found
+
+    @staticmethod
+    def told(changes: np.ndarray, J: np.ndarray) -> float:
+        """Return what an effect changes beyond what parameters and the size of the others take up, over the noise."""
+        change = changes[:, :, 0] - np.sum(changes[:, :, 1:], axis=2)
+        known = np.column_stack([J, *(changes[:, :, k].ravel() for k in range(1, changes.shape[2]))])
+        left = change.ravel() - known @ np.linalg.lstsq(known, change.ravel(), rcond=None)[0]
+        return float(np.sqrt(np.mean(left**2) * change.shape[1]))

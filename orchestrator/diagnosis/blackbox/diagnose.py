@@ -188,6 +188,7 @@ def _diagnosed(
         chosen = tried[1]
     search, base, _ = chosen
     best = search.run(base)
+    base = search.plain or base
     if len(tried) > 1 and not search.explained(best):
         # The other view of the start, from the model found: a wrong model hides what the start was.
         other = next(t[0] for t in tried if t[0] is not search)
@@ -196,9 +197,10 @@ def _diagnosed(
             again = other.fitter.settled(again)
             pays = settings.start.pays if other.fitter.ladder.spread > 0.0 else -settings.start.pays
             if again.total > best.total + pays:
-                other.steps = search.steps
+                other.earlier = tuple(search.steps)
                 rebased = other.fitter.fit(base.model, base.level)
-                search, best, base = other, other.run(again), rebased or base
+                search, best, base = other, other.run(again, rebased or base), rebased or base
+                base = search.plain or base
     search, base, best = _interleaved(search, base, best, settings.rest)
     # What a start that is off explains by itself needs no effect.
     if best.model.effects and (len(tried) == 1 or search.fitter.parts is not parts):
@@ -227,7 +229,7 @@ def _interleaved(
     parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces, whole)
     turns = BoxSearch(
         Fitter(fitter.problem, fitter.ladder, parts, fitter.settings),
-        search.effects, search.settings, search.progress, until=search.until,
+        search.effects, search.settings, search.progress, earlier=(*search.earlier, *search.steps), until=search.until,
     )  # fmt: skip
     plain = turns.fitter.fit(base.model, base.level)
     start = turns.fitter.fit(best.model, best.level) if best.model.effects else plain
@@ -235,15 +237,21 @@ def _interleaved(
         return search, base, best
     found = turns.run(start, plain)
     explains = bool(found.model.effects) and turns.explained(found)
-    return (turns, plain, found) if explains else (search, base, best)
+    return (turns, turns.plain or plain, found) if explains else (search, base, best)
+
+
+def _last(fitter: Fitter, fit: BoxFit) -> BoxFit:
+    """Return a fit over all rows that were looked at."""
+    return fitter.fit(fit.model, fit.level, None, fitter.parts.looked_at, iterations=4) or fit
 
 
 def _goes_on(fitter: Fitter, fit: BoxFit, settings: RestSettings) -> bool:
     """Tell whether a model leaves nothing that must be explained over all of the record either."""
-    y = fitter.problem.simulate([fit.model])[0]
+    last = _last(fitter, fit)
+    y = fitter.problem.simulate([last.model])[0]
     if y is None:
         return False
-    rest = rest_of(fitter, replace(fit, y=y), slice(0, fitter.problem.n), settings)
+    rest = rest_of(fitter, replace(last, y=y), slice(0, fitter.problem.n), settings)
     return rest.explained or rest.disturbed
 
 
@@ -258,7 +266,7 @@ def _judged(
 ) -> BoxOutcome:
     fitter, parts = search.fitter, search.fitter.parts
     seen = parts.looked_at
-    last = fitter.fit(best.model, best.level, None, seen, iterations=4) or best
+    last = _last(fitter, best)
     whole = problem.simulate([problem.nominal, base.model, last.model])
     if whole[0] is None:
         raise problem.does_not_run()

@@ -356,19 +356,31 @@ class Fitter:
         for _ in range(self.settings.fit.stages):
             if stop >= reach:
                 break
-            part = slice(0, min(max(int(self.settings.fit.further * stop), reach // 16), reach))
-            short = self.fit(model, self.best_level(y[: part.stop], part), None, part, 6, part.stop, y[: part.stop])
-            if short is None:
-                return None
-            run = self.problem.simulate([short.model], self.parts.seen)[0]
-            if run is None or (reached := self.horizon(run)) <= stop:
+            longer = self._longer(model, y, stop)
+            if longer is None:
                 break
-            model, y, stop, J = short.model, run, reached, None
+            model, y, J = *longer, None
+            stop = self.horizon(y)
         if J is None:
             k = self.best_level(y, rows)
         # What cannot be led to the end is left where it keeps close the longest: others start from there.
         lost = stop < self.settings.fit.lost * reach and self.ladder.share(k) >= self.ladder.shares[-2]
         return self.fit(model, k, J, held=held, y=y, iterations=0 if lost else None)
+
+    def _longer(self, model: BoxModel, y: Array, stop: int) -> tuple[BoxModel, Array] | None:
+        """Return a model, and its run, that keeps close to the record for longer; None where none is found.
+
+        What lies within its reach is fitted first: rows that have gone astray ask for noise, and blur the rest.
+        """
+        reach = self.parts.reach
+        for factor in (1.0, self.settings.fit.further):
+            part = slice(0, min(max(int(factor * stop), reach // 16), reach))
+            k = self.best_level(y[: part.stop], part)
+            short = self.fit(model, k, None, part, until=part.stop, y=y[: part.stop])
+            run = None if short is None else self.problem.simulate([short.model], self.parts.seen)[0]
+            if short is not None and run is not None and self.horizon(run) > stop:
+                return short.model, run
+        return None
 
     def settled(self, fit: BoxFit, rows: Rows | None = None, until: int | None = None) -> BoxFit:
         """Return a fit, or one from there without port noise, whichever is likelier.
@@ -445,9 +457,10 @@ class Fitter:
             The fit; None where the FMU fails.
         """
         again: BoxFit | None = fit
-        often = self.settings.fit.annealed
+        often, share = self.settings.fit.annealed, self.ladder.share(fit.level)
         for k in range(len(self.ladder.shares) - 1, -1, -1):
-            if k < self.ladder.size and self.ladder.share(k) < self.ladder.share(fit.level) and again is not None:
+            if k < self.ladder.size and self.ladder.share(k) <= share / self.settings.fit.quieter and again is not None:
+                share = self.ladder.share(k)
                 again = self.fit(again.model, k, y=again.y, held=often, iterations=often)
         return None if again is None else self.fit(again.model, again.level, again.J, y=again.y)
 
@@ -470,19 +483,20 @@ class Fitter:
     ) -> tuple[BoxModel, Array, float] | None:
         """Return the best of a whole step and parts of it that gains, with its run and likelihood."""
         step = self.step(model, y, J, k, rows, damping)
-        shares = (1.0, 0.4)
-        models = [model.moved(self.bounded(model.vector + s * step)) for s in shares]
-        found = self.problem.simulate(models, until)
         e0 = self.whitened(y, k)
         change = self.ladder[k].whiten((J @ step)[:, :, None])[:, :, 0]
         self._expected = self.likelihood(e0 - change, k, rows) - self.likelihood(e0, k, rows)
         best: tuple[BoxModel, Array, float] | None = None
-        for trial, run in zip(models, found, strict=True):
+        for share in (1.0, self.settings.fit.shorter):
+            trial = model.moved(self.bounded(model.vector + share * step))
+            run = self.problem.simulate([trial], until)[0]
             if run is None:
                 continue
             reached = self.likelihood(self.whitened(run, k), k, rows) + self.prior(trial)
             if reached > (value if best is None else best[2]) + 1e-9:
                 best = (trial, run, reached)
+            if reached - value > self.settings.fit.half_way * self._expected:
+                break
         return best
 
     def _result(self, model: BoxModel, k: int, y: Array, J: Array, rows: Rows) -> BoxFit:

@@ -58,10 +58,10 @@ def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> li
     rows = len(before.y)
     runs = fitter.problem.simulate(models, rows)
     columns: list[Array | None] = [None if run is None else (run - before.y) / fitter.problem.noise for run in runs]
-    promises = _promises(fitter, before, trials, columns, rows)
+    promises = _promises(_Known(fitter, before, rows), trials, columns)
     near = max(fitter.horizon(before.y), rows // 16)
     if near < fitter.settings.screen.straight * rows:  # beyond it nothing is linear any more
-        close = _promises(fitter, before, trials, [None if c is None else c[:near] for c in columns], near)
+        close = _promises(_Known(fitter, before, near), trials, [None if c is None else c[:near] for c in columns])
         promises = [p for pair in itertools.zip_longest(close, promises) for p in pair if p is not None]
     return promises
 
@@ -83,14 +83,14 @@ def scanned(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> dic
         values = effect.kind.scan(effect.scene)
         gains = run.gains(effect, values) if values else {}
         kept: list[int] = []
-        for k in sorted(gains, key=lambda k: -gains[k]):
+        for k in sorted(gains, key=lambda k: -gains[k].gain):
             if len(kept) < own.scanned and all(abs(k - other) >= own.apart for other in kept):
                 kept.append(k)
         for k in kept:
             edges = values[max(k - 1, 0)], values[min(k + 1, len(values) - 1)]
             finer = tuple(float(v) for v in np.linspace(*edges, 2 * own.parts + 1))
-            close = run.gains(effect, finer)
-            best = finer[max(close, key=lambda n: close[n])] if close else values[k]
+            close = run.gains(effect, finer, (gains[k].level,))
+            best = finer[max(close, key=lambda n: close[n].gain)] if close else values[k]
             chosen.setdefault(effect, []).append(_with(effect, best))
     return chosen
 
@@ -104,13 +104,14 @@ class _Sight:
     """What effects promise on top of one fit, seen through the surrogate of the FMU."""
 
     def __init__(self, fitter: Fitter, before: BoxFit) -> None:
-        self._fitter, self._before = fitter, before
+        self._fitter = fitter
         problem, self._rows = fitter.problem, len(before.y)
         self._table = problem.table(before.model, series_of(problem, self._rows))
         self._read = problem.read_finely(before.model, self._rows)
+        self._known = _Known(fitter, before, self._rows)
 
-    def gains(self, effect: BoxEffect, values: Sequence[float]) -> dict[int, float]:
-        """Return the gain that each of ``values`` promises, by its place."""
+    def gains(self, effect: BoxEffect, values: Sequence[float], levels: Sequence[int] = ()) -> dict[int, Promise]:
+        """Return what each of ``values`` promises, by its place; ``levels`` of port noise: default all."""
         fitter, problem = self._fitter, self._fitter.problem
         at_input = effect.kind.where == INPUT
         surrogate = problem.input_surrogate() if at_input else fitter.ladder.surrogate
@@ -125,9 +126,9 @@ class _Sight:
         amplitudes = _amplitude_count(effect)
         trials = [(effect, np.array(_with(effect, v)), amplitudes) for v in values]
         columns = [answers[:, :, k] for k in range(answers.shape[2])]
-        found = _promises(fitter, self._before, trials, columns, self._rows, exact=True)
+        found = _promises(self._known, trials, columns, exact=True, levels=levels)
         places = {v: k for k, v in enumerate(values)}
-        return {places[float(p.values[-1])]: p.gain for p in found}
+        return {places[float(p.values[-1])]: p for p in found}
 
     def _arriving(self, effect: BoxEffect, value: float) -> list[Array]:
         """Return what an effect in series changes of its input."""
@@ -143,38 +144,58 @@ class _Sight:
         return [size * np.sin(value * x), size * np.cos(value * x)]
 
 
+class _Known:
+    """What effects are looked for beside: the residual of one fit, and what its own values explain of it."""
+
+    def __init__(self, fitter: Fitter, before: BoxFit, rows: int) -> None:
+        self.fitter, self.rows = fitter, rows
+        y = before.y[:rows]
+        self.start = fitter.best_level(y, slice(0, rows))
+        self.now = fitter.likelihood(fitter.whitened(y, self.start), self.start, slice(0, rows)) + before.prior
+        self.levels = _levels(fitter, self.start)
+        self._block = np.concatenate([fitter.problem.residual(y)[:, :, None], before.J[:rows]], axis=2)
+        self._prior = np.zeros((len(fitter.mean), before.J.shape[2]))
+        self._prior[:, : len(fitter.mean)] = np.diag(1.0 / fitter.sd)
+        self._missing = (fitter.mean - before.model.p) / fitter.sd
+        self._made: dict[int, tuple[Array, Array]] = {}
+
+    def at(self, level: int) -> tuple[Array, Array]:
+        """Return an orthogonal base of what the values explain, and the residual without it."""
+        if level not in self._made:
+            white = self.fitter.ladder[level].whiten(self._block).reshape(-1, self._block.shape[2])
+            e = np.concatenate([white[:, 0], self._missing])
+            J = np.concatenate([white[:, 1:], self._prior])
+            Q, R = np.linalg.qr(J / np.maximum(np.sqrt(np.sum(J * J, axis=0)), 1e-300))
+            Q = np.ascontiguousarray(Q[:, np.abs(np.diag(R)) > 1e-9])
+            self._made[level] = Q, e - Q @ (Q.T @ e)
+        return self._made[level]
+
+    def beside(self, level: int, columns: Array) -> Array:
+        """Return columns (rows, outputs, c), whitened, without what the values explain of them."""
+        Q, _ = self.at(level)
+        white = self.fitter.ladder[level].whiten(columns).reshape(-1, columns.shape[2])
+        D = np.concatenate([white, np.zeros((len(self._missing), columns.shape[2]))])
+        return np.asarray(D - Q @ (Q.T @ D))
+
+
 def _promises(
-    fitter: Fitter, before: BoxFit, trials: Sequence[Trial], columns: Sequence[Array | None], rows: int,
-    exact: bool = False,
+    known: _Known, trials: Sequence[Trial], columns: Sequence[Array | None], exact: bool = False,
+    levels: Sequence[int] = (),
 ) -> list[Promise]:  # fmt: skip
-    """Return what each trial promises over the first ``rows``, best first; ``exact``: its values are not scaled."""
-    y, own = before.y[:rows], fitter.settings.screen
-    start = fitter.best_level(y, slice(0, rows))
-    now = fitter.likelihood(fitter.whitened(y, start), start, slice(0, rows)) + before.prior
+    """Return what each trial promises, best first; ``exact``: its values are not scaled; ``levels``: default all."""
+    fitter, own = known.fitter, known.fitter.settings.screen
     best: dict[int, Promise] = {}
     usable = [k for k, c in enumerate(columns) if c is not None and np.any(c)]
     if not usable:
         return []
-    residual = fitter.problem.residual(y)[:, :, None]
-    block = np.concatenate(
-        [residual, before.J[:rows], np.stack([c for c in (columns[k] for k in usable) if c is not None], axis=2)],
-        axis=2,
-    )
-    count = before.J.shape[2]
-    prior = np.zeros((len(fitter.mean), count))
-    prior[:, : len(fitter.mean)] = np.diag(1.0 / fitter.sd)
-    missing = (fitter.mean - before.model.p) / fitter.sd
+    block = np.stack([c for c in (columns[k] for k in usable) if c is not None], axis=2)
     place = {k: n for n, k in enumerate(usable)}
-    for level in _levels(fitter, start):
-        white = fitter.ladder[level].whiten(block).reshape(-1, block.shape[2])
-        e = np.concatenate([white[:, 0], missing])
-        J = np.concatenate([white[:, 1 : 1 + count], prior])
-        D = np.concatenate([white[:, 1 + count :], np.zeros((len(missing), len(usable)))])
-        Q, R = np.linalg.qr(J / np.maximum(np.sqrt(np.sum(J * J, axis=0)), 1e-300))
-        Q = Q[:, np.abs(np.diag(R)) > 1e-9]
-        e = e - Q @ (Q.T @ e)
-        D = D - Q @ (Q.T @ D)
-        log_det = float(np.sum(fitter.ladder[level].half_log[:rows]))
+    for level in levels or known.levels:
+        _, e = known.at(level)
+        D = known.beside(level, block)
+        along, sizes = D.T @ e, np.sum(D * D, axis=0)
+        log_det = float(np.sum(fitter.ladder[level].half_log[: known.rows]))
+        base = -0.5 * float(e @ e) - log_det - known.now
         at = 0
         for n, (effect, values, amplitudes) in enumerate(trials):
             mine = [place[at + a] for a in range(max(amplitudes, 1)) if at + a in place]
@@ -183,8 +204,11 @@ def _promises(
                 continue
             bounds = (own.smallest if effect.kind.shrinks else own.least, own.most)
             bounds = (1.0 - own.exact, 1.0 + own.exact) if exact else bounds
-            explained, c = _regressed(e, D[:, mine], amplitudes > 0, bounds)
-            gain = -0.5 * (float(e @ e) - explained) - log_det - now
+            if amplitudes == 0:
+                explained, c = _scaled(float(along[mine[0]]), float(sizes[mine[0]]), bounds)
+            else:
+                explained, c = _regressed(along[mine], D[:, mine])
+            gain = base + 0.5 * explained
             if n not in best or gain > best[n].gain:
                 found = values.copy()
                 if amplitudes:
@@ -206,14 +230,16 @@ def _amplitude_count(effect: BoxEffect) -> int:
     return len(effect.kind.parameters) if effect.kind.linear else effect.kind.amplitudes
 
 
-def _regressed(e: Array, D: Array, free: bool, bounds: tuple[float, float]) -> tuple[float, Array]:
-    """Return what columns explain of ``|e|^2``, and their factors; those of a finite size are close to 1."""
-    if not free:
-        size = float(D[:, 0] @ D[:, 0])
-        c = float(np.clip(D[:, 0] @ e / size, *bounds)) if size > 0.0 else 1.0
-        return float(2.0 * c * (D[:, 0] @ e) - c * c * size), np.array([c])
+def _scaled(along: float, size: float, bounds: tuple[float, float]) -> tuple[float, Array]:
+    """Return what a column of a finite size explains of ``|e|^2``, and its factor, which is close to 1."""
+    c = min(max(along / size, bounds[0]), bounds[1]) if size > 0.0 else 1.0
+    return 2.0 * c * along - c * c * size, np.array([c])
+
+
+def _regressed(along: Array, D: Array) -> tuple[float, Array]:
+    """Return what columns explain of ``|e|^2``, and their factors; ``along``: of each with the residual."""
     N = D.T @ D
     scale = np.sqrt(np.maximum(np.diag(N), 1e-300))
-    g = D.T @ e / scale
-    found = np.linalg.pinv(N / scale / scale[:, None], rcond=1e-8) @ g
+    g = along / scale
+    found = g if len(g) == 1 else np.linalg.pinv(N / scale / scale[:, None], rcond=1e-8) @ g
     return float(found @ g), found / scale

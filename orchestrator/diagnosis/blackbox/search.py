@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,10 @@ class BoxSearch:
     settings: BoxSearchSettings = field(default_factory=BoxSearchSettings)
     progress: Callable[[str], None] = lambda what: None
     steps: list[SearchStep] = field(default_factory=list)
+    earlier: tuple[SearchStep, ...] = ()
+    """Steps of searches before it, over other parts or with another start: their likelihoods do not compare."""
+    plain: BoxFit | None = None
+    """The model without effects: where an effect led to better values that need no effect, that with these."""
     until: float = float("inf")
     """Monotonic time [s] from which no further effect is fitted."""
 
@@ -70,7 +74,7 @@ class BoxSearch:
         Returns:
             Its fit.
         """
-        base = start if base is None else base
+        self.plain = base = start if base is None else base
         beam = [start]
         best = start
         while len(best.model.effects) < self.settings.most and not self.late:
@@ -80,11 +84,13 @@ class BoxSearch:
                 self.steps.append(step)
                 found += [self.pruned(fit, base) for fit in step.tried[:1] if step.accepted]
                 found += [fit for fit in step.tried[1:2] if step.accepted and self.pays(fit, before, base)]
+                found += [] if step.accepted else self._borne_out(step, base)
             found = [fit for fit in found if self.score(fit) > self.score(best)] or []
             if not found:
                 break
             found.sort(key=self.score, reverse=True)
             best = found[0]
+            self.plain = base = base if best.model.effects else best
             beam = [best] if self.explained(best) else self._distinct(found)
         return best
 
@@ -112,6 +118,34 @@ class BoxSearch:
         noisy = self.fitter.ladder.share(fit.level) > self.settings.quiet
         return fit.total - self.settings.penalty * (counted(fit.model) + noisy)
 
+    def _borne_out(self, step: SearchStep, base: BoxFit) -> list[BoxFit]:
+        """Return the best of a step's models that pays once all that is looked at is fitted, and the rest decides too.
+
+        What a small effect gains on half of a record, and from there on the next quarter, may be too little to tell.
+        """
+        own, before = self.settings, step.before
+        doubtful = [fit for fit in step.tried if self.score(fit) - self.score(before) > own.doubtful]
+        for fit in doubtful[: own.doubted]:
+            again = self.fitter.fit(fit.model.without(fit.model.effects[-1].label), fit.level)
+            without = [f for f in (before, again) if f is not None]
+            known, found = max(map(self._on_all, without), key=self.score), self._on_all(fit)
+            unseen = found.decided - known.decided + min(fit.decided - f.decided for f in without)
+            if self.score(found) - self.score(known) > self._least(found, before, base) and unseen > own.decided:
+                return [fit]
+        return []
+
+    def _on_all(self, fit: BoxFit) -> BoxFit:
+        """Return a fit to all that is looked at; what decides is the rest."""
+        fitter, parts = self.fitter, self.fitter.parts
+        found = fitter.fit(fit.model, fit.level, fit.J, parts.looked_at, iterations=4)
+        y = None if found is None else fitter.problem.simulate([found.model])[0]
+        if found is None or y is None:
+            return replace(fit, fitted=-np.inf, decided=-np.inf)
+        k = fitter.best_level(y, slice(0, len(y)), fitter.ladder.near(found.level))
+        e = fitter.whitened(y, k)
+        fitted, decided = (fitter.likelihood(e, k, rows) for rows in (parts.looked_at, parts.held_out))
+        return replace(found, level=k, y=y, fitted=fitted, decided=decided)
+
     def pays(self, fit: BoxFit, before: BoxFit, base: BoxFit) -> bool:
         """Tell whether what ``fit`` has more than ``before`` earns its place.
 
@@ -126,10 +160,15 @@ class BoxSearch:
         s = self.settings
         fitted = fit.fitted + fit.prior - before.fitted - before.prior
         decided = fit.decided - before.decided
+        if self.score(fit) - self.score(before) <= self._least(fit, before, base):
+            return False
+        return decided > max(s.decided, s.decided_share * fitted) and fitted > s.penalty
+
+    def _least(self, fit: BoxFit, before: BoxFit, base: BoxFit) -> float:
+        """Return the gain that what ``fit`` has more than ``before`` must bring."""
+        s = self.settings
         quiet = self.fitter.ladder.share(fit.level) <= s.quiet
-        least = max(s.pays if quiet else s.pays_disturbed, s.leaves * (before.total - base.total))
-        gain = self.score(fit) - self.score(before)
-        return gain > least and decided > max(s.decided, s.decided_share * fitted) and fitted > s.penalty
+        return max(s.pays if quiet else s.pays_disturbed, s.leaves * (before.total - base.total))
 
     def step(self, before: BoxFit, base: BoxFit) -> SearchStep:
         """Fit the most promising effects on top of ``before``.
@@ -176,7 +215,18 @@ class BoxSearch:
             if fits:
                 quick.append(max(fits, key=lambda fit: fit.total))
         quick.sort(key=self.score, reverse=True)
-        return [self.fitter.settled(f) if n < self.settings.settled else f for n, f in enumerate(quick)]
+        done: list[BoxFit] = []
+        for fit in quick:
+            worth = len(done) < self.settings.settled and self._worth(fit, before, done)
+            done.append(self.fitter.settled(fit) if worth else fit)
+        return done
+
+    def _worth(self, fit: BoxFit, before: BoxFit, done: Sequence[BoxFit]) -> bool:
+        """Tell whether a quick fit may become the best of a step, those ``done`` being settled."""
+        least = self.score(before)
+        if done:
+            least += self.settings.near * (max(self.score(f) for f in done) - least)
+        return self.score(fit) > least or not (done or self.explained(before))
 
     def explained(self, fit: BoxFit) -> bool:
         """Tell whether a model leaves no more than measurement noise.
@@ -232,7 +282,9 @@ class BoxSearch:
         return found
 
     def pruned(self, fit: BoxFit, base: BoxFit) -> BoxFit:
-        """Take out earlier effects that the last one has made superfluous.
+        """Take out effects that are superfluous: earlier ones since the last has come, or the last itself.
+
+        The other values start from where they are now: what an effect helped them to find they may keep without it.
 
         Args:
             fit: of a model.
@@ -241,17 +293,23 @@ class BoxSearch:
         Returns:
             The fit that is left.
         """
-        while len(fit.model.effects) > 1:
+        while fit.model.effects:
             reduced = []
             for effect in fit.model.effects:
                 again = self.fitter.grown(fit.model.without(effect.label), fit.level)
-                if again is not None:
-                    reduced.append(self.fitter.settled(again))
+                if again is None or self._carries(fit, again, base):
+                    continue
+                reduced.append(self.fitter.settled(again))
             reduced = [r for r in reduced if not self.pays(fit, r, base)]
             if not reduced:
                 break
             fit = max(reduced, key=self.score)
         return fit
+
+    def _carries(self, fit: BoxFit, without: BoxFit, base: BoxFit) -> bool:
+        """Tell whether what ``fit`` has more than ``without`` carries a good part of what all effects bring."""
+        least = self.settings.near * (self.score(fit) - self.score(base))
+        return self.score(fit) - self.score(without) > max(least, self._least(fit, without, base))
 
     def screen(self, before: BoxFit) -> list[Promise]:
         """Return what every start of every effect promises on top of a fit, best first.

@@ -19,6 +19,10 @@ class BoxSearchSettings(Settings, frozen=True):
     quiet: Annotated[float, share("port noise, of the drive, up to which that does not apply")] = 3e-4
     decided: Annotated[float, setting("least gain on the deciding part alone")] = 5.0
     decided_share: Annotated[float, share("and its least share of the gain on the fitted part")] = 0.06
+    doubtful: Annotated[
+        float, setting("gain beyond the penalty from which all of the record is asked, where it is too little")
+    ] = 3.0
+    doubted: Annotated[int, setting("effects of a step that it is asked about", ge=0)] = 3
     leaves: Annotated[float, share("of what is gained already, what a further effect must bring: no law is exact")] = (
         0.005
     )
@@ -74,6 +78,9 @@ class FitterSettings(Settings, frozen=True):
     further: Annotated[float, setting("times its reach that a run is fitted over next", ge=1)] = 1.3
     annealed_from: Annotated[float, share("port noise, of the drive, from which a fit is tried with ever less")] = 3e-4
     annealed: Annotated[int, setting("iterations at each of these levels", ge=1)] = 3
+    quieter: Annotated[float, setting("how many times less noise the next of them has at least", gt=1.0)] = 2.5
+    shorter: Annotated[float, share("of a step that is tried where the whole gains little")] = 0.4
+    half_way: Annotated[float, share("of what a step promised, from which no shorter one is tried")] = 0.5
     pieces: Annotated[int, setting("pieces of a record whose parts take turns: every third one decides", ge=3)] = 24
     comb: Annotated[
         float, setting("half width of the first comb over a value that acts in steps, in small changes of it")

@@ -174,13 +174,13 @@ def _family_of(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> tuple[str,
     kept = labels(best) - {effect.label}
     near: dict[str, float] = {}
     rivals: list[BoxFit] = []
-    for step in search.steps:
+    for step in (*search.earlier, *search.steps):
         beside = any(fit.model.effects[-1].label == effect.label for fit in step.tried)
         for fit in step.tried:
             other = fit.model.effects[-1]
             if other.label in labels(best) or other.kind.needs == effect.kind.name:  # what contains it is no other
                 continue
-            if labels(fit) == kept | {other.label}:
+            if labels(fit) == kept | {other.label} and step in search.steps:
                 near[other.label] = max(near.get(other.label, -np.inf), fit.total)
             elif beside:
                 rivals.append(fit)

@@ -40,12 +40,8 @@ class Surrogate:
         Returns:
             Shape (n, outputs, columns).
         """
-        x = np.zeros((self.order, pushes.shape[1]))
-        found = np.zeros((len(pushes) + 1, len(self.C), pushes.shape[1]))
-        for k, push in enumerate(pushes):
-            x = self.A @ x + self.B[:, place : place + 1] * push
-            found[k + 1] = self.C @ x
-        return found
+        B = np.ascontiguousarray(self.B[:, place])
+        return np.asarray(_responded(self.A, B, self.C, np.ascontiguousarray(pushes, dtype=np.float64)))
 
 
 def realised(impulses: Array, settings: PortNoiseSettings = DEFAULT.noise) -> Surrogate:
@@ -261,6 +257,30 @@ def _gains(A, C, Q, P, n):  # type: ignore[no-untyped-def]
         else:
             still = 0
     return K, R, half_log
+
+
+@kept()
+def _responded(A, B, C, pushes):  # type: ignore[no-untyped-def]
+    n, count = pushes.shape
+    states, outputs = A.shape[0], C.shape[0]
+    out = np.zeros((n + 1, outputs, count))
+    x = np.zeros((states, count))
+    fresh = np.zeros((states, count))
+    for k in range(n):
+        for s in range(states):
+            for c in range(count):
+                value = B[s] * pushes[k, c]
+                for i in range(states):
+                    value += A[s, i] * x[i, c]
+                fresh[s, c] = value
+        x, fresh = fresh, x
+        for j in range(outputs):
+            for c in range(count):
+                value = 0.0
+                for s in range(states):
+                    value += C[j, s] * x[s, c]
+                out[k + 1, j, c] = value
+    return out
 
 
 @kept()

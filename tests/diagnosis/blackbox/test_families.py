@@ -34,7 +34,9 @@ def search(totals: dict[str, float], *steps: SearchStep) -> SimpleNamespace:
         fit=lambda model, level: fit(totals[model.effects[-1].kind.name], *(e.kind.name for e in model.effects)),
         settled=lambda found: found,
     )
-    return SimpleNamespace(fitter=fitter, steps=steps, settings=DEFAULT.search, score=lambda found: found.total)
+    return SimpleNamespace(
+        fitter=fitter, steps=steps, earlier=(), settings=DEFAULT.search, score=lambda found: found.total
+    )
 
 
 def test_an_earlier_effect_has_a_family_too() -> None:
@@ -50,6 +52,14 @@ def test_what_contains_an_effect_is_none_of_its_family() -> None:
     best = fit(-10.0, "coulomb_friction")
     step = SearchStep(fit(-90.0), (best, fit(-9.0, "stribeck_friction"), fit(-13.0, "viscous_drag")), True)
     assert families_of(search({}, step), best) == (("viscous_drag@p",),)
+
+
+def test_what_stood_beside_an_effect_in_an_earlier_search_is_fitted_anew() -> None:
+    best = fit(-10.0, "input_delay")
+    step = SearchStep(fit(-900.0), (fit(-800.0, "input_delay"), fit(-11.0, "input_lag"), fit(-801.0, "load")), True)
+    found = search({"input_lag": -70.0, "load": -12.0})
+    found.earlier = (step,)
+    assert families_of(found, best) == (("load@p",),)
 
 
 def error_of_a_quantum(rows: int) -> float:
