@@ -83,6 +83,8 @@ def test_a_regression_is_judged_on_rows_that_it_has_not_seen() -> None:
     before = np.sum((white[250:, 0] - nuisance[250:, 0] @ alone) ** 2)
     assert 4.0 < gain <= 0.5 * 150 * np.log(before / left) * (1.0 + 1e-5)  # no more than its scatter allows
     assert share == pytest.approx(1.0 - left / before, rel=1e-5)
+    shrunk = (white[250:, 0] - nuisance[250:, 0] @ alone) ** 2 - (white[250:, 0] - both[250:, 0] @ fitted) ** 2
+    assert gain == pytest.approx(0.5 * len(shrunk) * (shrunk.mean() / shrunk.std(ddof=1)) ** 2, rel=1e-5)
     useless, _ = _out_of_sample(noise, both, nuisance, 250, exact)
     assert useless < 4.0
     damped, _ = _out_of_sample(white, both, nuisance, 250, strong)

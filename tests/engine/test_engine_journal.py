@@ -124,6 +124,15 @@ def test_two_runs_cannot_share_a_journal(tmp_path):
             Journal(tmp_path / "j", DEFINITION, 10, resume=True)
 
 
+def test_a_discarded_journal_is_gone_and_its_file_closed(tmp_path):
+    before = len(os.listdir("/proc/self/fd"))
+    journal = Journal(tmp_path / "j", DEFINITION, 10, resume=False)
+    journal.append(outcomes([1]))
+    journal.discard()
+    assert not list(tmp_path.iterdir())
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
 def test_nothing_is_left_of_a_journal_without_cases(tmp_path):
     with Journal(tmp_path / "a" / "b" / "j", DEFINITION, 10, resume=False):
         assert (tmp_path / "a" / "b" / "j").exists()

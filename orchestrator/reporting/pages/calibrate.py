@@ -32,7 +32,9 @@ def build(source: ResultDocument) -> Report:
         sections.append(Text("Take note", notes))
     sections += [_parameters(found), _misfit(found)]
     badge = trust_badge(found.trust, label, "good" if found.explained else "bad")
-    return Report("Calibration of an FMU", summary, tuple(sections), badge, source.origin(), source.downloads())
+    made = (("walls", found.walls), ("time taken [s]", found.seconds))
+    origin = (*source.origin(), *((name, value) for name, value in made if value not in (None, "")))
+    return Report("Calibration of an FMU", summary, tuple(sections), badge, origin, source.downloads())
 
 
 def _parameters(found: BoxCalibrationFound) -> ReportTable:
@@ -63,7 +65,7 @@ def _parameters(found: BoxCalibrationFound) -> ReportTable:
 
 
 def _misfit(found: BoxCalibrationFound) -> ReportTable:
-    columns = (TableColumn("output"), TableColumn("nominal"), TableColumn("calibrated"), TableColumn("noise"))
-    rows = tuple((name, m.nominal, m.calibrated, m.noise) for name, m in found.misfit.items())
+    columns = tuple(TableColumn(head) for head in ("output", "nominal", "calibrated", "noise", "unit"))
+    rows = tuple((name, m.nominal, m.calibrated, m.noise, m.unit) for name, m in found.misfit.items())
     note = "Nominal and calibrated: root mean square of the residual over the noise, on the held-out quarter."
     return ReportTable("Misfit over noise", columns, rows, note)
