@@ -48,8 +48,8 @@ def test_parts_of_a_series_are_those_of_its_records() -> None:
     assert splits == [(500, 750), (300, 450)]
     assert (parts.fitted, parts.validated, parts.held_out) == (slice(10, 800), slice(800, 1200), slice(1200, 1600))
     most, (edges,) = split([40_000], SETTINGS)
-    assert edges == (6000, 9000)
-    assert most.held_out == slice(9000, 40_000)
+    assert edges == (3000, 4500)
+    assert most.held_out == slice(4500, 40_000)
 
 
 def test_the_predictor_runs_through_each_record_in_time() -> None:
