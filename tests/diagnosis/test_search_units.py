@@ -345,6 +345,19 @@ def test_no_gap_is_looked_for_where_all_is_measured_or_explained(monkeypatch) ->
         assert len(called) == expected
 
 
+def test_beside_a_gap_that_no_encoder_sees_an_effect_must_leave_noise_alone(friction, monkeypatch) -> None:
+    search, _, base, best, _ = friction
+    search = replace(search, refused={}, hidden=best)
+    beside = search.candidate((*best.effects, PLAIN), best.fit)
+    for at_floor, kept in ((True, {FRICTION.label, PLAIN.label}), (False, {FRICTION.label})):
+        monkeypatch.setattr("orchestrator.diagnosis.search.search.at_the_floor", lambda *_, known=at_floor: known)
+        search.refused.clear()
+        assert labels(search.beside_hidden(beside).effects) == kept
+        assert set(search.refused) == {FRICTION.label, PLAIN.label} - kept
+    assert search.beside_hidden(base) is base
+    assert replace(search, hidden=None).beside_hidden(beside) is beside
+
+
 def test_what_a_model_leaves_above_the_noise_is_not_at_the_floor() -> None:
     likelihood, p = drivetrain_likelihood(size=240, channels=1)
     assert at_the_floor(likelihood, fit(likelihood, p, likelihood.settings.levels[-1], (), PARTS), PARTS.fitted)

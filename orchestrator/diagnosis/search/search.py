@@ -85,7 +85,30 @@ class Search(ModelSpace):
                 current = self.prune(step.candidates[0], base) if step.accepted else step.before
         except TimeUpError:
             self.stopped = True
-        return base, current
+        return base, self.beside_hidden(current)
+
+    def beside_hidden(self, current: Candidate) -> Candidate:
+        """Return the gap that no encoder sees alone, where what was named beside it does not leave noise alone.
+
+        The likelihood of such a gap is rough: between two levels of process noise it changes by more than most effects
+        gain, so that a gain is no evidence of one.
+
+        Args:
+            current: the model that was found.
+
+        Returns:
+            The model that is left.
+        """
+        hidden = self.hidden
+        if hidden is None or hidden.effects[0] not in current.effects or len(current.effects) == 1:
+            return current
+        if at_the_floor(self.likelihood, current.fit, self.parts.fitted):
+            return current
+        for effect in current.effects:
+            if effect not in hidden.effects:
+                what = f"{effect.name} ({effect.site})"
+                self.refused[effect.label] = f"{what} beside a gap that no encoder sees: more than noise would be left"
+        return max([hidden, *self.known(hidden.effects)], key=lambda candidate: candidate.score)
 
     def hidden_gap(self, base: Candidate) -> Candidate | None:
         """Return the model with a gap that one encoder alone shows, and take gains along its motion from now on.
