@@ -63,11 +63,9 @@ def diagnose(
         check_comparable(one, settings)
     given = [one if len(plant.bodies) > 1 else one.without_load_encoder() for one in given]
     nominal = plant.extended(model.values)
-    analysed = at_one_rate(given, plant, nominal, settings)
-    given = [one.record for one in analysed]
+    analysis, given = at_one_rate(given, plant, nominal, settings)
     check_resolved(plant, nominal, given[0].step, model.source, settings)
-    lag = plant.value(nominal, plant.drive.lag)
-    signals, parts = series(given, lag, settings, [one.noise for one in analysed])
+    signals, parts = series(given, plant.value(nominal, plant.drive.lag), settings)
     found = passes(model, signals, parts, nominal, settings, progress)
     likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
     base_fit, final = found.base, found.final
@@ -109,7 +107,7 @@ def diagnose(
         corrected={name: float(chosen.p[plant.index(name)]) for name in _changed(plant, nominal, chosen.p)},
         trust=doubts(verdict, found.left, found.floor_off, unnamed, far, misfit, warnings, settings.verdict),
         horizons=table(named_stages, (found.proof.base, found.proof.final)[: len(named_stages)]),
-        analysis=analysed[0].found(),
+        analysis=analysis.found(),
         settings=settings,
         workings=Workings(likelihood, parts, base_fit, chosen, best, tuple(search.steps)),
         records=by_record(likelihood, chosen.q, ends, parts.held_out, position),

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.fit.rate import analysed, decimated
-from orchestrator.diagnosis.fit.together import at_one_rate, series
 from orchestrator.diagnosis.proof.free_run import simulate
 from orchestrator.plants.predictor import coarse_runner_of
 from orchestrator.records.record import Record, record_from_columns
@@ -51,16 +50,6 @@ def bench_record(size: int) -> Record:
 @pytest.mark.parametrize(("size", "factor"), [(5000, 1), (12_000, 2), (20_000, 3), (50_000, 3)])
 def test_a_long_record_comes_down_as_far_as_its_oscillation_allows(size: int, factor: int) -> None:
     assert analysed(bench_record(size), DRIVETRAIN, bench(), SETTINGS).factor == factor
-
-
-def test_an_oscillation_of_few_rows_is_no_noise() -> None:
-    """At 833 Hz the shaft rings within eleven rows, which no cubic over nine follows: the rows of the file tell."""
-    found = at_one_rate([bench_record(20_000)], DRIVETRAIN, bench(), SETTINGS)
-    records, most = [one.record for one in found], [one.noise for one in found]
-    as_they_show = series(records, 0.0, SETTINGS)[0].noise
-    noise = series(records, 0.0, SETTINGS, most)[0].noise
-    assert np.array_equal(noise, most[0])
-    assert np.all(noise < 0.1 * as_they_show)
 
 
 @pytest.mark.parametrize("factor", [2, 3])

@@ -29,14 +29,11 @@ class Analysis:
         record: the record.
         factor: rows of the file for one that is analysed.
         interpolated: rows of the file for one that was measured; 1: none was interpolated.
-        noise: (encoders,) standard deviation of the noise of the rows that were measured, as far as it can be told
-            from motion; a filter before a lower rate leaves no more.
     """
 
     record: Record
     factor: int
     interpolated: int
-    noise: Array
 
     @property
     def rate(self) -> float:
@@ -88,9 +85,7 @@ def analysed(
     enough = max(own.least_rate, own.long_per_band * reach, own.long_per_mode * fastest)
     factor = max(factor, min(measured.size // own.many_rows, math.floor(rate / enough)))
     factor = factor if most is None else max(1, min(factor, most // native))
-    angles = [angle for angle in (measured.theta_m, measured.theta_l) if angle is not None]
-    noise = np.array([noise_level(angle, settings.likelihood.noise_window) for angle in angles])
-    return Analysis(decimated(measured, factor, own), factor * native, native, noise)
+    return Analysis(decimated(measured, factor, own), factor * native, native)
 
 
 def _interpolated_by(record: Record, settings: RateSettings) -> int:

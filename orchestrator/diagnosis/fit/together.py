@@ -1,7 +1,6 @@
 """Signals of several records of one machine, at one rate, in one series with common parts."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,9 @@ from orchestrator.records.record import Record
 Array = NDArray[np.float64]
 
 
-def at_one_rate(records: Sequence[Record], plant: Plant, nominal: Array, settings: DiagnosisSettings) -> list[Analysis]:
+def at_one_rate(
+    records: Sequence[Record], plant: Plant, nominal: Array, settings: DiagnosisSettings
+) -> tuple[Analysis, list[Record]]:
     """Return the records at the rate at which they are analysed together: the highest that one of them asks for.
 
     Args:
@@ -28,7 +29,7 @@ def at_one_rate(records: Sequence[Record], plant: Plant, nominal: Array, setting
         settings: of the diagnosis.
 
     Returns:
-        The analysis of each.
+        the analysis of the first record, and all records.
 
     Raises:
         RecordError: they were sampled at different rates, or have different encoders.
@@ -44,29 +45,25 @@ def at_one_rate(records: Sequence[Record], plant: Plant, nominal: Array, setting
             raise RecordError(f"{other.source}: encoders must be those of {first.source}, but are not")
     found = [analysed(record, plant, nominal, settings) for record in records]
     factor = min(analysis.factor for analysis in found)
-    return [
+    found = [
         analysis if analysis.factor == factor else analysed(record, plant, nominal, settings, factor)
         for record, analysis in zip(records, found, strict=True)
     ]
+    return found[0], [analysis.record for analysis in found]
 
 
-def series(
-    records: Sequence[Record], lag: float, settings: DiagnosisSettings, most_noise: Sequence[Array] = ()
-) -> tuple[Signals, Parts]:
+def series(records: Sequence[Record], lag: float, settings: DiagnosisSettings) -> tuple[Signals, Parts]:
     """Return the signals of records in one series, and its parts.
 
     Args:
         records: at one rate.
         lag: of the drive [s].
         settings: of the diagnosis.
-        most_noise: largest noise of each record's encoders; none: as the records show it.
 
     Returns:
         Both.
     """
     each = [signals_of(record, lag, settings.likelihood) for record in records]
-    if most_noise:
-        each = [replace(own, noise=np.minimum(own.noise, most)) for own, most in zip(each, most_noise, strict=True)]
     sizes = [signals.size for signals in each]
     parts, splits = split(sizes, settings)
     if len(each) == 1:
