@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import expm
 
 from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal, decided, fit, jacobian, log_prior, split
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, measurement_matrix
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, _largest_speed, measurement_matrix
 from orchestrator.diagnosis.fit.signals import Signals, lagged_rms, noise_level, signals_of
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import record_from_columns
@@ -249,6 +249,9 @@ def test_a_record_shorter_than_the_span_has_a_speed_too() -> None:
     likelihood = RecordLikelihood(AXIS, signals_from(y, torque(4), 1), AXIS.extended(
         [entry.default for entry in AXIS.table]), 4, SETTINGS)  # fmt: skip
     assert np.isfinite(likelihood.gains(Q).gains).all()
+    signals = signals_from(y, torque(4), 1)
+    for span, speed in ((4, 0.3 + 1e-9), (3, 0.2 / (3 * signals.h) + 1e-9)):  # a record of just the span, and of more
+        assert _largest_speed(signals, span * signals.h) == pytest.approx(speed)
 
 
 # -- the fit ---------------------------------------------------------------------------------------------------------
@@ -401,6 +404,8 @@ def test_parts_of_a_record() -> None:
     parts = split([1001], SETTINGS)[0]
     assert parts == Parts(slice(10, 500), slice(500, 750), slice(750, 1001))
     assert parts.seen == slice(10, 750)
+    few = msgspec.structs.replace(SETTINGS, fit=msgspec.structs.replace(SETTINGS.fit, most_fitted=900))
+    assert split([1000, 2000], few)[1] == [(300, 450), (600, 900)]  # each has its share of the rows that are fitted
     assert Parts(slice(250, 750), slice(10, 250), slice(750, 1000)).seen == slice(10, 750)
 
 

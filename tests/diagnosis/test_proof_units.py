@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis import proof
-from orchestrator.diagnosis.proof.free_run import free_run, simulate
+from orchestrator.diagnosis.proof.free_run import _steps, free_run, simulate
 from orchestrator.diagnosis.proof.misfit import held_out_misfit, segments
 from tests.support.short_records import (
     AXIS,
@@ -107,6 +107,16 @@ def test_no_step_is_taken_that_makes_it_worse() -> None:
     assert np.sum((after.rms / NOISE) ** 2) <= np.sum(np.mean(before**2, axis=0) / NOISE**2)
     still = free_run(DRIVETRAIN, p, guess, signals, part, msgspec.structs.replace(FREE_RUN, iterations=1, tries=1))
     assert np.sum((after.rms / NOISE) ** 2) <= np.sum((still.rms / NOISE) ** 2)
+
+
+@pytest.mark.parametrize("channels", [1, 2])
+def test_an_angle_is_nudged_by_the_noise_of_its_encoder(channels: int) -> None:
+    likelihood, _ = drivetrain_likelihood(size=60, channels=channels)
+    signals = replace(likelihood.signals, noise=np.array([1e-4, 3e-4])[:channels])
+    places = tuple(body.angle for body in likelihood.plant.bodies)
+    settings = SETTINGS.proof.free_run
+    steps = _steps(likelihood.plant, np.zeros(8), signals, places, settings)
+    assert steps == pytest.approx([settings.nudge * 1e-4, settings.nudge * (1e-4, 3e-4)[channels - 1]])
 
 
 def test_a_state_without_a_lag_stays_as_it_is() -> None:
