@@ -108,7 +108,7 @@ def test_place_that_cannot_be_written_is_refused_before_the_computation(tmp_path
 
 def test_model_that_is_too_fast_for_the_record_is_refused(tmp_path, capsys, columns) -> None:
     write_csv(tmp_path / "good.csv", columns)
-    (tmp_path / "model.toml").write_text("[parameters.tau]\nvalue = 1e-6\n")
+    (tmp_path / "model.toml").write_text("[parameters.c]\nvalue = 1e7\n")
     arguments = [str(tmp_path / "good.csv"), "--model", str(tmp_path / "model.toml"), "--out", str(tmp_path / "out")]
     assert main(["diagnose", *arguments]) == 2
     assert "time constants" in capsys.readouterr().err
