@@ -160,8 +160,9 @@ class FmuDiagnosisResult(Result):
 
     def _candidates(self) -> Iterator[BoxStepFound]:
         search = self.outcome.search
-        for step in () if search is None else search.steps:
-            assert search is not None
+        if search is None:
+            return
+        for step in search.steps:
             tried = tuple(
                 BoxTriedFound(
                     fit.model.effects[-1].label,

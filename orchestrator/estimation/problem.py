@@ -4,12 +4,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from orchestrator.estimation.innovations import Array, NoiseLevels
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
-from orchestrator.shared.inference.noise import robust_noise
+from orchestrator.shared.inference.noise import lagged_rms, robust_noise
 from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
@@ -135,9 +134,7 @@ def make_problem(record: Record, model: Model) -> GapProblem:
 
 def _torque_unit(record: Record, lag: float) -> float:
     """Return the rms of the drive's torque, ``lag`` [s] behind the request, over the nearest of usual drives."""
-    pole = math.exp(-record.step / lag) if lag > 0.0 else 0.0
-    torque = lfilter([1.0 - pole], [1.0, -pole], record.u)
-    rms = max(float(np.sqrt(np.mean(torque**2))), 1e-12)
+    rms = lagged_rms(record.u, record.step, lag)
     return rms / min(max(rms, DRIVES[0]), DRIVES[1])
 
 

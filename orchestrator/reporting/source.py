@@ -88,8 +88,11 @@ class ResultDocument:
         header = next(rows, [])
         return by_column(header, rows)
 
-    def origin(self) -> tuple[tuple[str, Cell], ...]:
+    def origin(self, *made: tuple[str, Cell]) -> tuple[tuple[str, Cell], ...]:
         """Return what was run and with what.
+
+        Args:
+            made: name and value of further facts; those without a value are left out.
 
         Returns:
             Name and value of each fact.
@@ -97,7 +100,8 @@ class ResultDocument:
         arguments = self.document.get("arguments") or {}
         given = {n: plain(v) for n, v in arguments.items() if n != "out" and v not in (None, False, [], {})}
         head = {"command": self.command, "version": self.document.get("version"), "seed": self.document.get("seed")}
-        return tuple((_with_unit(name), value) for name, value in (head | given).items() if value is not None)
+        known = tuple((_with_unit(name), value) for name, value in (head | given).items() if value is not None)
+        return (*known, *((name, value) for name, value in made if value not in (None, "")))
 
     def downloads(self) -> tuple[Path, ...]:
         """Return the data files of the directory, by name.

@@ -11,10 +11,11 @@ from scipy.linalg import expm
 
 from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal, decided, fit, jacobian, log_prior, split
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, _largest_speed, measurement_matrix
-from orchestrator.diagnosis.fit.signals import Signals, lagged_rms, noise_level, signals_of
+from orchestrator.diagnosis.fit.signals import Signals, noise_level, signals_of
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import record_from_columns
 from orchestrator.shared.inference.colour import colour_of
+from orchestrator.shared.inference.noise import lagged_rms
 from tests.support.short_records import (
     AXIS,
     DRIVETRAIN,

@@ -42,7 +42,7 @@ class BoxCalibration:
     @property
     def explained(self) -> bool:
         """Whether nothing but noise, and at most a small disturbance, is left."""
-        return self.rest.explained or self.rest.disturbed
+        return self.rest.nothing_missing
 
 
 def calibrate(
@@ -115,7 +115,7 @@ def calibrate(
         if share < settings.calibration.learned
     ]
     warnings += [f"`{a}` and `{b}` are hardly told apart: excite them at other frequencies" for a, b in pairs]
-    if not (rest.explained or rest.disturbed):
+    if not rest.nothing_missing:
         warnings.append("something else is missing: `diagnose` says what")
     seconds = time.monotonic() - begun
     return BoxCalibration(parameters, learned, pairs, found, rest, tuple(warnings), seconds)

@@ -252,7 +252,7 @@ def _goes_on(fitter: Fitter, fit: BoxFit, settings: RestSettings) -> bool:
     if y is None:
         return False
     rest = rest_of(fitter, replace(last, y=y), slice(0, fitter.problem.n), settings)
-    return rest.explained or rest.disturbed
+    return rest.nothing_missing
 
 
 def _judged(
@@ -278,7 +278,7 @@ def _judged(
     rest = rest_of(fitter, last, slice(0, problem.n), settings)
     if rest.disturbed:
         rest = _doubted(fitter, last, rest, bool(best.model.effects), settings)
-    fine = rest.explained or rest.disturbed
+    fine = rest.nothing_missing
     share = recovered(base, best, len(problem.outputs), len(seen))
     nominal = BoxFit(problem.nominal, last.level, stages[0], 0.0, 0.0, 0.0, last.J)
     if best.model.effects:

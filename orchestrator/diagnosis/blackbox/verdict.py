@@ -31,6 +31,11 @@ class Rest:
     reasons: tuple[str, ...]
     blocks: Array
 
+    @property
+    def nothing_missing(self) -> bool:
+        """Whether nothing but noise, and at most a small disturbance, is left."""
+        return self.explained or self.disturbed
+
 
 def rest_of(fitter: Fitter, fit: BoxFit, rows: slice, settings: RestSettings = DEFAULT.rest) -> Rest:
     """Return what a model leaves over ``rows``; ``fit.y`` must reach so far.

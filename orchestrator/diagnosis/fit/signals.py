@@ -13,7 +13,7 @@ from orchestrator.diagnosis.settings import LikelihoodSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import Record, quantisation_step
-from orchestrator.shared.inference.noise import residual_noise
+from orchestrator.shared.inference.noise import lagged_rms, residual_noise
 
 Array = NDArray[np.float64]
 
@@ -149,21 +149,3 @@ def noise_level(values: Array, window: int) -> float:
         The standard deviation, in the unit of ``values``.
     """
     return residual_noise(values, quantisation_step(values), window)
-
-
-def lagged_rms(u: Array, h: float, tau: float) -> float:
-    """Return the rms [N.m] of ``u`` behind a lag of ``tau`` [s].
-
-    Args:
-        u: (n,) requested torque [N.m].
-        h: sample time [s].
-        tau: [s].
-
-    Returns:
-        The rms, positive.
-    """
-    from scipy.signal import lfilter
-
-    pole = math.exp(-h / tau) if tau > 0.0 else 0.0
-    torque = lfilter([1.0 - pole], [1.0, -pole], u)
-    return max(float(np.sqrt(np.mean(torque**2))), 1e-12)

@@ -60,7 +60,7 @@ def cycle_of(torque: Array, request: Array, time: Array, knots: int, settings: C
     near = np.linspace(at - reach, at + reach, 33)
     period = float(max(near, key=lambda one: _repeats(torque, time, one, settings.bins, span)))
     count = min(fine, max(int(period / h), knots))
-    curve = _folded(torque, time, period, count)
+    curve, _ = _folded(torque, time, period, count)
     width = max(count // 8, 1)
     loud = np.convolve(np.concatenate([curve, curve[:width]]) - np.median(curve), np.ones(width), "same")
     quiet = int(np.argmin(np.abs(loud[:count])))
@@ -74,19 +74,17 @@ def _grid(shortest: float, longest: float, span: float, bins: int) -> Array:
     return np.asarray(span / turns)
 
 
-def _folded(values: Array, time: Array, period: float, bins: int) -> Array:
-    """Return the mean of the values (n,) in each part of a cycle."""
+def _folded(values: Array, time: Array, period: float, bins: int) -> tuple[Array, Array]:
+    """Return the mean of the values (n,) in each part of a cycle, and their number there."""
     at = np.minimum((np.mod(time, period) * (bins / period)).astype(np.int64), bins - 1)
     count = np.bincount(at, minlength=bins)
-    return np.asarray(np.bincount(at, values, bins) / np.maximum(count, 1))
+    return np.bincount(at, values, bins) / np.maximum(count, 1), count.astype(np.float64)
 
 
 def _repeats(values: Array, time: Array, period: float, bins: int, span: float) -> float:
     """Return the variance of the mean cycle over what that of as many unlike cycles would be."""
-    at = np.minimum((np.mod(time, period) * (bins / period)).astype(np.int64), bins - 1)
-    count = np.bincount(at, minlength=bins)
     centred = values - values.mean()
-    means = np.bincount(at, centred, bins) / np.maximum(count, 1)
+    means, count = _folded(centred, time, period, bins)
     total, between = float(np.sum(centred**2)), float(np.sum(count * means**2))
     return between / max(total - between, 1e-300) * max(span / period - 1.0, 0.0)
 

@@ -64,18 +64,19 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
     whole = int(np.floor(delay / signals.h + 1e-9))
     first = delay - whole * signals.h
     at = np.arange(place, place + end - begin)
-    late, early = (_requests(u, at - back, 0 if history else place) for back in (whole, whole + 1))
+    mean, followed = plant.followed(p, u, signals.h)
+    by_the_predictor = history and runs_coarsely(plant, p)
+    acting = mean if by_the_predictor else u
+    late, early = (_requests(acting, at - back, 0 if history else place) for back in (whole, whole + 1))
     out = np.empty((end - begin, 2))
     first = max(first, 0.0)
-    if history and runs_coarsely(plant, p):
-        mean, _ = plant.followed(p, u, signals.h)
-        late, early = (_requests(mean, at - back, 0) for back in (whole, whole + 1))
+    if by_the_predictor:
         steps = plant.substeps(p, signals.h)
         coarse = coarse_runner_of(plant)
         coarse(tuple(start.tolist()), tuple(p.tolist()), early, late, first, signals.h, (steps, FINER * steps), out)
         return _offset(plant, p, out)
     flat = tuple(float(v) for v in plant.own(p))
-    asked = float(plant.followed(p, u, signals.h)[1][max(place - whole, 0)])
+    asked = float(followed[max(place - whole, 0)])
     memory = (float(start[7]), asked) if history else (0.0, UNASKED)
     plant.runner()((*start[:7].tolist(), *memory), flat, early, late, first, signals.h, out)
     return _offset(plant, p, out)

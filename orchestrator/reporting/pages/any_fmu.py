@@ -50,7 +50,7 @@ def build(source: ResultDocument) -> Report:
             *_searched(found),
             *sections_of("More", {k: v for k, v in source.results.items() if k not in KNOWN}),
         ),
-        origin=(*source.origin(), *((name, value) for name, value in made if value not in (None, ""))),
+        origin=source.origin(*made),
         downloads=source.downloads(),
     )
 

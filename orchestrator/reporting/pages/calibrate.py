@@ -32,8 +32,7 @@ def build(source: ResultDocument) -> Report:
         sections.append(Text("Take note", notes))
     sections += [_parameters(found), _misfit(found)]
     badge = trust_badge(found.trust, label, "good" if found.explained else "bad")
-    made = (("walls", found.walls), ("time taken [s]", found.seconds))
-    origin = (*source.origin(), *((name, value) for name, value in made if value not in (None, "")))
+    origin = source.origin(("walls", found.walls), ("time taken [s]", found.seconds))
     return Report("Calibration of an FMU", summary, tuple(sections), badge, origin, source.downloads())
 
 

@@ -124,7 +124,7 @@ def build(source: ResultDocument) -> Report:
         summary=" ".join(filter(None, [sentence, _found(effects), _closed(misfit)])),
         badge=trust_badge(results.trust, label, badge),
         sections=tuple(sections),
-        origin=(*source.origin(), *_made(results)),
+        origin=source.origin(("corrected model", results.model), ("time taken [s]", results.seconds)),
         downloads=source.downloads(),
     )
 
@@ -141,11 +141,6 @@ def _in_short(results: DiagnoseFound) -> list[Section]:
             "as the model, without search, judges a new record."
         )
     return [Text("In short", tuple(lines))]
-
-
-def _made(results: DiagnoseFound) -> list[tuple[str, Cell]]:
-    facts = {"corrected model": results.model, "time taken [s]": results.seconds}
-    return [(name, value) for name, value in facts.items() if value is not None]
 
 
 def _sentence(text: str) -> str:

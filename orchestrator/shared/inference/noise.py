@@ -1,4 +1,4 @@
-"""The noise of a sampled signal: of a smooth motion's measurement, rounding included."""
+"""Sizes of a sampled signal: its noise as a smooth motion's measurement, rounding included, and its rms."""
 
 import math
 
@@ -53,3 +53,21 @@ def rms(values: Array) -> float:
         The root mean square, in their unit.
     """
     return float(np.sqrt(np.mean(values**2)))
+
+
+def lagged_rms(u: Array, h: float, tau: float) -> float:
+    """Return the rms [N.m] of ``u`` behind a lag of ``tau`` [s].
+
+    Args:
+        u: (n,) requested torque [N.m].
+        h: sample time [s].
+        tau: [s].
+
+    Returns:
+        The rms, positive.
+    """
+    from scipy.signal import lfilter
+
+    pole = math.exp(-h / tau) if tau > 0.0 else 0.0
+    torque = lfilter([1.0 - pole], [1.0, -pole], u)
+    return max(float(np.sqrt(np.mean(torque**2))), 1e-12)
