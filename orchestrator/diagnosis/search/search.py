@@ -413,7 +413,7 @@ class Search(ModelSpace):
         for start in effect.refine(values, scene):
             p = effect.put(self.plant, bare, start, self.refitted)
             fitted = annealed(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, effects)
-            if best is None or fitted.fitted > best.fitted:
+            if best is None or fitted.rank(self.parts) > best.rank(self.parts):
                 best = fitted
         self._tick(effect.label)
         if best is None:
@@ -440,7 +440,7 @@ class Search(ModelSpace):
         starts = [effect.put(self.plant, current.fit.p, guess.values, self.refitted) for guess in guesses]
         fits = [annealed(self.likelihood, p, current.fit.q, free, self.parts, effects) for p in starts]
         self._tick(effect.label)
-        return self.candidate(effects, max(fits, key=lambda fitted: fitted.fitted))
+        return self.candidate(effects, max(fits, key=lambda fitted: fitted.rank(self.parts)))
 
     def prune(self, current: Candidate, base: Candidate) -> Candidate:
         """Take out earlier effects that the last one has made superfluous.
