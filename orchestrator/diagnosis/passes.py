@@ -105,7 +105,7 @@ def _search(
 ) -> Pass:  # fmt: skip
     """Search for at most ``most`` effects with the parts ``used``; judge what is left on ``parts``."""
     settings = likelihood.settings
-    search = Search(likelihood, model, used, most, progress, deadline)
+    search = Search(likelihood, model, used, progress, deadline, most=most)
     base, best = search.run()
     likelihood = search.likelihood  # its gains may be those of a gap now
     whole = Parts(parts.seen, parts.validated, parts.held_out)
