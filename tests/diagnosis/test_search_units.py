@@ -313,7 +313,7 @@ def test_an_error_in_a_thread_stops_the_search() -> None:
     with pytest.raises(KeyError):
         search.each(fails, [1, 2])
     assert search.likelihood._halted.is_set()
-    assert search_of(axis_likelihood()[0])._each(lambda n: n * n, [3, 1, 2]) == [9, 1, 4]
+    assert search_of(axis_likelihood()[0]).each(lambda n: n * n, [3, 1, 2]) == [9, 1, 4]
 
 
 # -- a gap without an encoder behind it --------------------------------------------------------------------------------
