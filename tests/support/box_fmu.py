@@ -250,6 +250,8 @@ def _through(name: str, u, fine_step: float, size: float):
         return np.clip(fine, -size, size)
     if name == "input_dead_zone":
         return np.sign(fine) * np.maximum(np.abs(fine) - size, 0.0)
+    if name == "input_quantisation":
+        return size * np.rint(fine / size)
     if name == "input_delay":
         late = round(size / fine_step)
         return np.concatenate([np.full(late, fine[0]), fine[: len(fine) - late]])
@@ -277,6 +279,8 @@ def record(domain: Domain, names: tuple, rng, n: int = 1200, scale: float = 1.0,
             size = 0.3 * share * drive
         elif name in ("input_delay", "input_lag"):
             size = round(20.0 * share * FINE) * fine_step
+        elif name == "input_quantisation":
+            size = 0.25 * share * drive
         elif name == "unknown_dropouts":
             size = 0.0
         else:

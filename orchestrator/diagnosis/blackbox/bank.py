@@ -73,6 +73,7 @@ class Kind:
         shrinks: the response to a small value is proportional to it: what is smaller than the least start is found.
         scan: scene -> values of the last parameter, in order and so close that the best of them leads a fit to the
             right one: more than the FMU is run for, looked through with its surrogate.
+        small: scene -> values below those of the scan, in order: too many for it, they are sifted by one product each.
         finer: values, scene -> small changes where they depend on the values themselves (default: ``scales``).
     """
 
@@ -91,6 +92,7 @@ class Kind:
     angular: bool = False
     shrinks: bool = False
     scan: Callable[[Surroundings], tuple[float, ...]] = lambda scene: ()
+    small: Callable[[Surroundings], Array] = lambda scene: np.zeros(0)
     finer: Callable[[Values, Surroundings], Values] | None = None
 
 
@@ -138,6 +140,11 @@ def _all_quanta(s: Surroundings) -> tuple[float, ...]:
     return tuple(float(s.peak / count) for count in np.arange(60.0, 0.5, -0.25))
 
 
+def _small_quanta(s: Surroundings) -> Array:
+    """Return quanta of which the peak holds 2000 to 60, a quarter more or less each time."""
+    return np.asarray(s.peak / np.arange(2000.0, 60.0, -0.25))
+
+
 def _within_a_quantum(values: Values, s: Surroundings) -> Values:
     """Return a change of a quantum that moves the peak by a small share of one."""
     return (0.01 * values[0] ** 2 / s.peak,)
@@ -173,7 +180,7 @@ _SERIES = (
     Kind("input_rate_limit", INPUT, ("rate",), ("effort/s",), lambda s: (0.01 * _rates(s)[2][0],), _rates,
          lower=(1e-30,), scan=_all_rates),
     Kind("input_quantisation", INPUT, ("step",), ("effort",), lambda s: (0.01 * s.peak,), _quanta, lower=(0.0,),
-         scan=_all_quanta, finer=_within_a_quantum),
+         scan=_all_quanta, small=_small_quanta, finer=_within_a_quantum),
     Kind("output_gain", OUTPUT, ("gain",), ("1",), lambda s: (0.003,), lambda s: ((0.01,),), True),
     Kind("output_offset", OUTPUT, ("offset",), ("flow",), lambda s: (s.noise,), lambda s: ((s.noise,),), True),
     Kind("output_delay", OUTPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),

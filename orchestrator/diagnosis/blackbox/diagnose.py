@@ -224,7 +224,8 @@ def _interleaved(
     one that acts in the held-out quarter only is not found at all.
     """
     fitter, whole = search.fitter, search.explained(best)
-    if search.late or (whole and _goes_on(fitter, best, settings)):
+    unkept = any(step.unkept for step in search.steps if step.before is best)
+    if search.late or (whole and not unkept and _goes_on(fitter, best, settings)):
         return search, base, best
     parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces, whole)
     turns = BoxSearch(

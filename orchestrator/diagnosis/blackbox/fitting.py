@@ -405,27 +405,28 @@ class Fitter:
             fit = again if again is not None and again.total > fit.total else fit
         return fit
 
-    def combed(self, fit: BoxFit) -> BoxFit:
-        """Return a fit whose last effect's value has been looked for by runs, where no derivative leads to it.
+    def combed(self, fit: BoxFit, at: int = -1) -> BoxFit:
+        """Return a fit one of whose values has been looked for by runs, where no derivative leads to it.
 
         What comes in steps (a quantum) is right or wrong sample by sample: its likelihood is a comb with a long tooth.
 
         Args:
-            fit: of a model whose last effect has one value, nearly right.
+            fit: of a model with such a value, nearly right.
+            at: its place among all values.
 
         Returns:
             The fit, with the parameters fitted again.
         """
         own = self.settings.fit
-        width = own.comb * float(self.scales(fit.model)[-1])
+        width = own.comb * float(self.scales(fit.model)[at])
         for _ in range(own.combs):
             vectors = np.repeat(fit.model.vector[None], own.teeth, axis=0)
-            vectors[:, -1] += np.linspace(-width, width, own.teeth)
+            vectors[:, at] += np.linspace(-width, width, own.teeth)
             models = [fit.model.moved(vector) for vector in vectors]
             runs = self.problem.simulate(models, self.parts.seen)
             teeth = [(model, y) for model, y in zip(models, runs, strict=True) if y is not None]
             if teeth:
-                place, k = self._longest([y for _, y in teeth], fit.J[: self.parts.seen, :, :-1])
+                place, k = self._longest([y for _, y in teeth], np.delete(fit.J[: self.parts.seen], at, axis=2))
                 again = self.fit(teeth[place][0], k, y=teeth[place][1], held=2)
                 fit = again if again is not None and again.total > fit.total else fit
             width *= own.finer

@@ -80,7 +80,7 @@ def scanned(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> dic
     own, run = fitter.settings.screen, _Sight(fitter, before)
     chosen: dict[BoxEffect, list[tuple[float, ...]]] = {}
     for effect in effects:
-        values = effect.kind.scan(effect.scene)
+        values = (*run.sifted(effect), *effect.kind.scan(effect.scene))
         gains = run.gains(effect, values) if values else {}
         kept: list[int] = []
         for k in sorted(gains, key=lambda k: -gains[k].gain):
@@ -130,6 +130,32 @@ class _Sight:
         places = {v: k for k, v in enumerate(values)}
         return {places[float(p.values[-1])]: p for p in found}
 
+    def sifted(self, effect: BoxEffect) -> tuple[float, ...]:
+        """Return the small values of an effect in series whose response goes best with what is left, each with its kin.
+
+        They are quanta, found where noise is left at the ports. Their errors are about white: the response to each has
+        the power of the error itself, times the same factor.
+        """
+        fitter, problem, own = self._fitter, self._fitter.problem, self._fitter.settings.screen
+        values, surrogate = effect.kind.small(effect.scene), problem.input_surrogate()
+        if not len(values) or surrogate.order == 0 or fitter.ladder.share(self._known.start) == 0.0:
+            return ()
+        place, felt = problem.inputs.index(effect.place), []
+        for level in self._known.levels:
+            e = self._known.at(level)[1][: self._rows * len(problem.outputs)].reshape(self._rows, -1)
+            felt.append(surrogate.felt(fitter.ladder[level].transposed(e), place))
+        u = self._table[:: problem.m, problem.runner.inputs.index(effect.place)]
+        parts = np.array_split(values, 1 + len(values) * len(u) // own.at_once)
+        along = np.concatenate([_along(part, u, np.stack(felt, axis=1)) for part in parts])
+        best = np.max(along / np.maximum(np.mean(along, axis=0), 1e-300), axis=1)
+        found: list[int] = []
+        for k in np.argsort(-best):
+            if len(found) == own.sifted or best[k] < own.stands_out * 2.0 * np.log(len(values)):
+                break
+            if 0 < k < len(values) - 1 and all(abs(k - other) >= own.apart for other in found):
+                found.append(int(k))
+        return tuple(float(v) for k in sorted(found) for v in values[k - 1 : k + 2])
+
     def _arriving(self, effect: BoxEffect, value: float) -> list[Array]:
         """Return what an effect in series changes of its input."""
         fine = self._table[:, self._fitter.problem.runner.inputs.index(effect.place)]
@@ -142,6 +168,12 @@ class _Sight:
         x = self._read[:-1, problem.runner.reads.index(problem.map.ports[effect.place].position)]
         size = -problem.sign.get(effect.place, 1.0) * effect.kind.starts(effect.scene)[0][0]
         return [size * np.sin(value * x), size * np.cos(value * x)]
+
+
+def _along(quanta: Array, u: Array, felt: Array) -> Array:
+    """Return the squared products (quanta, columns) of unit errors of quantisation with the columns of ``felt``."""
+    errors = quanta[:, None] * np.rint(u / quanta[:, None]) - u
+    return np.asarray((errors @ felt) ** 2 / np.maximum(np.sum(errors * errors, axis=1), 1e-300)[:, None])
 
 
 class _Known:

@@ -23,6 +23,8 @@ class SearchStep:
     before: BoxFit
     tried: tuple[BoxFit, ...]
     accepted: bool
+    unkept: bool = False
+    """An effect was promised to pay where less noise is at the ports, and no fit came near it."""
 
 
 @dataclass
@@ -84,7 +86,7 @@ class BoxSearch:
                 self.steps.append(step)
                 found += [self.pruned(fit, base) for fit in step.tried[:1] if step.accepted]
                 found += [fit for fit in step.tried[1:2] if step.accepted and self.pays(fit, before, base)]
-                found += [] if step.accepted else self._borne_out(step, base)
+                found += [] if step.accepted else self._borne_out(step, base) or self._ahead(step, base)
             found = [fit for fit in found if self.score(fit) > self.score(best)] or []
             if not found:
                 break
@@ -131,8 +133,39 @@ class BoxSearch:
             known, found = max(map(self._on_all, without), key=self.score), self._on_all(fit)
             unseen = found.decided - known.decided + min(fit.decided - f.decided for f in without)
             if self.score(found) - self.score(known) > self._least(found, before, base) and unseen > own.decided:
-                return [fit]
+                return [self._relieved(fit)]
         return []
+
+    def _relieved(self, fit: BoxFit) -> BoxFit:
+        """Return a fit without the earlier effect, if any, whose part the last one plays as well."""
+        fewer = [self.fitter.grown(fit.model.without(e.label), fit.level) for e in fit.model.effects[:-1]]
+        return max((f for f in (fit, *fewer) if f is not None), key=self.score)
+
+    def _ahead(self, step: SearchStep, base: BoxFit) -> list[BoxFit]:
+        """Return models of two effects more without noise at the ports, where none pays alone beside that noise."""
+        own, before, share = self.settings, step.before, self.fitter.ladder.share
+        if not own.quiet < share(before.level) <= own.ahead_to:
+            return []
+        first: dict[frozenset[str], BoxFit] = {}
+        for fit in step.tried:
+            if self.score(fit) - self.score(before) > own.doubtful:
+                first.setdefault(labels(fit), fit)
+        found: list[BoxFit] = []
+        for fit in list(first.values())[: own.ahead]:
+            if self.late or any(self.explained(pair) for pair in found):
+                break
+            after = self.step(fit, base)
+            self.steps.append(after)
+            found += [self.pruned(pair, base) for pair in after.tried[:1] if after.accepted]
+        more = len(before.model.effects) + 1
+        return [
+            pair
+            for pair in found
+            if len(pair.model.effects) > more
+            and share(pair.level) <= own.quiet
+            and self.score(pair) - self.score(before) > 2.0 * own.pays
+            and pair.decided - before.decided > own.decided
+        ]
 
     def _on_all(self, fit: BoxFit) -> BoxFit:
         """Return a fit to all that is looked at; what decides is the rest."""
@@ -190,6 +223,9 @@ class BoxSearch:
                 if len(mine) < self.settings.starts:
                     mine.append(promise)
         tried = self._tried(before, short)
+        unkept = self._unkept(before, short, tried)
+        tried += [fit for promise in unkept for fit in self._led(before, promise)]
+        unkept = self._unkept(before, short, tried)
         tried += self._refined(tried, before, base)
         tried.sort(key=self.score, reverse=True)
         accepted = bool(tried) and self.pays(tried[0], before, base)
@@ -198,7 +234,40 @@ class BoxSearch:
             if paying:
                 tried = [*paying, *(fit for fit in tried if fit not in paying)]
                 accepted = True
-        return SearchStep(before, tuple(tried), accepted)
+        return SearchStep(before, tuple(tried), accepted, bool(unkept))
+
+    def _unkept(self, before: BoxFit, short: dict[str, list[Promise]], tried: Sequence[BoxFit]) -> list[Promise]:
+        """Return the best promises of less noise at the ports that would pay, where no fit has come near them."""
+        own, share = self.settings, self.fitter.ladder.share
+        reached = max(map(self.score, tried), default=self.score(before)) - self.score(before)
+
+        def worth(promise: Promise) -> float:
+            return promise.gain - own.penalty * len(promise.effect.kind.parameters)
+
+        best = [max(mine, key=worth) for mine in short.values()]
+        least = max(own.pays, reached / own.kept)
+        found = [
+            p
+            for p in best
+            if worth(p) > least
+            and share(p.level) < share(before.level)
+            and p.effect.kind.plausible(tuple(p.values), p.effect.scene)
+        ]
+        return [] if self.late else sorted(found, key=worth, reverse=True)[: own.led]
+
+    def _led(self, before: BoxFit, promise: Promise) -> list[BoxFit]:
+        """Return the fit of a promise from one to all that is looked at, at the level at which it was made.
+
+        Where noise at the ports explains much, a first step that is not exact makes more of it the likelier level.
+        """
+        fitter, model = self.fitter, before.model.extended(promise.effect, promise.effect.bounded(promise.values))
+        self.progress(promise.effect.label)
+        often = fitter.settings.fit.iterations
+        whole = fitter.fit(model, promise.level, before.J, fitter.parts.looked_at, held=often)
+        found = None if whole is None else fitter.fit(whole.model, promise.level, whole.J, y=whole.y, held=2)
+        if found is None or not promise.effect.kind.plausible(tuple(found.model.values[-1]), promise.effect.scene):
+            return []
+        return [found]
 
     def _tried(self, before: BoxFit, short: dict[str, list[Promise]]) -> list[BoxFit]:
         """Return a fit of each effect: all of them quickly, the best ones to the end."""
@@ -218,8 +287,16 @@ class BoxSearch:
         done: list[BoxFit] = []
         for fit in quick:
             worth = len(done) < self.settings.settled and self._worth(fit, before, done)
-            done.append(self.fitter.settled(fit) if worth else fit)
+            done.append(self._recombed(self.fitter.settled(fit)) if worth else fit)
         return done
+
+    def _recombed(self, fit: BoxFit) -> BoxFit:
+        """Return a fit whose earlier effects that act in steps are looked for again: less hides their steps now."""
+        at = len(fit.model.p)
+        for effect in fit.model.effects[:-1]:
+            fit = self.fitter.combed(fit, at) if effect.kind.finer is not None else fit
+            at += len(effect.kind.parameters)
+        return fit
 
     def _worth(self, fit: BoxFit, before: BoxFit, done: Sequence[BoxFit]) -> bool:
         """Tell whether a quick fit may become the best of a step, those ``done`` being settled."""

@@ -27,6 +27,14 @@ class BoxSearchSettings(Settings, frozen=True):
         0.005
     )
     promise: Annotated[float, setting("least predicted gain for which an effect is fitted at all")] = 8.0
+    ahead: Annotated[
+        int, setting("effects of a step that a second is looked for beside, where none pays alone", ge=0)
+    ] = 2
+    ahead_to: Annotated[
+        float, share("port noise, of the drive, up to which that is done: beyond it is called no disturbance")
+    ] = 0.03
+    kept: Annotated[float, share("of what an effect promises, that a fit must reach for it to be kept")] = 0.5
+    led: Annotated[int, setting("promises not kept that are fitted at the port noise that they suppose", ge=0)] = 3
     shortlist: Annotated[int, setting("effects that are fitted in full, in each step", ge=1)] = 8
     starts: Annotated[int, setting("starts of one effect that are fitted in full", ge=1)] = 2
     settled: Annotated[int, setting("effects of a step that are fitted to the end", ge=1)] = 3
@@ -54,6 +62,12 @@ class ScreenSettings(Settings, frozen=True):
     exact: Annotated[float, share("by which a scanned value's response may be off: a surrogate is not exact")] = 0.2
     scanned: Annotated[int, setting("values of one effect that its scan hands on to the FMU", ge=1)] = 3
     apart: Annotated[int, setting("places in a scan by which they are apart: neighbours lead to one fit", ge=1)] = 3
+    sifted: Annotated[int, setting("small values of one effect that are put among those of its scan", ge=0)] = 3
+    stands_out: Annotated[
+        float,
+        setting("times what the best of as many would be by chance, from which a small value is no chance", ge=0),
+    ] = 1.0
+    at_once: Annotated[int, setting("errors of small values that are held in memory at a time", ge=1)] = 500_000
     parts: Annotated[int, setting("parts into which the scan's step is cut around the best value", ge=1)] = 8
     straight: Annotated[float, share("of the record up to which a run that goes astray earlier is screened apart")] = (
         0.9

@@ -43,6 +43,22 @@ class Surrogate:
         B = np.ascontiguousarray(self.B[:, place])
         return np.asarray(_responded(self.A, B, self.C, np.ascontiguousarray(pushes, dtype=np.float64)))
 
+    def felt(self, gradient: Array, place: int) -> Array:
+        """Return the product of each effort's response with ``gradient``: the transpose of :meth:`response`.
+
+        Args:
+            gradient: (n, outputs).
+            place: of the input.
+
+        Returns:
+            Shape (n - 1,).
+        """
+        back, found = np.zeros(self.order), np.zeros(len(gradient) - 1)
+        for k in range(len(gradient) - 1, 0, -1):
+            back = self.C.T @ gradient[k] + self.A.T @ back
+            found[k - 1] = self.B[:, place] @ back
+        return found
+
 
 def realised(impulses: Array, settings: PortNoiseSettings = DEFAULT.noise) -> Surrogate:
     """Return a surrogate of impulse responses.
@@ -107,6 +123,21 @@ class NoiseLevel:
             Shape (n, outputs, c).
         """
         return np.asarray(_filtered(self.A, self.C, self.K, self.R, np.ascontiguousarray(columns)))
+
+    def transposed(self, e: Array) -> Array:
+        """Return the product of each sample's whitened response with ``e``: the transpose of :meth:`whiten`.
+
+        Args:
+            e: (rows, outputs), no more rows than there are gains.
+
+        Returns:
+            Shape (rows, outputs).
+        """
+        back, found = np.zeros(len(self.A)), np.empty_like(e)
+        for k in range(len(e) - 1, -1, -1):
+            found[k] = self.R[k].T @ e[k] + self.K[k].T @ back
+            back = self.A.T @ back - self.C.T @ found[k]
+        return found
 
 
 def level(

@@ -44,6 +44,7 @@ def made(tmp_path):
         (CIRCUIT, "quadratic_drag", 0.02),
         (TANKS, "input_saturation", 0.01),
         (SPRING, "hysteresis", 0.02),
+        (CIRCUIT, "input_quantisation", 1e-3),
     ],
     ids=lambda v: getattr(v, "name", str(v)),
 )
@@ -57,6 +58,15 @@ def test_a_hidden_effect_is_named_with_its_size(made, domain, name, tolerance):
         assert max(m.corrected for m in found.outcome.misfit) < 1.3
     finally:
         found.close()
+
+
+def test_two_effects_are_named_neither_of_which_pays_beside_what_the_other_leaves(made):
+    case, *files = made(SPRING, ("input_saturation", "coulomb_friction"), seed=22, scale=0.12)
+    found = diagnose(*files)
+    found.close()
+    sizes = {f.effect.kind.name: f.estimates[0].value for f in found.effects}
+    assert sizes == pytest.approx(dict(zip(case.names, case.sizes, strict=True)), rel=0.01)
+    assert not found.outcome.search.steps[0].accepted
 
 
 @pytest.mark.parametrize("disturbance", [0.0, 0.01])

@@ -33,6 +33,16 @@ def test_the_surrogate_answers_a_push_as_the_system_does():
     assert realised(impulses(400)).response(pushes, 0) == pytest.approx(np.stack(rows), abs=1e-7)
 
 
+@pytest.mark.parametrize("colour", [0.0, 0.7])
+def test_a_product_with_whitened_responses_needs_no_response(colour):
+    rng = np.random.default_rng(3)
+    surrogate, n = realised(30.0 * impulses(400)), 80
+    filtered = level(surrogate, 0.1, colour, np.ones(1), n)
+    pushes, e = rng.standard_normal((n - 1, 4)), rng.standard_normal((n, 1))
+    one_by_one = np.einsum("noc,no->c", filtered.whiten(surrogate.response(pushes, 0)), e)
+    assert surrogate.felt(filtered.transposed(e), 0) @ pushes == pytest.approx(one_by_one, rel=1e-9)
+
+
 def test_no_response_gives_no_surrogate():
     assert realised(np.zeros((100, 1, 1))).order == 0
 
