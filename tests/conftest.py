@@ -1,10 +1,17 @@
-"""Fixtures that all areas share."""
+"""Fixtures that all areas share, and the order in which files run."""
 
 from pathlib import Path
 
 import pytest
 
 from orchestrator.building.build import ensure_built
+
+LONG = ("test_readme.py", "test_contributing.py")  # minutes each: no core must wait for them at the end
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let the longest tests begin first."""
+    items.sort(key=lambda item: item.path.name not in LONG)
 
 
 @pytest.fixture(scope="session")
