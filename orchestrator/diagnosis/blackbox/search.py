@@ -47,6 +47,8 @@ class BoxSearch:
     """Steps of searches before it, over other parts or with another start: their likelihoods do not compare."""
     plain: BoxFit | None = None
     """The model without effects: where an effect led to better values that need no effect, that with these."""
+    last: tuple[BoxFit, BoxFit] | None = None
+    """A fit, and that of its model over all rows that were looked at."""
     until: float = float("inf")
     """Monotonic time [s] from which no further effect is fitted."""
 
