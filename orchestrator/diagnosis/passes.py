@@ -105,7 +105,7 @@ def _search(
 ) -> Pass:  # fmt: skip
     """Search for at most ``most`` effects with the parts ``used``; judge what is left on ``parts``."""
     settings = likelihood.settings
-    search = Search(likelihood, model, used, most, progress, deadline)
+    search = Search(likelihood, model, used, progress, deadline, most=most)
     base, best = search.run()
     likelihood = search.likelihood  # its gains may be those of a gap now
     whole = Parts(parts.seen, parts.validated, parts.held_out)
@@ -243,11 +243,15 @@ def _harm_over_fewer(
 
     That one is taken as the search fitted it, and fitted again to all that may be looked at: a small effect must not
     pass because its model is fitted to more of the record. All start from the filter of the final model.
+    A few long runs that disagree say nothing against an effect with which many short ones are surely better.
     """
     after = horizons(likelihood, final.p, final.q, whole.held_out)
 
     def harm(p: Array) -> tuple[str, ...]:
-        return after.harm_over(horizons(likelihood, p, final.q, whole.held_out), replace(noise, before=p))
+        before = horizons(likelihood, p, final.q, whole.held_out)
+        undecided = after.undecided_over(before) if after.surely_better_than(before) else ()
+        found = after.harm_over(before, replace(noise, before=p))
+        return tuple(label for label in found if label not in undecided)
 
     found = harm(fewer.fit.p)
     if found:

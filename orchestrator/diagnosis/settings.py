@@ -57,11 +57,12 @@ class RateSettings(Settings, frozen=True):
     pane: Annotated[int, setting("samples of a spectrum's pane at most", ge=64)] = 1024
     most_interpolated: Annotated[int, setting("rows per measured row that are looked for", ge=2)] = 10
     on_line: Annotated[
-        float, setting("of the typical second difference: rows so close to a line were interpolated")
+        float, setting("of the rms of second differences: rows so close to a line were interpolated")
     ] = 1e-3
+    least_bends: Annotated[int, setting("measured rows at least that lie on no line between others", ge=10)] = 50
     rounding: Annotated[float, share("of a rate that time stamps may be off by")] = 0.02
     cut_off: Annotated[float, share("of half the lower rate at which the filter before it cuts off")] = 0.8
-    all_but: Annotated[float, share("share of rows that must lie on lines, the corners apart")] = 0.98
+    all_but: Annotated[float, share("share of the bends that must lie at measured rows")] = 0.98
 
 
 class FitSettings(Settings, frozen=True):

@@ -9,7 +9,7 @@ from orchestrator.diagnosis.fit.rate import analysed, decimated
 from orchestrator.diagnosis.proof.free_run import simulate
 from orchestrator.plants.predictor import coarse_runner_of
 from orchestrator.records.record import Record, record_from_columns
-from tests.support.short_records import DRIVETRAIN, SETTINGS, signals_from
+from tests.support.short_records import AXIS, DRIVETRAIN, SETTINGS, signals_from
 
 STEP = 4e-4
 BENCH = {"J_m": 5e-3, "J_l": 5e-3, "k": 560.0, "c": 0.05, "b_m": 0.05, "b_l": 0.05, "i": 1.0, "tau": 2e-4}
@@ -87,3 +87,24 @@ def test_a_vibrating_bench_with_friction_runs_as_the_exact_one_does() -> None:
     right = exact(p, u, STEP)
     without = exact(bench(), u, STEP)
     assert np.std(found - right) < 0.02 * np.std(without - right)
+
+
+@pytest.mark.parametrize("factor", [1, 2, 3])
+def test_rows_that_were_interpolated_between_counts_of_an_encoder_go(factor: int) -> None:
+    """At rest for a third of it, in counts, large angles: interpolated rows lie on lines but for rounding."""
+    size, count = 3000, 6.283e-4
+    time = 1e-3 * np.arange(size)
+    angle = 2000.0 + 5.0 * np.maximum(time - 1.0, 0.0) ** 2
+    counted = np.round(angle / count) * count
+    fine = np.linspace(0.0, time[-1], factor * (size - 1) + 1)
+    u, theta_m = np.sin(20.0 * fine), np.interp(fine, time, counted)
+    record = record_from_columns({"time": fine, "u": u, "theta_m": theta_m}, "counted")
+    p = AXIS.extended([entry.default for entry in AXIS.table])
+    found = analysed(record, AXIS, p, SETTINGS)
+    assert found.interpolated == factor
+    if factor > 1:
+        own = record_from_columns({"time": time, "u": np.sin(20.0 * time), "theta_m": counted}, "counted")
+        alone = analysed(own, AXIS, p, SETTINGS)
+        assert found.factor == factor * alone.factor
+        rows = min(found.record.size, alone.record.size)
+        assert np.abs(found.record.theta_m[:rows] - alone.record.theta_m[:rows]).max() < count

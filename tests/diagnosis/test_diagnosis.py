@@ -208,7 +208,7 @@ def test_blocks_of_a_record_disagree_about_a_model_that_is_wrong() -> None:
         parts = split([signals.size], SETTINGS)[0]
         nominal = DRIVETRAIN.extended(MODEL.values)
         likelihood = RecordLikelihood(DRIVETRAIN, signals, nominal, parts.validated.stop, SETTINGS)
-        base = Search(likelihood, MODEL, parts, 4).base().fit
+        base = Search(likelihood, MODEL, parts, most=4).base().fit
         found = widened(likelihood, base, parts.fitted, ())
         ratios.append(np.diag(found.covariance) / np.diag(base.covariance))
     assert np.all(ratios[0] >= 1.0 - 1e-12)

@@ -9,7 +9,18 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal, decided, fit, jacobian, log_prior, split
+from orchestrator.diagnosis.fit.fitting import (
+    Fit,
+    Free,
+    Parts,
+    anneal,
+    decided,
+    fit,
+    jacobian,
+    log_prior,
+    settled,
+    split,
+)
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, _largest_speed, measurement_matrix
 from orchestrator.diagnosis.fit.signals import Signals, noise_level, signals_of
 from orchestrator.plants.measurement import LEAD, SHIFT
@@ -369,6 +380,36 @@ def test_the_ladder_of_noise_is_climbed_both_ways() -> None:
     for start in {levels[max(at - 1, 0)], best, levels[at + 1]}:
         assert anneal(likelihood, wrong, start, (), PARTS, levels).q == best
     assert anneal(likelihood, wrong, levels[at + 1], (), PARTS, levels[at:]).q == best  # the first of the ladder
+
+
+def test_fits_of_one_model_are_ranked_by_what_decides_too_where_it_was_not_fitted() -> None:
+    likelihood, p = axis_likelihood()
+    found = fit(likelihood, p, 1e-3, (), PARTS)
+    by_heart, right = replace(found, fitted=10.0, validated=-5.0), replace(found, fitted=8.0, validated=0.0)
+    assert (by_heart.rank(PARTS), right.rank(PARTS)) == (5.0, 8.0)
+    exchanged = Parts(PARTS.validated, PARTS.fitted, PARTS.held_out)
+    assert by_heart.rank(exchanged) < right.rank(exchanged)
+    whole = Parts(PARTS.seen, PARTS.validated, PARTS.held_out)
+    assert by_heart.rank(whole) > right.rank(whole)
+
+
+def test_values_from_white_innovations_stay_where_a_colour_hides_what_is_wrong() -> None:
+    """A drift in the fitted part alone, whose colour takes what the signals say of the inertia with it."""
+    likelihood, _ = axis_likelihood(240, J=1.25, b=1.6)
+    rng, drift = np.random.default_rng(3), np.zeros(240)
+    for n in range(1, PARTS.fitted.stop):
+        drift[n] = 0.97 * drift[n - 1] + rng.standard_normal()
+    y = likelihood.signals.y.copy()
+    y[:, 0] += 3e-4 * np.cumsum(drift)
+    likelihood = replace(likelihood, signals=replace(likelihood.signals, y=y))
+    free = free_of(likelihood, "J", "b")
+    found = settled(likelihood, likelihood.nominal, Q, free, PARTS)
+    direct, white = (fit(likelihood, likelihood.nominal, Q, free, PARTS, most=most) for most in (12, 0))
+    again = fit(likelihood, white.p, Q, free, PARTS)
+    assert np.array_equal(found.p, white.p)
+    assert found.colour.order > 0
+    assert found.rank(PARTS) > max(direct.rank(PARTS), again.rank(PARTS))
+    assert abs(found.p[AXIS.index("J")] - 1.25) < abs(direct.p[AXIS.index("J")] - 1.25)
 
 
 def test_the_deciding_part_may_have_more_noise() -> None:

@@ -141,7 +141,7 @@ def test_a_motor_that_hardly_turns_back_turns_one_way(sign: float, back: float, 
 def test_offsets_between_encoders_need_both() -> None:
     for channels, seen in ((1, False), (2, True)):
         likelihood, _ = drivetrain_likelihood(40, channels=channels)
-        search = Search(likelihood, default_model(), PARTS, 4)
+        search = Search(likelihood, default_model(), PARTS, most=4)
         assert ("sensor_offset@load" in labels(search.eligible(BASE))) is seen
 
 
@@ -311,16 +311,16 @@ def test_an_error_in_a_thread_stops_the_search() -> None:
         raise KeyError(item)
 
     with pytest.raises(KeyError):
-        search._each(fails, [1, 2])
+        search.each(fails, [1, 2])
     assert search.likelihood._halted.is_set()
-    assert search_of(axis_likelihood()[0])._each(lambda n: n * n, [3, 1, 2]) == [9, 1, 4]
+    assert search_of(axis_likelihood()[0]).each(lambda n: n * n, [3, 1, 2]) == [9, 1, 4]
 
 
 # -- a gap without an encoder behind it --------------------------------------------------------------------------------
 
 
 def hidden_search(likelihood, model):
-    return Search(likelihood, model, PARTS, 4)
+    return Search(likelihood, model, PARTS, most=4)
 
 
 def test_the_ratio_is_not_fitted_from_one_side() -> None:

@@ -10,9 +10,11 @@ from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
-from orchestrator.diagnosis.passes import _is_weak, _larger_misfit, honest
+from orchestrator.diagnosis.passes import _harm_over_fewer, _is_weak, _larger_misfit, honest
+from orchestrator.diagnosis.proof.free_run import FreeRun
 from orchestrator.diagnosis.proof.horizons import Horizons
-from orchestrator.diagnosis.verdict.chance import torque_noise
+from orchestrator.diagnosis.search.candidate import Candidate
+from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
 from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED, Proof, doubts, is_unknown
 from orchestrator.diagnosis.verdict.remainder import Remainder
@@ -104,6 +106,42 @@ def test_what_predicts_better_does_so_beyond_scatter_and_by_more_than_a_hair() -
     assert away.surely_better_than(before) == ()
     assert before.harm_over(away) == ()
     assert "one sample" in away.harm_over(before)
+
+
+def test_a_few_runs_that_disagree_decide_nothing() -> None:
+    def with_runs(*errors: float) -> Horizons:
+        pieces = tuple((FreeRun(np.zeros((2, 1)), np.zeros(8), np.array([e])), slice(0, 2)) for e in errors)
+        return replace(horizons([0.1, 0.2, 0.3, 1.0]), runs=(pieces,))
+
+    before = with_runs(1.0, 1.0, 1.0)
+    assert with_runs(1.4, 0.8, 0.9).undecided_over(before) == ("whole part",)
+    assert with_runs(1.4, 1.3, 1.5).undecided_over(before) == ()
+    assert with_runs(0.5, 0.4, 0.6).undecided_over(before) == ("whole part",)  # better is no harm either
+    assert with_runs(1.4).undecided_over(with_runs(1.0)) == ()  # one run has no scatter
+
+
+@pytest.mark.parametrize(("better", "disagree", "harm"), [
+    (("one sample",), ("2 s",), ("whole part",)), ((), ("2 s",), ("2 s", "whole part")),
+    (("one sample",), (), ("2 s", "whole part")),
+])  # fmt: skip
+def test_long_runs_that_disagree_are_no_harm_beside_many_that_are_better(monkeypatch, better, disagree, harm) -> None:
+    likelihood, p = axis_likelihood()
+    final = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
+    fewer = Candidate((), final, SETTINGS.search)
+
+    class Errors:
+        def harm_over(self, other: "Errors", chance: object) -> tuple[str, ...]:
+            return "2 s", "whole part"
+
+        def surely_better_than(self, other: "Errors") -> tuple[str, ...]:
+            return better
+
+        def undecided_over(self, other: "Errors") -> tuple[str, ...]:
+            return disagree
+
+    monkeypatch.setattr("orchestrator.diagnosis.passes.horizons", lambda *_: Errors())
+    noise = TorqueNoise(likelihood, final, np.zeros(1), p)
+    assert _harm_over_fewer(likelihood, final, fewer, Parts(*(slice(10, 100),) * 3), noise) == harm
 
 
 def test_a_larger_misfit_of_held_out_data_is_harm() -> None:

@@ -26,4 +26,4 @@ def axis_model() -> Model:
 def search_of(likelihood, **settings) -> Search:
     """Return a search over a record, with other ``settings`` of the search."""
     quick = msgspec.structs.replace(SETTINGS, search=msgspec.structs.replace(SETTINGS.search, **settings))
-    return Search(replace(likelihood, settings=quick), axis_model(), PARTS, quick.search.most_effects)
+    return Search(replace(likelihood, settings=quick), axis_model(), PARTS, most=quick.search.most_effects)

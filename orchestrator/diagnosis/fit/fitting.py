@@ -39,6 +39,19 @@ class Fit:
     validated: float  # log-likelihood of the part after it
     colour: Colour = WHITE  # of the innovations of the part that was fitted
 
+    def rank(self, parts: "Parts") -> float:
+        """Return what fits of one model are chosen by: the log-likelihood of all that it was fitted to or decides.
+
+        A colour that learns the fitted part by heart, and parameters that are wrong beside it, fail on the other.
+
+        Args:
+            parts: of the record.
+
+        Returns:
+            The log-likelihood, prior included.
+        """
+        return self.fitted + self.validated if parts.apart else self.fitted
+
     def standard_error(self, place: int) -> float:
         """Return the standard error of one free parameter.
 
@@ -73,6 +86,11 @@ class Parts:
     fitted: slice
     validated: slice
     held_out: slice
+
+    @property
+    def apart(self) -> bool:
+        """Tell whether the deciding part was not fitted."""
+        return self.validated.start >= self.fitted.stop or self.validated.stop <= self.fitted.start
 
     @property
     def seen(self) -> slice:
@@ -156,7 +174,7 @@ def fit(
         parts: parts of the record.
         iterations: most Levenberg-Marquardt steps; None: as in the settings.
         most: largest order of the autoregression; 0: innovations count as white.
-        bar: likelihood that the fit must reach: it is given up where steps as large as its last would not get there.
+        bar: rank that the fit must reach: it is given up where steps as large as its last would not get there.
 
     Returns:
         The fit.
@@ -166,10 +184,10 @@ def fit(
 
 @np.errstate(over="ignore", invalid="ignore")
 def settled(likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts) -> Fit:
-    """Return the better of two fits: from ``start``, and from where innovations counted as white lead from there.
+    """Return the best of three fits: from ``start``, where innovations counted as white lead, and from there.
 
     A model that is far off leaves slow innovations, whose autoregression hides what is slow in the signals, its
-    own errors among it: such a fit stays where it is.
+    own errors among it: such a fit stays where it is, or leaves the right values for wrong ones.
 
     Args:
         likelihood: of the record.
@@ -183,8 +201,12 @@ def settled(likelihood: RecordLikelihood, start: Array, q: float, free: Sequence
     """
     direct = fit(likelihood, start, q, free, parts)
     white = _descent(likelihood, start, q, free, parts, None, 0)
-    other = fit(likelihood, white.p, q, free, parts) if np.all(np.isfinite(white.z)) else direct
-    return other if other.fitted > direct.fitted else direct
+    if not np.all(np.isfinite(white.z)):
+        return direct
+    again = fit(likelihood, white.p, q, free, parts)
+    colour = colour_of(white.z, parts.fitted)
+    there = replace(_fit_at(likelihood, white.p, q, white.z, free, parts, colour), covariance=white.covariance)
+    return max((direct, again, there), key=lambda found: found.rank(parts))
 
 
 Point = tuple[Array, Array]  # parameters, innovations
@@ -225,7 +247,8 @@ def _descent(
         return Linearised(hessian, J.T @ residual + weight * pull, float(cost), moved)
 
     def converged(gain: float, cost: float) -> bool:
-        return gain < settings.enough or seen[-1].fitted + settings.iterations * gain < bar
+        risen = max(gain, seen[-1].rank(parts) - seen[-2].rank(parts)) if len(seen) > 1 else np.inf
+        return gain < settings.enough or seen[-1].rank(parts) + settings.iterations * risen < bar
 
     damping = Damping(settings.damping, settings.damping, lambda hessian: settings.ridge, settings.patience)
     first = np.array(start, dtype=float)
@@ -281,8 +304,12 @@ def anneal(
     Returns:
         The fit.
     """
+
+    def at_level(fitted: Fit) -> Fit:
+        return replace(fitted, validated=decided(likelihood, fitted, parts, levels)) if most else fitted
+
     first = settled(likelihood, start, q, free, parts) if most else fit(likelihood, start, q, free, parts, most=0)
-    at, best = list(levels).index(q), first
+    at, best = list(levels).index(q), at_level(first)
     known = {at}
     settings = likelihood.settings.fit
     for stride in settings.strides:
@@ -295,12 +322,12 @@ def anneal(
                     misses += 1
                     continue
                 known.add(place)
-                tried = fit(likelihood, best.p, levels[place], free, parts, most=most, bar=best.fitted)
-                if tried.fitted > best.fitted:
+                tried = at_level(fit(likelihood, best.p, levels[place], free, parts, most=most, bar=best.rank(parts)))
+                if tried.rank(parts) > best.rank(parts):
                     best, at, misses = tried, place, 0
                 else:
                     misses += 1
-    return replace(best, validated=decided(likelihood, best, parts, levels)) if most else best
+    return best
 
 
 def decided(likelihood: RecordLikelihood, best: Fit, parts: Parts, levels: Sequence[float]) -> float:

@@ -16,6 +16,7 @@ from orchestrator.diagnosis.fit.signals import noise_level
 from orchestrator.diagnosis.settings import DiagnosisSettings, RateSettings
 from orchestrator.plants.description import Plant
 from orchestrator.records.record import Record
+from orchestrator.shared.inference.noise import rms
 from orchestrator.shared.results.diagnose import AnalysisFound
 
 Array = NDArray[np.float64]
@@ -91,15 +92,10 @@ def analysed(
 def _interpolated_by(record: Record, settings: RateSettings) -> int:
     """Return how many rows there are for one that was measured, from rows that lie on a line between others."""
     second = np.abs(np.diff(record.theta_m, 2))
-    moving = second[second > 0.0]
-    if moving.size < 50:
-        return 1
-    limit = settings.on_line * float(np.median(moving))
+    limit = settings.on_line * rms(second)  # of all: interpolated rows, but for rounding, have none
     for factor in range(settings.most_interpolated, 1, -1):
-        phases = [second[(n % factor) :: factor] for n in range(factor)]
-        bent = [float(np.mean(phase > limit)) for phase in phases]
-        corner = int(np.argmax(bent))
-        if bent[corner] > 0.5 and all(b < 1.0 - settings.all_but for n, b in enumerate(bent) if n != corner):
+        bent = np.array([np.count_nonzero(second[n::factor] > limit) for n in range(factor)])
+        if bent.max() >= settings.least_bends and bent.sum() - bent.max() <= (1.0 - settings.all_but) * bent.max():
             return factor
     return 1
 

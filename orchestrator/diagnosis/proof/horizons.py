@@ -87,6 +87,24 @@ class Horizons:
         changes = zip(self.labels, less, self._changes_over(other), strict=False)
         return tuple(label for label, enough, (mean, spread) in changes if enough and mean < -settings.sure * spread)
 
+    def undecided_over(self, other: "Horizons") -> tuple[str, ...]:
+        """Return the horizons of a few runs whose change is no larger than its scatter from run to run allows.
+
+        Args:
+            other: of the other model, over the same part.
+
+        Returns:
+            Their labels; one run has no scatter, and its horizon is not among them.
+        """
+        found = []
+        for label, mine, theirs in zip(self.labels[len(self.squares) :], self.runs, other.runs, strict=True):
+            pairs = list(zip(mine, theirs, strict=True))
+            m = self.noise.size
+            change = np.array([np.sum((a.rms[:m] ** 2 - b.rms[:m] ** 2) / self.noise**2) for (a, _), (b, _) in pairs])
+            if len(pairs) > 1 and np.mean(change) <= self.settings.sure * np.std(change, ddof=1) / len(pairs) ** 0.5:
+                found.append(label)
+        return tuple(found)
+
     def _changes_over(self, other: "Horizons") -> Iterator[tuple[float, float]]:
         """Yield, for each horizon of many starts, the mean change of the squared error and its standard error."""
         for own, before in zip(self.squares, other.squares, strict=True):

@@ -2,69 +2,38 @@
 
 Every candidate is fitted together with the uncertain linear parameters, with its own level of process noise. What a
 step gains is counted on the part of the record that decides (and on the part that was fitted); naming an effect
-must pay on both. Candidates are fitted in threads, one per core; the predictor runs outside the interpreter's lock.
+must pay on both.
 """
 
-import math
-import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import partial
-from threading import Lock
-from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
-from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.proof.horizons import horizons
-from orchestrator.diagnosis.search.candidate import (
-    Candidate,
-    ForwardStep,
-    annealed,
-)
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed
+from orchestrator.diagnosis.search.fits import Fits, Guesses, TimeUpError
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
-from orchestrator.diagnosis.search.model_space import ModelSpace
 from orchestrator.diagnosis.search.periodic import with_cycles
 from orchestrator.diagnosis.search.plausible import implausible
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Guess, Screen
 from orchestrator.plants.effects import Effect, Scene
-from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.inference.colour import Colour, colour_of
-
-Array = NDArray[np.float64]
-Guesses = tuple[Guess, ...]  # best first, at least one
-T = TypeVar("T")
-R = TypeVar("R")
-
-
-class TimeUpError(Exception):
-    """The search may take no longer."""
 
 
 @dataclass
-class Search(ModelSpace):
+class Search(Fits):
     """The state of a search; :meth:`run` carries it out.
 
     Attributes:
         most: effects that are named at most.
-        progress: called with (done, expected, what) as candidates are fitted.
-        deadline: by the monotonic clock [s]; no fit of a candidate begins after it.
         stopped: the deadline has cut the search short.
-        hidden: the model with a gap before a body that is not measured; None: there is none to look for.
+        refused: effects that were not named, by label, and why.
     """
 
-    most: int
-    progress: Callable[[int, int, str], None] = lambda done, expected, what: None
-    deadline: float = math.inf
+    most: int = field(kw_only=True)
     stopped: bool = False
-    hidden: Candidate | None = None
-    steps: list[ForwardStep] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
-    done: int = 0
-    _counting: Lock = field(default_factory=Lock)
 
     def run(self) -> tuple[Candidate, Candidate]:
         """Return the model with re-fitted parameters only, and the best model found.
@@ -129,7 +98,7 @@ class Search(ModelSpace):
         if gap is None or self.most == 0 or not one_sided or at_the_floor(likelihood, base.fit, self.parts.fitted):
             return None
         p = gap_of_the_estimator(likelihood, self.model, self.parts.fitted, self.deadline)
-        self._tick(f"{gap.label}, estimated")
+        self.tick(f"{gap.label}, estimated")
         if p is None:
             return None
         free = self.free((gap,), scene_of(likelihood, base.fit))
@@ -138,7 +107,7 @@ class Search(ModelSpace):
             self.likelihood = likelihood.about(p)
             fitted = annealed(self.likelihood, p, first, free, self.parts, (gap,))
             p, first = fitted.p, fitted.q
-            self._tick(gap.label)
+            self.tick(gap.label)
         return self.candidate((gap,), fitted)
 
     def base(self) -> Candidate:
@@ -150,7 +119,7 @@ class Search(ModelSpace):
         start = self.plant.extended(self.model.values)
         first = self.likelihood.settings.levels[self.settings.first_level]
         fitted = annealed(self.likelihood, start, first, self.linear(), self.parts, ())
-        self._tick("parameters")
+        self.tick("parameters")
         return self.candidate((), fitted)
 
     def step(self, current: Candidate, base: Candidate) -> ForwardStep:
@@ -164,9 +133,9 @@ class Search(ModelSpace):
             What was tried and what was accepted.
         """
         scene, guesses = self.screen(current)
-        found = self._each(lambda pair: self.extend(current, *pair, scene), guesses)
+        found = self.each(lambda pair: self.extend(current, *pair, scene), guesses)
         found += self.refined(found, current, base, scene)
-        found = self._each(lambda candidate: self.rescued(candidate, current, base), found)
+        found = self.each(lambda candidate: self.rescued(candidate, current, base), found)
         found = self.possible(found, scene)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
         if found and self.earns(found[0], current, base):
@@ -281,7 +250,7 @@ class Search(ModelSpace):
             Effects with their guesses.
         """
         screen = Screen(self.likelihood, current.fit, self.parts, colour)
-        pairs = self._each(
+        pairs = self.each(
             lambda effect: (effect, self.guesses(screen, effect, scene, current)), list(self.eligible(current))
         )
         return sorted((pair for pair in pairs if pair[1]), key=lambda pair: pair[1][0].gain, reverse=True)
@@ -365,82 +334,8 @@ class Search(ModelSpace):
                 simpler = next((e for e in source.effects if e.label == effect.needs), None)
                 if simpler is not None and (source is current or simpler is source.effects[-1]):
                     trials.append((source, simpler, effect))
-        refined = self._each(lambda trial: self.refine(*trial, scene), trials)
+        refined = self.each(lambda trial: self.refine(*trial, scene), trials)
         return [candidate for candidate in refined if candidate is not None]
-
-    def rescued(self, candidate: Candidate, current: Candidate, base: Candidate) -> Candidate:
-        """Fit a candidate to both parts when it gains much on the first and fails on the second.
-
-        A law that holds where it was fitted may fail where the deciding part reaches further (a spring that hardens
-        faster than its cubic, a limit that is reached once); fitted to both, it shows what it is worth.
-
-        Args:
-            candidate: a fitted model.
-            current: the model to build on.
-            base: the model without effects.
-
-        Returns:
-            The better of both.
-        """
-        gained = candidate.fit.fitted - current.fit.fitted
-        if gained < self.settings.rescued or candidate.pays_over(current, base):
-            return candidate
-        start, stop = (f(self.parts.fitted, self.parts.validated) for f in (_first, _last))
-        both = Parts(slice(start, stop), self.parts.validated, self.parts.held_out)
-        fitted = annealed(self.likelihood, candidate.fit.p, current.fit.q, candidate.fit.free, both, candidate.effects)
-        self._tick(f"{candidate.effects[-1].label}, both parts")
-        whole = fitted.fitted
-        share = self.likelihood.log_likelihood(fitted.z, fitted.q, self.parts.validated, fitted.colour, fitted.p)
-        retried = self.candidate(candidate.effects, replace(fitted, fitted=whole - share, validated=share))
-        return max(candidate, retried, key=lambda c: c.score)
-
-    def refine(self, source: Candidate, simpler: Effect, effect: Effect, scene: Scene) -> Candidate | None:
-        """Return the best fit of ``effect`` in the place of ``simpler``, from several starts; None: not plausible.
-
-        Args:
-            source: the model that has ``simpler``.
-            simpler: the effect that ``effect`` contains.
-            effect: of the bank.
-            scene: sizes of the record's signals.
-
-        Returns:
-            The candidate.
-        """
-        effects = tuple(effect if e is simpler else e for e in source.effects)
-        values = {short: float(source.fit.p[place]) for short, place in simpler.places(self.plant).items()}
-        bare = self.without(source.fit.p, simpler)
-        best: Fit | None = None
-        for start in effect.refine(values, scene):
-            p = effect.put(self.plant, bare, start, self.refitted)
-            fitted = annealed(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, effects)
-            if best is None or fitted.fitted > best.fitted:
-                best = fitted
-        self._tick(effect.label)
-        if best is None:
-            return None
-        final = {short: float(best.p[place]) for short, place in effect.places(self.plant).items()}
-        return self.candidate(effects, best) if effect.plausible(final) else None
-
-    def extend(self, current: Candidate, effect: Effect, guesses: Guesses, scene: Scene) -> Candidate:
-        """Return ``current`` with one more effect: the best of the fits from the guesses.
-
-        Args:
-            current: the model to build on.
-            effect: of the bank.
-            guesses: starting values.
-            scene: sizes of the record's signals.
-
-        Returns:
-            The candidate.
-        """
-        effects = (*current.effects, effect)
-        if self.hidden is not None and self.hidden.effects == effects:
-            return self.hidden
-        free = self.free(effects, scene)
-        starts = [effect.put(self.plant, current.fit.p, guess.values, self.refitted) for guess in guesses]
-        fits = [annealed(self.likelihood, p, current.fit.q, free, self.parts, effects) for p in starts]
-        self._tick(effect.label)
-        return self.candidate(effects, max(fits, key=lambda fitted: fitted.fitted))
 
     def prune(self, current: Candidate, base: Candidate) -> Candidate:
         """Take out earlier effects that the last one has made superfluous.
@@ -454,72 +349,9 @@ class Search(ModelSpace):
         """
         scene = scene_of(self.likelihood, current.fit)
         while len(current.effects) > 1:
-            reduced = self._each(partial(self.reduced, current, scene), current.effects[:-1])
+            reduced = self.each(partial(self.reduced, current, scene), current.effects[:-1])
             best = max(reduced, key=lambda candidate: candidate.score)
             if current.pays_over(best, base):
                 break
             current = best
         return current
-
-    def reduced(self, current: Candidate, scene: Scene, effect: Effect) -> Candidate:
-        """Return ``current`` without one of its effects: fitted again from there, or as it was found on the way.
-
-        Args:
-            current: the model to build on.
-            scene: sizes of the record's signals.
-            effect: of the bank.
-
-        Returns:
-            The candidate.
-        """
-        kept = tuple(e for e in current.effects if e is not effect)
-        p = self.without(current.fit.p, effect)
-        fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
-        self._tick(f"without {effect.label}")
-        return max((self.candidate(kept, fitted), *self.known(kept)), key=lambda candidate: candidate.score)
-
-    def known(self, effects: Sequence[Effect]) -> list[Candidate]:
-        """Return the models with the same effects, in whatever order, that the search has met.
-
-        Args:
-            effects: of the bank.
-
-        Returns:
-            The candidates.
-        """
-        met = (candidate for step in self.steps for candidate in (step.before, *step.candidates))
-        labels = {effect.label for effect in effects}
-        return [one for one in met if {effect.label for effect in one.effects} == labels]
-
-    def _each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Return ``function`` of each item, in order, computed in threads."""
-
-        def in_time(item: T) -> R:
-            if time.monotonic() > self.deadline:
-                raise TimeUpError
-            return function(item)
-
-        with ThreadPoolExecutor(usable_cores()) as pool:
-            try:
-                return list(pool.map(in_time, items))
-            except TimeUpError:
-                pool.shutdown(cancel_futures=True)
-                raise
-            except BaseException:
-                self.likelihood.halt()  # an interrupt need not wait for the fits that run
-                pool.shutdown(cancel_futures=True)
-                raise
-
-    def _tick(self, what: str) -> None:
-        with self._counting:
-            self.done += 1
-            expected = max(self.done + 2, (len(self.steps) + 1) * (self.settings.shortlist + 2))
-            self.progress(self.done, expected, what)
-
-
-def _first(a: slice, b: slice) -> int:
-    return int(min(a.start, b.start))
-
-
-def _last(a: slice, b: slice) -> int:
-    return int(max(a.stop, b.stop))

@@ -1,0 +1,204 @@
+"""The fits of a search: of a model with one more effect, with a finer one in its place, or with one taken out.
+
+Fits run in threads, one per core; the predictor runs outside the interpreter's lock.
+"""
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from threading import Lock
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit, Parts
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed
+from orchestrator.diagnosis.search.model_space import ModelSpace
+from orchestrator.diagnosis.search.screening import Guess
+from orchestrator.plants.effects import Effect, Scene
+from orchestrator.shared.cores import usable_cores
+
+Array = NDArray[np.float64]
+Guesses = tuple[Guess, ...]  # best first, at least one
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+class TimeUpError(Exception):
+    """The search may take no longer."""
+
+
+@dataclass
+class Fits(ModelSpace):
+    """The fits of one search, and the models that it has met.
+
+    Attributes:
+        progress: called with (done, expected, what) as candidates are fitted.
+        deadline: by the monotonic clock [s]; no fit of a candidate begins after it.
+        hidden: the model with a gap before a body that is not measured; None: there is none to look for.
+        steps: that were taken.
+        done: fits so far.
+    """
+
+    progress: Callable[[int, int, str], None] = lambda done, expected, what: None
+    deadline: float = math.inf
+    hidden: Candidate | None = None
+    steps: list[ForwardStep] = field(default_factory=list)
+    done: int = 0
+    _counting: Lock = field(default_factory=Lock)
+
+    def rescued(self, candidate: Candidate, current: Candidate, base: Candidate) -> Candidate:
+        """Fit a candidate to both parts when it gains much on the first and fails on the second.
+
+        A law that holds where it was fitted may fail where the deciding part reaches further (a spring that hardens
+        faster than its cubic, a limit that is reached once); fitted to both, it shows what it is worth.
+
+        Args:
+            candidate: a fitted model.
+            current: the model to build on.
+            base: the model without effects.
+
+        Returns:
+            The better of both.
+        """
+        gained = candidate.fit.fitted - current.fit.fitted
+        if gained < self.settings.rescued or candidate.pays_over(current, base):
+            return candidate
+        start, stop = (f(self.parts.fitted, self.parts.validated) for f in (_first, _last))
+        both = Parts(slice(start, stop), self.parts.validated, self.parts.held_out)
+        fitted = annealed(self.likelihood, candidate.fit.p, current.fit.q, candidate.fit.free, both, candidate.effects)
+        self.tick(f"{candidate.effects[-1].label}, both parts")
+        whole = fitted.fitted
+        share = self.likelihood.log_likelihood(fitted.z, fitted.q, self.parts.validated, fitted.colour, fitted.p)
+        retried = self.candidate(candidate.effects, replace(fitted, fitted=whole - share, validated=share))
+        return max(candidate, retried, key=lambda c: c.score)
+
+    def refine(self, source: Candidate, simpler: Effect, effect: Effect, scene: Scene) -> Candidate | None:
+        """Return the best fit of ``effect`` in the place of ``simpler``, from several starts; None: not plausible.
+
+        Args:
+            source: the model that has ``simpler``.
+            simpler: the effect that ``effect`` contains.
+            effect: of the bank.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The candidate.
+        """
+        effects = tuple(effect if e is simpler else e for e in source.effects)
+        values = {short: float(source.fit.p[place]) for short, place in simpler.places(self.plant).items()}
+        bare = self.without(source.fit.p, simpler)
+        best: Fit | None = None
+        for start in effect.refine(values, scene):
+            p = effect.put(self.plant, bare, start, self.refitted)
+            fitted = annealed(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, effects)
+            if best is None or fitted.rank(self.parts) > best.rank(self.parts):
+                best = fitted
+        self.tick(effect.label)
+        if best is None:
+            return None
+        final = {short: float(best.p[place]) for short, place in effect.places(self.plant).items()}
+        return self.candidate(effects, best) if effect.plausible(final) else None
+
+    def extend(self, current: Candidate, effect: Effect, guesses: Guesses, scene: Scene) -> Candidate:
+        """Return ``current`` with one more effect: the best of the fits from the guesses.
+
+        Args:
+            current: the model to build on.
+            effect: of the bank.
+            guesses: starting values.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The candidate.
+        """
+        effects = (*current.effects, effect)
+        if self.hidden is not None and self.hidden.effects == effects:
+            return self.hidden
+        free = self.free(effects, scene)
+        starts = [effect.put(self.plant, current.fit.p, guess.values, self.refitted) for guess in guesses]
+        fits = [annealed(self.likelihood, p, current.fit.q, free, self.parts, effects) for p in starts]
+        self.tick(effect.label)
+        return self.candidate(effects, max(fits, key=lambda fitted: fitted.rank(self.parts)))
+
+    def reduced(self, current: Candidate, scene: Scene, effect: Effect) -> Candidate:
+        """Return ``current`` without one of its effects: fitted again from there, or as it was found on the way.
+
+        Args:
+            current: the model to build on.
+            scene: sizes of the record's signals.
+            effect: of the bank.
+
+        Returns:
+            The candidate.
+        """
+        kept = tuple(e for e in current.effects if e is not effect)
+        p = self.without(current.fit.p, effect)
+        fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
+        self.tick(f"without {effect.label}")
+        return max((self.candidate(kept, fitted), *self.known(kept)), key=lambda candidate: candidate.score)
+
+    def known(self, effects: Sequence[Effect]) -> list[Candidate]:
+        """Return the models with the same effects, in whatever order, that the search has met.
+
+        Args:
+            effects: of the bank.
+
+        Returns:
+            The candidates.
+        """
+        met = (candidate for step in self.steps for candidate in (step.before, *step.candidates))
+        labels = {effect.label for effect in effects}
+        return [one for one in met if {effect.label for effect in one.effects} == labels]
+
+    def each(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+        """Return ``function`` of each item, in order, computed in threads.
+
+        Args:
+            function: fits one.
+            items: what to fit.
+
+        Returns:
+            The results.
+
+        Raises:
+            TimeUpError: the deadline has passed.
+        """
+
+        def in_time(item: T) -> R:
+            if time.monotonic() > self.deadline:
+                raise TimeUpError
+            return function(item)
+
+        with ThreadPoolExecutor(usable_cores()) as pool:
+            try:
+                return list(pool.map(in_time, items))
+            except TimeUpError:
+                pool.shutdown(cancel_futures=True)
+                raise
+            except BaseException:
+                self.likelihood.halt()  # an interrupt need not wait for the fits that run
+                pool.shutdown(cancel_futures=True)
+                raise
+
+    def tick(self, what: str) -> None:
+        """Tell of one more fit.
+
+        Args:
+            what: was fitted.
+        """
+        with self._counting:
+            self.done += 1
+            expected = max(self.done + 2, (len(self.steps) + 1) * (self.settings.shortlist + 2))
+            self.progress(self.done, expected, what)
+
+
+def _first(a: slice, b: slice) -> int:
+    return int(min(a.start, b.start))
+
+
+def _last(a: slice, b: slice) -> int:
+    return int(max(a.stop, b.stop))
