@@ -225,7 +225,7 @@ def _interleaved(
     """
     fitter, whole = search.fitter, search.explained(best)
     unkept = any(step.unkept for step in search.steps if step.before is best)
-    if search.late or (whole and not unkept and _goes_on(fitter, best, settings)):
+    if search.late or (whole and not unkept and _goes_on(search, best, settings)):
         return search, base, best
     parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces, whole)
     turns = BoxSearch(
@@ -241,14 +241,18 @@ def _interleaved(
     return (turns, turns.plain or plain, found) if explains else (search, base, best)
 
 
-def _last(fitter: Fitter, fit: BoxFit) -> BoxFit:
+def _last(search: BoxSearch, fit: BoxFit) -> BoxFit:
     """Return a fit over all rows that were looked at."""
-    return fitter.fit(fit.model, fit.level, None, fitter.parts.looked_at, iterations=4) or fit
+    fitter = search.fitter
+    if search.last is None or search.last[0] is not fit:
+        found = fitter.fit(fit.model, fit.level, None, fitter.parts.looked_at, iterations=4)
+        search.last = fit, found or fit
+    return search.last[1]
 
 
-def _goes_on(fitter: Fitter, fit: BoxFit, settings: RestSettings) -> bool:
+def _goes_on(search: BoxSearch, fit: BoxFit, settings: RestSettings) -> bool:
     """Tell whether a model leaves nothing that must be explained over all of the record either."""
-    last = _last(fitter, fit)
+    last, fitter = _last(search, fit), search.fitter
     y = fitter.problem.simulate([last.model])[0]
     if y is None:
         return False
@@ -267,7 +271,7 @@ def _judged(
 ) -> BoxOutcome:
     fitter, parts = search.fitter, search.fitter.parts
     seen = parts.looked_at
-    last = _last(fitter, best)
+    last = _last(search, best)
     whole = problem.simulate([problem.nominal, base.model, last.model])
     if whole[0] is None:
         raise problem.does_not_run()

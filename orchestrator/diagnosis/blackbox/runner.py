@@ -1,6 +1,8 @@
 """Runs of a foreign FMU in jails: batches, deadlines, and a new jail where one was lost."""
 
 import threading
+import time
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -82,15 +84,19 @@ class Runner:
         self._jails: dict[int, Jail] = {}
         self._warm: set[int] = set()
         self._lock = threading.Lock()
+        self._starting = self._spent = 0.0  # s: what the first child took to start, and all runs so far
         self._scratch = Scratch("box")
         self._folders = {name: self._scratch.path / f"fmu_{k}" for k, name in enumerate(subject.members)}
         # A jail dies with the thread that made it: the threads live as long as this.
-        self._pool = ThreadPoolExecutor(min(2, usable_cores()) if workers is None else workers)
+        self._most = min(2, usable_cores()) if workers is None else workers
+        self._threads = [ThreadPoolExecutor(1)]
         try:
             _compile_loop()
             for name, folder in self._folders.items():
                 unpack(subject.members[name], folder)
-            self._pool.submit(self._jail).result()
+            begun = time.monotonic()
+            self._threads[0].submit(self._jail).result()
+            self._starting = time.monotonic() - begun
         except ChildError as error:
             self.close()
             raise SlaveError(
@@ -133,18 +139,28 @@ class Runner:
             return results
         self.runs += len(plans)
         own = self.settings
+        if len(self._threads) < self._most and self._spent > self._starting:  # now another child has paid
+            self._threads.append(ThreadPoolExecutor(1))
         size = own.chunk if len(plans) >= 2 * own.chunk else 1
         if together or len(plans) * self.step_cost * len(plans[0].table) < own.small:
             size = len(plans)  # the latter: not worth a second child
-        chunks = [list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size)]
+        waiting = deque(list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size))
         grid = (start, step, per_row, lead)
-        futures: list[Future[None]] = [self._pool.submit(self._chunk, c, plans, grid, results) for c in chunks]
+
+        def work() -> None:
+            while True:
+                try:
+                    chunk = waiting.popleft()
+                except IndexError:
+                    return
+                self._chunk(chunk, plans, grid, results)
+
+        futures: list[Future[None]] = [t.submit(work) for t in self._threads[: len(waiting)]]
         try:
             for future in futures:
                 future.result()
         except BaseException:
-            for future in futures:
-                future.cancel()
+            waiting.clear()
             for jail in list(self._jails.values()):
                 jail.interrupt()
             raise
@@ -154,7 +170,8 @@ class Runner:
         """End the children and remove their files."""
         for jail in list(self._jails.values()):
             jail.interrupt()
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        for thread in self._threads:
+            thread.shutdown(wait=True, cancel_futures=True)
         for jail in self._jails.values():
             jail.close()
         self._jails = {}
@@ -227,6 +244,7 @@ class Runner:
             elif isinstance(reason, str) and reason:
                 self.reason = self._named(reason)
         mine = threading.get_ident()
+        self._spent += seconds
         if mine in self._warm:  # the first answer of a child includes what it loads
             self.step_cost = max(0.5 * self.step_cost, seconds / max(steps, 1))
         self._warm.add(mine)

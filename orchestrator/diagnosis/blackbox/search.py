@@ -47,6 +47,8 @@ class BoxSearch:
     """Steps of searches before it, over other parts or with another start: their likelihoods do not compare."""
     plain: BoxFit | None = None
     """The model without effects: where an effect led to better values that need no effect, that with these."""
+    last: tuple[BoxFit, BoxFit] | None = None
+    """A fit, and that of its model over all rows that were looked at."""
     until: float = float("inf")
     """Monotonic time [s] from which no further effect is fitted."""
 
@@ -84,7 +86,7 @@ class BoxSearch:
             for before in beam:
                 step = self.step(before, base)
                 self.steps.append(step)
-                found += [self.pruned(fit, base) for fit in step.tried[:1] if step.accepted]
+                found += [self._enriched(self.pruned(fit, base), base) for fit in step.tried[:1] if step.accepted]
                 found += [fit for fit in step.tried[1:2] if step.accepted and self.pays(fit, before, base)]
                 found += [] if step.accepted else self._borne_out(step, base) or self._ahead(step, base)
             found = [fit for fit in found if self.score(fit) > self.score(best)] or []
@@ -118,7 +120,7 @@ class BoxSearch:
             The score.
         """
         noisy = self.fitter.ladder.share(fit.level) > self.settings.quiet
-        return fit.total - self.settings.penalty * (counted(fit.model) + noisy)
+        return fit.total - self.settings.penalty * (counted(fit.model) + noisy) - sought(fit.model)
 
     def _borne_out(self, step: SearchStep, base: BoxFit) -> list[BoxFit]:
         """Return the best of a step's models that pays once all that is looked at is fitted, and the rest decides too.
@@ -133,7 +135,7 @@ class BoxSearch:
             known, found = max(map(self._on_all, without), key=self.score), self._on_all(fit)
             unseen = found.decided - known.decided + min(fit.decided - f.decided for f in without)
             if self.score(found) - self.score(known) > self._least(found, before, base) and unseen > own.decided:
-                return [self._relieved(fit)]
+                return [self._enriched(self._relieved(fit), base)]
         return []
 
     def _relieved(self, fit: BoxFit) -> BoxFit:
@@ -156,7 +158,7 @@ class BoxSearch:
                 break
             after = self.step(fit, base)
             self.steps.append(after)
-            found += [self.pruned(pair, base) for pair in after.tried[:1] if after.accepted]
+            found += [self._enriched(self.pruned(pair, base), base) for pair in after.tried[:1] if after.accepted]
         more = len(before.model.effects) + 1
         return [
             pair
@@ -340,22 +342,35 @@ class BoxSearch:
 
     def _refined(self, tried: Sequence[BoxFit], before: BoxFit, base: BoxFit) -> list[BoxFit]:
         """Return fits of effects that contain one that pays (Stribeck's friction contains Coulomb's)."""
-        found = []
-        for fit in tried:
-            if not self.pays(fit, before, base):
+        return [
+            found
+            for fit in tried
+            if self.pays(fit, before, base)
+            for found in self._richer(fit, len(fit.model.effects) - 1)
+        ]
+
+    def _enriched(self, fit: BoxFit, base: BoxFit) -> BoxFit:
+        """Return a fit, or one with what contains an earlier effect in its place: another hid what it lacks."""
+        for k in range(len(fit.model.effects) - 1):
+            richer = [f for f in self._richer(fit, k) if self.pays(f, fit, base)]
+            if richer:
+                return self.fitter.settled(max(richer, key=self.score))
+        return fit
+
+    def _richer(self, fit: BoxFit, k: int) -> list[BoxFit]:
+        """Return fits of effects that contain the one at place ``k`` of a model."""
+        found, model = [], fit.model
+        simple, at = model.effects[k], len(model.p) + sum(len(v) for v in model.values[:k])
+        for effect in self.effects:
+            if effect.kind.needs != simple.kind.name or effect.place != simple.place:
                 continue
-            simple = fit.model.effects[-1]
-            for effect in self.effects:
-                if effect.kind.needs != simple.kind.name or effect.place != simple.place:
-                    continue
-                level, distance = fit.model.values[-1]
-                for share in (0.05, 0.3):
-                    values = np.array([0.9 * level, 1.5 * level, share * effect.scene.speed, distance])
-                    model = fit.model.without(simple.label).extended(effect, values)
-                    J = fit.J[:, :, : len(fit.model.vector) - 2]
-                    again = self.fitter.fit(model, fit.level, J, held=1)
-                    if again is not None and effect.kind.plausible(tuple(again.model.values[-1]), effect.scene):
-                        found.append(again)
+            level, distance = model.values[k]
+            J = np.delete(fit.J, range(at, at + 2), axis=2)
+            for share in (0.05, 0.3):
+                values = np.array([0.9 * level, 1.5 * level, share * effect.scene.speed, distance])
+                again = self.fitter.fit(model.without(simple.label).extended(effect, values), fit.level, J, held=1)
+                if again is not None and effect.kind.plausible(tuple(again.model.values[-1]), effect.scene):
+                    found.append(again)
         return found
 
     def pruned(self, fit: BoxFit, base: BoxFit) -> BoxFit:
@@ -411,6 +426,22 @@ def counted(model: BoxModel) -> int:
         The number.
     """
     return sum(len(effect.kind.parameters) for effect in model.effects)
+
+
+def sought(model: BoxModel) -> float:
+    """Return what chance gives to the best of as many small values as were sifted, where one of them was taken.
+
+    Args:
+        model: with its effects.
+
+    Returns:
+        A log-likelihood.
+    """
+    cost = 0.0
+    for effect, values in zip(model.effects, model.values, strict=True):
+        small = effect.kind.small(effect.scene)
+        cost += np.log(len(small)) if len(small) and values[0] <= small[-1] else 0.0
+    return float(cost)
 
 
 def labels(fit: BoxFit) -> frozenset[str]:
