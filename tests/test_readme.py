@@ -27,7 +27,7 @@ def blocks(page, language):
 
 def run(words, folder):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=900, check=False)
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=3600, check=False)
 
 
 COMMANDS = [line for body in blocks("README.md", "sh") for line in body.splitlines() if line.startswith("python -m")]

@@ -1,7 +1,6 @@
 """Passes of the search over a record: parts in their usual roles, then in others where something is left."""
 
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -25,6 +24,7 @@ from orchestrator.diagnosis.verdict.remainder import Remainder, noise_floor, rem
 from orchestrator.plants.effects import Effect
 from orchestrator.records.model_file import Model
 from orchestrator.shared.inference.colour import colour_of
+from orchestrator.shared.stopwatch import Stopwatch
 
 Array = NDArray[np.float64]
 
@@ -77,35 +77,35 @@ def passes(
     size, head = signals.size, settings.likelihood.head
     again = settings.search.most_in_a_repeat
     limit = settings.search.time_limit
-    deadline = time.monotonic() + limit if limit else math.inf
+    allowed = Stopwatch(limit or math.inf)
     likelihood = RecordLikelihood(model.plant, signals, nominal, parts.validated.stop, settings)
-    found = _search(model, likelihood, parts, parts, settings.search.most_effects, progress, deadline)
+    found = _search(model, likelihood, parts, parts, settings.search.most_effects, progress, allowed)
     first = int(size * (1.0 - settings.fit.looked_at))  # as many samples as are held out
-    if found.unknown and not found.search.stopped and time.monotonic() >= deadline:
+    if found.unknown and not found.search.stopped and allowed.over:
         note = f"a search with the record's parts exchanged was not begun after {limit:g} s"
         found = replace(found, withdrawn=(note, *found.withdrawn))
-    if found.unknown and not found.hopeless and time.monotonic() < deadline:
+    if found.unknown and not found.hopeless and not allowed.over:
         # What shows on the deciding part alone (a limit that is reached once) must be fitted to be found.
         exchanged = Parts(slice(first, parts.validated.stop), slice(head, first), parts.held_out)
-        other = _search(model, likelihood, parts, exchanged, again, progress, deadline)
+        other = _search(model, likelihood, parts, exchanged, again, progress, allowed)
         found = found if other.unknown else other
-    if found.unknown and found.left.growth > settings.verdict.grown and time.monotonic() < deadline:
+    if found.unknown and found.left.growth > settings.verdict.grown and not allowed.over:
         # What shows on the held-out part alone must be looked at: the first part is held out in its place.
         held_out = slice(head, first)
         turned = Parts(slice(first, parts.held_out.start), parts.held_out, held_out)
         exchanged = Parts(slice(parts.fitted.stop, size), slice(first, parts.fitted.stop), held_out)
-        other = _search(model, likelihood.over(size), turned, exchanged, again, progress, deadline)
+        other = _search(model, likelihood.over(size), turned, exchanged, again, progress, allowed)
         found = found if other.unknown else other
     return found
 
 
 def _search(
     model: Model, likelihood: RecordLikelihood, parts: Parts, used: Parts, most: int, progress: Progress,
-    deadline: float,
+    allowed: Stopwatch,
 ) -> Pass:  # fmt: skip
     """Search for at most ``most`` effects with the parts ``used``; judge what is left on ``parts``."""
     settings = likelihood.settings
-    search = Search(likelihood, model, used, progress, deadline, most=most)
+    search = Search(likelihood, model, used, progress, allowed, most=most)
     base, best = search.run()
     likelihood = search.likelihood  # its gains may be those of a gap now
     whole = Parts(parts.seen, parts.validated, parts.held_out)

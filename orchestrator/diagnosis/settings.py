@@ -119,7 +119,7 @@ class SearchSettings(Settings, frozen=True):
     """Which candidates are fitted, what an effect must gain, and how far process noise may go."""
 
     time_limit: Annotated[
-        float, setting("time [s] after which it stops and nothing is named: most take a tenth of it; 0: never", ge=0)
+        float, setting("time [s] it may use, then nothing is named: most take a tenth of it; 0: any", ge=0)
     ] = 600.0
     most_noise: Annotated[float, setting("largest process noise, as a share of the drive's torque", gt=0)] = 3.0
     least_noise: Annotated[float, setting("smallest: predictions are nearly free runs there", gt=0)] = 1e-5

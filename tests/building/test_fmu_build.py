@@ -221,7 +221,7 @@ def test_two_builds_at_a_time_do_no_harm(tmp_path: Path, fmus: dict[str, Path]) 
     words = [sys.executable, "-c", BUILD_HERE]
     environment = os.environ | {"PYTHONPATH": str(build.ROOT)}
     processes = [subprocess.Popen(words, cwd=tmp_path, env=environment) for _ in range(2)]
-    assert [process.wait(timeout=900) for process in processes] == [0, 0]
+    assert [process.wait(timeout=3600) for process in processes] == [0, 0]
     assert [path.name for path in tmp_path.iterdir()] == ["Drivetrain.fmu"]
     assert (tmp_path / "Drivetrain.fmu").read_bytes() == fmus["Drivetrain"].read_bytes()
 

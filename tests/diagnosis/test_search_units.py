@@ -16,6 +16,7 @@ from orchestrator.diagnosis.search.search import Search
 from orchestrator.plants.effects import Effect
 from orchestrator.records.columns import Column
 from orchestrator.records.model_file import default_model
+from orchestrator.shared.stopwatch import Stopwatch
 from tests.support.short_records import AXIS, SETTINGS, axis_likelihood, drivetrain_likelihood
 from tests.support.small_search import search_of
 
@@ -217,7 +218,7 @@ def test_at_most_so_many_effects_are_named(friction) -> None:
 
 
 def test_a_search_whose_time_is_up_stops_with_what_it_has(friction) -> None:
-    search = replace(friction[0], steps=[], deadline=0.0)
+    search = replace(friction[0], steps=[], allowed=Stopwatch(0.0))
     base, best = search.run()
     assert search.stopped
     assert best is base

@@ -22,7 +22,7 @@ def run(code, folder):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=900,
+        timeout=3600,
         check=False,
     )
 

@@ -190,7 +190,7 @@ def test_misuse_never_kills_the_process(fmus: dict[str, Path], name: str) -> Non
         cwd=root,
         capture_output=True,
         text=True,
-        timeout=900,
+        timeout=3600,
         check=False,
     )
     assert (run.returncode, run.stdout) == (0, "alive 3\n"), run.stderr[-500:]
@@ -215,7 +215,7 @@ def test_without_a_compiler_the_fmu_still_refuses_and_runs_in_python_hosts(stock
         cwd=root,
         capture_output=True,
         text=True,
-        timeout=900,
+        timeout=3600,
         check=False,
     )
     assert (run.returncode, run.stdout) == (0, "alive None\n"), run.stderr[-500:]

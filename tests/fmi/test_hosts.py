@@ -275,7 +275,7 @@ def run_in_package(code: str, package: str, fmus: dict[str, Path], folder: Path)
     }
     (folder / "job.json").write_text(json.dumps(job))
     words = [sys.executable, "-c", AROUND.format(code), str(folder / "job.json"), str(folder / "rows.json")]
-    run = subprocess.run(words, env=without_hints(), capture_output=True, text=True, check=False, timeout=900)
+    run = subprocess.run(words, env=without_hints(), capture_output=True, text=True, check=False, timeout=3600)
     assert run.returncode == 0, run.stderr[-500:]
     rows: list[list[float]] = json.loads((folder / "rows.json").read_text())
     return rows

@@ -3,13 +3,13 @@
 A probe returns whether the ones after it make sense.
 """
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library, ProbedSlave, StatusError, TerminatedError, finite
 from orchestrator.checking.probing.trajectory import Bench, Difference, ProbedVariable, compare, excitation
+from orchestrator.shared.stopwatch import Stopwatch
 
 _LEAK_PER_INSTANCE = 256 * 1024
 _LEAK_PER_STEP = 8 * 1024
@@ -101,7 +101,7 @@ def life_cycle(context: Context) -> bool:
         slave.call("fmi2ExitInitializationMode")
         complaints: set[str] = set()
         _look(context, outputs, bench.read(slave, outputs, "after initialisation"), "after initialisation", complaints)
-        clock = time.monotonic()
+        budget = Stopwatch(job.budget)
         for n in range(job.steps):
             t = job.start + n * job.step
             try:
@@ -111,7 +111,7 @@ def life_cycle(context: Context) -> bool:
                 break
             when = f"at t = {t + job.step:g}"
             _look(context, outputs, bench.read(slave, outputs, when), when, complaints)
-            if time.monotonic() - clock > job.budget and n + 1 >= _FEWEST_STEPS:
+            if budget.over and n + 1 >= _FEWEST_STEPS:
                 bench.job = replace(job, steps=n + 1)
                 break
         slave.call("fmi2Terminate")
@@ -234,7 +234,7 @@ def memory(context: Context) -> bool:
     resident = bench.library.resident
     if not resident():
         return True
-    clock = time.monotonic()
+    budget = Stopwatch(job.budget)
     cycles, before = 0, None
     for n in range(30):
         with bench.instance():
@@ -242,7 +242,7 @@ def memory(context: Context) -> bool:
         if n == 9:
             before = resident()
         cycles += before is not None
-        if time.monotonic() - clock > job.budget:
+        if budget.over:
             break
     growth = (resident() - (before or 0)) / max(cycles - 1, 1)
     if before is not None and cycles > 5 and growth > _LEAK_PER_INSTANCE:

@@ -1,12 +1,12 @@
 """The probe that reproduces the reference result which an FMU carries."""
 
-import time
 from itertools import pairwise
 from typing import Any
 
 from orchestrator.checking.probing.binding import ProbedSlave, TerminatedError
 from orchestrator.checking.probing.probes import Context
 from orchestrator.checking.probing.trajectory import ProbedVariable
+from orchestrator.shared.stopwatch import Stopwatch
 
 _RELATIVE = 0.02
 _OUTSIDE = 0.02
@@ -76,7 +76,7 @@ def _simulate(context: Context, rows: list[Row], parameters: Columns, inputs: Co
     """Run over the times of ``rows``; False when it takes too long."""
     bench, job = context.bench, context.bench.job
     variables = [v for _, v in tube.columns]
-    deadline = time.monotonic() + _PATIENCE * job.budget
+    budget = Stopwatch(_PATIENCE * job.budget)
     with bench.instance(initialised=False) as slave:
         _set(slave, parameters + inputs, rows[0])
         slave.setup(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]), job.tolerance)
@@ -90,7 +90,7 @@ def _simulate(context: Context, rows: list[Row], parameters: Columns, inputs: Co
             except TerminatedError:
                 break
             tube.compare(bench.read(slave, variables, f"at t = {following[0]:g}"), following)
-            if time.monotonic() > deadline:
+            if budget.over:
                 return False
     return True
 

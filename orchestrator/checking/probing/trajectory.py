@@ -34,7 +34,7 @@ class ProbeJob:
     Attributes:
         start, stop, step: the experiment in s; ``stop`` is None when the FMU does not say.
         steps: number of communication steps of a test run.
-        budget: seconds that a test run may take.
+        budget: seconds that a test run may take, of a :class:`Stopwatch`.
         flags: capability flags that are true.
         reference: names, rows of the reference result, or None.
     """

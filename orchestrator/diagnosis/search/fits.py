@@ -3,8 +3,6 @@
 Fits run in threads, one per core; the predictor runs outside the interpreter's lock.
 """
 
-import math
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -20,6 +18,7 @@ from orchestrator.diagnosis.search.model_space import ModelSpace
 from orchestrator.diagnosis.search.screening import Guess
 from orchestrator.plants.effects import Effect, Scene
 from orchestrator.shared.cores import usable_cores
+from orchestrator.shared.stopwatch import Stopwatch
 
 Array = NDArray[np.float64]
 Guesses = tuple[Guess, ...]  # best first, at least one
@@ -37,14 +36,14 @@ class Fits(ModelSpace):
 
     Attributes:
         progress: called with (done, expected, what) as candidates are fitted.
-        deadline: by the monotonic clock [s]; no fit of a candidate begins after it.
+        allowed: time that fits may take; no fit of a candidate begins after it.
         hidden: the model with a gap before a body that is not measured; None: there is none to look for.
         steps: that were taken.
         done: fits so far.
     """
 
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None
-    deadline: float = math.inf
+    allowed: Stopwatch = field(default_factory=Stopwatch)
     hidden: Candidate | None = None
     steps: list[ForwardStep] = field(default_factory=list)
     done: int = 0
@@ -165,11 +164,11 @@ class Fits(ModelSpace):
             The results.
 
         Raises:
-            TimeUpError: the deadline has passed.
+            TimeUpError: no time is left.
         """
 
         def in_time(item: T) -> R:
-            if time.monotonic() > self.deadline:
+            if self.allowed.over:
                 raise TimeUpError
             return function(item)
 

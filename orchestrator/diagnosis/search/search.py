@@ -5,6 +5,7 @@ step gains is counted on the part of the record that decides (and on the part th
 must pay on both.
 """
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -27,7 +28,7 @@ class Search(Fits):
 
     Attributes:
         most: effects that are named at most.
-        stopped: the deadline has cut the search short.
+        stopped: its time was up before its end.
         refused: effects that were not named, by label, and why.
     """
 
@@ -97,7 +98,7 @@ class Search(Fits):
         one_sided = likelihood.signals.channels < len(self.plant.bodies)
         if gap is None or self.most == 0 or not one_sided or at_the_floor(likelihood, base.fit, self.parts.fitted):
             return None
-        p = gap_of_the_estimator(likelihood, self.model, self.parts.fitted, self.deadline)
+        p = gap_of_the_estimator(likelihood, self.model, self.parts.fitted, time.monotonic() + self.allowed.left)
         self.tick(f"{gap.label}, estimated")
         if p is None:
             return None
