@@ -346,19 +346,27 @@ class BoxSearch:
             found
             for fit in tried
             if self.pays(fit, before, base)
-            for found in self._richer(fit, len(fit.model.effects) - 1)
+            for found in self.richer(fit, len(fit.model.effects) - 1)
         ]
 
     def _enriched(self, fit: BoxFit, base: BoxFit) -> BoxFit:
         """Return a fit, or one with what contains an earlier effect in its place: another hid what it lacks."""
         for k in range(len(fit.model.effects) - 1):
-            richer = [f for f in self._richer(fit, k) if self.pays(f, fit, base)]
+            richer = [f for f in self.richer(fit, k) if self.pays(f, fit, base)]
             if richer:
                 return self.fitter.settled(max(richer, key=self.score))
         return fit
 
-    def _richer(self, fit: BoxFit, k: int) -> list[BoxFit]:
-        """Return fits of effects that contain the one at place ``k`` of a model."""
+    def richer(self, fit: BoxFit, k: int) -> list[BoxFit]:
+        """Return fits of effects that contain one of a model, each in its place.
+
+        Args:
+            fit: of the model.
+            k: place of that effect in it.
+
+        Returns:
+            The fits, the effect in question last.
+        """
         found, model = [], fit.model
         simple, at = model.effects[k], len(model.p) + sum(len(v) for v in model.values[:k])
         for effect in self.effects:

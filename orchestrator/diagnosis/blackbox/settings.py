@@ -43,6 +43,9 @@ class BoxSearchSettings(Settings, frozen=True):
     beam: Annotated[int, setting("models that are carried on", ge=1)] = 2
     near: Annotated[float, share("of what the best model gains, by which another may be behind to be carried on")] = 0.3
     family: Annotated[float, setting("log-likelihood within which a record does not tell two effects apart")] = 6.0
+    departs: Annotated[
+        float, share("by which a law must differ from the one that it contains, to be told as of its family")
+    ] = 0.1
     rivals: Annotated[
         int, setting("effects that are put in the place of each that is named, to see whether they do as well", ge=0)
     ] = 2

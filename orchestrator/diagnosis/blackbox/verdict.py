@@ -162,7 +162,8 @@ def predicted(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest
 def families_of(search: BoxSearch, best: BoxFit) -> tuple[tuple[str, ...], ...]:
     """Return labels of effects that the record does not tell from each one of the best model.
 
-    What stood beside an effect in the step that brought it is put in its place, and fitted with all the others.
+    What stood beside an effect in the step that brought it is put in its place, and fitted with all the others; so is
+    what contains it (Stribeck's friction contains Coulomb's), where its law is another within the record's motion.
 
     Args:
         search: that found it.
@@ -171,7 +172,17 @@ def families_of(search: BoxSearch, best: BoxFit) -> tuple[tuple[str, ...], ...]:
     Returns:
         The labels, for each effect in its order.
     """
-    return tuple(_family_of(search, best, effect) for effect in best.model.effects)
+    own = search.settings
+    found = []
+    for k, effect in enumerate(best.model.effects):
+        others = _family_of(search, best, effect)
+        for fit in search.richer(best, k):
+            last, values = fit.model.effects[-1], fit.model.values[-1]
+            differs = last.kind.departs(tuple(values), last.scene) > own.departs
+            if differs and best.total - search.fitter.settled(fit).total < own.family and last.label not in others:
+                others = (*others, last.label)
+        found.append(others)
+    return tuple(found)
 
 
 def _family_of(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.estimates import errors_of
@@ -35,8 +36,9 @@ def search(totals: dict[str, float], *steps: SearchStep) -> SimpleNamespace:
         settled=lambda found: found,
     )
     return SimpleNamespace(
-        fitter=fitter, steps=steps, earlier=(), settings=DEFAULT.search, score=lambda found: found.total
-    )
+        fitter=fitter, steps=steps, earlier=(), settings=DEFAULT.search, score=lambda found: found.total,
+        richer=lambda fit, k: [],
+    )  # fmt: skip
 
 
 def test_an_earlier_effect_has_a_family_too() -> None:
@@ -52,6 +54,21 @@ def test_what_contains_an_effect_is_none_of_its_family() -> None:
     best = fit(-10.0, "coulomb_friction")
     step = SearchStep(fit(-90.0), (best, fit(-9.0, "stribeck_friction"), fit(-13.0, "viscous_drag")), True)
     assert families_of(search({}, step), best) == (("viscous_drag@p",),)
+
+
+@pytest.mark.parametrize(("total", "sliding", "speed", "told"), [
+    (-12.0, 0.06, 1.0, False),  # as likely, and falls by a quarter within the motion
+    (-17.0, 0.06, 1.0, True),  # less likely
+    (-12.0, 0.095, 1.0, True),  # hardly another law
+    (-12.0, 0.06, 9.0, True),  # falls beyond the speeds of the record
+])  # fmt: skip
+def test_what_contains_an_effect_is_of_its_family_where_its_law_is_another(total, sliding, speed, told) -> None:
+    best = fit(-10.0, "coulomb_friction")
+    values = np.array([sliding, 0.1, speed, 0.01])
+    model = BoxModel(np.zeros(0)).extended(at("stribeck_friction"), values)
+    found = search({})
+    found.richer = lambda fit, k: [BoxFit(model, 0, NONE, total, 0.0, 0.0, NONE)]
+    assert families_of(found, best) == ((() if told else ("stribeck_friction@p",)),)
 
 
 def test_what_stood_beside_an_effect_in_an_earlier_search_is_fitted_anew() -> None:
