@@ -32,7 +32,7 @@ def opened(driver, page):
     driver.get_log("browser")
     driver.get_log("performance")
     browsers.set_screen(driver, 1280, 900, "light")
-    driver.get(page.as_uri())
+    browsers.open_page(driver, page.as_uri())
     yield driver
     assert driver.get_log("browser") == []
 

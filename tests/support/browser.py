@@ -67,3 +67,12 @@ def whole_page(driver: Any, path: Path, width: int, scheme: str) -> None:
     height = int(driver.execute_script("return document.documentElement.scrollHeight"))
     set_screen(driver, width, height, scheme)
     driver.save_screenshot(str(path))
+
+
+def open_page(driver: Any, address: str) -> None:
+    """Open a page and wait until its program has run, which shows the button for the theme."""
+    from selenium.webdriver.support.wait import WebDriverWait
+
+    driver.get(address)
+    ready = "return document.readyState === 'complete' && document.getElementById('theme')?.hidden === false"
+    WebDriverWait(driver, 600).until(lambda opened: opened.execute_script(ready))
