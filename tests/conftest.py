@@ -6,11 +6,11 @@ import pytest
 
 from orchestrator.building.build import ensure_built
 
-LONG = ("test_readme.py", "test_contributing.py")  # minutes each: no core must wait for them at the end
+LONG = ("test_readme.py", "test_contributing.py", "test_notebooks.py", "test_public_api.py")  # minutes each
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let the longest tests begin first."""
+    """Let the longest tests begin first: no core must wait for them at the end."""
     items.sort(key=lambda item: item.path.name not in LONG)
 
 

@@ -59,7 +59,7 @@ def open_page(driver, folder):
     write_report(folder)
     browsers.set_screen(driver, 1280, 900, "light")
     driver.get_log("browser")
-    driver.get((folder / "report.html").as_uri())
+    browsers.open_page(driver, (folder / "report.html").as_uri())
     done = "const d = arguments[0], w = () => document.querySelector('.live').live.took ? d() : setTimeout(w, 10); w();"
     driver.execute_async_script(done)
 

@@ -178,8 +178,8 @@ def families_of(search: BoxSearch, best: BoxFit) -> tuple[tuple[str, ...], ...]:
         others = _family_of(search, best, effect)
         for fit in search.richer(best, k):
             last, values = fit.model.effects[-1], fit.model.values[-1]
-            differs = last.kind.departs(tuple(values), last.scene) > own.departs
-            if differs and best.total - search.fitter.settled(fit).total < own.family and last.label not in others:
+            other = last.label not in others and last.kind.departs(tuple(values), last.scene) > own.departs
+            if other and best.total - search.fitter.settled(fit).total < own.family:
                 others = (*others, last.label)
         found.append(others)
     return tuple(found)

@@ -156,6 +156,9 @@ def jacobian(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Fr
     return columns
 
 
+Point = tuple[Array, Array]  # parameters, innovations
+
+
 @np.errstate(over="ignore", invalid="ignore")  # a step into instability is seen by its cost
 def fit(
     likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts,
@@ -179,44 +182,6 @@ def fit(
     Returns:
         The fit.
     """
-    return _descent(likelihood, start, q, free, parts, iterations, most, bar)
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def settled(likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts) -> Fit:
-    """Return the best of three fits: from ``start``, where innovations counted as white lead, and from there.
-
-    A model that is far off leaves slow innovations, whose autoregression hides what is slow in the signals, its
-    own errors among it: such a fit stays where it is, or leaves the right values for wrong ones.
-
-    Args:
-        likelihood: of the record.
-        start: (parameters,) to start from.
-        q: process noise, as a share of the drive's rms torque.
-        free: parameters to fit.
-        parts: of the record: fitted, deciding, held out.
-
-    Returns:
-        The fit.
-    """
-    direct = fit(likelihood, start, q, free, parts)
-    white = _descent(likelihood, start, q, free, parts, None, 0)
-    if not np.all(np.isfinite(white.z)):
-        return direct
-    again = fit(likelihood, white.p, q, free, parts)
-    colour = colour_of(white.z, parts.fitted)
-    there = replace(_fit_at(likelihood, white.p, q, white.z, free, parts, colour), covariance=white.covariance)
-    return max((direct, again, there), key=lambda found: found.rank(parts))
-
-
-Point = tuple[Array, Array]  # parameters, innovations
-
-
-def _descent(
-    likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, iterations: int | None,
-    most: int, bar: float = -np.inf,
-) -> Fit:  # fmt: skip
-    """Return the best point of a descent whose innovations are whitened by an autoregression of order ``most``."""
     settings, part = likelihood.settings.fit, parts.fitted
     scales = np.array([f.scale for f in free])
     seen: list[Fit] = []  # at every point of the descent
@@ -259,6 +224,33 @@ def _descent(
     last = _fit_at(likelihood, p, q, z, free, parts, colour_of(z, part, most))
     seen.append(replace(last, covariance=seen[-1].covariance) if seen else last)
     return max(seen, key=lambda found: found.fitted)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def settled(likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts) -> Fit:
+    """Return the best of three fits: from ``start``, where innovations counted as white lead, and from there.
+
+    A model that is far off leaves slow innovations, whose autoregression hides what is slow in the signals, its
+    own errors among it: such a fit stays where it is, or leaves the right values for wrong ones.
+
+    Args:
+        likelihood: of the record.
+        start: (parameters,) to start from.
+        q: process noise, as a share of the drive's rms torque.
+        free: parameters to fit.
+        parts: of the record: fitted, deciding, held out.
+
+    Returns:
+        The fit.
+    """
+    direct = fit(likelihood, start, q, free, parts)
+    white = fit(likelihood, start, q, free, parts, most=0)
+    if not np.all(np.isfinite(white.z)):
+        return direct
+    again = fit(likelihood, white.p, q, free, parts)
+    colour = colour_of(white.z, parts.fitted)
+    there = replace(_fit_at(likelihood, white.p, q, white.z, free, parts, colour), covariance=white.covariance)
+    return max((direct, again, there), key=lambda found: found.rank(parts))
 
 
 def _fit_at(
@@ -306,7 +298,7 @@ def anneal(
     """
 
     def at_level(fitted: Fit) -> Fit:
-        return replace(fitted, validated=decided(likelihood, fitted, parts, levels)) if most else fitted
+        return replace(fitted, validated=decided(likelihood, fitted, parts, levels)) if most and parts.apart else fitted
 
     first = settled(likelihood, start, q, free, parts) if most else fit(likelihood, start, q, free, parts, most=0)
     at, best = list(levels).index(q), at_level(first)
