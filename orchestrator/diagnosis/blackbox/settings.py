@@ -27,6 +27,12 @@ class BoxSearchSettings(Settings, frozen=True):
         0.005
     )
     promise: Annotated[float, setting("least predicted gain for which an effect is fitted at all")] = 8.0
+    slight: Annotated[
+        float,
+        share(
+            "of what is first tried, a hundredth of the drive, below which an effort is a matter of the FMU's solver"
+        ),
+    ] = 1e-3
     ahead: Annotated[
         int, setting("effects of a step that a second is looked for beside, where none pays alone", ge=0)
     ] = 2
