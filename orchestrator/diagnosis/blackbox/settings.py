@@ -149,6 +149,9 @@ class RestSettings(Settings, frozen=True):
         float, setting("standard deviations of chance from which what is left follows from the drive: no disturbance")
     ] = 5.5
     driven_lags: Annotated[int, setting("samples of the inputs that it may follow from", ge=1)] = 24
+    solver: Annotated[float, share("port noise, of the drive, up to which what is left is a matter of the solver")] = (
+        1e-5
+    )
     stretches: Annotated[
         int, setting("parts of an output's range in each of which what is left may act in a way of its own", ge=2)
     ] = 12

@@ -176,9 +176,10 @@ def followed(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest)
     """
     problem, ladder, n = fitter.problem, fitter.ladder, fitter.problem.n
     read = problem.read([fit.model])[0]
-    if read is None or len(fit.J) < n or ladder.surrogate.order == 0:
+    share = ladder.share(fit.level)
+    if read is None or len(fit.J) < n or ladder.surrogate.order == 0 or share <= settings.solver:
         return 0.0, ""
-    known, share = Known(fitter, fit, n), ladder.share(fit.level)
+    known = Known(fitter, fit, n)
     levels = {fit.level, *(k for k in range(ladder.size) if ladder.colour(k) == 0.0 and ladder.share(k) <= share)}
     alone = {k: known.explains(k) for k in levels}
     best = 0.0, ""
