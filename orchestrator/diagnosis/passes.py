@@ -19,7 +19,7 @@ from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import far_off
-from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown
+from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown, refuted
 from orchestrator.diagnosis.verdict.remainder import Remainder, noise_floor, remainder, tails
 from orchestrator.plants.effects import Effect
 from orchestrator.records.model_file import Model
@@ -125,7 +125,10 @@ def _search(
     proof = proven.proof
     if logged is not plain:  # what putting the log right explains is no proof of an effect
         proof = Proof(horizons(likelihood, logged.p, plain.q, whole.held_out), proof.final)
-    unknown = search.stopped or is_unknown(left, floor_off, proof, named, bool(far), verdict)
+    why = refuted(floor_off, proof, far, verdict) if named else ""
+    if why:
+        withdrawn = (*withdrawn, f"nothing is named: {why}")
+    unknown = search.stopped or bool(why) or is_unknown(left, floor_off, proof, named, bool(far), verdict)
     if search.stopped:
         withdrawn = (
             f"the search was stopped after {settings.search.time_limit:g} s, in step {len(search.steps) + 1}: "

@@ -282,6 +282,29 @@ class BoxEffect:
         finer = self.kind.finer
         return self.kind.scales(self.scene) if finer is None else finer(tuple(values), self.scene)
 
+    @property
+    def amplitudes(self) -> int:
+        """Return in how many of its leading values the response to it is linear."""
+        return len(self.kind.parameters) if self.kind.linear else self.kind.amplitudes
+
+    def means(self, values: Array, least: float) -> bool:
+        """Tell whether values are within what the effect means, and its effort is no matter of rounding.
+
+        Args:
+            values: of the effect's parameters.
+            least: share of what is first tried that an effort must have.
+
+        Returns:
+            True when they are.
+        """
+        if self.kind.where in (INPUT, PORT) and self.amplitudes:
+            first = (
+                np.array(self.kind.starts(self.scene)[0][: self.amplitudes]) if self.kind.starts(self.scene) else 0.0
+            )
+            if np.all(np.abs(values[: self.amplitudes]) < least * np.abs(first)):
+                return False
+        return self.kind.plausible(tuple(values), self.scene)
+
     def bounded(self, values: Array) -> Array:
         """Return values no smaller than what the law allows.
 

@@ -27,6 +27,7 @@ from orchestrator.diagnosis.blackbox.verdict import (
     Rest,
     beginning_of,
     families_of,
+    followed,
     predicted,
     recovered,
     rest_of,
@@ -211,7 +212,7 @@ def _diagnosed(
             tried = [tried[0], (plain, found, found)]
     for other, found, _ in tried[1:]:
         if other is not search and best.model.effects and search.score(best) < found.total + settings.start.pays:
-            search, base, best = other, found, found
+            search, base, best = other, found, found if other.explained(found) else other.run(found)
     return _judged(problem, probe, search, base, best, begun, settings.rest)
 
 
@@ -339,6 +340,9 @@ def _doubted(fitter: Fitter, fit: BoxFit, rest: Rest, named: bool, settings: Res
         )
     if predicted(fitter, fit, settings) > settings.driven:
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
+    deviations, port = followed(fitter, fit, settings)
+    if deviations > settings.driven:
+        return replace(rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`",))
     gain, name, time = beginning_of(fitter, fit, settings)
     if gain > settings.begins:
         return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))

@@ -27,9 +27,115 @@ class Promise:
 Trial = tuple[BoxEffect, Array, int]
 """An effect, its values, and how many of the leading ones are amplitudes."""
 
+AMPLITUDES = 2
+"""Of one effect, in a pair, at most."""
 
-def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> list[Promise]:
-    """Return what every start of every effect promises on top of a fit, best first.
+
+@dataclass(frozen=True)
+class Pair:
+    """Starts of two effects, and what linearisation says that they would gain together."""
+
+    effects: tuple[BoxEffect, BoxEffect]
+    values: tuple[Array, Array]
+    gain: float
+    level: int
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """What every start of every effect does on top of a fit, and what it promises, best first."""
+
+    promises: list[Promise]
+    _known: "Known"
+    _trials: list[Trial]
+    _columns: list[Array | None]
+    _scanned: frozenset[int]
+
+    def pairs(self, least: float) -> list[Pair]:
+        """Return what two effects promise together where less noise is at the ports, best first.
+
+        Args:
+            least: gain from which they are told.
+
+        Returns:
+            The best pair of starts of each two effects.
+        """
+        share = self._known.fitter.ladder.share
+        now = share(self._known.start)
+        best: dict[tuple[str, str], Pair] = {}
+        for level in self._known.levels:
+            for pair in self._pairs_at(level, least) if share(level) < now else ():
+                one, other = (effect.label for effect in pair.effects)
+                key = (min(one, other), max(one, other))
+                if key not in best or pair.gain > best[key].gain:
+                    best[key] = pair
+        return sorted(best.values(), key=lambda pair: pair.gain, reverse=True)
+
+    def _pairs_at(self, level: int, least: float) -> list[Pair]:
+        """Return the pairs that promise more than ``least`` at a level of port noise, by a regression on each two."""
+        known, places = self._known, self._places()
+        if len(places) < 2:
+            return []
+        used = sorted({k for mine in places.values() for k in mine})
+        D = known.beside(level, np.stack([np.asarray(self._columns[k]) for k in used], axis=2))
+        sizes = np.append(np.sqrt(np.maximum(np.sum(D * D, axis=0), 1e-300)), 1.0)
+        D = np.hstack([D, np.zeros((len(D), 1))]) / sizes  # the last column is nothing: for starts that have but one
+        padded = [(*map(used.index, mine), *[len(used)] * (AMPLITUDES - len(mine))) for mine in places.values()]
+        one, other = np.triu_indices(len(places), 1)
+        both = np.array(padded)[np.stack([one, other], axis=1)].reshape(len(one), -1)
+        N, g = D.T @ D, D.T @ known.at(level)[1]
+        blocks = N[both[:, :, None], both[:, None, :]]
+        blocks[:, range(2 * AMPLITUDES), range(2 * AMPLITUDES)] += np.where(both == len(used), 1.0, 1e-9)
+        factors = np.linalg.solve(blocks, g[both][:, :, None])[:, :, 0]
+        gains = 0.5 * np.sum(factors * g[both], axis=1) + known.explains(level) - known.now
+        factors /= sizes[both]
+        starts = list(places)
+        lowest, highest = np.array([self._bounds(start) for start in starts]).T
+        leading = factors[:, [0, AMPLITUDES]]
+        mine = np.stack([one, other], axis=1)
+        stand = np.all((leading >= lowest[mine]) & (leading <= highest[mine]), axis=1)
+        found = []
+        for k in np.flatnonzero(stand & (gains > least)):
+            pair = starts[one[k]], starts[other[k]]
+            first, second = (self._trials[start][0] for start in pair)
+            if first.label != second.label:
+                values = self._grown(pair[0], factors[k, :AMPLITUDES]), self._grown(pair[1], factors[k, AMPLITUDES:])
+                found.append(Pair((first, second), values, float(gains[k]), level))
+        return found
+
+    def _places(self) -> dict[int, range]:
+        """Return the columns of each start, by its place, that has some and not too many."""
+        found, at = {}, 0
+        for start, (_, _, amplitudes) in enumerate(self._trials):
+            mine = range(at, at + max(amplitudes, 1))
+            at = mine.stop
+            if len(mine) <= AMPLITUDES and all(c is not None and np.any(c) for c in self._columns[at - len(mine) : at]):
+                found[start] = mine
+        return found
+
+    def _bounds(self, start: int) -> tuple[float, float]:
+        """Return between which factors the response to a start stands for that to others."""
+        own = self._known.fitter.settings.screen
+        effect, _, amplitudes = self._trials[start]
+        if amplitudes:
+            return -np.inf, np.inf
+        if start in self._scanned:
+            return 1.0 - own.exact, 1.0 + own.exact
+        return (own.smallest if effect.kind.shrinks else own.least), own.most
+
+    def _grown(self, start: int, factors: Array) -> Array:
+        """Return the values of a start, those in which the response is linear times their factors."""
+        effect, values, amplitudes = self._trials[start]
+        found = values.copy()
+        if amplitudes:
+            found[:amplitudes] = values[:amplitudes] * factors[:amplitudes]
+        elif effect.kind.shrinks and start not in self._scanned:
+            found[0] = values[0] * factors[0]
+        return found
+
+
+def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> Screened:
+    """Return what every start of every effect promises on top of a fit.
 
     Args:
         fitter: gives the filters and the FMU.
@@ -37,7 +143,7 @@ def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> li
         before: fit of the model before.
 
     Returns:
-        The promises.
+        The promises, and what they rest on.
     """
     present = {effect.label for effect in before.model.effects}
     replaced = {f"{effect.kind.needs}@{effect.place}" for effect in before.model.effects}
@@ -48,7 +154,7 @@ def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> li
     for effect in free:
         for start in found.get(effect) or effect.kind.starts(effect.scene):
             values = np.array(start)
-            amplitudes = _amplitude_count(effect)
+            amplitudes = effect.amplitudes
             trials.append((effect, values, amplitudes))
             for a in range(max(amplitudes, 1)):
                 one = values.copy()
@@ -58,12 +164,13 @@ def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> li
     rows = len(before.y)
     runs = fitter.problem.simulate(models, rows)
     columns: list[Array | None] = [None if run is None else (run - before.y) / fitter.problem.noise for run in runs]
-    promises = _promises(_Known(fitter, before, rows), trials, columns)
+    known = Known(fitter, before, rows)
+    promises = _promises(known, trials, columns)
     near = max(fitter.horizon(before.y), rows // 16)
     if near < fitter.settings.screen.straight * rows:  # beyond it nothing is linear any more
-        close = _promises(_Known(fitter, before, near), trials, [None if c is None else c[:near] for c in columns])
+        close = _promises(Known(fitter, before, near), trials, [None if c is None else c[:near] for c in columns])
         promises = [p for pair in itertools.zip_longest(close, promises) for p in pair if p is not None]
-    return promises
+    return Screened(promises, known, trials, columns, frozenset(n for n, t in enumerate(trials) if t[0] in found))
 
 
 def scanned(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> dict[BoxEffect, list[tuple[float, ...]]]:
@@ -108,7 +215,7 @@ class _Sight:
         problem, self._rows = fitter.problem, len(before.y)
         self._table = problem.table(before.model, series_of(problem, self._rows))
         self._read = problem.read_finely(before.model, self._rows)
-        self._known = _Known(fitter, before, self._rows)
+        self._known = Known(fitter, before, self._rows)
 
     def gains(self, effect: BoxEffect, values: Sequence[float], levels: Sequence[int] = ()) -> dict[int, Promise]:
         """Return what each of ``values`` promises, by its place; ``levels`` of port noise: default all."""
@@ -123,7 +230,7 @@ class _Sight:
         at = problem.runner.inputs.index(name)
         place = problem.inputs.index(name) if at_input else problem.noise_places.index(at)
         answers = surrogate.response(pushes / problem.drive([at])[0], place)
-        amplitudes = _amplitude_count(effect)
+        amplitudes = effect.amplitudes
         trials = [(effect, np.array(_with(effect, v)), amplitudes) for v in values]
         columns = [answers[:, :, k] for k in range(answers.shape[2])]
         found = _promises(self._known, trials, columns, exact=True, levels=levels)
@@ -176,7 +283,7 @@ def _along(quanta: Array, u: Array, felt: Array) -> Array:
     return np.asarray((errors @ felt) ** 2 / np.maximum(np.sum(errors * errors, axis=1), 1e-300)[:, None])
 
 
-class _Known:
+class Known:
     """What effects are looked for beside: the residual of one fit, and what its own values explain of it."""
 
     def __init__(self, fitter: Fitter, before: BoxFit, rows: int) -> None:
@@ -192,7 +299,14 @@ class _Known:
         self._made: dict[int, tuple[Array, Array]] = {}
 
     def at(self, level: int) -> tuple[Array, Array]:
-        """Return an orthogonal base of what the values explain, and the residual without it."""
+        """Return an orthogonal base of what the values explain, and the residual without it.
+
+        Args:
+            level: of port noise.
+
+        Returns:
+            Shapes (rows and values, columns) and (rows and values,).
+        """
         if level not in self._made:
             white = self.fitter.ladder[level].whiten(self._block).reshape(-1, self._block.shape[2])
             e = np.concatenate([white[:, 0], self._missing])
@@ -202,8 +316,28 @@ class _Known:
             self._made[level] = Q, e - Q @ (Q.T @ e)
         return self._made[level]
 
+    def explains(self, level: int) -> float:
+        """Return the log-likelihood at a level, the values at their best.
+
+        Args:
+            level: of port noise.
+
+        Returns:
+            The log-likelihood, without its constant.
+        """
+        _, e = self.at(level)
+        return -0.5 * float(e @ e) - float(np.sum(self.fitter.ladder[level].half_log[: self.rows]))
+
     def beside(self, level: int, columns: Array) -> Array:
-        """Return columns (rows, outputs, c), whitened, without what the values explain of them."""
+        """Return columns, whitened, without what the values explain of them.
+
+        Args:
+            level: of port noise.
+            columns: (rows, outputs, c), in units of the noise.
+
+        Returns:
+            Shape (rows and values, c).
+        """
         Q, _ = self.at(level)
         white = self.fitter.ladder[level].whiten(columns).reshape(-1, columns.shape[2])
         D = np.concatenate([white, np.zeros((len(self._missing), columns.shape[2]))])
@@ -211,11 +345,11 @@ class _Known:
 
 
 def _promises(
-    known: _Known, trials: Sequence[Trial], columns: Sequence[Array | None], exact: bool = False,
+    known: Known, trials: Sequence[Trial], columns: Sequence[Array | None], exact: bool = False,
     levels: Sequence[int] = (),
 ) -> list[Promise]:  # fmt: skip
     """Return what each trial promises, best first; ``exact``: its values are not scaled; ``levels``: default all."""
-    fitter, own = known.fitter, known.fitter.settings.screen
+    own = known.fitter.settings.screen
     best: dict[int, Promise] = {}
     usable = [k for k, c in enumerate(columns) if c is not None and np.any(c)]
     if not usable:
@@ -226,8 +360,7 @@ def _promises(
         _, e = known.at(level)
         D = known.beside(level, block)
         along, sizes = D.T @ e, np.sum(D * D, axis=0)
-        log_det = float(np.sum(fitter.ladder[level].half_log[: known.rows]))
-        base = -0.5 * float(e @ e) - log_det - known.now
+        base = known.explains(level) - known.now
         at = 0
         for n, (effect, values, amplitudes) in enumerate(trials):
             mine = [place[at + a] for a in range(max(amplitudes, 1)) if at + a in place]
@@ -255,11 +388,6 @@ def _levels(fitter: Fitter, now: int) -> list[int]:
     ladder = fitter.ladder
     lower = [k for k in range(ladder.size) if ladder.colour(k) == 0.0 and ladder.share(k) < ladder.share(now)]
     return sorted({now, 0, *lower[1::3], *lower[-1:]})
-
-
-def _amplitude_count(effect: BoxEffect) -> int:
-    """Return in how many of its leading values the response to an effect is linear."""
-    return len(effect.kind.parameters) if effect.kind.linear else effect.kind.amplitudes
 
 
 def _scaled(along: float, size: float, bounds: tuple[float, float]) -> tuple[float, Array]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
 from orchestrator.diagnosis.blackbox.problem import BoxModel
-from orchestrator.diagnosis.blackbox.screening import Promise, screened
+from orchestrator.diagnosis.blackbox.screening import Pair, Promise, Screened, screened
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings
 
 Array = NDArray[np.float64]
@@ -25,6 +25,8 @@ class SearchStep:
     accepted: bool
     unkept: bool = False
     """An effect was promised to pay where less noise is at the ports, and no fit came near it."""
+    pairs: tuple[Pair, ...] = ()
+    """Where nothing was accepted: two effects that promise to pay together where less noise is at the ports."""
 
 
 @dataclass
@@ -146,28 +148,42 @@ class BoxSearch:
     def _ahead(self, step: SearchStep, base: BoxFit) -> list[BoxFit]:
         """Return models of two effects more without noise at the ports, where none pays alone beside that noise."""
         own, before, share = self.settings, step.before, self.fitter.ladder.share
+        found = [
+            self._enriched(self.pruned(fit, base), base) for pair in step.pairs for fit in self._joined(before, pair)
+        ]
         if not own.quiet < share(before.level) <= own.ahead_to:
-            return []
+            return self._two_more(found, before)
         first: dict[frozenset[str], BoxFit] = {}
         for fit in step.tried:
             if self.score(fit) - self.score(before) > own.doubtful:
                 first.setdefault(labels(fit), fit)
-        found: list[BoxFit] = []
         for fit in list(first.values())[: own.ahead]:
             if self.late or any(self.explained(pair) for pair in found):
                 break
             after = self.step(fit, base)
             self.steps.append(after)
             found += [self._enriched(self.pruned(pair, base), base) for pair in after.tried[:1] if after.accepted]
-        more = len(before.model.effects) + 1
+        return self._two_more(found, before)
+
+    def _two_more(self, found: Sequence[BoxFit], before: BoxFit) -> list[BoxFit]:
+        """Return those of two effects more that pay together, and leave less noise at the ports, next to none."""
+        own, share = self.settings, self.fitter.ladder.share
         return [
             pair
             for pair in found
-            if len(pair.model.effects) > more
+            if len(pair.model.effects) > len(before.model.effects) + 1
             and share(pair.level) <= own.quiet
+            and share(pair.level) < share(before.level)
             and self.score(pair) - self.score(before) > 2.0 * own.pays
             and pair.decided - before.decided > own.decided
         ]
+
+    def _joined(self, before: BoxFit, pair: Pair) -> list[BoxFit]:
+        """Return the fit of two effects at once, at the level at which they were promised."""
+        model = before.model
+        for effect, values in zip(pair.effects, pair.values, strict=True):
+            model = model.extended(effect, effect.bounded(values))
+        return [] if self.late else [self.fitter.settled(fit) for fit in self._led_to(before, model, pair.level)]
 
     def _on_all(self, fit: BoxFit) -> BoxFit:
         """Return a fit to all that is looked at; what decides is the rest."""
@@ -200,10 +216,15 @@ class BoxSearch:
         return decided > max(s.decided, s.decided_share * fitted) and fitted > s.penalty
 
     def _least(self, fit: BoxFit, before: BoxFit, base: BoxFit) -> float:
-        """Return the gain that what ``fit`` has more than ``before`` must bring."""
-        s = self.settings
-        quiet = self.fitter.ladder.share(fit.level) <= s.quiet
-        return max(s.pays if quiet else s.pays_disturbed, s.leaves * (before.total - base.total))
+        """Return the gain that what ``fit`` has more than ``before`` must bring.
+
+        A law that is not exact leaves something that no other takes away whole: it is asked for less where it does.
+        """
+        s, share = self.settings, self.fitter.ladder.share
+        quiet = share(fit.level) <= s.quiet
+        least = max(s.pays if quiet else s.pays_disturbed, s.leaves * (before.total - base.total))
+        whole = quiet and share(before.level) > s.quiet and self.explained(fit)
+        return min(least, s.pays_disturbed) if whole else least
 
     def step(self, before: BoxFit, base: BoxFit) -> SearchStep:
         """Fit the most promising effects on top of ``before``.
@@ -215,10 +236,11 @@ class BoxSearch:
         Returns:
             What was tried, and what was accepted.
         """
-        promises = self.screen(before)
+        screen = self.screen(before)
+        promises = screen.promises
         short: dict[str, list[Promise]] = {}
         for promise in promises:
-            if promise.gain < self.settings.promise:
+            if promise.gain < self.settings.promise or not promise.effect.means(promise.values, self.settings.slight):
                 continue
             if promise.effect.label in short or len(short) < self.settings.shortlist:
                 mine = short.setdefault(promise.effect.label, [])
@@ -236,7 +258,9 @@ class BoxSearch:
             if paying:
                 tried = [*paying, *(fit for fit in tried if fit not in paying)]
                 accepted = True
-        return SearchStep(before, tuple(tried), accepted, bool(unkept))
+        disturbed = 0.0 < self.fitter.ladder.share(before.level) <= self.settings.ahead_to
+        pairs = screen.pairs(2.0 * self.settings.pays) if disturbed and not accepted else []
+        return SearchStep(before, tuple(tried), accepted, bool(unkept), tuple(pairs[: self.settings.ahead]))
 
     def _unkept(self, before: BoxFit, short: dict[str, list[Promise]], tried: Sequence[BoxFit]) -> list[Promise]:
         """Return the best promises of less noise at the ports that would pay, where no fit has come near them."""
@@ -251,9 +275,7 @@ class BoxSearch:
         found = [
             p
             for p in best
-            if worth(p) > least
-            and share(p.level) < share(before.level)
-            and p.effect.kind.plausible(tuple(p.values), p.effect.scene)
+            if worth(p) > least and share(p.level) < share(before.level) and p.effect.means(p.values, own.slight)
         ]
         return [] if self.late else sorted(found, key=worth, reverse=True)[: own.led]
 
@@ -262,14 +284,20 @@ class BoxSearch:
 
         Where noise at the ports explains much, a first step that is not exact makes more of it the likelier level.
         """
-        fitter, model = self.fitter, before.model.extended(promise.effect, promise.effect.bounded(promise.values))
-        self.progress(promise.effect.label)
+        model = before.model.extended(promise.effect, promise.effect.bounded(promise.values))
+        return self._led_to(before, model, promise.level)
+
+    def _led_to(self, before: BoxFit, model: BoxModel, level: int) -> list[BoxFit]:
+        """Return the fit of a model that has more effects than ``before``, led at a level of noise at the ports."""
+        fitter, new = self.fitter, len(before.model.effects)
+        self.progress(" and ".join(effect.label for effect in model.effects[new:]))
         often = fitter.settings.fit.iterations
-        whole = fitter.fit(model, promise.level, before.J, fitter.parts.looked_at, held=often)
-        found = None if whole is None else fitter.fit(whole.model, promise.level, whole.J, y=whole.y, held=2)
-        if found is None or not promise.effect.kind.plausible(tuple(found.model.values[-1]), promise.effect.scene):
+        whole = fitter.fit(model, level, before.J, fitter.parts.looked_at, held=often)
+        found = None if whole is None else fitter.fit(whole.model, level, whole.J, y=whole.y, held=2)
+        if found is None:
             return []
-        return [found]
+        added = zip(found.model.effects[new:], found.model.values[new:], strict=True)
+        return [found] if all(effect.means(values, self.settings.slight) for effect, values in added) else []
 
     def _tried(self, before: BoxFit, short: dict[str, list[Promise]]) -> list[BoxFit]:
         """Return a fit of each effect: all of them quickly, the best ones to the end."""
@@ -308,7 +336,7 @@ class BoxSearch:
         return self.score(fit) > least or not (done or self.explained(before))
 
     def explained(self, fit: BoxFit) -> bool:
-        """Tell whether a model leaves no more than measurement noise.
+        """Tell whether a model leaves no more than measurement noise, and no more at the ports than a disturbance.
 
         Args:
             fit: of a model.
@@ -316,6 +344,8 @@ class BoxSearch:
         Returns:
             True when it leaves no more.
         """
+        if self.fitter.ladder.share(fit.level) > self.settings.ahead_to:
+            return False
         seen = len(self.fitter.parts.looked_at) * len(self.fitter.problem.outputs)
         return fit.fitted + fit.decided > -0.5 * seen - self.settings.noise_margin * np.sqrt(0.5 * seen)
 
@@ -326,7 +356,7 @@ class BoxSearch:
             return []
         if promise.effect.kind.finer is not None:
             found = self.fitter.combed(found)
-        if promise.effect.kind.plausible(tuple(found.model.values[-1]), promise.effect.scene):
+        if promise.effect.means(found.model.values[-1], self.settings.slight):
             return [found]
         simple = self._simpler(found)
         return [] if simple is None else [simple]
@@ -411,14 +441,14 @@ class BoxSearch:
         least = self.settings.near * (self.score(fit) - self.score(base))
         return self.score(fit) - self.score(without) > max(least, self._least(fit, without, base))
 
-    def screen(self, before: BoxFit) -> list[Promise]:
-        """Return what every start of every effect promises on top of a fit, best first.
+    def screen(self, before: BoxFit) -> Screened:
+        """Return what every start of every effect promises on top of a fit.
 
         Args:
             before: fit of the model before.
 
         Returns:
-            The promises.
+            The promises, and what they rest on.
         """
         self.progress("screening")
         return screened(self.fitter, self.effects, before)

@@ -27,6 +27,12 @@ class BoxSearchSettings(Settings, frozen=True):
         0.005
     )
     promise: Annotated[float, setting("least predicted gain for which an effect is fitted at all")] = 8.0
+    slight: Annotated[
+        float,
+        share(
+            "of what is first tried, a hundredth of the drive, below which an effort is a matter of the FMU's solver"
+        ),
+    ] = 1e-3
     ahead: Annotated[
         int, setting("effects of a step that a second is looked for beside, where none pays alone", ge=0)
     ] = 2
@@ -143,6 +149,9 @@ class RestSettings(Settings, frozen=True):
         float, setting("standard deviations of chance from which what is left follows from the drive: no disturbance")
     ] = 5.5
     driven_lags: Annotated[int, setting("samples of the inputs that it may follow from", ge=1)] = 24
+    solver: Annotated[float, share("port noise, of the drive, up to which what is left is a matter of the solver")] = (
+        1e-5
+    )
     stretches: Annotated[
         int, setting("parts of an output's range in each of which what is left may act in a way of its own", ge=2)
     ] = 12

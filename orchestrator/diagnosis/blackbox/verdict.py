@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
+from orchestrator.diagnosis.blackbox.screening import Known
 from orchestrator.diagnosis.blackbox.search import BoxSearch, labels
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
 
@@ -157,6 +158,45 @@ def predicted(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest
     together = float((np.sum(power) - count) / np.sqrt(2.0 * count))
     alone = np.abs(block.T @ e) / size / np.sqrt(len(e))
     return max(together, float(np.max(alone)))
+
+
+def followed(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> tuple[float, str]:
+    """Return by how many standard deviations of chance a law of the motion at a port does better than noise there.
+
+    Noise at a port takes up what an effect outside the bank does. Efforts of any size in each stretch of the position,
+    in proportion to the speed and constant, are fitted in its place, with less noise: the FMU's surrogate answers.
+
+    Args:
+        fitter: gives the filters, the surrogate and the record.
+        fit: of a model.
+        settings: in how many stretches of the position.
+
+    Returns:
+        The number of standard deviations, and the port.
+    """
+    problem, ladder, n = fitter.problem, fitter.ladder, fitter.problem.n
+    read = problem.read([fit.model])[0]
+    share = ladder.share(fit.level)
+    if read is None or len(fit.J) < n or ladder.surrogate.order == 0 or share <= settings.solver:
+        return 0.0, ""
+    known = Known(fitter, fit, n)
+    levels = {fit.level, *(k for k in range(ladder.size) if ladder.colour(k) == 0.0 and ladder.share(k) <= share)}
+    alone = {k: known.explains(k) for k in levels}
+    best = 0.0, ""
+    for name, port in problem.map.ports.items():
+        y = read[:, problem.runner.reads.index(port.position)]
+        cells = np.quantile(y, np.linspace(0.0, 1.0, settings.stretches + 1)[1:-1])
+        here = np.searchsorted(cells, y)[:, None] == np.arange(settings.stretches)
+        pushes = np.hstack([here * np.gradient(y)[:, None], here])[:-1]
+        place = problem.noise_places.index(problem.runner.inputs.index(port.input))
+        answers = ladder.surrogate.response(pushes / np.maximum(np.max(np.abs(pushes), axis=0), 1e-300), place)
+        for k in levels:
+            U, s, _ = np.linalg.svd(known.beside(k, answers), full_matrices=False)
+            U = U[:, s > 1e-9 * s[0]]
+            gain = alone[k] - max(alone.values()) + 0.5 * float(np.sum((U.T @ known.at(k)[1]) ** 2))
+            count = U.shape[1] / 2.0
+            best = max(best, (float((gain - count) / np.sqrt(max(count, 0.5))), name))
+    return best
 
 
 def families_of(search: BoxSearch, best: BoxFit) -> tuple[tuple[str, ...], ...]:

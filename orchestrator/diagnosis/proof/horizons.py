@@ -159,6 +159,19 @@ class Horizons:
         own, before = (np.mean((h.errors[first:] / self.noise) ** 2, axis=1) - 1.0 for h in (self, other))
         return np.asarray(1.0 - np.maximum(own, 0.0) / np.maximum(before, 1e-9))
 
+    def follows(self, share: float) -> bool:
+        """Tell whether the model follows the motion: over the whole part, or over half a second and more.
+
+        Args:
+            share: of the variance, or of the squared error of a motion at constant speed, that it must explain.
+
+        Returns:
+            True when it does, for one signal at least.
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ahead = 1.0 - (self.errors[self.long :] / self.plain[self.long :]) ** 2
+            return bool(np.any(self.r_squared > share) or np.any(ahead > share))
+
     def is_hopeless(self, share: float) -> bool:
         """Tell whether the model predicts hardly better than a motion at constant speed, and not the whole part.
 
