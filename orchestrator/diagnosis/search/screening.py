@@ -31,7 +31,8 @@ class Screen:
 
     def __init__(self, likelihood: RecordLikelihood, model: Fit, parts: Parts, colour: Colour | None = None) -> None:
         """Take the Jacobian of the model's free parameters once; ``colour`` (or the model's) whitens innovations."""
-        self._likelihood, self._plant, self._model, self._part = likelihood, likelihood.plant, model, parts.fitted
+        self._plant, self._model, self._part = likelihood.plant, model, parts.fitted
+        self._likelihood = likelihood.over(min(likelihood.stop, parts.fitted.stop))  # nothing else is looked at
         colour = colour or model.colour
         self._colour = colour
         wide, inner = reaching_back(parts.fitted, colour.order)
