@@ -119,7 +119,9 @@ def _search(
     left = replace(left, growth=growth if best.effects else max(growth, left.growth))
     floor = _over_floor(likelihood, proven.efficient, parts, lowest)
     verdict = settings.verdict
-    floor_off = floor > verdict.least_missing * (parts.seen.stop - parts.seen.start)
+    per_sample = floor / (parts.seen.stop - parts.seen.start)
+    # A floor far above what is left was made of a noise that is overrated: it says nothing then.
+    floor_off = per_sample > verdict.least_missing or per_sample < -verdict.overrated
     far = far_off(model, final.p, verdict)
     named = any(not effect.measurement for effect in best.effects)
     proof = proven.proof

@@ -189,6 +189,9 @@ class VerdictSettings(Settings, frozen=True):
         float, share("of the missing log-likelihood; right models recover over 0.75, wrong under 0.2")
     ] = 0.4
     least_missing: Annotated[float, setting("missing log-likelihood per sample below which nothing is left")] = 0.05
+    overrated: Annotated[
+        float, setting("surplus per sample from which the noise was rated too large by half", gt=0)
+    ] = 0.5
     grown: Annotated[float, setting("times larger innovations on later parts that tell of a change with time")] = 3.0
     structured: Annotated[
         float, setting("out-of-sample gain from which what is left is no noise (four standard errors)")
