@@ -340,8 +340,8 @@ def _doubted(fitter: Fitter, fit: BoxFit, rest: Rest, named: bool, settings: Res
         )
     if predicted(fitter, fit, settings) > settings.driven:
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
-    deviations, port = followed(fitter, fit, settings)
-    if deviations > settings.driven:
+    gain, port = followed(fitter, fit, settings)
+    if gain > 0.0:
         return replace(rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`",))
     gain, name, time = beginning_of(fitter, fit, settings)
     if gain > settings.begins:
