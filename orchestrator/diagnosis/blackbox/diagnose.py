@@ -15,10 +15,13 @@ from orchestrator.diagnosis.blackbox.estimates import (
     estimates_of,
     misfits,
 )
-from orchestrator.diagnosis.blackbox.fitting import BoxFit, BoxParts, Fitter, Ladder, interleaved, parts_of
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.mapping import Map
+from orchestrator.diagnosis.blackbox.model import BoxModel, Data
+from orchestrator.diagnosis.blackbox.parts import BoxParts, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
-from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
+from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
 from orchestrator.diagnosis.blackbox.sites import effects_of
@@ -32,6 +35,7 @@ from orchestrator.diagnosis.blackbox.verdict import (
     recovered,
     rest_of,
 )
+from orchestrator.diagnosis.blackbox.whitening import Ladder
 
 Array = NDArray[np.float64]
 

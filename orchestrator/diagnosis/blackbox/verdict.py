@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
-from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.screening import Known
 from orchestrator.diagnosis.blackbox.search import BoxSearch, labels
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
-from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter, parts_of
-from orchestrator.diagnosis.blackbox.problem import BoxModel
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel
+from orchestrator.diagnosis.blackbox.parts import parts_of
 from orchestrator.diagnosis.blackbox.screening import Known, Screened
 from orchestrator.diagnosis.blackbox.verdict import followed
 from orchestrator.diagnosis.blackbox.whitening import Ladder, Surrogate
