@@ -250,7 +250,12 @@ def _last(search: BoxSearch, fit: BoxFit) -> BoxFit:
     """Return a fit over all rows that were looked at."""
     fitter = search.fitter
     if search.last is None or search.last[0] is not fit:
-        found = fitter.fit(fit.model, fit.level, None, fitter.parts.looked_at, iterations=4)
+        seen = fitter.parts.looked_at
+        found = fitter.fit(fit.model, fit.level, None, seen, iterations=4)
+        at = len(fit.model.p)
+        for effect in fit.model.effects:  # the rows that decided tell more of a value that acts in steps
+            found = fitter.combed(found, at, seen) if found is not None and effect.kind.finer is not None else found
+            at += len(effect.kind.parameters)
         search.last = fit, found or fit
     return search.last[1]
 

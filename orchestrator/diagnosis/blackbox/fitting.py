@@ -153,7 +153,7 @@ class Fitter(Likelihood):
             fit = again if again is not None and again.total > fit.total else fit
         return fit
 
-    def combed(self, fit: BoxFit, at: int = -1) -> BoxFit:
+    def combed(self, fit: BoxFit, at: int = -1, rows: Rows | None = None) -> BoxFit:
         """Return a fit one of whose values has been looked for by runs, where no derivative leads to it.
 
         What comes in steps (a quantum) is right or wrong sample by sample: its likelihood is a comb with a long tooth.
@@ -161,6 +161,7 @@ class Fitter(Likelihood):
         Args:
             fit: of a model with such a value, nearly right.
             at: its place among all values.
+            rows: what is fitted (default: the fitted part), as it was in ``fit``.
 
         Returns:
             The fit, with the parameters fitted again.
@@ -174,15 +175,16 @@ class Fitter(Likelihood):
             runs = self.problem.simulate(models, self.parts.seen)
             teeth = [(model, y) for model, y in zip(models, runs, strict=True) if y is not None]
             if teeth:
-                place, k = self._longest([y for _, y in teeth], np.delete(fit.J[: self.parts.seen], at, axis=2))
-                again = self.fit(teeth[place][0], k, y=teeth[place][1], held=2)
+                J = np.delete(fit.J[: self.parts.seen], at, axis=2)
+                place, k = self._longest([y for _, y in teeth], J, self.parts.fitted if rows is None else rows)
+                again = self.fit(teeth[place][0], k, rows=rows, y=teeth[place][1], held=2)
                 fit = again if again is not None and again.total > fit.total else fit
             width *= own.finer
         return fit
 
-    def _longest(self, runs: Sequence[Array], J: Array) -> tuple[int, int]:
+    def _longest(self, runs: Sequence[Array], J: Array, rows: Rows) -> tuple[int, int]:
         """Return the free run that is likeliest once all other values follow, and the level at which it is."""
-        rows, found = self.parts.fitted, []
+        found = []
         block = np.concatenate([J, *(self.problem.residual(y)[:, :, None] for y in runs)], axis=2)
         for k in range(min(len(self.ladder.shares), self.ladder.size)):
             white = self.ladder[k].whiten(block)[rows].reshape(-1, block.shape[2])
