@@ -351,7 +351,9 @@ def _doubted(fitter: Fitter, fit: BoxFit, rest: Rest, named: bool, settings: Res
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
     gain, port = followed(fitter, fit, settings)
     if gain > 0.0:
-        return replace(rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`",))
+        return replace(
+            rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`, or from the time",)
+        )
     gain, name, time = beginning_of(fitter, fit, settings)
     if gain > settings.begins:
         return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))

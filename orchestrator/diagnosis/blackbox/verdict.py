@@ -162,10 +162,11 @@ def predicted(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest
 
 
 def followed(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> tuple[float, str]:
-    """Return how much better a law of the motion at a port does than noise there, the choice of its values paid for.
+    """Return how much better a law of the motion or of time does than noise at a port, its values paid for.
 
     Noise at a port takes up what an effect outside the bank does. Efforts of any size in each stretch of the position,
-    in proportion to the speed, constant, or both, are fitted in its place, with less noise, on the FMU's surrogate.
+    in proportion to the speed, constant, or both, and in each stretch of time, are fitted in its place, with less
+    noise, on the FMU's surrogate.
 
     Args:
         fitter: gives the filters, the surrogate and the record.
@@ -188,12 +189,14 @@ def followed(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest)
         y = read[:, problem.runner.reads.index(port.position)]
         cells = np.quantile(y, np.linspace(0.0, 1.0, settings.stretches + 1)[1:-1])
         here = np.searchsorted(cells, y)[:, None] == np.arange(settings.stretches)
-        pushes = np.hstack([here * np.gradient(y)[:, None], here])[:-1]
+        when = (np.arange(n) * settings.stretches // n)[:, None] == np.arange(settings.stretches)
+        pushes = np.hstack([here * np.gradient(y)[:, None], here, when])[:-1]
         place = problem.noise_places.index(problem.runner.inputs.index(port.input))
         answers = ladder.surrogate.response(pushes / np.maximum(np.max(np.abs(pushes), axis=0), 1e-300), place)
         for k in levels:
             white, e = known.beside(k, answers), known.at(k)[1]
-            for part in (slice(settings.stretches), slice(settings.stretches, None), slice(None)):
+            count = settings.stretches
+            for part in (slice(count), slice(count, 2 * count), slice(2 * count), slice(2 * count, 3 * count)):
                 U, s, _ = np.linalg.svd(white[:, part], full_matrices=False)
                 U = U[:, s > 1e-9 * s[0]]
                 gain = alone[k] - max(alone.values()) + 0.5 * float(np.sum((U.T @ e) ** 2))

@@ -85,6 +85,14 @@ def test_drag_in_one_spot_is_no_disturbance() -> None:
     assert followed(own, fit)[0] > 0.0
 
 
+def test_an_effort_that_comes_is_no_disturbance() -> None:
+    coming = np.where(np.arange(ROWS) > 430, 1e-2, 0.0)
+    own = fitter(answer(coming) + noise(5))
+    fit = plain(own)
+    assert own.ladder.share(fit.level) > 1e-5
+    assert followed(own, fit)[0] > 0.0
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_disturbance_follows_no_law_of_the_motion(seed: int) -> None:
     pushes = 1e-2 * np.random.default_rng(10 + seed).normal(size=ROWS)
