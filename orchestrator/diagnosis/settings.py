@@ -205,7 +205,10 @@ class VerdictSettings(Settings, frozen=True):
     hopeless: Annotated[
         float, share("error over that of a motion at constant speed, and R2, beyond which nothing is predicted")
     ] = 0.5
-    good: Annotated[float, share("R2 of the free run over the held-out part below which trust is amber")] = 0.9
+    good: Annotated[
+        float,
+        share("R2 of the free run over the held-out part below which trust is amber, and beside a rest nothing named"),
+    ] = 0.9
     notable_misfit: Annotated[
         float, setting("times the noise: laws of friction and contact that are nearly right leave up to two", ge=1)
     ] = 3.0

@@ -23,6 +23,9 @@ from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.numba_cache import kept
 from orchestrator.shared.output import write_text
 
+INLINED = ("rates", "elastic_torque", "motor_torque", "load_torque")
+"""Functions whose call costs more than their body: every stage of every step makes it."""
+
 _PACKAGE = pyfmu_sources.__name__
 _SOURCES = Path(pyfmu_sources.__file__).parent
 
@@ -58,7 +61,7 @@ def compiled(name: str) -> ModuleType:
         home = value.__module__.rpartition(".")[2]
         if home == name:
             value.__module__ = full_name
-            setattr(copy, attribute, kept()(value))
+            setattr(copy, attribute, kept(forceinline=attribute in INLINED)(value))
         elif value.__module__.startswith(_PACKAGE + "."):
             setattr(copy, attribute, getattr(compiled(home), attribute))
     return copy

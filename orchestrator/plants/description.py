@@ -338,12 +338,11 @@ class Plant:
         plain = self.extended([entry.default for entry in self.table])
         for name in self.linear:
             plain[self.index(name)] = p[self.index(name)]
-        flat = tuple(plain.tolist())
         columns = []
         for place in self.states:
             x = [0.0] * STATES
             x[place] = 1.0
-            rate = rates(tuple(x), (0.0, 0.0), flat, 0.0)
+            rate = rates(tuple(x), (0.0, 0.0), plain, 0.0)
             columns.append([rate[s] for s in self.states])
         return np.array(columns).T
 

@@ -154,6 +154,8 @@ def with_law(plant: Plant, clocked: bool = False) -> Plant:
 def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
     from numba import njit
 
+    from orchestrator.shared.numba_cache import kept
+
     friction, rates, presliding = plant.stage()
     motor, last = plant.bodies[0], plant.bodies[-1]
     J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)
@@ -170,7 +172,7 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
         share = (s - p[knot_at + n - 1]) / (p[knot_at + n] - p[knot_at + n - 1])
         return float(p[value_at + n - 1] + share * (p[value_at + n] - p[value_at + n - 1]))
 
-    @njit(error_model="numpy")
+    @kept(error_model="numpy")
     def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
         r = rates(x, signs, p, u)
         code = int(p[first])
@@ -211,11 +213,11 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
 
 
 def _runner(plant: Plant) -> Any:
-    from numba import njit
+    from orchestrator.shared.numba_cache import kept
 
     rest_of, reach_of, sample = sample_of(plant)
 
-    @njit(error_model="numpy", nogil=True)
+    @kept(error_model="numpy", nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
         rest, reach = rest_of(p), reach_of(p)

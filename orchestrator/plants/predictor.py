@@ -21,6 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
+from orchestrator.shared.numba_cache import kept
 
 Array = NDArray[np.float64]
 
@@ -215,7 +216,7 @@ def predictor_of(plant: Plant) -> Any:
     """
     rest_of, reach_of, sample = sample_of(plant)
 
-    @njit(error_model="numpy", nogil=True)
+    @kept(error_model="numpy", nogil=True)
     def predict(
         y: Array, early: Array, late: Array, first: float, p: Any, h: float, substeps: Any, gains: Array, offsets: Any,
         start: Any, innovations: Array, states: Array,
@@ -248,7 +249,7 @@ def coarse_runner_of(plant: Plant) -> Any:
     """
     rest_of, reach_of, sample = sample_of(plant)
 
-    @njit(error_model="numpy", nogil=True)
+    @kept(error_model="numpy", nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, substeps: Any, out: Array) -> None:
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7])
         rest, reach = rest_of(p), reach_of(p)
@@ -314,7 +315,7 @@ def follower_of(plant: Plant) -> Any:
             x[6] + wide[6], x[7],
         )  # fmt: skip
 
-    @njit(error_model="numpy", nogil=True)
+    @kept(error_model="numpy", nogil=True)
     def follow(
         y: Array, early: Array, late: Array, first: float, p: Any, h: float, substeps: Any, offsets: Any, start: Any,
         places: Any, measured: Any, P: Array, Q: Array, R: Array, gains: Array, roots: Array,
@@ -337,8 +338,8 @@ def follower_of(plant: Plant) -> Any:
             if m > 1:
                 error[1] = y[n, 1] - x[2] - offsets[1]
             x = moved(x, places, gain @ error)
-            kept = identity - gain @ C
-            P = kept @ P @ kept.T + gain @ R @ gain.T
+            unmeasured = identity - gain @ C
+            P = unmeasured @ P @ unmeasured.T + gain @ R @ gain.T
             root = _root(P)
             torques = (early[n], late[n])
             for j in range(k):

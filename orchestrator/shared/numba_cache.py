@@ -14,11 +14,16 @@ from typing import Any
 from numba import njit
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from orchestrator.shared.cache import cache_directory
+from orchestrator.shared.code_digest import digest_of
+
 _DIGEST = hashlib.sha256().digest_size
 
 
 def kept(**options: Any) -> Callable[[Any], Any]:
     """Return a decorator like ``numba.njit`` that keeps machine code for later processes, where there is a place.
+
+    A function with a closure is kept under a digest of all that it reaches; where that is not known, not at all.
 
     Args:
         options: of ``njit``, but for ``cache``.
@@ -31,7 +36,10 @@ def kept(**options: Any) -> Callable[[Any], Any]:
         dispatcher = njit(**options)(function)
         # Without a folder that can be written the function is compiled in every process.
         with contextlib.suppress(RuntimeError, OSError):
-            dispatcher._cache = _Cache(function)
+            if function.__closure__ is None:
+                dispatcher._cache = _Cache(function)
+            elif digest := digest_of(function):
+                dispatcher._cache = _ClosureCache(function, digest)
         return dispatcher
 
     return compiled
@@ -85,3 +93,17 @@ class _Cache(FunctionCache):
         stamp = self._impl.locator.get_source_stamp()
         # Another ending than numba's own, whose files a version without hashes may have left beside these.
         self._cache_file = _Files(self._cache_path, f"{self._impl.filename_base}.checked", stamp)
+
+
+class _ClosureCache(_Cache):
+    """Of a function made within another one: numba's own key of it differs from process to process."""
+
+    def __init__(self, function: Any, digest: str) -> None:
+        super().__init__(function)
+        self._cache_path = str(cache_directory("numba") / digest[:20])
+        Path(self._cache_path).mkdir(exist_ok=True)
+        self._digest = digest
+        self._cache_file = _Files(self._cache_path, f"{self._impl.filename_base}.checked", digest)
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return (sig, codegen.magic_tuple(), self._digest)

@@ -3,6 +3,7 @@
 import gc
 import importlib.util
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -79,3 +80,44 @@ def test_a_full_disk_or_no_place_at_all_is_no_failure(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr(numba_cache._Cache, "__init__", nowhere)
     assert hits(tmp_path) == 0
+
+
+CLOSURE = "def make(factor):\n    def times(x):\n        return factor * x\n    return times\n"
+
+
+def closure_hits(folder: Path, factor: float) -> int:
+    path = folder / "closure.py"
+    path.write_text(CLOSURE)
+    gc.collect()
+    spec = importlib.util.spec_from_file_location(MODULE, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[MODULE] = module
+    spec.loader.exec_module(module)
+    function = numba_cache.kept()(module.make(factor))
+    assert function(1.5) == factor * 1.5
+    return sum(function.stats.cache_hits.values())
+
+
+def test_a_closure_is_kept_by_what_it_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba_cache, "cache_directory", lambda name: tmp_path)
+    assert closure_hits(tmp_path, 2.0) == 0
+    assert closure_hits(tmp_path, 2.0) == 1
+    assert closure_hits(tmp_path, 3.0) == 0
+    assert closure_hits(tmp_path, 2.0) == 1
+
+
+def test_predictors_are_compiled_once_per_machine(tmp_path: Path) -> None:
+    program = (
+        "from orchestrator.plants.known.servo_axis import PLANT\n"
+        "rates = PLANT.stage().rates\n"
+        "PLANT.jacobian(PLANT.extended([entry.default for entry in PLANT.table]))\n"
+        "print(sum(rates.stats.cache_hits.values()))\n"
+    )
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    hits = [
+        int(subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, check=True).stdout)
+        for _ in range(2)
+    ]
+    assert hits == [0, 1]

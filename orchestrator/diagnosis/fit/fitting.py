@@ -146,13 +146,14 @@ def jacobian(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Fr
         The derivative.
     """
     columns = np.empty((*z[part].shape, len(free)))
+    until = likelihood.over(min(likelihood.stop, part.stop))
     for n, entry in enumerate(free):
         moved = p.copy()
         step = likelihood.settings.fit.difference * entry.scale
         if moved[entry.place] + step > entry.maximum:
             step = -step
         moved[entry.place] += step
-        columns[:, :, n] = (likelihood.whitened(moved, q)[part] - z[part]) / (step / entry.scale)
+        columns[:, :, n] = (until.whitened(moved, q)[part] - z[part]) / (step / entry.scale)
     return columns
 
 

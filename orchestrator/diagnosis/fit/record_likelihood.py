@@ -136,7 +136,7 @@ class RecordLikelihood:
         for rows, u, start in self._records(signals, n):
             errors, corrected = np.empty((len(u), 2)), np.empty((len(u), STATES))
             self._predict(
-                signals.y[rows], *self.delivered(p, u), tuple(p.tolist()), signals.h, self.substeps(p), gains[rows],
+                signals.y[rows], *self.delivered(p, u), p, signals.h, self.substeps(p), gains[rows],
                 (offsets[0], offsets[1]), start, errors, corrected,
             )  # fmt: skip
             raw[rows], states[rows] = errors, corrected
@@ -281,8 +281,8 @@ class RecordLikelihood:
             else:
                 offsets = [reference[place] for place in self._offsets] + [0.0, 0.0]
                 follower_of(plant)(
-                    signals.y[rows], *self.delivered(reference, u), tuple(reference.tolist()), signals.h,
-                    self.substeps(reference), (offsets[0], offsets[1]), start, np.array(plant.states),
+                    signals.y[rows], *self.delivered(reference, u), reference, signals.h, self.substeps(reference),
+                    (offsets[0], offsets[1]), start, np.array(plant.states),
                     np.array([at[body.angle] for body in plant.bodies[:m]]), P, Q, R, own, factors,
                 )  # fmt: skip
             gains[rows], roots[rows] = own, factors

@@ -73,12 +73,11 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
     if by_the_predictor:
         steps = plant.substeps(p, signals.h)
         coarse = coarse_runner_of(plant)
-        coarse(tuple(start.tolist()), tuple(p.tolist()), early, late, first, signals.h, (steps, FINER * steps), out)
+        coarse(tuple(start.tolist()), p, early, late, first, signals.h, (steps, FINER * steps), out)
         return _offset(plant, p, out)
-    flat = tuple(float(v) for v in plant.own(p))
     asked = float(followed[max(place - whole, 0)])
     memory = (float(start[7]), asked) if history else (0.0, UNASKED)
-    plant.runner()((*start[:7].tolist(), *memory), flat, early, late, first, signals.h, out)
+    plant.runner()((*start[:7].tolist(), *memory), plant.own(p), early, late, first, signals.h, out)
     return _offset(plant, p, out)
 
 

@@ -143,21 +143,35 @@ class Horizons:
         """
         return float(np.min(self._removed(other, 1)))
 
-    def skill_over(self, other: "Horizons") -> float:
+    def skill_over(self, other: "Horizons", first: int | None = None) -> float:
         """Return the largest share of the other's squared error that this one removes, at horizons beyond noise.
 
         Args:
             other: prediction errors of another model on the same samples.
+            first: horizon from which on they count; None: that which noise does not rule.
 
         Returns:
             The share; minus infinity where there is no such horizon.
         """
-        return float(np.max(self._removed(other, self.long), initial=-np.inf))
+        return float(np.max(self._removed(other, self.long if first is None else first), initial=-np.inf))
 
     def _removed(self, other: "Horizons", first: int) -> Array:
         """Return, from horizon ``first`` on, the share removed of what the other's squared error has beyond noise."""
         own, before = (np.mean((h.errors[first:] / self.noise) ** 2, axis=1) - 1.0 for h in (self, other))
         return np.asarray(1.0 - np.maximum(own, 0.0) / np.maximum(before, 1e-9))
+
+    def follows(self, share: float) -> bool:
+        """Tell whether the model follows the motion: over the whole part, or over half a second and more.
+
+        Args:
+            share: of the variance, or of the squared error of a motion at constant speed, that it must explain.
+
+        Returns:
+            True when it does, for one signal at least.
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            ahead = 1.0 - (self.errors[self.long :] / self.plain[self.long :]) ** 2
+            return bool(np.any(self.r_squared > share) or np.any(ahead > share))
 
     def is_hopeless(self, share: float) -> bool:
         """Tell whether the model predicts hardly better than a motion at constant speed, and not the whole part.

@@ -33,8 +33,16 @@ class Proof:
         return self.final.even_skill_over(self.base)
 
 
-def _structured(left: Remainder, settings: VerdictSettings) -> bool:
-    """Tell whether what is left is something else than a coloured torque noise."""
+def structured(left: Remainder, settings: VerdictSettings) -> bool:
+    """Tell whether what is left is something else than a coloured torque noise.
+
+    Args:
+        left: what the final model leaves.
+        settings: the rules' thresholds.
+
+    Returns:
+        True when it is.
+    """
     if left.tails > settings.heavy:
         return True
     return any(
@@ -68,8 +76,30 @@ def is_unknown(
         return left.growth > settings.grown
     if proven:
         return False
-    no_noise = _structured(left, settings) or (far_off and not named)
+    no_noise = structured(left, settings) or (far_off and not named)
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
+
+
+def refuted(floor_off: bool, proof: Proof, far_off: Sequence[str], settings: VerdictSettings) -> str:
+    """Return why what the final model has is no finding, in words; empty: nothing speaks against it.
+
+    Effects make up for another machine too: a prescribed motion takes next to no inertia, and waves for a spring.
+
+    Args:
+        floor_off: more is left than measurement noise.
+        proof: of the final model, which has effects.
+        far_off: names of parameters whose re-fitted values lie far outside what the model file allows.
+        settings: the rules' thresholds.
+
+    Returns:
+        The words.
+    """
+    if far_off:
+        names = ", ".join(f"`{name}`" for name in far_off)
+        return f"with it {names} would lie far outside what the model file allows: a value, or a unit, may be wrong"
+    if floor_off and not proof.final.follows(settings.good):
+        return "with it free runs over the held-out part do not follow the motion: `u` may not be what drives it"
+    return ""
 
 
 UNEXPLAINED = "a misfit is left that nothing in the library explains"
@@ -104,7 +134,7 @@ def doubts(
         if entry.after > before * (1.0 + settings.larger):
             share = 100.0 * (entry.after / before - 1.0)
             found.append(f"the misfit of {entry.signal} on held-out data is {share:.0f} % larger with what is named")
-    if floor_off and _structured(left, settings):
+    if floor_off and structured(left, settings):
         found.append("what the final model leaves is no noise")
     if left.growth > settings.grown:
         found.append(f"innovations are {left.growth:.1f} times larger on the held-out part")

@@ -29,7 +29,8 @@ def warnings_of(found: Pass, named: Sequence[Named], channels: int, encoders: in
         warnings.append(f"{UNEXPLAINED}; it {kind_of_rest(left, settings)}")
         if named:
             names = ", ".join(f"{n.name} ({n.site})" for n in named)
-            warnings.append(f"{names} would take {100 * max(left.explained, 0):.0f} % of it: too little to be named")
+            little = ": too little to be named" if left.explained < settings.least_explained else ""
+            warnings.append(f"{names} would take {100 * min(max(left.explained, 0), 1):.0f} % of it{little}")
     elif found.floor_off and left.explained < settings.mostly_explained:
         warnings.append(f"{100 * (1 - left.explained):.0f} % {LEFT_OVER}; it {kind_of_rest(left, settings)}")
     warnings += [*found.withdrawn, *(f"refused: {why}" for why in found.search.refused.values())]

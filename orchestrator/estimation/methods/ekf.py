@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
-import numba
 import numpy as np
 
 from orchestrator.estimation.innovations import Array
@@ -15,6 +14,7 @@ from orchestrator.plants.compiled import compiled
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.normal import NORMAL_95
+from orchestrator.shared.numba_cache import kept
 from pyfmu_sources.backlash_estimator import FILTERS, SIZE, NoiseSettings
 
 UNMEASURED = 1e6  # rad, standard deviation that stands for an encoder that is absent
@@ -36,7 +36,7 @@ def _runner() -> Callable[..., None]:
     begin, advance, measure = source.begin, source.advance, source.measure
     look, touching = source.combine, source.contact
 
-    @numba.njit
+    @kept()
     def loop(u, theta_m, theta_l, model, settings, step, filters, alpha, deviation, contact):  # type: ignore[no-untyped-def]
         first = 0
         while first < u.size - 1 and not (theta_m[first] == theta_m[first] and theta_l[first] == theta_l[first]):

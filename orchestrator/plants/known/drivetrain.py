@@ -41,6 +41,7 @@ def _stage() -> CompiledEquations:
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
+    from orchestrator.shared.numba_cache import kept
 
     source = compiled("equations")
     rates, twist, contact_of, elastic = source.rates, source.twist, source.contact_of, source.elastic_torque
@@ -64,7 +65,7 @@ def _stage() -> CompiledEquations:
             shaft = elastic(full, contact, p)
         return friction_m(full, shaft * twist_slope(full, p), p), friction_l(full, shaft, p)
 
-    @njit(error_model="numpy")
+    @kept(error_model="numpy")
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         full = whole(x, u)
         angle = twist(full, p)
@@ -84,16 +85,15 @@ def _stage() -> CompiledEquations:
 @cache
 def _runner() -> Any:
     """Return the compiled, event-located simulation."""
-    from numba import njit
-
     from orchestrator.plants.compiled import compiled
+    from orchestrator.shared.numba_cache import kept
 
     source = compiled("drivetrain")
     advance, initial_mode, prepare, consistent = (
         source.advance, source.initial_mode, source.prepare, source.consistent_start,
     )  # fmt: skip
 
-    @njit
+    @kept()
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = consistent((start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0), p)
         x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], start[7], start[8])

@@ -33,6 +33,7 @@ def stage() -> CompiledEquations:
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
+    from orchestrator.shared.numba_cache import kept
 
     source = compiled("servo_axis")
     rates, level = source.rates, source.friction
@@ -42,7 +43,7 @@ def stage() -> CompiledEquations:
     def friction(x: Any, p: Any) -> Any:
         return level((x[0], x[1], x[4], 0.0, 0.0), p), 0.0
 
-    @njit(error_model="numpy")
+    @kept(error_model="numpy")
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
@@ -57,14 +58,13 @@ def runner() -> Any:
     Returns:
         A function, see ``Plant.runner``.
     """
-    from numba import njit
-
     from orchestrator.plants.compiled import compiled
+    from orchestrator.shared.numba_cache import kept
 
     source = compiled("servo_axis")
     advance, initial_mode, begin = source.advance, source.initial_mode, source.start
 
-    @njit
+    @kept()
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = begin(start[0], start[1], start[4], p)
         x = (x[0], x[1], x[2], x[3], start[8])
