@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.likelihood import BoxFit, Likelihood
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit, BoxLikelihood
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.parts import Rows
 
 Array = NDArray[np.float64]
 
 
-class Fitter(Likelihood):
+class Fitter(BoxLikelihood):
     """Fits models of one problem to one part of its record."""
 
     def fit(

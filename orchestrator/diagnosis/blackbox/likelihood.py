@@ -41,7 +41,7 @@ class BoxFit:
         return self.fitted + self.decided + self.prior
 
 
-class Likelihood:
+class BoxLikelihood:
     """Judges models of one problem by one part of its record.
 
     Args:
