@@ -18,7 +18,7 @@ from orchestrator.diagnosis.blackbox.draft import drafted
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, validated
 from orchestrator.diagnosis.blackbox.figures import draw_signals
 from orchestrator.diagnosis.blackbox.mapping import read_map
-from orchestrator.diagnosis.blackbox.problem import Data
+from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
 from orchestrator.diagnosis.blackbox.search import counted
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings

@@ -19,7 +19,7 @@ from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import far_off
-from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown, refuted
+from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown, refuted, structured
 from orchestrator.diagnosis.verdict.remainder import Remainder, noise_floor, remainder, tails
 from orchestrator.plants.effects import Effect
 from orchestrator.records.model_file import Model
@@ -110,18 +110,15 @@ def _search(
     likelihood = search.likelihood  # its gains may be those of a gap now
     whole = Parts(parts.seen, parts.validated, parts.held_out)
     plain = annealed(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, ())
-    proven = _proven(search, whole, base, plain, best)
+    proven = _proven(search, whole, parts, base, plain, best)
     best, final, withdrawn = proven.best, proven.final.fit, proven.notes
     lowest = ladder(settings.levels, best.effects, proven.efficient.q)[-1]
     logged = _of_the_log(search, whole, plain, best)
     left = _left(likelihood, logged, proven.efficient, best.fit, parts, lowest)
     growth = _growth(likelihood, final, whole)
     left = replace(left, growth=growth if best.effects else max(growth, left.growth))
-    floor = _over_floor(likelihood, proven.efficient, parts, lowest)
     verdict = settings.verdict
-    per_sample = floor / (parts.seen.stop - parts.seen.start)
-    # A floor far above what is left was made of a noise that is overrated: it says nothing then.
-    floor_off = per_sample > verdict.least_missing or per_sample < -verdict.overrated
+    floor_off = _is_off_floor(likelihood, proven.efficient, parts, lowest)
     far = far_off(model, final.p, verdict)
     named = any(not effect.measurement for effect in best.effects)
     proof = proven.proof
@@ -180,12 +177,14 @@ class _Proven:
     notes: tuple[str, ...]
 
 
-def _proven(search: Search, whole: Parts, base: Candidate, plain: Fit, best: Candidate) -> _Proven:
+def _proven(
+    search: Search, whole: Parts, parts: Parts, base: Candidate, plain: Fit, best: Candidate
+) -> _Proven:  # fmt: skip
     """Return the best model all of whose effects stand on all that may be looked at, and do no harm on the rest.
 
     An effect is withdrawn when its size, within what the model's error leaves open, is not far from zero, or when with
     it the model predicts worse, at any horizon and by more than chance, than without it or than re-fitted parameters
-    alone, or its misfit on held-out data is larger than theirs.
+    alone, or its misfit on held-out data is larger than theirs, or what is left is no noise and more than it explains.
     """
     likelihood = search.likelihood
     levels = likelihood.settings.levels
@@ -204,9 +203,13 @@ def _proven(search: Search, whole: Parts, base: Candidate, plain: Fit, best: Can
         if weak is None and not harm and fewer.effects:
             harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
         harm = harm or _larger_misfit(likelihood, sized_base.fit, final.fit, whole)
-        if weak is None and not harm:
-            return _Proven(best, efficient, sized_base, final, Proof(before, after), tuple(notes))
         why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
+        if weak is None and not harm:
+            small = _minor(search, parts, plain, best, efficient, after)
+            if small is None:
+                return _Proven(best, efficient, sized_base, final, Proof(before, after), tuple(notes))
+            out, fewer = small
+            why = "what is left is no noise, and more than it explains"
         notes.append(f"{out.name} ({out.site}) was withdrawn: {why}")
         best = fewer
     final = replace(sized_base, fit=honest(likelihood, sized_base.fit, (), whole))
@@ -286,6 +289,44 @@ def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: flo
         return False
     without = horizons(likelihood, search.without(final.p, effect), q, whole.held_out)
     return not after.surely_better_than(without) or bool(without.surely_better_than(after))
+
+
+def _minor(
+    search: Search, parts: Parts, plain: Fit, best: Candidate, efficient: Fit, after: Horizons
+) -> tuple[Effect, Candidate] | None:
+    """Return the effect that explains least, and the model without it, where a rest may be what it stands for.
+
+    Something else than noise is left then, far above it, and held-out predictions without the effect, its model fitted
+    again, are nearly as good at every horizon.
+    """
+    likelihood, settings = search.likelihood, search.likelihood.settings
+    lowest = ladder(settings.levels, best.effects, efficient.q)[-1]
+    misfit = held_out_misfit(likelihood, efficient.q, [("", efficient.p)], parts.held_out, "")
+    if all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit):
+        return None
+    if not _is_off_floor(likelihood, efficient, parts, lowest):
+        return None
+    if not structured(_left(likelihood, plain, efficient, best.fit, parts, lowest), settings.verdict):
+        return None
+    whole, scene = Parts(parts.seen, parts.validated, parts.held_out), scene_of(likelihood, best.fit)
+    found: list[tuple[float, Effect, Candidate]] = []
+    for effect in (one for one in best.effects if not one.measurement):
+        fewer = search.reduced(best, scene, effect)
+        again = annealed(likelihood, fewer.fit.p, fewer.fit.q, fewer.fit.free, whole, fewer.effects)
+        share = after.skill_over(horizons(likelihood, again.p, plain.q, parts.held_out), first=0)
+        found.append((share, effect, fewer))
+    share, effect, fewer = min(found, key=lambda one: one[0], default=(math.inf, best.effects[-1], best))
+    return (effect, fewer) if share < settings.verdict.proven else None
+
+
+def _is_off_floor(likelihood: RecordLikelihood, final: Fit, parts: Parts, lowest: float) -> bool:
+    """Tell whether more than measurement noise is left.
+
+    A floor far above what is left was made of a noise that is overrated: it says nothing then.
+    """
+    settings = likelihood.settings.verdict
+    per_sample = _over_floor(likelihood, final, parts, lowest) / (parts.seen.stop - parts.seen.start)
+    return per_sample > settings.least_missing or per_sample < -settings.overrated
 
 
 def _over_floor(likelihood: RecordLikelihood, final: Fit, parts: Parts, lowest: float) -> float:

@@ -16,8 +16,8 @@ from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.search.candidate import Candidate
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
-from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED, Proof, doubts, is_unknown, refuted
-from orchestrator.diagnosis.verdict.remainder import Remainder
+from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED, Proof, doubts, is_unknown, refuted, structured
+from orchestrator.diagnosis.verdict.remainder import Predictable, Remainder
 from orchestrator.plants.known.drivetrain import PLANT
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.model_file import default_model
@@ -207,6 +207,20 @@ def test_pulses_are_outweighed_by_skill_at_every_horizon_only() -> None:
     even, late = (Proof(base, horizons([0.1, short, 0.1, 0.1])) for short in (0.1, 0.9))
     assert not is_unknown(left, True, even, True, False, SETTINGS.verdict)
     assert is_unknown(left, True, late, True, False, SETTINGS.verdict)
+
+
+def test_skill_counts_from_the_horizon_that_is_asked_for() -> None:
+    before, after = horizons([1.0, 1.0, 1.0, 1.0]), horizons([0.1, 1.0, 1.0, 0.9])
+    assert after.skill_over(before, first=0) > 0.9  # the first sample, which a wave shows in
+    assert after.skill_over(before) < 0.2
+
+
+def test_a_rest_is_no_noise_where_a_basis_predicts_it_or_pulses_come() -> None:
+    plain = Remainder(100.0, 0.0, 1.0, (Predictable("motor", "speed", 2.0, 0.5),))
+    assert not structured(plain, SETTINGS.verdict)
+    assert structured(replace(plain, predictable=(Predictable("motor", "speed", 9.0, 0.01),)), SETTINGS.verdict)
+    assert structured(replace(plain, predictable=(Predictable("motor", "speed", 4.0, 0.5),)), SETTINGS.verdict)
+    assert structured(replace(plain, tails=2.0), SETTINGS.verdict)
 
 
 def test_what_is_named_must_leave_the_stated_machine_and_follow_the_motion() -> None:

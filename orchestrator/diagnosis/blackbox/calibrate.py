@@ -8,9 +8,9 @@ import numpy as np
 
 from orchestrator.diagnosis.blackbox.diagnose import fitters, prepared
 from orchestrator.diagnosis.blackbox.estimates import OutputMisfit, ValueEstimate, estimates_of, misfits
-from orchestrator.diagnosis.blackbox.fitting import parts_of
 from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.problem import Data
+from orchestrator.diagnosis.blackbox.model import Data
+from orchestrator.diagnosis.blackbox.parts import parts_of
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.verdict import Rest, rest_of

@@ -15,10 +15,13 @@ from orchestrator.diagnosis.blackbox.estimates import (
     estimates_of,
     misfits,
 )
-from orchestrator.diagnosis.blackbox.fitting import BoxFit, BoxParts, Fitter, Ladder, interleaved, parts_of
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.mapping import Map
+from orchestrator.diagnosis.blackbox.model import BoxModel, Data
+from orchestrator.diagnosis.blackbox.parts import BoxParts, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
-from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
+from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
 from orchestrator.diagnosis.blackbox.sites import effects_of
@@ -32,6 +35,7 @@ from orchestrator.diagnosis.blackbox.verdict import (
     recovered,
     rest_of,
 )
+from orchestrator.diagnosis.blackbox.whitening import Ladder
 
 Array = NDArray[np.float64]
 
@@ -246,7 +250,12 @@ def _last(search: BoxSearch, fit: BoxFit) -> BoxFit:
     """Return a fit over all rows that were looked at."""
     fitter = search.fitter
     if search.last is None or search.last[0] is not fit:
-        found = fitter.fit(fit.model, fit.level, None, fitter.parts.looked_at, iterations=4)
+        seen = fitter.parts.looked_at
+        found = fitter.fit(fit.model, fit.level, None, seen, iterations=4)
+        at = len(fit.model.p)
+        for effect in fit.model.effects:  # the rows that decided tell more of a value that acts in steps
+            found = fitter.combed(found, at, seen) if found is not None and effect.kind.finer is not None else found
+            at += len(effect.kind.parameters)
         search.last = fit, found or fit
     return search.last[1]
 
@@ -340,9 +349,11 @@ def _doubted(fitter: Fitter, fit: BoxFit, rest: Rest, named: bool, settings: Res
         )
     if predicted(fitter, fit, settings) > settings.driven:
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
-    deviations, port = followed(fitter, fit, settings)
-    if deviations > settings.driven:
-        return replace(rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`",))
+    gain, port = followed(fitter, fit, settings)
+    if gain > 0.0:
+        return replace(
+            rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`, or from the time",)
+        )
     gain, name, time = beginning_of(fitter, fit, settings)
     if gain > settings.begins:
         return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))

@@ -7,8 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import CUT, PORT, BoxEffect
-from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter, Rows
-from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel, Data
+from orchestrator.diagnosis.blackbox.parts import Rows
+from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.errors import FmuError
 from orchestrator.shared.inference.normal import NORMAL_95, interval_95
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
-from orchestrator.diagnosis.blackbox.problem import Data
+from orchestrator.diagnosis.blackbox.model import Data
 
 
 def draw_signals(path: Path, outcome: BoxOutcome, data: Data) -> None:

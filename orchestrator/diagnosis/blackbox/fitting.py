@@ -1,256 +1,19 @@
 """Fits: Gauss-Newton on whitened residuals of free runs, with priors, the level of port noise chosen as it goes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
-from orchestrator.diagnosis.blackbox.whitening import Ladder
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit, BoxLikelihood
+from orchestrator.diagnosis.blackbox.model import BoxModel
+from orchestrator.diagnosis.blackbox.parts import Rows
 
 Array = NDArray[np.float64]
 
-Rows = slice | NDArray[np.int64]
 
-
-@dataclass(frozen=True, eq=False)
-class BoxParts:
-    """Rows that are fitted, that decide, and that are held out."""
-
-    fitted: Rows
-    decides: Rows
-    held_out: Rows
-
-    @property
-    def looked_at(self) -> NDArray[np.int64]:
-        """Return the rows that are fitted or decide, in order."""
-        rows = [np.arange(p.start, p.stop) if isinstance(p, slice) else p for p in (self.fitted, self.decides)]
-        return np.sort(np.concatenate(rows))
-
-    @property
-    def seen(self) -> int:
-        """Return the number of rows that the search runs over."""
-        return int(self.looked_at[-1]) + 1
-
-    @property
-    def reach(self) -> int:
-        """Return the row at which the fitted part ends."""
-        return int(self.fitted.stop if isinstance(self.fitted, slice) else self.fitted[-1] + 1)
-
-
-def parts_of(n: int) -> BoxParts:
-    """Return half, a quarter and a quarter.
-
-    Args:
-        n: samples of the record.
-
-    Returns:
-        The fitted, the deciding and the held-out part.
-    """
-    return BoxParts(slice(0, n // 2), slice(n // 2, 3 * n // 4), slice(3 * n // 4, n))
-
-
-def interleaved(n: int, pieces: int, whole: bool = False) -> BoxParts:
-    """Return parts of the first three quarters that take turns: for what acts in one half only.
-
-    ``whole``: of all of it, every fourth one held out: for what acts in the last quarter only.
-
-    Args:
-        n: samples of the record.
-        pieces: that it is cut into.
-
-    Returns:
-        The parts, the held-out one last.
-    """
-    if whole:
-        turn = np.arange(n) * pieces // n % 4
-        return BoxParts(np.flatnonzero(turn % 2 == 0), np.flatnonzero(turn == 1), np.flatnonzero(turn == 3))
-    seen = 3 * n // 4
-    piece = np.arange(seen) * pieces // seen
-    return BoxParts(np.flatnonzero(piece % 3 != 1), np.flatnonzero(piece % 3 == 1), slice(seen, n))
-
-
-@dataclass(frozen=True, eq=False)
-class BoxFit:
-    """A fitted model.
-
-    Attributes:
-        model: its structure and values.
-        level: port noise that it needs, as its place in the ladder.
-        y: (rows, outputs) its free run.
-        gains: log-likelihood on the fitted and the deciding part.
-        J: (rows, outputs, values) its Jacobian, in units of the noise, as last computed.
-    """
-
-    model: BoxModel
-    level: int
-    y: Array
-    fitted: float
-    decided: float
-    prior: float
-    J: Array
-
-    @property
-    def total(self) -> float:
-        """Return the log-likelihood of both parts, with the prior."""
-        return self.fitted + self.decided + self.prior
-
-
-class Fitter:
-    """Fits models of one problem to one part of its record.
-
-    Args:
-        problem: what is fitted.
-        ladder: filters.
-        parts: of the record.
-        settings: thresholds.
-    """
-
-    def __init__(self, problem: BoxProblem, ladder: Ladder, parts: BoxParts, settings: BoxSettings = DEFAULT) -> None:
-        self.problem, self.ladder, self.parts, self.settings = problem, ladder, parts, settings
-        self.sd = np.array([u.standard_deviation for u in problem.map.uncertain])
-        self.mean = problem.nominal.p
-        self.lower = np.array([u.minimum for u in problem.map.uncertain])
-        self.upper = np.array([u.maximum for u in problem.map.uncertain])
-
-    def likelihood(self, e: Array, k: int, rows: Rows) -> float:
-        """Return the log-likelihood of whitened residuals (n, outputs) over ``rows``, without its constant.
-
-        Args:
-            e: whitened residuals.
-            k: level of port noise, from 0.
-            rows: samples that count.
-
-        Returns:
-            The log-likelihood.
-        """
-        found = e[rows]
-        return float(-0.5 * np.sum(found * found) - np.sum(self.ladder[k].half_log[rows]))
-
-    def prior(self, model: BoxModel) -> float:
-        """Return the logarithm of the prior.
-
-        Args:
-            model: parameters, effects and their values.
-
-        Returns:
-            The logarithm, without its constant.
-        """
-        z = (model.p - self.mean) / self.sd
-        return float(-0.5 * z @ z)
-
-    def whitened(self, y: Array, k: int) -> Array:
-        """Return the whitened residual (rows, outputs) of a free run.
-
-        Args:
-            y: (rows, outputs) free run of the model.
-            k: level of port noise, from 0.
-
-        Returns:
-            The residual, each sample of unit variance if the model is right.
-        """
-        return self.ladder[k].whiten(self.problem.residual(y)[:, :, None])[:, :, 0]
-
-    def best_level(self, y: Array, rows: Rows, among: Sequence[int] | None = None) -> int:
-        """Return the level at which a free run is likeliest over ``rows``.
-
-        Args:
-            y: (rows, outputs) free run of the model.
-            rows: samples that count.
-            among: levels to choose from (default: all).
-
-        Returns:
-            The level.
-        """
-        among = range(self.ladder.size) if among is None else among
-        return max(among, key=lambda k: self.likelihood(self.whitened(y, k), k, rows))
-
-    def bounded(self, vector: Array) -> Array:
-        """Return values within the FMU's own bounds.
-
-        Args:
-            vector: (values,) parameters first.
-
-        Returns:
-            A copy.
-        """
-        out = vector.copy()
-        n = len(self.mean)
-        out[:n] = np.clip(out[:n], self.lower, self.upper)
-        return out
-
-    def scales(self, model: BoxModel) -> Array:
-        """Return the step of each value for differences.
-
-        Args:
-            model: parameters, effects and their values.
-
-        Returns:
-            Shape (values,).
-        """
-        return np.concatenate(
-            [
-                self.sd * self.settings.fit.difference,
-                *(np.array(e.scales(v)) for e, v in zip(model.effects, model.values, strict=True)),
-            ]
-        )
-
-    def jacobian(self, model: BoxModel, y: Array, only: slice | None = None) -> Array | None:
-        """Return differences (rows, outputs, values) of the free run, in units of the noise; None where a run fails.
-
-        Args:
-            model: parameters, effects and their values.
-            y: (rows, outputs) free run of the model.
-            only: which of the values (default: all).
-
-        Returns:
-            The differences.
-        """
-        z, steps = model.vector, self.scales(model)
-        places = list(range(len(z)))[only or slice(None)]
-        models = []
-        for k in places:
-            trial = z.copy()
-            trial[k] += steps[k] if z[k] + steps[k] <= self._high(k) else -steps[k]
-            models.append(model.moved(trial))
-        found = self.problem.simulate(models, len(y))
-        J = np.zeros((*y.shape, len(places)))
-        for at, (k, run, trial_model) in enumerate(zip(places, found, models, strict=True)):
-            if run is None:
-                return None
-            J[:, :, at] = (run - y) / self.problem.noise / (trial_model.vector[k] - z[k])
-        return J
-
-    def _high(self, k: int) -> float:
-        return float(self.upper[k]) if k < len(self.upper) else np.inf
-
-    def step(self, model: BoxModel, y: Array, J: Array, k: int, rows: Rows, damping: float) -> Array:
-        """Return the damped Gauss-Newton step of all values.
-
-        Args:
-            model: parameters, effects and their values.
-            y: (rows, outputs) free run of the model.
-            J: (rows, outputs, values) Jacobian of the free run, in units of the noise.
-            k: level of port noise, from 0.
-            rows: samples that count.
-            damping: Levenberg's, without unit.
-
-        Returns:
-            Shape (values,).
-        """
-        whitened = self.ladder[k].whiten(np.concatenate([self.problem.residual(y)[:, :, None], J], axis=2))[rows]
-        flat = whitened.reshape(-1, whitened.shape[2])
-        e, columns = flat[:, 0], flat[:, 1:]
-        N, g = columns.T @ columns, columns.T @ e
-        count = len(self.mean)
-        N[range(count), range(count)] += 1.0 / self.sd**2
-        g[:count] -= (model.p - self.mean) / self.sd**2
-        scale = np.sqrt(np.maximum(np.diag(N), 1e-300))
-        N = N / scale / scale[:, None]
-        N[range(len(N)), range(len(N))] += damping + 1e-12
-        return np.asarray(np.linalg.solve(N, g / scale) / scale)
+class Fitter(BoxLikelihood):
+    """Fits models of one problem to one part of its record."""
 
     def fit(
         self,
@@ -317,21 +80,6 @@ class Fitter:
                     break
                 J, fresh = again, True
         return self._result(model, k, y, J, rows)
-
-    def horizon(self, y: Array) -> int:
-        """Return the row up to which a free run keeps close to the record.
-
-        Args:
-            y: (rows, outputs) free run of the model.
-
-        Returns:
-            The row; the run's length when it never leaves.
-        """
-        scale = (
-            self.settings.fit.astray * np.std(self.problem.data.outputs[: self.parts.seen], axis=0) / self.problem.noise
-        )
-        far = np.any(np.abs(self.problem.residual(y)) > np.maximum(scale, self.settings.fit.astray_noise), axis=1)
-        return int(np.argmax(far)) if far.any() else len(y)
 
     def grown(self, model: BoxModel, k: int, J: Array | None = None, held: int = 0) -> BoxFit | None:
         """Return the fit from a start, over a growing part of the record while the free run goes astray.
@@ -405,7 +153,7 @@ class Fitter:
             fit = again if again is not None and again.total > fit.total else fit
         return fit
 
-    def combed(self, fit: BoxFit, at: int = -1) -> BoxFit:
+    def combed(self, fit: BoxFit, at: int = -1, rows: Rows | None = None) -> BoxFit:
         """Return a fit one of whose values has been looked for by runs, where no derivative leads to it.
 
         What comes in steps (a quantum) is right or wrong sample by sample: its likelihood is a comb with a long tooth.
@@ -413,6 +161,7 @@ class Fitter:
         Args:
             fit: of a model with such a value, nearly right.
             at: its place among all values.
+            rows: what is fitted (default: the fitted part), as it was in ``fit``.
 
         Returns:
             The fit, with the parameters fitted again.
@@ -426,15 +175,16 @@ class Fitter:
             runs = self.problem.simulate(models, self.parts.seen)
             teeth = [(model, y) for model, y in zip(models, runs, strict=True) if y is not None]
             if teeth:
-                place, k = self._longest([y for _, y in teeth], np.delete(fit.J[: self.parts.seen], at, axis=2))
-                again = self.fit(teeth[place][0], k, y=teeth[place][1], held=2)
+                J = np.delete(fit.J[: self.parts.seen], at, axis=2)
+                place, k = self._longest([y for _, y in teeth], J, self.parts.fitted if rows is None else rows)
+                again = self.fit(teeth[place][0], k, rows=rows, y=teeth[place][1], held=2)
                 fit = again if again is not None and again.total > fit.total else fit
             width *= own.finer
         return fit
 
-    def _longest(self, runs: Sequence[Array], J: Array) -> tuple[int, int]:
+    def _longest(self, runs: Sequence[Array], J: Array, rows: Rows) -> tuple[int, int]:
         """Return the free run that is likeliest once all other values follow, and the level at which it is."""
-        rows, found = self.parts.fitted, []
+        found = []
         block = np.concatenate([J, *(self.problem.residual(y)[:, :, None] for y in runs)], axis=2)
         for k in range(min(len(self.ladder.shares), self.ladder.size)):
             white = self.ladder[k].whiten(block)[rows].reshape(-1, block.shape[2])
@@ -514,24 +264,6 @@ class Fitter:
     def _both(self, y: Array, k: int) -> float:
         e = self.whitened(y, k)
         return self.likelihood(e, k, self.parts.fitted) + self.likelihood(e, k, self.parts.decides)
-
-    def covariance(self, fit: BoxFit, rows: Rows) -> Array:
-        """Return the covariance of all values.
-
-        Args:
-            fit: whose Jacobian is known over ``rows``.
-            rows: samples that count.
-
-        Returns:
-            Shape (values, values).
-        """
-        whitened = self.ladder[fit.level].whiten(fit.J)[rows]
-        columns = whitened.reshape(-1, whitened.shape[2])
-        N = columns.T @ columns
-        count = len(self.mean)
-        N[range(count), range(count)] += 1.0 / self.sd**2
-        scale = np.sqrt(np.maximum(np.diag(N), 1e-300))
-        return np.asarray(np.linalg.pinv(N / scale / scale[:, None], rcond=1e-13) / scale / scale[:, None])
 
 
 def _updated(J: Array, before: Array, after: Array, y: Array, run: Array, noise: Array) -> Array:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.problem import BoxModel, BoxProblem, Data, series_of
+from orchestrator.diagnosis.blackbox.model import BoxModel, Data
+from orchestrator.diagnosis.blackbox.problem import BoxProblem, series_of
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.subject import Subject

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.blackbox import series
 from orchestrator.diagnosis.blackbox.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.mapping import Map
+from orchestrator.diagnosis.blackbox.model import BoxModel, Data
+from orchestrator.diagnosis.blackbox.passed import at_input, at_output
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
@@ -17,83 +19,6 @@ from orchestrator.errors import SlaveError
 from pyfmu_sources.port_laws import COMPLIANCE
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Data:
-    """The columns of a record that a map names.
-
-    Attributes:
-        time: (n,) s, uniform.
-        inputs: (n, inputs) in the order of the map.
-        outputs: (n, outputs).
-        source: file name, for messages.
-        signals: (n, signals), off their references.
-    """
-
-    time: Array
-    inputs: Array
-    outputs: Array
-    source: str
-    signals: Array = field(default_factory=lambda: np.zeros((0, 0)))
-
-    @property
-    def step(self) -> float:
-        """Return the sample time [s]."""
-        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
-
-
-@dataclass(frozen=True, eq=False)
-class BoxModel:
-    """A model: values of the uncertain parameters, effects, and their values."""
-
-    p: Array
-    effects: tuple[BoxEffect, ...] = ()
-    values: tuple[Array, ...] = ()
-
-    @property
-    def vector(self) -> Array:
-        """Return all values in one row."""
-        return np.concatenate([self.p, *self.values])
-
-    def moved(self, vector: Array) -> "BoxModel":
-        """Return the same structure with other values, kept within what the laws allow.
-
-        Args:
-            vector: (values,) parameters first.
-
-        Returns:
-            The model.
-        """
-        values, at = [], len(self.p)
-        for effect, old in zip(self.effects, self.values, strict=True):
-            values.append(effect.bounded(vector[at : at + len(old)]))
-            at += len(old)
-        return BoxModel(vector[: len(self.p)], self.effects, tuple(values))
-
-    def extended(self, effect: BoxEffect, values: Array) -> "BoxModel":
-        """Return this model with one more effect.
-
-        Args:
-            effect: that is added.
-            values: of its parameters.
-
-        Returns:
-            The model.
-        """
-        return BoxModel(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))
-
-    def without(self, label: str) -> "BoxModel":
-        """Return this model with one effect less.
-
-        Args:
-            label: of the effect that goes.
-
-        Returns:
-            The model.
-        """
-        kept = [k for k, effect in enumerate(self.effects) if effect.label != label]
-        return BoxModel(self.p, tuple(self.effects[k] for k in kept), tuple(self.values[k] for k in kept))
 
 
 @dataclass
@@ -369,7 +294,7 @@ class BoxProblem:
             if y.base is not None:
                 y = y.copy()
             column = self.outputs.index(effect.place)
-            y[:, column] = _at_output(effect.kind.name, y[:, column], self.h / self.m, float(values[0]))
+            y[:, column] = at_output(effect, y[:, column], self.h / self.m, float(values[0]))
         return y[:: self.m]
 
     def impulses(self, model: BoxModel, length: int, places: Sequence[int] | None = None) -> tuple[Surrogate, Array]:
@@ -470,46 +395,3 @@ def series_of(problem: BoxProblem, rows: int) -> Array:
         order = 1 if entry.hold == "linear" else 0
         table[:, k] = series.finely(problem.data.inputs[:rows, k], problem.m, order)
     return table
-
-
-def at_input(effect: BoxEffect, fine: Array, step: float, value: float) -> Array:
-    """Return an input behind an effect in series with it; before the record it had its first value, or was zero.
-
-    Args:
-        effect: at an input.
-        fine: (steps,) recorded input.
-        step: communication step [s].
-        value: of the effect's parameter.
-
-    Returns:
-        Shape (steps,).
-    """
-    name, first = effect.kind.name, 0.0 if effect.at_rest else float(fine[0])
-    if name == "input_gain":
-        return np.asarray(fine * (1.0 + value))
-    if name == "input_offset":
-        return np.asarray(fine + value)
-    if name == "input_delay":
-        return series.delayed(fine, step, value, first)
-    if name == "input_lag":
-        return np.asarray(series.lagged(fine, step, value, first))
-    if name == "input_saturation":
-        return series.saturated(fine, value)
-    if name == "input_dead_zone":
-        return series.dead_zone(fine, value)
-    if name == "input_rate_limit":
-        return np.asarray(series.rate_limited(fine, step, value, first))
-    return series.quantised(fine, value)
-
-
-def _at_output(name: str, rows: Array, h: float, value: float) -> Array:
-    """Return an output behind an effect in series with it."""
-    if name == "output_gain":
-        return np.asarray(rows * (1.0 + value))
-    if name == "output_offset":
-        return np.asarray(rows + value)
-    if name == "output_delay":
-        return series.later(rows, h, value)
-    if name == "output_lag":
-        return np.asarray(series.smoothed(rows, h, value))
-    return series.quantised(rows, value)

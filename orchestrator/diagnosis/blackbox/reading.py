@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.problem import Data
+from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, ReadSettings
 from orchestrator.errors import RecordError
 

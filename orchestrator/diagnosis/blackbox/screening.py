@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import INPUT, BoxEffect
-from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
-from orchestrator.diagnosis.blackbox.problem import BoxModel, at_input, series_of
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel
+from orchestrator.diagnosis.blackbox.passed import at_input
+from orchestrator.diagnosis.blackbox.problem import series_of
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
-from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
-from orchestrator.diagnosis.blackbox.problem import BoxModel
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.screening import Pair, Promise, Screened, screened
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings
 

@@ -153,7 +153,8 @@ class RestSettings(Settings, frozen=True):
         1e-5
     )
     stretches: Annotated[
-        int, setting("parts of an output's range in each of which what is left may act in a way of its own", ge=2)
+        int,
+        setting("parts of a position's range, or of time, in each of which what is left may act in its own way", ge=2),
     ] = 12
     stands_out: Annotated[float, setting("times the expected power from which a stretch of time is pointed at")] = 1.3
     worse: Annotated[

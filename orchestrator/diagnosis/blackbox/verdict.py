@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
-from orchestrator.diagnosis.blackbox.fitting import BoxFit, Fitter
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.screening import Known
 from orchestrator.diagnosis.blackbox.search import BoxSearch, labels
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
@@ -161,10 +162,11 @@ def predicted(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest
 
 
 def followed(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> tuple[float, str]:
-    """Return by how many standard deviations of chance a law of the motion at a port does better than noise there.
+    """Return how much better a law of the motion or of time does than noise at a port, its values paid for.
 
     Noise at a port takes up what an effect outside the bank does. Efforts of any size in each stretch of the position,
-    in proportion to the speed and constant, are fitted in its place, with less noise: the FMU's surrogate answers.
+    in proportion to the speed, constant, or both, and in each stretch of time, are fitted in its place, with less
+    noise, on the FMU's surrogate.
 
     Args:
         fitter: gives the filters, the surrogate and the record.
@@ -172,30 +174,33 @@ def followed(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest)
         settings: in how many stretches of the position.
 
     Returns:
-        The number of standard deviations, and the port.
+        The gain in log-likelihood beyond Schwarz's (1978) cost of its values, and the port.
     """
     problem, ladder, n = fitter.problem, fitter.ladder, fitter.problem.n
     read = problem.read([fit.model])[0]
     share = ladder.share(fit.level)
     if read is None or len(fit.J) < n or ladder.surrogate.order == 0 or share <= settings.solver:
-        return 0.0, ""
+        return -np.inf, ""
     known = Known(fitter, fit, n)
     levels = {fit.level, *(k for k in range(ladder.size) if ladder.colour(k) == 0.0 and ladder.share(k) <= share)}
     alone = {k: known.explains(k) for k in levels}
-    best = 0.0, ""
+    best = -np.inf, ""
     for name, port in problem.map.ports.items():
         y = read[:, problem.runner.reads.index(port.position)]
         cells = np.quantile(y, np.linspace(0.0, 1.0, settings.stretches + 1)[1:-1])
         here = np.searchsorted(cells, y)[:, None] == np.arange(settings.stretches)
-        pushes = np.hstack([here * np.gradient(y)[:, None], here])[:-1]
+        when = (np.arange(n) * settings.stretches // n)[:, None] == np.arange(settings.stretches)
+        pushes = np.hstack([here * np.gradient(y)[:, None], here, when])[:-1]
         place = problem.noise_places.index(problem.runner.inputs.index(port.input))
         answers = ladder.surrogate.response(pushes / np.maximum(np.max(np.abs(pushes), axis=0), 1e-300), place)
         for k in levels:
-            U, s, _ = np.linalg.svd(known.beside(k, answers), full_matrices=False)
-            U = U[:, s > 1e-9 * s[0]]
-            gain = alone[k] - max(alone.values()) + 0.5 * float(np.sum((U.T @ known.at(k)[1]) ** 2))
-            count = U.shape[1] / 2.0
-            best = max(best, (float((gain - count) / np.sqrt(max(count, 0.5))), name))
+            white, e = known.beside(k, answers), known.at(k)[1]
+            count = settings.stretches
+            for part in (slice(count), slice(count, 2 * count), slice(2 * count), slice(2 * count, 3 * count)):
+                U, s, _ = np.linalg.svd(white[:, part], full_matrices=False)
+                U = U[:, s > 1e-9 * s[0]]
+                gain = alone[k] - max(alone.values()) + 0.5 * float(np.sum((U.T @ e) ** 2))
+                best = max(best, (gain - 0.5 * U.shape[1] * float(np.log(n)), name))
     return best
 
 

@@ -143,16 +143,17 @@ class Horizons:
         """
         return float(np.min(self._removed(other, 1)))
 
-    def skill_over(self, other: "Horizons") -> float:
+    def skill_over(self, other: "Horizons", first: int | None = None) -> float:
         """Return the largest share of the other's squared error that this one removes, at horizons beyond noise.
 
         Args:
             other: prediction errors of another model on the same samples.
+            first: horizon from which on they count; None: that which noise does not rule.
 
         Returns:
             The share; minus infinity where there is no such horizon.
         """
-        return float(np.max(self._removed(other, self.long), initial=-np.inf))
+        return float(np.max(self._removed(other, self.long if first is None else first), initial=-np.inf))
 
     def _removed(self, other: "Horizons", first: int) -> Array:
         """Return, from horizon ``first`` on, the share removed of what the other's squared error has beyond noise."""

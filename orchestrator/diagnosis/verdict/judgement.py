@@ -33,8 +33,16 @@ class Proof:
         return self.final.even_skill_over(self.base)
 
 
-def _structured(left: Remainder, settings: VerdictSettings) -> bool:
-    """Tell whether what is left is something else than a coloured torque noise."""
+def structured(left: Remainder, settings: VerdictSettings) -> bool:
+    """Tell whether what is left is something else than a coloured torque noise.
+
+    Args:
+        left: what the final model leaves.
+        settings: the rules' thresholds.
+
+    Returns:
+        True when it is.
+    """
     if left.tails > settings.heavy:
         return True
     return any(
@@ -68,7 +76,7 @@ def is_unknown(
         return left.growth > settings.grown
     if proven:
         return False
-    no_noise = _structured(left, settings) or (far_off and not named)
+    no_noise = structured(left, settings) or (far_off and not named)
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
 
 
@@ -126,7 +134,7 @@ def doubts(
         if entry.after > before * (1.0 + settings.larger):
             share = 100.0 * (entry.after / before - 1.0)
             found.append(f"the misfit of {entry.signal} on held-out data is {share:.0f} % larger with what is named")
-    if floor_off and _structured(left, settings):
+    if floor_off and structured(left, settings):
         found.append("what the final model leaves is no noise")
     if left.growth > settings.grown:
         found.append(f"innovations are {left.growth:.1f} times larger on the held-out part")

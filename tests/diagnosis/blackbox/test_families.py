@@ -7,8 +7,8 @@ import pytest
 
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.estimates import errors_of
-from orchestrator.diagnosis.blackbox.fitting import BoxFit
-from orchestrator.diagnosis.blackbox.problem import BoxModel
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.search import SearchStep
 from orchestrator.diagnosis.blackbox.series import quantised
 from orchestrator.diagnosis.blackbox.settings import DEFAULT

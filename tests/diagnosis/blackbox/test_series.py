@@ -5,7 +5,7 @@ import pytest
 
 from orchestrator.diagnosis.blackbox import series
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
-from orchestrator.diagnosis.blackbox.problem import at_input
+from orchestrator.diagnosis.blackbox.passed import at_input
 from pyfmu_sources.attachment import SERIES, AttachedEffect
 
 STEP = 0.01

@@ -1,0 +1,87 @@
+"""A record as a map names its columns, and a model: values of parameters, effects, and their values."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.bank import BoxEffect
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """The columns of a record that a map names.
+
+    Attributes:
+        time: (n,) s, uniform.
+        inputs: (n, inputs) in the order of the map.
+        outputs: (n, outputs).
+        source: file name, for messages.
+        signals: (n, signals), off their references.
+    """
+
+    time: Array
+    inputs: Array
+    outputs: Array
+    source: str
+    signals: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @property
+    def step(self) -> float:
+        """Return the sample time [s]."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class BoxModel:
+    """A model: values of the uncertain parameters, effects, and their values."""
+
+    p: Array
+    effects: tuple[BoxEffect, ...] = ()
+    values: tuple[Array, ...] = ()
+
+    @property
+    def vector(self) -> Array:
+        """Return all values in one row."""
+        return np.concatenate([self.p, *self.values])
+
+    def moved(self, vector: Array) -> "BoxModel":
+        """Return the same structure with other values, kept within what the laws allow.
+
+        Args:
+            vector: (values,) parameters first.
+
+        Returns:
+            The model.
+        """
+        values, at = [], len(self.p)
+        for effect, old in zip(self.effects, self.values, strict=True):
+            values.append(effect.bounded(vector[at : at + len(old)]))
+            at += len(old)
+        return BoxModel(vector[: len(self.p)], self.effects, tuple(values))
+
+    def extended(self, effect: BoxEffect, values: Array) -> "BoxModel":
+        """Return this model with one more effect.
+
+        Args:
+            effect: that is added.
+            values: of its parameters.
+
+        Returns:
+            The model.
+        """
+        return BoxModel(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))
+
+    def without(self, label: str) -> "BoxModel":
+        """Return this model with one effect less.
+
+        Args:
+            label: of the effect that goes.
+
+        Returns:
+            The model.
+        """
+        kept = [k for k, effect in enumerate(self.effects) if effect.label != label]
+        return BoxModel(self.p, tuple(self.effects[k] for k in kept), tuple(self.values[k] for k in kept))

@@ -1,0 +1,111 @@
+"""Two effects that pay together only; laws of the motion that noise at a port would hide; efforts too small to name."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel
+from orchestrator.diagnosis.blackbox.parts import parts_of
+from orchestrator.diagnosis.blackbox.screening import Known, Screened
+from orchestrator.diagnosis.blackbox.verdict import followed
+from orchestrator.diagnosis.blackbox.whitening import Ladder, Surrogate
+
+ROWS = 800
+SCENE = Surroundings(0.01, 1.0, 1.0, np.linspace(-1.0, 1.0, ROWS))
+TURNS = Surrogate(np.array([[1.0, 1.0], [0.0, 0.999]]), np.array([[0.5], [1.0]]), np.array([[1.0, 0.0]]))
+"""A body that turns freely: noise at its port explains most of what goes on slowly."""
+MOTION = 40.0 * np.sin(0.021 * np.arange(ROWS)) + 7.0 * np.sin(0.13 * np.arange(ROWS))
+
+
+def answer(effort: np.ndarray) -> np.ndarray:
+    return TURNS.response(effort[:-1, None], 0)[:, 0, 0]
+
+
+SPRING, LOAD, DRAG = answer(-MOTION), answer(np.sign(np.gradient(MOTION))), answer(-np.gradient(MOTION))
+
+
+def fitter(measured: np.ndarray) -> Fitter:
+    """Return a fitter of a record that a model without parameters should have left at zero."""
+    problem = SimpleNamespace(
+        map=SimpleNamespace(uncertain=(), ports={"p": SimpleNamespace(position="x", input="u")}),
+        nominal=BoxModel(np.zeros(0)), residual=lambda y: measured[: len(y), None] - y, outputs=("y",), n=ROWS,
+        noise_places=[0], runner=SimpleNamespace(reads=["x"], inputs=["u"]), read=lambda models: [MOTION[:, None]],
+    )  # fmt: skip
+    return Fitter(problem, Ladder(TURNS, np.ones(1), ROWS), parts_of(ROWS))
+
+
+def plain(own: Fitter) -> BoxFit:
+    y = np.zeros((ROWS, 1))
+    return BoxFit(BoxModel(np.zeros(0)), own.best_level(y, slice(0, ROWS)), y, 0.0, 0.0, 0.0, np.zeros((ROWS, 1, 0)))
+
+
+def noise(seed: int) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=ROWS)
+
+
+def unit(column: np.ndarray) -> np.ndarray:
+    return column / np.sqrt(np.mean(column**2))
+
+
+def test_two_effects_that_noise_at_the_port_would_hide_are_promised_together() -> None:
+    columns = {"spring": unit(SPRING), "directional_friction": unit(LOAD), "viscous_drag": unit(DRAG)}
+    effects = [BoxEffect(BANK[name], "p", SCENE) for name in columns]
+    trials = [(effect, np.ones(1), 1) for effect in effects]
+    own = fitter(12.0 * columns["spring"] + 9.0 * columns["directional_friction"] + noise(1))
+    known = Known(own, plain(own), ROWS)
+    assert own.ladder.share(known.start) > 0.0
+    screened = Screened([], known, trials, [c[:, None] for c in columns.values()], frozenset())
+    best = screened.pairs(20.0)[0]
+    assert {e.kind.name for e in best.effects} == {"spring", "directional_friction"}
+    assert own.ladder.share(best.level) < own.ladder.share(known.start)
+    found = {e.kind.name: v[0] for e, v in zip(best.effects, best.values, strict=True)}
+    assert found["spring"] == pytest.approx(12.0, rel=0.05)
+    assert found["directional_friction"] == pytest.approx(9.0, rel=0.05)
+
+
+def test_noise_alone_promises_no_pair() -> None:
+    columns = [unit(c)[:, None] for c in (SPRING, LOAD, DRAG)]
+    trials = [(BoxEffect(BANK[name], "p", SCENE), np.ones(1), 1) for name in ("spring", "load", "viscous_drag")]
+    pushes = 1e-2 * np.random.default_rng(2).normal(size=ROWS)
+    own = fitter(answer(pushes) + noise(3))
+    screened = Screened([], Known(own, plain(own), ROWS), trials, columns, frozenset())
+    assert screened.pairs(20.0) == []
+
+
+def test_drag_in_one_spot_is_no_disturbance() -> None:
+    spot = np.abs(MOTION - 20.0) < 6.0
+    left = answer(-2e-2 * spot * np.gradient(MOTION))
+    own = fitter(left + noise(4))
+    fit = plain(own)
+    assert own.ladder.share(fit.level) > 1e-5
+    assert followed(own, fit)[0] > 0.0
+
+
+def test_an_effort_that_comes_is_no_disturbance() -> None:
+    coming = np.where(np.arange(ROWS) > 430, 1e-2, 0.0)
+    own = fitter(answer(coming) + noise(5))
+    fit = plain(own)
+    assert own.ladder.share(fit.level) > 1e-5
+    assert followed(own, fit)[0] > 0.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_disturbance_follows_no_law_of_the_motion(seed: int) -> None:
+    pushes = 1e-2 * np.random.default_rng(10 + seed).normal(size=ROWS)
+    own = fitter(answer(pushes) + noise(20 + seed))
+    fit = plain(own)
+    assert own.ladder.share(fit.level) > 1e-5
+    assert followed(own, fit)[0] < 0.0
+
+
+@pytest.mark.parametrize(("name", "values", "means"), [
+    ("load", [1e-2], True), ("load", [1e-6], False),
+    ("input_offset", [-1e-6], False), ("gravity", [1e-9, -1e-3], True), ("gravity", [1e-9, 1e-9], False),
+    ("input_delay", [1e-9], True), ("coulomb_friction", [1e-7, 0.01], False),
+])  # fmt: skip
+def test_an_effort_of_the_size_of_rounding_is_no_effect(name: str, values: list[float], means: bool) -> None:
+    assert BoxEffect(BANK[name], "p", SCENE).means(np.array(values), 1e-3) is means
