@@ -10,6 +10,7 @@ import pytest
 from orchestrator.diagnosis import verdict
 from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit, split
 from orchestrator.diagnosis.outcome import Named
+from orchestrator.diagnosis import passes as rules
 from orchestrator.diagnosis.passes import _growth, _left, passes
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
 from orchestrator.diagnosis.verdict.naming import METRIC, named, unit_of
@@ -223,10 +224,19 @@ def test_units_of_a_position_in_metres() -> None:
 
 
 def warned(
-    *, unknown=False, floor_off=False, explained=1.0, growth=1.0, follows=(), effects=(), channels=2, turned=False
+    *,
+    unknown=False,
+    floor_off=False,
+    explained=1.0,
+    growth=1.0,
+    follows=(),
+    effects=(),
+    channels=2,
+    turned=False,
+    missing=1.0,
 ):
     parts = Parts(slice(250, 500), slice(500, 750), slice(10, 250)) if turned else PARTS
-    left = Remainder(1.0, explained, growth, tuple(follows))
+    left = Remainder(missing, explained, growth, tuple(follows))
     likelihood = SimpleNamespace(settings=SETTINGS)
     found = SimpleNamespace(
         left=left,
@@ -257,6 +267,25 @@ def test_notes_say_what_is_left() -> None:
     assert partly.startswith("30 % of the misfit's evidence is left; it")
     assert warned(floor_off=True, explained=0.8) == ()
     assert warned(floor_off=False, explained=0.1) == ()
+
+
+def test_where_the_noise_was_overrated_no_share_is_told() -> None:
+    one = Named("drag", "load", {}, 1.0, "", 1.0)
+    assert warned(floor_off=True, explained=0.0, missing=-5.0) == ()
+    words = warned(unknown=True, effects=[one], explained=0.0, missing=-5.0)[1]
+    assert words == "drag (load) would take an unknown share of it: too little to be named"
+
+
+@pytest.mark.parametrize(
+    ("per_sample", "off"), [(0.049, False), (0.051, True), (0.0, False), (-0.49, False), (-0.51, True)]
+)
+def test_a_floor_says_nothing_where_the_noise_was_overrated(
+    per_sample: float, off: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = PARTS.seen.stop - PARTS.seen.start
+    monkeypatch.setattr(rules, "_over_floor", lambda *_: per_sample * rows)
+    likelihood, final = SimpleNamespace(settings=SETTINGS), SimpleNamespace()
+    assert rules._is_off_floor(likelihood, final, PARTS, 0.0) is off  # type: ignore[arg-type]
 
 
 def test_notes_name_what_cannot_be_told_apart() -> None:

@@ -30,8 +30,9 @@ def warnings_of(found: Pass, named: Sequence[Named], channels: int, encoders: in
         if named:
             names = ", ".join(f"{n.name} ({n.site})" for n in named)
             little = ": too little to be named" if left.explained < settings.least_explained else ""
-            warnings.append(f"{names} would take {100 * min(max(left.explained, 0), 1):.0f} % of it{little}")
-    elif found.floor_off and left.explained < settings.mostly_explained:
+            share = f"{100 * min(max(left.explained, 0), 1):.0f} %" if left.missing > 0.0 else "an unknown share"
+            warnings.append(f"{names} would take {share} of it{little}")
+    elif found.floor_off and left.missing > 0.0 and left.explained < settings.mostly_explained:
         warnings.append(f"{100 * (1 - left.explained):.0f} % {LEFT_OVER}; it {kind_of_rest(left, settings)}")
     warnings += [*found.withdrawn, *(f"refused: {why}" for why in found.search.refused.values())]
     for effect in named:
