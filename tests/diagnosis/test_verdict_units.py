@@ -7,10 +7,10 @@ import msgspec
 import numpy as np
 import pytest
 
+from orchestrator.diagnosis import passes as rules
 from orchestrator.diagnosis import verdict
 from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit, split
 from orchestrator.diagnosis.outcome import Named
-from orchestrator.diagnosis import passes as rules
 from orchestrator.diagnosis.passes import _growth, _left, passes
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
 from orchestrator.diagnosis.verdict.naming import METRIC, named, unit_of
