@@ -9,6 +9,7 @@ import pytest
 from orchestrator.diagnosis import proof
 from orchestrator.diagnosis.proof.free_run import _steps, free_run, simulate
 from orchestrator.diagnosis.proof.misfit import held_out_misfit, segments
+from orchestrator.plants.predictor import runs_coarsely
 from tests.support.short_records import (
     AXIS,
     DRIVETRAIN,
@@ -51,6 +52,19 @@ def test_a_limit_cuts_the_requests() -> None:
     signals = signals_from(np.zeros((40, 2)), u, 2)
     exact = drivetrain_angles(drivetrain(), np.clip(u, -8.0, 8.0))
     assert np.allclose(simulate(DRIVETRAIN, p, np.zeros(8), signals, slice(0, 40)), exact, atol=1e-12)
+
+
+def test_steps_of_the_predictor_are_driven_by_what_the_drives_filter_lets_through() -> None:
+    u = torque(60)
+    p = drivetrain(effects__hardening_stiffness__cubic=2e6, effects__drive_filter__time_constant=0.05)
+    signals = signals_from(np.zeros((60, 2)), u, 2)
+    coarse, exact = (
+        simulate(DRIVETRAIN, p, np.zeros(8), signals, slice(0, 60), history=history) for history in (True, False)
+    )
+    assert runs_coarsely(DRIVETRAIN, p)
+    unfiltered = simulate(DRIVETRAIN, drivetrain(effects__hardening_stiffness__cubic=2e6), np.zeros(8), signals,
+                          slice(0, 60))  # fmt: skip
+    assert np.max(np.abs(coarse - exact)) < 0.05 * np.max(np.abs(unfiltered - exact))
 
 
 @pytest.mark.parametrize("samples", [1, 2])

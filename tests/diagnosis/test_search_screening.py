@@ -76,6 +76,8 @@ def test_the_scan_normalises_by_the_response_along_the_way() -> None:
     assert power[1] == pytest.approx((a * a + b * b) / (400 * 4.0))  # 2 * 3 / 2.9: third entry
     assert power[0] < 0.05 * power[1]
     assert power[2] == 0.0  # beyond the table
+    gains = np.array([1.0, 1.0, 4.0, 1.0, 9.0, 9.0])[:4]  # what lies behind the table in memory is none of it
+    assert _scan(effort, theta, omega, np.array([4.0]), gains, 2.9)[0] == 0.0  # 4 * 3 / 2.9: one entry too far
 
 
 def test_a_ripples_period_is_found_by_the_scan() -> None:

@@ -291,6 +291,17 @@ def test_a_law_that_contains_another_is_tried_where_that_pays(friction) -> None:
     assert search.refine(best, FRICTION, implausible, scene) is None
 
 
+def test_only_a_law_that_contains_the_effect_is_tried_for_it(friction, monkeypatch: pytest.MonkeyPatch) -> None:
+    search, _, base, best, _ = friction
+    tried: list[tuple[str, str]] = []
+    monkeypatch.setattr(
+        search, "refine", lambda source, simpler, effect, scene: tried.append((simpler.label, effect.label))
+    )
+    assert search.refined((best,), base, base, scene_of(search.likelihood, best.fit)) == []
+    assert tried == [(FRICTION.label, e.label) for e in AXIS.bank if e.needs == FRICTION.label]
+    assert (FRICTION.label, STRIBECK.label) in tried
+
+
 def test_what_fails_to_decide_is_fitted_to_both_parts(friction) -> None:
     search, _, base, best, _ = friction
     assert search.rescued(best, base, base) is best  # it pays already
