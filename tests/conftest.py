@@ -1,6 +1,5 @@
 """Fixtures that all areas share, and the order in which files run."""
 
-import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -27,14 +26,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def _temporary_files_end_with_the_run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Keep what tests, and tools of others that they run, leave in the temporary directory from staying there."""
     folder = tmp_path_factory.mktemp("tmp")
-    before = os.environ.get("TMPDIR")
-    os.environ["TMPDIR"], tempfile.tempdir = str(folder), None
-    yield
-    tempfile.tempdir = None
-    if before is None:
-        del os.environ["TMPDIR"]
-    else:
-        os.environ["TMPDIR"] = before
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", str(folder))
+        patch.setattr(tempfile, "tempdir", None)
+        yield
     shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -22,11 +22,10 @@ def _no_module_is_left() -> Iterator[None]:
     sys.modules.pop(MODULE, None)
 
 
-def compiled(folder: Path):
-    """The function of a new process, as far as the cache is concerned."""
-    path = folder / "source.py"
+def loaded(path: Path, source: str):
+    """The module of a new process, as far as the cache is concerned."""
     if not path.exists():
-        path.write_text(SOURCE)
+        path.write_text(source)
     gc.collect()  # what an earlier function left in memory is not there in a new process
     spec = importlib.util.spec_from_file_location(MODULE, path)
     assert spec is not None
@@ -34,11 +33,11 @@ def compiled(folder: Path):
     module = importlib.util.module_from_spec(spec)
     sys.modules[MODULE] = module  # numba imports a kept function's module by its name
     spec.loader.exec_module(module)
-    return numba_cache.kept()(module.twice)
+    return module
 
 
 def hits(folder: Path) -> int:
-    function = compiled(folder)
+    function = numba_cache.kept()(loaded(folder / "source.py", SOURCE).twice)
     assert function(1.5) == 3.0
     return sum(function.stats.cache_hits.values())
 
@@ -86,16 +85,7 @@ CLOSURE = "def make(factor):\n    def times(x):\n        return factor * x\n    
 
 
 def closure_hits(folder: Path, factor: float) -> int:
-    path = folder / "closure.py"
-    path.write_text(CLOSURE)
-    gc.collect()
-    spec = importlib.util.spec_from_file_location(MODULE, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[MODULE] = module
-    spec.loader.exec_module(module)
-    function = numba_cache.kept()(module.make(factor))
+    function = numba_cache.kept()(loaded(folder / "closure.py", CLOSURE).make(factor))
     assert function(1.5) == factor * 1.5
     return sum(function.stats.cache_hits.values())
 

@@ -297,12 +297,10 @@ class BoxEffect:
         Returns:
             True when they are.
         """
-        if self.kind.where in (INPUT, PORT) and self.amplitudes:
-            first = (
-                np.array(self.kind.starts(self.scene)[0][: self.amplitudes]) if self.kind.starts(self.scene) else 0.0
-            )
-            if np.all(np.abs(values[: self.amplitudes]) < least * np.abs(first)):
-                return False
+        starts, leading = self.kind.starts(self.scene), self.amplitudes
+        is_effort = self.kind.where in (INPUT, PORT) and leading > 0 and bool(starts)
+        if is_effort and np.all(np.abs(values[:leading]) < least * np.abs(starts[0][:leading])):
+            return False
         return self.kind.plausible(tuple(values), self.scene)
 
     def bounded(self, values: Array) -> Array:

@@ -11,6 +11,7 @@ along the motion of one of them, the ``reference``.
 import math
 from collections.abc import Iterator
 from concurrent.futures import CancelledError
+from copy import copy
 from dataclasses import dataclass, field, replace
 from threading import Event
 from typing import Any
@@ -65,7 +66,9 @@ class RecordLikelihood:
         Returns:
             The likelihood.
         """
-        return replace(self, stop=stop)
+        shorter = copy(self)  # nothing else depends on where it stops
+        shorter.stop = stop
+        return shorter
 
     def about(self, reference: Array) -> "RecordLikelihood":
         """Return the likelihood whose gains for models with a gap are those along the motion of ``reference``.
