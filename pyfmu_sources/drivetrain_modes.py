@@ -1,13 +1,14 @@
 """The drivetrain as model exchange sees it: state derivatives, event indicators, what follows at an event.
 
-The laws and their guards are those of :mod:`smooth_mode`; here they are without the integrator, which is the host's.
+The laws and their guards are those of :mod:`smooth_events`; here they are without the integrator, which is the host's.
 """
 
+from .dormand_prince import mode_rates
 from .drivetrain_parameters import P_LIMIT, P_OFFSET_L, P_OFFSET_M, P_RES_J
 from .dry_friction import NEVER, shaft_torque
 from .effects import UNASKED, saturated
 from .equations import Mode, Parameters, State
-from .smooth_mode import guard, guard_room, mode_rates, settled
+from .smooth_events import guard, guard_room, settled
 
 Indicators = tuple[float, float, float, float]
 Outputs = tuple[float, float, float, float, float, float]

@@ -1,0 +1,146 @@
+"""One step of Dormand and Prince's method of order 5(4) inside a smooth mode of the drivetrain.
+
+Source: Dormand and Prince, J. Comput. Appl. Math. 6, 1980.
+"""
+
+from math import sqrt
+
+from .bristles import builds_up_l, builds_up_m, turned_signs
+from .equations import Mode, Parameters, State, rates
+
+RELATIVE_TOLERANCE = 1e-11
+ABSOLUTE_TOLERANCE = 1e-13
+
+
+def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
+    """Return the derivative of ``x`` in ``mode``; what sticks does not move.
+
+    Args:
+        x: state, as in ``equations``.
+        mode: contact, and the directions in which motor and load slide.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        The derivative.
+    """
+    still_m = mode[1] == 0
+    still_l = mode[2] == 0
+    if not still_m and not still_l:
+        return rates(x, mode[0], float(mode[1]), float(mode[2]), p, u, T_l)
+    sign_m, sign_l, bends_m, bends_l = turned_signs(x, mode, p)
+    r = rates(x, mode[0], sign_m, sign_l, p, u, T_l)
+    still_m = still_m and not builds_up_m(p)
+    still_l = still_l and not builds_up_l(p)
+    return (
+        0.0 if still_m else r[0],
+        0.0 if still_m else r[1],
+        0.0 if still_l else r[2],
+        0.0 if still_l else r[3],
+        r[4],
+        r[5],
+        r[6],
+        r[7],
+        bends_m,
+        bends_l,
+        r[10],
+        r[11],
+    )
+
+
+def ahead(x: State, f: float, k: State) -> State:
+    """Return ``x + f k``.
+
+    Args:
+        x: state, as in ``equations``.
+        f: factor.
+        k: derivative.
+
+    Returns:
+        The state.
+    """
+    return (
+        x[0] + f * k[0],
+        x[1] + f * k[1],
+        x[2] + f * k[2],
+        x[3] + f * k[3],
+        x[4] + f * k[4],
+        x[5] + f * k[5],
+        x[6] + f * k[6],
+        x[7] + f * k[7],
+        x[8] + f * k[8],
+        x[9] + f * k[9],
+        x[10] + f * k[10],
+        x[11] + f * k[11],
+    )
+
+
+def combine(a: float, k: State, b: float, m: State) -> State:
+    """Return ``a k + b m``.
+
+    Args:
+        a: factor.
+        k: derivative.
+        b: factor.
+        m: derivative.
+
+    Returns:
+        The sum.
+    """
+    return (
+        a * k[0] + b * m[0],
+        a * k[1] + b * m[1],
+        a * k[2] + b * m[2],
+        a * k[3] + b * m[3],
+        a * k[4] + b * m[4],
+        a * k[5] + b * m[5],
+        a * k[6] + b * m[6],
+        a * k[7] + b * m[7],
+        a * k[8] + b * m[8],
+        a * k[9] + b * m[9],
+        a * k[10] + b * m[10],
+        a * k[11] + b * m[11],
+    )
+
+
+def runge_kutta(
+    x: State, k1: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float
+) -> tuple[State, State, float]:
+    """Return the state after one Dormand-Prince step, its derivative there and the scaled error.
+
+    Args:
+        x: state, as in ``equations``.
+        k1: derivative at the beginning.
+        mode: contact, and the directions in which motor and load slide.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+
+    Returns:
+        The three; an error below 1 is within the tolerance.
+    """
+    k2 = mode_rates(ahead(x, h / 5.0, k1), mode, p, u, T_l)
+    k3 = mode_rates(ahead(x, h, combine(3.0 / 40.0, k1, 9.0 / 40.0, k2)), mode, p, u, T_l)
+    sum4 = ahead(combine(44.0 / 45.0, k1, -56.0 / 15.0, k2), 32.0 / 9.0, k3)
+    k4 = mode_rates(ahead(x, h, sum4), mode, p, u, T_l)
+    sum5 = combine(19372.0 / 6561.0, k1, -25360.0 / 2187.0, k2)
+    sum5 = ahead(ahead(sum5, 64448.0 / 6561.0, k3), -212.0 / 729.0, k4)
+    k5 = mode_rates(ahead(x, h, sum5), mode, p, u, T_l)
+    sum6 = combine(9017.0 / 3168.0, k1, -355.0 / 33.0, k2)
+    sum6 = ahead(ahead(ahead(sum6, 46732.0 / 5247.0, k3), 49.0 / 176.0, k4), -5103.0 / 18656.0, k5)
+    k6 = mode_rates(ahead(x, h, sum6), mode, p, u, T_l)
+    sum7 = combine(35.0 / 384.0, k1, 500.0 / 1113.0, k3)
+    sum7 = ahead(ahead(ahead(sum7, 125.0 / 192.0, k4), -2187.0 / 6784.0, k5), 11.0 / 84.0, k6)
+    after = ahead(x, h, sum7)
+    k7 = mode_rates(after, mode, p, u, T_l)
+    wrong = combine(71.0 / 57600.0, k1, -71.0 / 16695.0, k3)
+    wrong = ahead(ahead(ahead(wrong, 71.0 / 1920.0, k4), -17253.0 / 339200.0, k5), 22.0 / 525.0, k6)
+    wrong = ahead(wrong, -1.0 / 40.0, k7)
+    square = 0.0
+    for n in range(12):
+        scale = ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * max(abs(x[n]), abs(after[n]))
+        share = h * wrong[n] / scale
+        square += share * share
+    return (after, k7, sqrt(square / 8.0))
