@@ -13,9 +13,9 @@ same, the model file states the unit.
 """
 
 from .bristles import bent_sign, has_settled, leaving_speed
+from .drive_request import UNASKED, request_rate
 from .drivetrain_parameters import BIG
 from .effects import (
-    UNASKED,
     bristle_rate,
     dependent_friction,
     directional_friction,
@@ -24,7 +24,6 @@ from .effects import (
     periodic,
     periodic_slope,
     quadratic_drag,
-    request_rate,
     sliding_friction,
     spring_torque,
     torque_ripple,

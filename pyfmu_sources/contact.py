@@ -2,6 +2,7 @@
 
 from .backlash_models import BOUNCING, HELD, RIGID
 from .bristles import resting_bristles
+from .drive_request import UNASKED
 from .drivetrain_parameters import (
     NONE,
     P_ALPHA,
@@ -9,7 +10,6 @@ from .drivetrain_parameters import (
     P_MODEL,
     P_RESTITUTION,
 )
-from .effects import UNASKED
 from .equations import (
     Parameters,
     State,

@@ -9,6 +9,7 @@ from math import exp
 from .backlash_models import NEVER_PULLING
 from .bristles import has_friction_l, has_friction_m
 from .contact import after_event, consistent_start, initial_contact
+from .drive_request import UNASKED, ramp_end, ramp_target, ramp_time
 from .drivetrain_parameters import (
     BIG,
     NONE,
@@ -39,7 +40,6 @@ from .drivetrain_parameters import (
     P_STOP_UPPER,
 )
 from .dry_friction import shaft_torque, slips
-from .effects import UNASKED, ramp_end, ramp_target, ramp_time
 from .equations import (
     Mode,
     Parameters,
@@ -53,17 +53,9 @@ from .equations import (
     twist,
     twist_rate,
 )
-from .linear_mode import (
-    Transition,
-    evaluate,
-    fastest_rate,
-    first_event,
-    law_of,
-    relaxation_rate,
-    taylor,
-    transition,
-)
+from .linear_mode import Transition, evaluate, first_event, law_of, taylor
 from .smooth_mode import advance_smooth, refused
+from .transition import fastest_rate, relaxation_rate, transition
 
 __all__ = [
     "Mode",

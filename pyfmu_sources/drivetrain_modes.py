@@ -4,9 +4,9 @@ The laws and their guards are those of :mod:`smooth_events`; here they are witho
 """
 
 from .dormand_prince import mode_rates
+from .drive_request import UNASKED, saturated
 from .drivetrain_parameters import P_LIMIT, P_OFFSET_L, P_OFFSET_M, P_RES_J
 from .dry_friction import NEVER, shaft_torque
-from .effects import UNASKED, saturated
 from .equations import Mode, Parameters, State
 from .smooth_events import guard, guard_room, settled
 

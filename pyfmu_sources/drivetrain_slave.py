@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar
 
 from . import drivetrain
+from .drive_request import saturated
 from .drivetrain import Mode, State, Table
 from .drivetrain_modes import QUIET, Indicators, after_events, indicators, rates_and_outputs, state_rates
 from .drivetrain_parameters import (
@@ -21,7 +22,6 @@ from .drivetrain_parameters import (
     PARAMETERS,
     Parameter,
 )
-from .effects import saturated
 from .fmu_variables import LARGEST, FmuVariable
 from .plant_slave import PlantSlave
 from .slave_base import TOO_STIFF, StepRefusedError

@@ -17,6 +17,7 @@ Torques are positive when they drive motor or load forward; ``T_l`` and the load
 """
 
 from .backlash_models import GRADUAL, HELD, NEVER_PULLING, OWN_CONTACT, PLAIN_WHEN_CLOSED, RIGID
+from .drive_request import request_rate
 from .drivetrain_parameters import (
     BIG,
     NONE,
@@ -97,7 +98,6 @@ from .effects import (
     periodic,
     periodic_slope,
     quadratic_drag,
-    request_rate,
     resonance_torque,
     set_in,
     sliding_friction,

@@ -8,7 +8,7 @@ needs no series: one product with the transition matrix, made once for each step
 ``x6 = (theta_m, omega_m, theta_l, omega_l, T_m, s)`` here, the part of the state that moves.
 """
 
-from math import ceil, sqrt
+from math import sqrt
 from typing import Annotated
 
 from .backlash_models import BOUNCING, HELD
@@ -39,9 +39,6 @@ Series = Annotated[list[float], TERMS + 1]
 GUARD_ROUNDINGS = 16.0
 EPSILON = 2.220446049250313e-16
 MAX_MARCH = 400
-# A law so stiff that a step would need more Taylor steps than this is brought over it by doubling a shorter one.
-MOST_PIECES = 512.0
-MOST_DOUBLINGS = 200
 # The march ends at this part of the tolerance, which it can only approach from above.
 REACHED = 0.01
 
@@ -97,37 +94,6 @@ def linear_rates(x: State6, constant: float, law: Law, p: Parameters, u: float, 
     if kind == LOAD_HELD:
         return (x[1], motor / p[P_J_M], x[3], 0.0, lag, 0.0)
     return (x[1], 0.0, x[3], 0.0, lag, 0.0)
-
-
-def fastest_rate(law: Law, p: Parameters) -> float:
-    """Return a bound [1/s] on the rates of the linear law, by which Taylor steps are scaled.
-
-    Args:
-        law: kind, stiffness, damping and offset of the linear law.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The bound.
-    """
-    mobility = 1.0 / p[P_J_L] + 1.0 / (p[P_J_M] * p[P_I] * p[P_I])
-    friction = p[P_B_M] / p[P_J_M] + p[P_B_L] / p[P_J_L] + 1.0 / p[P_TAU]
-    return sqrt(law[1] * mobility) + law[2] * mobility + friction
-
-
-def relaxation_rate(p: Parameters) -> float:
-    """Return the rate [1/s] at which a parted shaft unwinds; zero where it does so at once or has none.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The rate.
-    """
-    damping = shaft_damping(p)
-    stiffness = shaft_stiffness(p)
-    if not teeth_never_pull(p) or damping == 0.0 or stiffness > 1e7 * damping:
-        return 0.0
-    return stiffness / damping
 
 
 def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float, kappa: float) -> Coefficients:
@@ -316,141 +282,3 @@ def first_root(series: Series, end: float, tolerance: float) -> float:
         if time >= end:
             return end
     return time
-
-
-def column(x: State6, start: State6) -> Row:
-    """Return what a unit start value has added to each state.
-
-    Args:
-        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
-        start: state at the beginning.
-
-    Returns:
-        The row.
-    """
-    return (x[0] - start[0], x[1] - start[1], x[2] - start[2], x[3] - start[3], x[4] - start[4], 0.0)
-
-
-def propagate(x: State6, law: Law, p: Parameters, u: float, T_l: float, h: float) -> State6:
-    """Return the state after ``h`` [s] in one linear mode, whatever its guards say.
-
-    Args:
-        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
-        law: kind, stiffness, damping and offset of the linear law.
-        p: parameters, in the order of the FMU's table.
-        u: requested torque [N.m], delayed and saturated already.
-        T_l: load torque [N.m].
-        h: length of the step [s].
-
-    Returns:
-        The state.
-    """
-    count = max(1, ceil(h * fastest_rate(law, p)))
-    for _ in range(count):
-        x = evaluate(taylor(x, law, p, u, T_l, h / count, 0.0), 1.0)
-    return x
-
-
-def transition(law: Law, p: Parameters, h: float) -> Transition:
-    """Return the five rows by which ``(twist, omega_m, omega_l, T_m, u, T_l)`` moves the state in ``h`` [s].
-
-    Args:
-        law: kind, stiffness, damping and offset of the linear law.
-        p: parameters, in the order of the FMU's table.
-        h: length of the step [s].
-
-    Returns:
-        Five rows.
-    """
-    free = (law[0], law[1], law[2], 0.0)
-    doublings = 0
-    while h * fastest_rate(law, p) > MOST_PIECES and doublings < MOST_DOUBLINGS:
-        h *= 0.5
-        doublings += 1
-    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    wound = (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
-    motor = (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)
-    load = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    torque = (0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-    a = column(propagate(wound, free, p, 0.0, 0.0, h), wound)
-    b = column(propagate(motor, free, p, 0.0, 0.0, h), motor)
-    c = column(propagate(load, free, p, 0.0, 0.0, h), load)
-    d = column(propagate(torque, free, p, 0.0, 0.0, h), torque)
-    e = column(propagate(zero, free, p, 1.0, 0.0, h), zero)
-    f = column(propagate(zero, free, p, 0.0, 1.0, h), zero)
-    rows = (
-        (a[0], b[0], c[0], d[0], e[0], f[0]),
-        (a[1], b[1], c[1], d[1], e[1], f[1]),
-        (a[2], b[2], c[2], d[2], e[2], f[2]),
-        (a[3], b[3], c[3], d[3], e[3], f[3]),
-        (a[4], b[4], c[4], d[4], e[4], f[4]),
-    )
-    for _ in range(doublings):
-        rows = doubled(rows, p[P_I])
-    return rows
-
-
-def doubled(rows: Transition, i: float) -> Transition:
-    """Return the transition rows of two steps in a row: a stiff law needs too many Taylor steps for one.
-
-    Args:
-        rows: of the transition.
-        i: gear ratio.
-
-    Returns:
-        Five rows.
-    """
-    r0, r1, r2, r3, r4 = rows
-    wound = added(scaled(r0, 1.0 / i), scaled(r2, -1.0))
-    return (
-        added(r0, followed(r0, wound, r1, r3, r4)),
-        added(r1, followed(r1, wound, r1, r3, r4)),
-        added(r2, followed(r2, wound, r1, r3, r4)),
-        added(r3, followed(r3, wound, r1, r3, r4)),
-        added(r4, followed(r4, wound, r1, r3, r4)),
-    )
-
-
-def scaled(row: Row, f: float) -> Row:
-    """Return ``f row``.
-
-    Args:
-        row: six numbers.
-        f: factor.
-
-    Returns:
-        Six numbers.
-    """
-    return (f * row[0], f * row[1], f * row[2], f * row[3], f * row[4], f * row[5])
-
-
-def added(a: Row, b: Row) -> Row:
-    """Return ``a + b``.
-
-    Args:
-        a: six numbers.
-        b: six numbers.
-
-    Returns:
-        Six numbers.
-    """
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
-
-
-def followed(row: Row, wound: Row, motor: Row, load: Row, torque: Row) -> Row:
-    """Return what ``row`` adds in a step that starts where a step with the given rows has ended.
-
-    Args:
-        row: of the second step.
-        wound: row of the twist of the first step.
-        motor: row of the motor's speed.
-        load: row of the load's speed.
-        torque: row of the drive's torque.
-
-    Returns:
-        The row of both steps.
-    """
-    moved = added(
-        added(scaled(wound, row[0]), scaled(motor, row[1])), added(scaled(load, row[2]), scaled(torque, row[3]))
-    )
-    return added(row, moved)

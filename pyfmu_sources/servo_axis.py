@@ -24,8 +24,8 @@ from .axis_equations import (
     start,
 )
 from .axis_steps import breaking_time, held, longest_step, slowing_time, smooth_step, stop_time
+from .drive_request import UNASKED, ramp_end, ramp_target, ramp_time
 from .drivetrain_parameters import BIG
-from .effects import UNASKED, ramp_end, ramp_target, ramp_time
 from .servo_axis_parameters import P_FILTER, P_RATE, P_WAVY
 
 __all__ = [

@@ -19,8 +19,8 @@ from .axis_equations import (
     sliding_torque,
     slip_at_rest,
 )
+from .drive_request import UNASKED, saturated
 from .drivetrain_parameters import BIG
-from .effects import UNASKED, saturated
 from .servo_axis_parameters import P_LIMIT, P_OFFSET, P_STOP_LOWER, P_STOP_UPPER, P_WAVY
 
 Indicators = tuple[float, float]

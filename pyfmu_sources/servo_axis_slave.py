@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Annotated, Any, ClassVar
 
 from . import servo_axis
+from .drive_request import saturated
 from .drivetrain_parameters import BIG
-from .effects import saturated
 from .fmu_variables import LARGEST, FmuVariable
 from .plant_slave import PlantSlave
 from .servo_axis import State

@@ -11,7 +11,7 @@ from orchestrator.plants.known.drivetrain import PLANT, realised
 from orchestrator.records.model_file import default_model
 from orchestrator.records.record import record_from_columns
 from pyfmu_sources import drivetrain_parameters as dt
-from pyfmu_sources.effects import followed_request
+from pyfmu_sources.drive_request import followed_request
 from tests.support.independent_plant import SIGMA_M, make_record
 
 MODEL = default_model()

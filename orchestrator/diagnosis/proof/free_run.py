@@ -21,7 +21,7 @@ from orchestrator.diagnosis.settings import FreeRunSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.predictor import FINER, coarse_runner_of, runs_coarsely
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
-from pyfmu_sources.effects import UNASKED
+from pyfmu_sources.drive_request import UNASKED
 
 Array = NDArray[np.float64]
 
