@@ -11,7 +11,7 @@ from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
-from orchestrator.diagnosis.blackbox.screening import Pair, Promise, Screened, screened
+from orchestrator.diagnosis.blackbox.screening import Known, Pair, Promise, Screened, screened
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings
 
 Array = NDArray[np.float64]
@@ -219,12 +219,15 @@ class BoxSearch:
     def _least(self, fit: BoxFit, before: BoxFit, base: BoxFit) -> float:
         """Return the gain that what ``fit`` has more than ``before`` must bring.
 
-        A law that is not exact leaves something that no other takes away whole: it is asked for less where it does.
+        A law that is not exact leaves something that no other takes away whole: it is asked for less where it does, and
+        for more where no more than measurement noise is left.
         """
         s, share = self.settings, self.fitter.ladder.share
         quiet = share(fit.level) <= s.quiet
         least = max(s.pays if quiet else s.pays_disturbed, s.leaves * (before.total - base.total))
         whole = quiet and share(before.level) > s.quiet and self.explained(fit)
+        if before.model.effects and share(before.level) <= self.fitter.settings.rest.solver and self.explained(before):
+            return max(least, s.pays_disturbed)  # noise alone is left, and of a law that is not exact a little
         return min(least, s.pays_disturbed) if whole else least
 
     def step(self, before: BoxFit, base: BoxFit) -> SearchStep:
@@ -311,7 +314,10 @@ class BoxSearch:
             if self.late:
                 break
             self.progress(label)
-            fits = [fit for promise in mine for fit in self._extended(before, promise)]
+            fits: list[BoxFit] = []
+            for promise in mine:  # a start that promises no more than is reached leads nowhere else
+                if all(promise.gain > fit.total - before.total for fit in fits):
+                    fits += self._extended(before, promise)
             if fits:
                 quick.append(max(fits, key=lambda fit: fit.total))
         quick.sort(key=self.score, reverse=True)
@@ -349,6 +355,22 @@ class BoxSearch:
             return False
         seen = len(self.fitter.parts.looked_at) * len(self.fitter.problem.outputs)
         return fit.fitted + fit.decided > -0.5 * seen - self.settings.noise_margin * np.sqrt(0.5 * seen)
+
+    def idle(self, fit: BoxFit) -> bool:
+        """Tell whether the fitted part is not explained, and no effect that was tried explains more of it.
+
+        Args:
+            fit: of the best model.
+
+        Returns:
+            True when nothing does: other rows would not change that.
+        """
+        count = 0.5 * np.arange(self.fitter.problem.n)[self.fitter.parts.fitted].size * len(self.fitter.problem.outputs)
+        if fit.fitted > -count - self.settings.noise_margin * np.sqrt(count):
+            return False
+        tried = [other for step in self.steps if step.before is fit and not step.unkept for other in step.tried]
+        asked = any(step.before is fit for step in self.steps)
+        return asked and all(other.fitted - fit.fitted < self.settings.penalty for other in tried)
 
     def _extended(self, before: BoxFit, promise: Promise) -> list[BoxFit]:
         model = before.model.extended(promise.effect, promise.effect.bounded(promise.values))
@@ -427,6 +449,8 @@ class BoxSearch:
         while fit.model.effects:
             reduced = []
             for effect in fit.model.effects:
+                if self._needed(fit, effect, base):
+                    continue
                 again = self.fitter.grown(fit.model.without(effect.label), fit.level)
                 if again is None or self._carries(fit, again, base):
                     continue
@@ -436,6 +460,23 @@ class BoxSearch:
                 break
             fit = max(reduced, key=self.score)
         return fit
+
+    def _needed(self, fit: BoxFit, effect: BoxEffect, base: BoxFit) -> bool:
+        """Tell whether a fit loses by far too much without an effect, the other values following as far as they can."""
+        model, at = fit.model.without(effect.label), len(fit.model.p)
+        for other, values in zip(fit.model.effects, fit.model.values, strict=True):
+            if other.label == effect.label:
+                break
+            at += len(values)
+        y = self.fitter.problem.simulate([model], self.fitter.parts.seen)[0]
+        if y is None:
+            return True
+        count = len(effect.kind.parameters)
+        J = np.delete(fit.J[: len(y)], range(at, at + count), axis=2)
+        without = replace(fit, model=model, y=y, J=J)
+        known = Known(self.fitter, without, len(y))
+        reached = max(known.explains(level) for level in self.fitter.ladder.near(known.start))
+        return fit.total - reached > self.settings.surely * self._least(fit, base, base)
 
     def _carries(self, fit: BoxFit, without: BoxFit, base: BoxFit) -> bool:
         """Tell whether what ``fit`` has more than ``without`` carries a good part of what all effects bring."""
