@@ -11,23 +11,11 @@ from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
-from orchestrator.diagnosis.blackbox.screening import Known, Pair, Promise, Screened, screened
+from orchestrator.diagnosis.blackbox.screening import Pair, Promise, Screened, screened
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings
+from orchestrator.diagnosis.blackbox.steps import SearchStep, counted, labels, lost_without, sought
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class SearchStep:
-    """One step: the model before, and every model that was fitted, best first."""
-
-    before: BoxFit
-    tried: tuple[BoxFit, ...]
-    accepted: bool
-    unkept: bool = False
-    """An effect was promised to pay where less noise is at the ports, and no fit came near it."""
-    pairs: tuple[Pair, ...] = ()
-    """Where nothing was accepted: two effects that promise to pay together where less noise is at the ports."""
 
 
 @dataclass
@@ -449,7 +437,7 @@ class BoxSearch:
         while fit.model.effects:
             reduced = []
             for effect in fit.model.effects:
-                if self._needed(fit, effect, base):
+                if lost_without(self.fitter, fit, effect) > self.settings.surely * self._least(fit, base, base):
                     continue
                 again = self.fitter.grown(fit.model.without(effect.label), fit.level)
                 if again is None or self._carries(fit, again, base):
@@ -460,23 +448,6 @@ class BoxSearch:
                 break
             fit = max(reduced, key=self.score)
         return fit
-
-    def _needed(self, fit: BoxFit, effect: BoxEffect, base: BoxFit) -> bool:
-        """Tell whether a fit loses by far too much without an effect, the other values following as far as they can."""
-        model, at = fit.model.without(effect.label), len(fit.model.p)
-        for other, values in zip(fit.model.effects, fit.model.values, strict=True):
-            if other.label == effect.label:
-                break
-            at += len(values)
-        y = self.fitter.problem.simulate([model], self.fitter.parts.seen)[0]
-        if y is None:
-            return True
-        count = len(effect.kind.parameters)
-        J = np.delete(fit.J[: len(y)], range(at, at + count), axis=2)
-        without = replace(fit, model=model, y=y, J=J)
-        known = Known(self.fitter, without, len(y))
-        reached = max(known.explains(level) for level in self.fitter.ladder.near(known.start))
-        return fit.total - reached > self.settings.surely * self._least(fit, base, base)
 
     def _carries(self, fit: BoxFit, without: BoxFit, base: BoxFit) -> bool:
         """Tell whether what ``fit`` has more than ``without`` carries a good part of what all effects bring."""
@@ -494,43 +465,3 @@ class BoxSearch:
         """
         self.progress("screening")
         return screened(self.fitter, self.effects, before)
-
-
-def counted(model: BoxModel) -> int:
-    """Return the number of values of the effects of a model that count as parameters.
-
-    Args:
-        model: with its effects.
-
-    Returns:
-        The number.
-    """
-    return sum(len(effect.kind.parameters) for effect in model.effects)
-
-
-def sought(model: BoxModel) -> float:
-    """Return what chance gives to the best of as many small values as were sifted, where one of them was taken.
-
-    Args:
-        model: with its effects.
-
-    Returns:
-        A log-likelihood.
-    """
-    cost = 0.0
-    for effect, values in zip(model.effects, model.values, strict=True):
-        small = effect.kind.small(effect.scene)
-        cost += np.log(len(small)) if len(small) and values[0] <= small[-1] else 0.0
-    return float(cost)
-
-
-def labels(fit: BoxFit) -> frozenset[str]:
-    """Return the names of its effects.
-
-    Args:
-        fit: of a model.
-
-    Returns:
-        The names.
-    """
-    return frozenset(effect.label for effect in fit.model.effects)

@@ -9,8 +9,9 @@ from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.screening import Known
-from orchestrator.diagnosis.blackbox.search import BoxSearch, labels
+from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
+from orchestrator.diagnosis.blackbox.steps import labels
 
 Array = NDArray[np.float64]
 

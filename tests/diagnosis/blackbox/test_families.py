@@ -9,9 +9,9 @@ from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.estimates import errors_of
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
-from orchestrator.diagnosis.blackbox.search import SearchStep
 from orchestrator.diagnosis.blackbox.series import quantised
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
+from orchestrator.diagnosis.blackbox.steps import SearchStep
 from orchestrator.diagnosis.blackbox.verdict import settled_names
 
 SCENE = Surroundings(0.01, 1.0, 1.0, np.linspace(-1.0, 1.0, 400))
