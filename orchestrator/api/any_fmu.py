@@ -20,8 +20,8 @@ from orchestrator.diagnosis.blackbox.figures import draw_signals
 from orchestrator.diagnosis.blackbox.mapping import read_map
 from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
-from orchestrator.diagnosis.blackbox.search import counted
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
+from orchestrator.diagnosis.blackbox.steps import counted
 from orchestrator.diagnosis.blackbox.subject import subject_of
 from orchestrator.diagnosis.blackbox.trust import SECOND, doubts, harm, statement
 from orchestrator.shared.isolation.walls import support

@@ -29,11 +29,12 @@ from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.verdict import (
     Rest,
     beginning_of,
-    families_of,
     followed,
     predicted,
     recovered,
     rest_of,
+    settled_names,
+    stand_in,
 )
 from orchestrator.diagnosis.blackbox.whitening import Ladder
 
@@ -194,7 +195,7 @@ def _diagnosed(
     search, base, _ = chosen
     best = search.run(base)
     base = search.plain or base
-    if len(tried) > 1 and not search.explained(best):
+    if len(tried) > 1 and (search.fitter.ladder.spread > 0.0 or not search.explained(best)):
         # The other view of the start, from the model found: a wrong model hides what the start was.
         other = next(t[0] for t in tried if t[0] is not search)
         again = other.fitter.fit(best.model, best.level)
@@ -217,7 +218,8 @@ def _diagnosed(
     for other, found, _ in tried[1:]:
         if other is not search and best.model.effects and search.score(best) < found.total + settings.start.pays:
             search, base, best = other, found, found if other.explained(found) else other.run(found)
-    return _judged(problem, probe, search, base, best, begun, settings.rest)
+    best, families = settled_names(search, best)
+    return _judged(problem, probe, search, base, best, families, begun, settings.rest)
 
 
 def _interleaved(
@@ -230,7 +232,7 @@ def _interleaved(
     """
     fitter, whole = search.fitter, search.explained(best)
     unkept = any(step.unkept for step in search.steps if step.before is best)
-    if search.late or (whole and not unkept and _goes_on(search, best, settings)):
+    if search.late or search.idle(best) or (whole and not unkept and _goes_on(search, best, settings)):
         return search, base, best
     parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces, whole)
     turns = BoxSearch(
@@ -276,6 +278,7 @@ def _judged(
     search: BoxSearch,
     base: BoxFit,
     best: BoxFit,
+    families: tuple[tuple[str, ...], ...],
     begun: float,
     settings: RestSettings,
 ) -> BoxOutcome:
@@ -292,7 +295,7 @@ def _judged(
     last = replace(last, y=stages[2], J=last.J if J is None else J)
     rest = rest_of(fitter, last, slice(0, problem.n), settings)
     if rest.disturbed:
-        rest = _doubted(fitter, last, rest, bool(best.model.effects), settings)
+        rest = _doubted(search, best, last, rest, settings)
     fine = rest.nothing_missing
     share = recovered(base, best, len(problem.outputs), len(seen))
     nominal = BoxFit(problem.nominal, last.level, stages[0], 0.0, 0.0, 0.0, last.J)
@@ -304,13 +307,12 @@ def _judged(
     parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen))
     named: tuple[FoundEffect, ...] = ()
     if verdict == "effects":
-        families = families_of(search, best)
         named = tuple(
             FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
         )
     suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
     if suspects:
-        suspects += tuple(dict.fromkeys(label for family in families_of(search, best) for label in family))
+        suspects += tuple(dict.fromkeys(label for family in families for label in family))
     model = last.model if verdict != "unknown" else base.model
     where = _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else ()
     return BoxOutcome(
@@ -341,9 +343,13 @@ def _warned(probe: Probe, search: BoxSearch, verdict: str, best: BoxFit, share: 
     return tuple(warnings)
 
 
-def _doubted(fitter: Fitter, fit: BoxFit, rest: Rest, named: bool, settings: RestSettings) -> Rest:
-    """Return what is left, no disturbance where it begins at some time or is large beside effects that are named."""
-    if named and rest.share > settings.most_with_effects:
+def _doubted(search: BoxSearch, best: BoxFit, fit: BoxFit, rest: Rest, settings: RestSettings) -> Rest:
+    """Return what is left of the best model, fitted to all rows as ``fit``: no disturbance where it has some shape.
+
+    Nor where it is large beside effects that are named, or one of them takes little of it away.
+    """
+    fitter = search.fitter
+    if best.model.effects and rest.share > settings.most_with_effects:
         return replace(
             rest, disturbed=False, reasons=(f"{100.0 * rest.share:.2g} % of the drive is left at the ports",)
         )
@@ -354,6 +360,8 @@ def _doubted(fitter: Fitter, fit: BoxFit, rest: Rest, named: bool, settings: Res
         return replace(
             rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`, or from the time",)
         )
+    if label := stand_in(search, best, settings):
+        return replace(rest, disturbed=False, reasons=(f"`{label}` takes away little of what is left at the ports",))
     gain, name, time = beginning_of(fitter, fit, settings)
     if gain > settings.begins:
         return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))

@@ -207,13 +207,25 @@ class Fitter(BoxLikelihood):
         Returns:
             The fit; None where the FMU fails.
         """
+        own, share, rows = self.settings.fit, self.ladder.share(fit.level), self.parts.fitted
         again: BoxFit | None = fit
-        often, share = self.settings.fit.annealed, self.ladder.share(fit.level)
+        reached, waited = self._likeliest(fit.y, rows), 0
         for k in range(len(self.ladder.shares) - 1, -1, -1):
-            if k < self.ladder.size and self.ladder.share(k) <= share / self.settings.fit.quieter and again is not None:
-                share = self.ladder.share(k)
-                again = self.fit(again.model, k, y=again.y, held=often, iterations=often)
+            if again is None or waited == own.patience or not self._next(k, share):
+                continue
+            share = self.ladder.share(k)
+            again = self.fit(again.model, k, again.J, y=again.y, held=own.annealed, iterations=own.annealed)
+            now = -np.inf if again is None else self._likeliest(again.y, rows)
+            reached, waited = max(now, reached), 0 if now > reached else waited + 1
         return None if again is None else self.fit(again.model, again.level, again.J, y=again.y)
+
+    def _next(self, k: int, share: float) -> bool:
+        return k < self.ladder.size and self.ladder.share(k) <= share / self.settings.fit.quieter
+
+    def _likeliest(self, y: Array, rows: Rows) -> float:
+        """Return the log-likelihood of a free run at the level at which it is likeliest."""
+        k = self.best_level(y, rows)
+        return self.likelihood(self.whitened(y, k), k, rows)
 
     @property
     def _quietest(self) -> int:

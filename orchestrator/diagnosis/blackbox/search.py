@@ -13,21 +13,9 @@ from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.screening import Pair, Promise, Screened, screened
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings
+from orchestrator.diagnosis.blackbox.steps import SearchStep, counted, labels, lost_without, sought
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class SearchStep:
-    """One step: the model before, and every model that was fitted, best first."""
-
-    before: BoxFit
-    tried: tuple[BoxFit, ...]
-    accepted: bool
-    unkept: bool = False
-    """An effect was promised to pay where less noise is at the ports, and no fit came near it."""
-    pairs: tuple[Pair, ...] = ()
-    """Where nothing was accepted: two effects that promise to pay together where less noise is at the ports."""
 
 
 @dataclass
@@ -219,12 +207,15 @@ class BoxSearch:
     def _least(self, fit: BoxFit, before: BoxFit, base: BoxFit) -> float:
         """Return the gain that what ``fit`` has more than ``before`` must bring.
 
-        A law that is not exact leaves something that no other takes away whole: it is asked for less where it does.
+        A law that is not exact leaves something that no other takes away whole: it is asked for less where it does, and
+        for more where no more than measurement noise is left.
         """
         s, share = self.settings, self.fitter.ladder.share
         quiet = share(fit.level) <= s.quiet
         least = max(s.pays if quiet else s.pays_disturbed, s.leaves * (before.total - base.total))
         whole = quiet and share(before.level) > s.quiet and self.explained(fit)
+        if before.model.effects and share(before.level) <= self.fitter.settings.rest.solver and self.explained(before):
+            return max(least, s.pays_disturbed)  # noise alone is left, and of a law that is not exact a little
         return min(least, s.pays_disturbed) if whole else least
 
     def step(self, before: BoxFit, base: BoxFit) -> SearchStep:
@@ -311,7 +302,10 @@ class BoxSearch:
             if self.late:
                 break
             self.progress(label)
-            fits = [fit for promise in mine for fit in self._extended(before, promise)]
+            fits: list[BoxFit] = []
+            for promise in mine:  # a start that promises no more than is reached leads nowhere else
+                if all(promise.gain > fit.total - before.total for fit in fits):
+                    fits += self._extended(before, promise)
             if fits:
                 quick.append(max(fits, key=lambda fit: fit.total))
         quick.sort(key=self.score, reverse=True)
@@ -349,6 +343,22 @@ class BoxSearch:
             return False
         seen = len(self.fitter.parts.looked_at) * len(self.fitter.problem.outputs)
         return fit.fitted + fit.decided > -0.5 * seen - self.settings.noise_margin * np.sqrt(0.5 * seen)
+
+    def idle(self, fit: BoxFit) -> bool:
+        """Tell whether the fitted part is not explained, and no effect that was tried explains more of it.
+
+        Args:
+            fit: of the best model.
+
+        Returns:
+            True when nothing does: other rows would not change that.
+        """
+        count = 0.5 * np.arange(self.fitter.problem.n)[self.fitter.parts.fitted].size * len(self.fitter.problem.outputs)
+        if fit.fitted > -count - self.settings.noise_margin * np.sqrt(count):
+            return False
+        tried = [other for step in self.steps if step.before is fit and not step.unkept for other in step.tried]
+        asked = any(step.before is fit for step in self.steps)
+        return asked and all(other.fitted - fit.fitted < self.settings.penalty for other in tried)
 
     def _extended(self, before: BoxFit, promise: Promise) -> list[BoxFit]:
         model = before.model.extended(promise.effect, promise.effect.bounded(promise.values))
@@ -427,6 +437,8 @@ class BoxSearch:
         while fit.model.effects:
             reduced = []
             for effect in fit.model.effects:
+                if lost_without(self.fitter, fit, effect) > self.settings.surely * self._least(fit, base, base):
+                    continue
                 again = self.fitter.grown(fit.model.without(effect.label), fit.level)
                 if again is None or self._carries(fit, again, base):
                     continue
@@ -453,43 +465,3 @@ class BoxSearch:
         """
         self.progress("screening")
         return screened(self.fitter, self.effects, before)
-
-
-def counted(model: BoxModel) -> int:
-    """Return the number of values of the effects of a model that count as parameters.
-
-    Args:
-        model: with its effects.
-
-    Returns:
-        The number.
-    """
-    return sum(len(effect.kind.parameters) for effect in model.effects)
-
-
-def sought(model: BoxModel) -> float:
-    """Return what chance gives to the best of as many small values as were sifted, where one of them was taken.
-
-    Args:
-        model: with its effects.
-
-    Returns:
-        A log-likelihood.
-    """
-    cost = 0.0
-    for effect, values in zip(model.effects, model.values, strict=True):
-        small = effect.kind.small(effect.scene)
-        cost += np.log(len(small)) if len(small) and values[0] <= small[-1] else 0.0
-    return float(cost)
-
-
-def labels(fit: BoxFit) -> frozenset[str]:
-    """Return the names of its effects.
-
-    Args:
-        fit: of a model.
-
-    Returns:
-        The names.
-    """
-    return frozenset(effect.label for effect in fit.model.effects)

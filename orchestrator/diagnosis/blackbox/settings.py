@@ -44,6 +44,9 @@ class BoxSearchSettings(Settings, frozen=True):
     shortlist: Annotated[int, setting("effects that are fitted in full, in each step", ge=1)] = 8
     starts: Annotated[int, setting("starts of one effect that are fitted in full", ge=1)] = 2
     settled: Annotated[int, setting("effects of a step that are fitted to the end", ge=1)] = 3
+    surely: Annotated[
+        float, setting("times the gain that names an effect, from which linearisation alone tells that it is needed")
+    ] = 5.0
     rest: Annotated[float, share("of its gain, what others must promise once one explains the record")] = 0.3
     most: Annotated[int, setting("effects that are named at most", ge=0)] = 4
     beam: Annotated[int, setting("models that are carried on", ge=1)] = 2
@@ -101,6 +104,9 @@ class FitterSettings(Settings, frozen=True):
     further: Annotated[float, setting("times its reach that a run is fitted over next", ge=1)] = 1.3
     annealed_from: Annotated[float, share("port noise, of the drive, from which a fit is tried with ever less")] = 3e-4
     annealed: Annotated[int, setting("iterations at each of these levels", ge=1)] = 3
+    patience: Annotated[
+        int, setting("of these levels in turn that lead to nothing likelier, until no more are tried", ge=1)
+    ] = 2
     quieter: Annotated[float, setting("how many times less noise the next of them has at least", gt=1.0)] = 2.5
     shorter: Annotated[float, share("of a step that is tried where the whole gains little")] = 0.4
     half_way: Annotated[float, share("of what a step promised, from which no shorter one is tried")] = 0.5
@@ -142,6 +148,10 @@ class RestSettings(Settings, frozen=True):
     most_with_effects: Annotated[
         float, share("the same where effects are named: beside more of it, what a law leaves could be anything")
     ] = 0.015
+    halved: Annotated[
+        float,
+        share("of the port noise without an effect, up to which it may be left beside it: more, it is a stand-in"),
+    ] = 0.5
     beginnings: Annotated[int, setting("times at which an effort that begins is tried", ge=1)] = 12
     push: Annotated[float, share("of the drive, by which its response is measured")] = 0.02
     begins: Annotated[float, setting("gain from which an effort that begins at some time is no chance")] = 12.0

@@ -9,8 +9,9 @@ from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.screening import Known
-from orchestrator.diagnosis.blackbox.search import BoxSearch, labels
+from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
+from orchestrator.diagnosis.blackbox.steps import labels
 
 Array = NDArray[np.float64]
 
@@ -84,6 +85,31 @@ def _reasons(e: Array, s: RestSettings) -> list[str]:
         if float(parts.max()) / mean_square - 1.0 > s.deviations * np.sqrt(2.0 * s.blocks / n):
             found.append(f"output {k + 1}: changes with time")
     return found
+
+
+def stand_in(search: BoxSearch, best: BoxFit, settings: RestSettings = DEFAULT.rest) -> str:
+    """Return the first effect without which little more noise is needed at the ports; empty where there is none.
+
+    What an effect beside a disturbance leaves is no disturbance where the effect takes little of it away: another law
+    is at work, which the effect resembles.
+
+    Args:
+        search: that found it.
+        best: fit of the best model.
+        settings: how much an effect must take away, and how little noise is a matter of the solver.
+
+    Returns:
+        Its label.
+    """
+    fitter, share = search.fitter, search.fitter.ladder.share
+    left = share(best.level)
+    if left <= search.settings.quiet:
+        return ""
+    for effect in best.model.effects:
+        without = fitter.fit(best.model.without(effect.label), best.level)
+        if without is not None and left > settings.halved * share(fitter.settled(without).level):
+            return effect.label
+    return ""
 
 
 def beginning_of(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> tuple[float, str, float]:
@@ -204,36 +230,43 @@ def followed(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest)
     return best
 
 
-def families_of(search: BoxSearch, best: BoxFit) -> tuple[tuple[str, ...], ...]:
-    """Return labels of effects that the record does not tell from each one of the best model.
+def settled_names(search: BoxSearch, best: BoxFit) -> tuple[BoxFit, tuple[tuple[str, ...], ...]]:
+    """Return the best model, and labels of effects that the record does not tell from each one of it.
 
-    What stood beside an effect in the step that brought it is put in its place, and fitted with all the others; so is
-    what contains it (Stribeck's friction contains Coulomb's), where its law is another within the record's motion.
+    What stood beside an effect in the step that brought it is put in its place, and fitted with all the others: where
+    it does better it stays there. So is what contains it (Stribeck's friction contains Coulomb's), where its law is
+    another within the record's motion.
 
     Args:
         search: that found it.
         best: fit of the best model.
 
     Returns:
-        The labels, for each effect in its order.
+        The model, and the labels for each of its effects in their order.
     """
+    for _ in range(1 + len(best.model.effects)):
+        beside = [_beside(search, best, effect) for effect in best.model.effects]
+        better = [fit for near in beside for fit in near.values() if search.score(fit) > search.score(best)]
+        if not better:
+            break
+        best = max(better, key=search.score)
     own = search.settings
     found = []
-    for k, effect in enumerate(best.model.effects):
-        others = _family_of(search, best, effect)
+    for k, near in enumerate(beside if best.model.effects else []):
+        others = tuple(label for label, fit in near.items() if best.total - fit.total < own.family)
         for fit in search.richer(best, k):
             last, values = fit.model.effects[-1], fit.model.values[-1]
             other = last.label not in others and last.kind.departs(tuple(values), last.scene) > own.departs
             if other and best.total - search.fitter.settled(fit).total < own.family:
                 others = (*others, last.label)
         found.append(others)
-    return tuple(found)
+    return best, tuple(found)
 
 
-def _family_of(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> tuple[str, ...]:
-    """Return labels of effects that the record does not tell from one of the best model."""
+def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, BoxFit]:
+    """Return fits of the best model with another effect in the place of ``effect``, by the other's label."""
     kept = labels(best) - {effect.label}
-    near: dict[str, float] = {}
+    near: dict[str, BoxFit] = {}
     rivals: list[BoxFit] = []
     for step in (*search.earlier, *search.steps):
         beside = any(fit.model.effects[-1].label == effect.label for fit in step.tried)
@@ -242,7 +275,8 @@ def _family_of(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> tuple[str,
             if other.label in labels(best) or other.kind.needs == effect.kind.name:  # what contains it is no other
                 continue
             if labels(fit) == kept | {other.label} and step in search.steps:
-                near[other.label] = max(near.get(other.label, -np.inf), fit.total)
+                known = near.get(other.label)
+                near[other.label] = fit if known is None or fit.total > known.total else known
             elif beside:
                 rivals.append(fit)
     rivals.sort(key=search.score, reverse=True)
@@ -250,8 +284,8 @@ def _family_of(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> tuple[str,
         model = best.model.without(effect.label).extended(fit.model.effects[-1], fit.model.values[-1])
         again = search.fitter.fit(model, best.level)
         if again is not None:
-            near.setdefault(fit.model.effects[-1].label, search.fitter.settled(again).total)
-    return tuple(label for label, total in near.items() if best.total - total < search.settings.family)
+            near.setdefault(fit.model.effects[-1].label, search.fitter.settled(again))
+    return near
 
 
 def recovered(base: BoxFit, best: BoxFit, outputs: int, rows: int) -> float:

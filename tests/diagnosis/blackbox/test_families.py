@@ -9,10 +9,10 @@ from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.estimates import errors_of
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
-from orchestrator.diagnosis.blackbox.search import SearchStep
 from orchestrator.diagnosis.blackbox.series import quantised
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
-from orchestrator.diagnosis.blackbox.verdict import families_of
+from orchestrator.diagnosis.blackbox.steps import SearchStep
+from orchestrator.diagnosis.blackbox.verdict import settled_names
 
 SCENE = Surroundings(0.01, 1.0, 1.0, np.linspace(-1.0, 1.0, 400))
 NONE = np.zeros((1, 1))
@@ -46,14 +46,15 @@ def test_an_earlier_effect_has_a_family_too() -> None:
     best = fit(-10.0, "input_delay", "spring")
     alone = fit(-50.0, "input_delay")
     second = SearchStep(alone, (best, fit(-40.0, "input_delay", "load")), True)
-    found = families_of(search({"input_lag": -12.0, "load": -70.0}, first, second), best)
-    assert found == (("input_lag@p",), ())
+    found, families = settled_names(search({"input_lag": -12.0, "load": -70.0}, first, second), best)
+    assert found is best
+    assert families == (("input_lag@p",), ())
 
 
 def test_what_contains_an_effect_is_none_of_its_family() -> None:
     best = fit(-10.0, "coulomb_friction")
     step = SearchStep(fit(-90.0), (best, fit(-9.0, "stribeck_friction"), fit(-13.0, "viscous_drag")), True)
-    assert families_of(search({}, step), best) == (("viscous_drag@p",),)
+    assert settled_names(search({}, step), best)[1] == (("viscous_drag@p",),)
 
 
 @pytest.mark.parametrize(("total", "sliding", "speed", "told"), [
@@ -68,7 +69,7 @@ def test_what_contains_an_effect_is_of_its_family_where_its_law_is_another(total
     model = BoxModel(np.zeros(0)).extended(at("stribeck_friction"), values)
     found = search({})
     found.richer = lambda fit, k: [BoxFit(model, 0, NONE, total, 0.0, 0.0, NONE)]
-    assert families_of(found, best) == ((() if told else ("stribeck_friction@p",)),)
+    assert settled_names(found, best)[1] == ((() if told else ("stribeck_friction@p",)),)
 
 
 def test_what_stood_beside_an_effect_in_an_earlier_search_is_fitted_anew() -> None:
@@ -76,7 +77,16 @@ def test_what_stood_beside_an_effect_in_an_earlier_search_is_fitted_anew() -> No
     step = SearchStep(fit(-900.0), (fit(-800.0, "input_delay"), fit(-11.0, "input_lag"), fit(-801.0, "load")), True)
     found = search({"input_lag": -70.0, "load": -12.0})
     found.earlier = (step,)
-    assert families_of(found, best) == (("load@p",),)
+    assert settled_names(found, best)[1] == (("load@p",),)
+
+
+def test_what_does_better_in_the_place_of_an_effect_stays_there() -> None:
+    first = SearchStep(fit(-90.0), (fit(-50.0, "input_lag"), fit(-52.0, "input_delay"), fit(-80.0, "load")), True)
+    found, families = settled_names(
+        search({"input_delay": -5.0, "input_lag": -30.0, "load": -70.0}, first), fit(-30.0, "input_lag", "spring")
+    )
+    assert [effect.kind.name for effect in found.model.effects] == ["spring", "input_delay"]
+    assert families == ((), ())
 
 
 def error_of_a_quantum(rows: int) -> float:

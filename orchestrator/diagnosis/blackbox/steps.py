@@ -1,0 +1,86 @@
+"""Steps of a search, and what is said of the models in them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from orchestrator.diagnosis.blackbox.bank import BoxEffect
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel
+from orchestrator.diagnosis.blackbox.screening import Known, Pair
+
+
+@dataclass(frozen=True)
+class SearchStep:
+    """One step: the model before, and every model that was fitted, best first."""
+
+    before: BoxFit
+    tried: tuple[BoxFit, ...]
+    accepted: bool
+    unkept: bool = False
+    """An effect was promised to pay where less noise is at the ports, and no fit came near it."""
+    pairs: tuple[Pair, ...] = ()
+    """Where nothing was accepted: two effects that promise to pay together where less noise is at the ports."""
+
+
+def counted(model: BoxModel) -> int:
+    """Return the number of values of the effects of a model that count as parameters.
+
+    Args:
+        model: with its effects.
+
+    Returns:
+        The number.
+    """
+    return sum(len(effect.kind.parameters) for effect in model.effects)
+
+
+def sought(model: BoxModel) -> float:
+    """Return what chance gives to the best of as many small values as were sifted, where one of them was taken.
+
+    Args:
+        model: with its effects.
+
+    Returns:
+        A log-likelihood.
+    """
+    cost = 0.0
+    for effect, values in zip(model.effects, model.values, strict=True):
+        small = effect.kind.small(effect.scene)
+        cost += np.log(len(small)) if len(small) and values[0] <= small[-1] else 0.0
+    return float(cost)
+
+
+def labels(fit: BoxFit) -> frozenset[str]:
+    """Return the names of its effects.
+
+    Args:
+        fit: of a model.
+
+    Returns:
+        The names.
+    """
+    return frozenset(effect.label for effect in fit.model.effects)
+
+
+def lost_without(fitter: Fitter, fit: BoxFit, effect: BoxEffect) -> float:
+    """Return what a fit loses without one of its effects, the other values following as far as linearisation says.
+
+    Args:
+        fitter: gives the filters and the FMU.
+        fit: of a model.
+        effect: one of it.
+
+    Returns:
+        A log-likelihood; infinity where the FMU fails without it.
+    """
+    model, J = fit.model.without(effect.label), fit.J
+    y = fitter.problem.simulate([model], fitter.parts.seen)[0]
+    if y is None:
+        return np.inf
+    before = fit.model.effects.index(effect)
+    at = len(fit.model.p) + sum(len(values) for values in fit.model.values[:before])
+    J = np.delete(J[: len(y)], range(at, at + len(effect.kind.parameters)), axis=2)
+    known = Known(fitter, replace(fit, model=model, y=y, J=J), len(y))
+    return fit.total - max(known.explains(level) for level in fitter.ladder.near(known.start))
