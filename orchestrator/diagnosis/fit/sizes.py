@@ -63,7 +63,8 @@ def sized(
         for place, bad in zip(places, far, strict=True)
         if bad and place < len(likelihood.plant.table)
     )
-    if not disputed and _is_less_sure(efficient, robust, likelihood.settings.fit.less_sure):
+    # Without effects, a model is what theirs are compared with: it stays the likeliest one.
+    if effects and not disputed and _is_less_sure(efficient, robust, likelihood.settings.fit.less_sure):
         return Sized(replace(robust, colour=colour_of(robust.z, parts.fitted)))
     if not disputed:
         return Sized(efficient)
