@@ -1,8 +1,10 @@
 """Fixtures that all areas share, and the order in which files run."""
 
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -10,16 +12,18 @@ import pytest
 from orchestrator.building.build import ensure_built
 
 LONG = ("test_readme.py", "test_contributing.py", "test_notebooks.py", "test_public_api.py")  # minutes each
-EARLY = 0.8  # share of the run over which they are spread
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Spread the longest tests over the first part of the run: each worker begins some of them early."""
-    long = [item for item in items if item.path.name in LONG]
-    items[:] = [item for item in items if item.path.name not in LONG]
-    spacing = EARLY * len(items) / max(len(long), 1)
-    for place, item in reversed(list(enumerate(long))):
-        items.insert(int(place * spacing), item)
+    """Put the longest tests first in the part of each worker: the run does not wait for one of them at its end."""
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
+    minutes = [item for item in items if item.path.name in LONG]
+    slow = [item for item in items if item.get_closest_marker("slow") and item not in minutes]
+    early = minutes + slow
+    others = iter([item for item in items if item not in set(early)])
+    size = -(-len(items) // workers)
+    parts = [early[worker::workers] for worker in range(workers)]
+    items[:] = [item for part in parts for item in (*part, *islice(others, max(0, size - len(part))))]
 
 
 @pytest.fixture(scope="session", autouse=True)
