@@ -63,9 +63,11 @@ def diagnose(
         check_comparable(one, settings)
     given = [one if len(plant.bodies) > 1 else one.without_load_encoder() for one in given]
     nominal = plant.extended(model.values)
-    analysis, given = at_one_rate(given, plant, nominal, settings)
+    analyses = at_one_rate(given, plant, nominal, settings)
+    analysis, given = analyses[0], [one.record for one in analyses]
     check_resolved(plant, nominal, given[0].step, model.source, settings)
-    signals, parts = series(given, plant.value(nominal, plant.drive.lag), settings)
+    lag = plant.value(nominal, plant.drive.lag)
+    signals, parts = series(given, lag, settings, [one.most_noise for one in analyses])
     found = passes(model, signals, parts, nominal, settings, progress)
     likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
     base_fit, final = found.base, found.final

@@ -92,7 +92,14 @@ class FitSettings(Settings, frozen=True):
     disputed: Annotated[
         float, setting("standard errors by which sizes may differ as innovations count as coloured or white")
     ] = 2.0
+    less_sure: Annotated[
+        float, setting("times larger errors, blocks compared, from which coloured innovations mislead", ge=1)
+    ] = 2.0
     blocks: Annotated[int, setting("blocks of the record whose disagreement widens intervals", ge=2)] = 4
+    absent: Annotated[float, share("of an effect's size below which a block of the record is without it")] = 0.5
+    surely_absent: Annotated[
+        float, setting("standard errors of the block by which its size must lie below: it comes or goes", gt=0)
+    ] = 4.0
     block_iterations: Annotated[int, setting("steps of a block's fit, which starts at the whole's", ge=1)] = 5
 
 
@@ -274,6 +281,9 @@ class FreeRunSettings(Settings, frozen=True):
     enough: Annotated[float, setting("relative gain below which a start has converged")] = 1e-4
     fade: Annotated[float, setting("share of the trace added to the diagonal: unseen states stay put", gt=0)] = 1e-10
     close: Annotated[float, setting("rms in noise deviations up to which a run is close", ge=1)] = 1.3
+    straight: Annotated[
+        float, share("by which the first step may miss what derivatives foretell: a linear run has one best start")
+    ] = 0.01
     growing: Annotated[tuple[float, ...], note("shares of the run over which a start is sought again")] = (
         0.1,
         0.25,

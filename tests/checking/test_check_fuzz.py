@@ -1,4 +1,4 @@
-"""A short run of the fuzzer; ``bench_fuzz_check.py`` is the long one."""
+"""A short run of the fuzzer; ``benchmarks/fuzz_check.py`` is the long one, which looks at the time too."""
 
 import random
 import sys

@@ -162,7 +162,7 @@ def test_the_documentation_lists_every_rule() -> None:
 
 
 @given(st.binary(max_size=300) | st.text(max_size=200).map(lambda t: f"<a b='{t}'/>".encode(errors="replace")))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_any_bytes_are_xml_or_a_finding(data: bytes) -> None:
     root, findings = xml_reading.parse(data, "a.xml")
     assert root is not None or len(findings) == 1
@@ -172,7 +172,7 @@ _CELL = st.text(st.characters(blacklist_categories=()), max_size=6) | st.floats(
 
 
 @given(st.lists(st.lists(_CELL, max_size=4), max_size=6), st.binary(max_size=20))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_any_bytes_are_a_reference_result_or_refused(rows: list[list[str]], tail: bytes) -> None:
     data = b"time,x\n0,1\n" + "\n".join(",".join(r) for r in rows).encode(errors="replace") + tail
     try:

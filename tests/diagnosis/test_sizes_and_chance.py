@@ -228,12 +228,15 @@ def test_what_is_named_must_leave_the_stated_machine_and_follow_the_motion() -> 
     errors = horizons([0.1, 0.1, 0.1, 0.1])
     plain = np.full_like(errors.errors, 0.2)
     lost = replace(errors, plain=plain, r_squared=np.full(errors.r_squared.size, 0.6))
-    assert refuted(True, Proof(base, lost), (), SETTINGS.verdict).startswith("with it free runs")
-    assert not refuted(False, Proof(base, lost), (), SETTINGS.verdict)  # nothing but noise is left
-    assert not refuted(True, Proof(base, replace(lost, plain=4.0 * plain)), (), SETTINGS.verdict)
+    assert refuted(True, Proof(base, lost), (), (), SETTINGS.verdict).startswith("with it free runs")
+    assert not refuted(False, Proof(base, lost), (), (), SETTINGS.verdict)  # nothing but noise is left
+    assert not refuted(True, Proof(base, replace(lost, plain=4.0 * plain)), (), (), SETTINGS.verdict)
     follows = replace(lost, r_squared=np.full(errors.r_squared.size, 0.99))
-    assert not refuted(True, Proof(base, follows), (), SETTINGS.verdict)
-    assert "`J`" in refuted(False, Proof(base, follows), ("J",), SETTINGS.verdict)
+    assert not refuted(True, Proof(base, follows), (), (), SETTINGS.verdict)
+    assert "`J`" in refuted(False, Proof(base, follows), ("J",), (), SETTINGS.verdict)
+    assert "without friction (motor)" in refuted(
+        True, Proof(base, follows), (), ("friction (motor)",), SETTINGS.verdict
+    )
 
 
 def test_doubts_are_listed_once_and_worst_first() -> None:

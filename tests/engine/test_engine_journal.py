@@ -67,7 +67,7 @@ def test_a_case_is_recorded_once(tmp_path):
         assert list(journal.outcomes()) == outcomes([3])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(cut=st.integers(0, 400))
 def test_a_file_cut_anywhere_keeps_every_whole_line(cut, tmp_path_factory):
     path = filled(tmp_path_factory.mktemp("j") / "j")
@@ -80,7 +80,7 @@ def test_a_file_cut_anywhere_keeps_every_whole_line(cut, tmp_path_factory):
         assert list(journal.outcomes()) == outcomes(range(10))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_a_changed_byte_loses_at_most_its_own_line(data, tmp_path_factory):
     path = filled(tmp_path_factory.mktemp("j") / "j")

@@ -222,7 +222,7 @@ def test_a_load_torque_presses_the_teeth_together_at_rest():
         assert abs(states[-1, 3]) < 1e-3
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     model=st.integers(0, 5),
     alpha=st.sampled_from([0.0, 1e-15, 1e-9, 1e-3, 0.1, 10.0, 1e6]),

@@ -197,7 +197,7 @@ def test_the_shared_records_are_read_and_plausible() -> None:
         check_plausible(read_record(path), default_model())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.binary(max_size=400))
 def test_no_bytes_whatever_raise_anything_else(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
     path = tmp_path_factory.mktemp("fuzz") / "data.csv"

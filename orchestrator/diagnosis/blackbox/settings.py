@@ -56,8 +56,13 @@ class BoxSearchSettings(Settings, frozen=True):
         float, share("by which a law must differ from the one that it contains, to be told as of its family")
     ] = 0.1
     rivals: Annotated[
-        int, setting("effects that are put in the place of each that is named, to see whether they do as well", ge=0)
-    ] = 2
+        int,
+        setting(
+            "effects put in the place of each that is named, to see whether they do as well: lags and delays on either "
+            "side of an FMU are four",
+            ge=0,
+        ),
+    ] = 3
     noise_margin: Annotated[
         float, setting("standard deviations of pure noise's log-likelihood within which a record is explained")
     ] = 4.0

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.signals import noise_level
+from orchestrator.diagnosis.fit.signals import encoder_noise, noise_level
 from orchestrator.diagnosis.settings import DiagnosisSettings, RateSettings
 from orchestrator.plants.description import Plant
 from orchestrator.records.record import Record
@@ -30,11 +30,13 @@ class Analysis:
         record: the record.
         factor: rows of the file for one that is analysed.
         interpolated: rows of the file for one that was measured; 1: none was interpolated.
+        most_noise: (channels,) standard deviation of the encoders' noise in the rows as they were measured.
     """
 
     record: Record
     factor: int
     interpolated: int
+    most_noise: Array
 
     @property
     def rate(self) -> float:
@@ -86,7 +88,8 @@ def analysed(
     enough = max(own.least_rate, own.long_per_band * reach, own.long_per_mode * fastest)
     factor = max(factor, min(measured.size // own.many_rows, math.floor(rate / enough)))
     factor = factor if most is None else max(1, min(factor, most // native))
-    return Analysis(decimated(measured, factor, own), factor * native, native)
+    most_noise = encoder_noise(measured, settings.likelihood.noise_window)
+    return Analysis(decimated(measured, factor, own), factor * native, native, most_noise)
 
 
 def _interpolated_by(record: Record, settings: RateSettings) -> int:

@@ -70,6 +70,25 @@ class RecordLikelihood:
         shorter.stop = stop
         return shorter
 
+    def alone(self, part: slice) -> tuple["RecordLikelihood", slice]:
+        """Return the likelihood of a part as a record of its own, and where the part lies in that.
+
+        Close to free runs, predictions of a part are ruled by all that came before it: its own starts anew.
+
+        Args:
+            part: the samples.
+
+        Returns:
+            Both; those of the whole where there are several records.
+        """
+        if self.signals.runs:
+            return self, part
+        begin = max(part.start - self.settings.likelihood.head, 0)
+        rows = slice(begin, part.stop)
+        signals = replace(self.signals, y=np.ascontiguousarray(self.signals.y[rows]), u=self.signals.u[rows])
+        own = replace(self, signals=signals, stop=part.stop - begin, _gains={})
+        return own, slice(part.start - begin, part.stop - begin)
+
     def about(self, reference: Array) -> "RecordLikelihood":
         """Return the likelihood whose gains for models with a gap are those along the motion of ``reference``.
 

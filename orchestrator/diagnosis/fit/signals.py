@@ -117,25 +117,40 @@ def _earlier(u: Array, samples: float) -> Array:
     return np.asarray(first + (samples - whole) * (second - first))
 
 
-def signals_of(record: Record, tau: float, settings: LikelihoodSettings) -> Signals:
+def signals_of(record: Record, tau: float, settings: LikelihoodSettings, most_noise: Array | None = None) -> Signals:
     """Return the signals of a record for a plant whose torque lags by ``tau`` [s].
 
     Args:
         record: the record.
         tau: lag of the drive [s].
         settings: of the likelihood.
+        most_noise: (channels,) of the rows that the record's were averaged from, which is the most that is left of it;
+            None: it is as it was measured.
 
     Returns:
         Torque, angles, their noise and sizes.
     """
-    one = record.theta_l is None
     load = np.zeros(record.size) if record.theta_l is None else record.theta_l
     y = np.ascontiguousarray(np.column_stack([record.theta_m, load]))
-    channels = 1 if one else 2
-    noise = np.array([noise_level(y[:, n], settings.noise_window) for n in range(channels)])
-    return Signals(
-        y, np.ascontiguousarray(record.u), record.step, channels, noise, lagged_rms(record.u, record.step, tau)
-    )
+    noise = encoder_noise(record, settings.noise_window)
+    if most_noise is not None:  # of few rows a period, a cubic takes motion for noise
+        noise = np.minimum(noise, most_noise)
+    torque = lagged_rms(record.u, record.step, tau)
+    return Signals(y, np.ascontiguousarray(record.u), record.step, noise.size, noise, torque)
+
+
+def encoder_noise(record: Record, window: int) -> Array:
+    """Return the standard deviation (channels,) of each encoder's noise.
+
+    Args:
+        record: the record.
+        window: samples of the sliding cubic whose residual is the noise.
+
+    Returns:
+        The standard deviations, in the unit of each angle.
+    """
+    angles = (record.theta_m,) if record.theta_l is None else (record.theta_m, record.theta_l)
+    return np.array([noise_level(angle, window) for angle in angles])
 
 
 def noise_level(values: Array, window: int) -> float:

@@ -63,11 +63,22 @@ def sized(
         for place, bad in zip(places, far, strict=True)
         if bad and place < len(likelihood.plant.table)
     )
+    # Without effects, a model is what theirs are compared with: it stays the likeliest one.
+    if effects and not disputed and _is_less_sure(efficient, robust, likelihood.settings.fit.less_sure):
+        return Sized(replace(robust, colour=colour_of(robust.z, parts.fitted)))
     if not disputed:
         return Sized(efficient)
     covariance = robust.covariance + np.diag((0.5 * change) ** 2)
     colour = colour_of(robust.z, parts.fitted)
     return Sized(replace(robust, covariance=covariance, colour=colour), disputed)
+
+
+def _is_less_sure(efficient: Fit, robust: Fit, times: float) -> bool:
+    """Tell whether blocks of the record agree on the robust fit's values far better than on the efficient one's."""
+    errors = [np.diag(one.covariance) for one in (efficient, robust)]
+    if not all(np.all(e > 0.0) for e in errors):
+        return False
+    return bool(np.mean(np.log(errors[0] / errors[1])) > 2.0 * np.log(times))
 
 
 def with_model_error(

@@ -48,6 +48,34 @@ def widened(
     return replace(found, covariance=covariance)
 
 
+def absent_at_times(
+    likelihood: RecordLikelihood, whole: Fit, part: slice, effects: Sequence[Effect]
+) -> tuple[Effect, ...]:
+    """Return the effects that one block of the record clearly is without, though it would have shown them.
+
+    Args:
+        likelihood: of the record.
+        whole: the fit to all of ``part``.
+        part: the samples that were fitted.
+        effects: of the model; those whose size is an amplitude are looked at: others may rest for a while.
+
+    Returns:
+        Those that come or go.
+    """
+    settings = likelihood.settings.fit
+    looked_at = [effect for effect in effects if effect.size in effect.amplitudes]
+    if not looked_at:
+        return ()
+    blocks = _block_fits(likelihood, whole, part)
+
+    def is_absent(effect: Effect) -> bool:
+        place = effect.places(likelihood.plant)[effect.size]
+        most = settings.absent * abs(float(whole.p[place]))
+        return any(abs(own.p[place]) + settings.surely_absent * own.standard_error(place) < most for own in blocks)
+
+    return tuple(effect for effect in looked_at if is_absent(effect))
+
+
 def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Refit = fit) -> Array:
     """Return, for each free parameter, the mean square of how far blocks lie from the whole, in standard errors.
 
@@ -59,6 +87,14 @@ def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: 
         part: the samples that were fitted.
         refit: how ``whole`` was fitted.
     """
+    blocks = _block_fits(likelihood, whole, part, refit)
+    places = [entry.place for entry in whole.free]
+    squares = [(own.p[places] - whole.p[places]) ** 2 / np.maximum(np.diag(own.covariance), 1e-300) for own in blocks]
+    return np.asarray(np.mean(squares, axis=0) * len(blocks) / (len(blocks) - 1))
+
+
+def _block_fits(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Refit = fit) -> list[Fit]:
+    """Return the fit repeated on each block of ``part``."""
     settings = likelihood.settings.fit
     blocks = settings.blocks
     edges = np.linspace(part.start, part.stop, blocks + 1).astype(int).tolist()
@@ -66,11 +102,8 @@ def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: 
         replace(entry, prior=(entry.prior[0], entry.prior[1] * blocks**0.5)) if entry.prior else entry
         for entry in whole.free
     )
-    places = [entry.place for entry in free]
-    squares = []
+    found = []
     for start, stop in itertools.pairwise(edges):
-        block = slice(start, stop)
-        own = refit(likelihood, whole.p, whole.q, free, Parts(block, block, block), settings.block_iterations)
-        variance = np.maximum(np.diag(own.covariance), 1e-300)
-        squares.append((own.p[places] - whole.p[places]) ** 2 / variance)
-    return np.asarray(np.mean(squares, axis=0) * blocks / (blocks - 1))
+        own, block = likelihood.alone(slice(start, stop))
+        found.append(refit(own, whole.p, whole.q, free, Parts(block, block, block), settings.block_iterations))
+    return found

@@ -17,10 +17,8 @@ from orchestrator.records.record import Record
 Array = NDArray[np.float64]
 
 
-def at_one_rate(
-    records: Sequence[Record], plant: Plant, nominal: Array, settings: DiagnosisSettings
-) -> tuple[Analysis, list[Record]]:
-    """Return the records at the rate at which they are analysed together: the highest that one of them asks for.
+def at_one_rate(records: Sequence[Record], plant: Plant, nominal: Array, settings: DiagnosisSettings) -> list[Analysis]:
+    """Return records at the rate at which they are analysed together: the highest that one of them asks for.
 
     Args:
         records: of one machine.
@@ -29,7 +27,7 @@ def at_one_rate(
         settings: of the diagnosis.
 
     Returns:
-        the analysis of the first record, and all records.
+        The analysis of each.
 
     Raises:
         RecordError: they were sampled at different rates, or have different encoders.
@@ -45,25 +43,28 @@ def at_one_rate(
             raise RecordError(f"{other.source}: encoders must be those of {first.source}, but are not")
     found = [analysed(record, plant, nominal, settings) for record in records]
     factor = min(analysis.factor for analysis in found)
-    found = [
+    return [
         analysis if analysis.factor == factor else analysed(record, plant, nominal, settings, factor)
         for record, analysis in zip(records, found, strict=True)
     ]
-    return found[0], [analysis.record for analysis in found]
 
 
-def series(records: Sequence[Record], lag: float, settings: DiagnosisSettings) -> tuple[Signals, Parts]:
+def series(
+    records: Sequence[Record], lag: float, settings: DiagnosisSettings, most_noise: Sequence[Array | None] = ()
+) -> tuple[Signals, Parts]:
     """Return the signals of records in one series, and its parts.
 
     Args:
         records: at one rate.
         lag: of the drive [s].
         settings: of the diagnosis.
+        most_noise: of each record, as :func:`signals_of` takes it; none: records are as they were measured.
 
     Returns:
         Both.
     """
-    each = [signals_of(record, lag, settings.likelihood) for record in records]
+    bounds = most_noise or [None] * len(records)
+    each = [signals_of(record, lag, settings.likelihood, bound) for record, bound in zip(records, bounds, strict=True)]
     sizes = [signals.size for signals in each]
     parts, splits = split(sizes, settings)
     if len(each) == 1:

@@ -34,11 +34,13 @@ class FreeRun:
         outputs: (n, channels) simulated encoder angles.
         start: (8,) the initial state.
         rms: (channels,) rms of simulated minus measured.
+        straight: it answered to its initial state as its derivatives said: no other start leads closer.
     """
 
     outputs: Array
     start: Array
     rms: Array
+    straight: bool = False
 
 
 def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice, history: bool = True) -> Array:
@@ -99,7 +101,7 @@ def free_run(
     """Return the free run whose initial state lies closest to the measurement.
 
     Where impacts make the end of a run depend on its start in no simple way, a run that has not come close is sought
-    again over growing parts of its length.
+    again over growing parts of its length; not where it answers to its start as a linear system does.
 
     Args:
         plant: the plant.
@@ -114,7 +116,7 @@ def free_run(
         Initial state and angles.
     """
     first = _closest(plant, p, guess, signals, part, settings, history)
-    if float(np.max(first.rms / signals.noise)) < settings.close:
+    if (first.straight and not _teeth_may_part(plant, p)) or float(np.max(first.rms / signals.noise)) < settings.close:
         return first
     begin, end, _ = part.indices(signals.size)
     start, run = guess, first
@@ -126,6 +128,10 @@ def free_run(
         run = _closest(plant, p, start, signals, part, settings, history)
     cost, other = (float(np.sum((r.rms / signals.noise) ** 2)) for r in (first, run))
     return run if other < cost else first
+
+
+def _teeth_may_part(plant: Plant, p: Array) -> bool:
+    return plant.shaft is not None and bool(plant.shaft.gap) and plant.value(p, plant.shaft.gap) > 0.0
 
 
 def _closest(
@@ -143,6 +149,7 @@ def _closest(
         return float(np.sum(((out - measured) / scale) ** 2))
 
     first = _followed(plant, np.array(guess, dtype=float))
+    foretold: list[float] = []  # squared errors over what derivatives foretold, of each step
     steps = _steps(plant, first, signals, free, settings)
 
     def linearise(point: tuple[Array, Array]) -> Linearised[tuple[Array, Array]] | None:
@@ -156,16 +163,20 @@ def _closest(
             there[list(free)] += change
             there = _followed(plant, there)
             new = outputs(there)
-            return (there, new), cost(new)
+            after = cost(new)
+            foretold.append(after / max(float(np.sum((error + J @ change) ** 2)), 1e-300))
+            return (there, new), after
 
-        return Linearised(J.T @ J, J.T @ ((out - measured) / scale).ravel(), cost(out), moved)
+        error = ((out - measured) / scale).ravel()
+        return Linearised(J.T @ J, J.T @ error, cost(out), moved)
 
     damping = Damping(settings.damping, 0.0, lambda H: settings.fade * float(np.trace(H)), settings.tries)
     (start, out), _ = damped_fit(
         (first, outputs(first)), linearise, damping, settings.iterations,
         lambda gain, after: gain == 0.0 or gain < settings.enough * after,
     )  # fmt: skip
-    return FreeRun(out, start, np.sqrt(np.mean((out - measured) ** 2, axis=0)))
+    straight = bool(foretold) and abs(foretold[0] - 1.0) < settings.straight
+    return FreeRun(out, start, np.sqrt(np.mean((out - measured) ** 2, axis=0)), straight)
 
 
 def start_answers(

@@ -46,7 +46,8 @@ def validate(record: Record, diagnosis: Diagnosis) -> Validation:
     """
     w, settings = diagnosis.workings, diagnosis.settings
     record = record if len(w.plant.bodies) > 1 else record.without_load_encoder()
-    signals = _signals(analysed(record, w.plant, w.nominal, settings).record, w)
+    analysis = analysed(record, w.plant, w.nominal, settings)
+    signals = _signals(analysis.record, w, analysis.most_noise)
     likelihood = RecordLikelihood(w.plant, signals, w.nominal, signals.size, settings)
     models = _models(w)
     part = slice(settings.likelihood.head, signals.size)
@@ -105,8 +106,9 @@ def torque_errors(record: Record, diagnosis: Diagnosis) -> dict[str, float]:
     return _torque_errors(diagnosis.workings, _signals(record, diagnosis.workings))
 
 
-def _signals(record: Record, w: Workings) -> Signals:
-    return signals_of(record, w.plant.value(w.nominal, w.plant.drive.lag), w.likelihood.settings.likelihood)
+def _signals(record: Record, w: Workings, most_noise: Array | None = None) -> Signals:
+    lag = w.plant.value(w.nominal, w.plant.drive.lag)
+    return signals_of(record, lag, w.likelihood.settings.likelihood, most_noise)
 
 
 def _torque_errors(w: Workings, signals: Signals) -> dict[str, float]:

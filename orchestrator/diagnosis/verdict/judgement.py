@@ -80,7 +80,9 @@ def is_unknown(
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
 
 
-def refuted(floor_off: bool, proof: Proof, far_off: Sequence[str], settings: VerdictSettings) -> str:
+def refuted(
+    floor_off: bool, proof: Proof, far_off: Sequence[str], passing: Sequence[str], settings: VerdictSettings
+) -> str:
     """Return why what the final model has is no finding, in words; empty: nothing speaks against it.
 
     Effects make up for another machine too: a prescribed motion takes next to no inertia, and waves for a spring.
@@ -89,6 +91,7 @@ def refuted(floor_off: bool, proof: Proof, far_off: Sequence[str], settings: Ver
         floor_off: more is left than measurement noise.
         proof: of the final model, which has effects.
         far_off: names of parameters whose re-fitted values lie far outside what the model file allows.
+        passing: names of effects that a stretch of the record is without.
         settings: the rules' thresholds.
 
     Returns:
@@ -99,6 +102,8 @@ def refuted(floor_off: bool, proof: Proof, far_off: Sequence[str], settings: Ver
         return f"with it {names} would lie far outside what the model file allows: a value, or a unit, may be wrong"
     if floor_off and not proof.final.follows(settings.good):
         return "with it free runs over the held-out part do not follow the motion: `u` may not be what drives it"
+    if passing:
+        return f"a stretch of the record is without {' and '.join(passing)}: it changes with time"
     return ""
 
 

@@ -1,0 +1,130 @@
+"""Stretches of a record as records of their own, effects that come or go, and what a lower rate takes for noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
+from orchestrator.diagnosis.fit.rate import analysed
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.signals import encoder_noise
+from orchestrator.diagnosis.fit.sizes import _is_less_sure
+from orchestrator.diagnosis.fit.spread import absent_at_times, widened
+from orchestrator.diagnosis.fit.together import series
+from orchestrator.diagnosis.proof.free_run import free_run
+from orchestrator.plants.effects import Effect
+from orchestrator.records.record import Record
+from pyfmu_sources import servo_axis
+from tests.diagnosis.test_analysis_rate import BENCH, STEP, bench, bench_record
+from tests.support.short_records import AXIS, DRIVETRAIN, SETTINGS, H, axis_likelihood, signals_from, torque
+
+FRICTION = next(effect for effect in AXIS.bank if effect.label == "coulomb_friction@motor")
+NOISE = 1e-4
+
+
+def halfway(name: str, before: float, after: float, size: int = 800) -> RecordLikelihood:
+    """Return the likelihood of an axis's record with one parameter that changes half-way."""
+    nominal = AXIS.extended([entry.default for entry in AXIS.table])
+    nominal[AXIS.index("J")], nominal[AXIS.index("b")] = 1.0, 2.0
+    u, out = torque(size, 5, 8.0), []
+    x = servo_axis.start(0.0, 0.0, 0.0, tuple(nominal[: len(AXIS.table)].tolist()))
+    for half, value in enumerate((before, after)):
+        p = nominal.copy()
+        p[AXIS.index(name)] = value
+        flat = tuple(p[: len(AXIS.table)].tolist())
+        part = u[half * size // 2 : (half + 1) * size // 2]
+        mode = servo_axis.initial_mode(x, flat, float(part[0]))
+        for asked in part:
+            out.append((x[0], 0.0))
+            x, mode = servo_axis.advance(x, mode, flat, float(asked), 0.0, H)
+    y = np.array(out)
+    y[:, 0] += NOISE * np.random.default_rng(9).standard_normal(size)
+    return RecordLikelihood(AXIS, signals_from(y, u, 1, np.array([NOISE])), nominal, size, SETTINGS)
+
+
+def fitted(likelihood: RecordLikelihood, effects: tuple[Effect, ...], q: float) -> Fit:
+    """Return a fit of drag, and of the sizes of effects, to all of a record."""
+    places = [AXIS.index("b"), *(effect.places(AXIS)[effect.size] for effect in effects)]
+    free = tuple(Free(place, 0.1, 0.0, 100.0) for place in places)
+    part = slice(10, likelihood.stop)
+    return fit(likelihood, likelihood.nominal, q, free, Parts(part, part, part), most=0)
+
+
+def test_a_stretch_is_not_ruled_by_what_came_before_it() -> None:
+    likelihood, place = halfway("b", 2.0, 3.0), AXIS.index("b")
+    late = slice(500, 800)
+    own, part = likelihood.alone(late)
+    assert np.array_equal(own.signals.y[part], likelihood.signals.y[late])
+    free = (Free(place, 0.1, 0.0, 100.0),)
+    found = fit(own, likelihood.nominal, 1e-5, free, Parts(part, part, part), most=0)
+    assert found.p[place] == pytest.approx(3.0, rel=0.01)
+    ruled = fit(likelihood, likelihood.nominal, 1e-5, free, Parts(late, late, late), most=0)
+    assert abs(ruled.p[place] - 3.0) > 10.0 * abs(found.p[place] - 3.0)
+
+
+def test_a_drag_that_changes_widens_its_interval_by_what_it_changes() -> None:
+    likelihood, place = halfway("b", 2.0, 3.0), AXIS.index("b")
+    found = fitted(likelihood, (), 1e-5)
+    wide = widened(likelihood, found, slice(10, likelihood.stop), ())
+    assert wide.standard_error(place) > 0.3
+    same = fitted(halfway("b", 2.0, 2.0), (), 1e-5)
+    assert widened(halfway("b", 2.0, 2.0), same, slice(10, 800), ()).standard_error(place) < 0.02
+
+
+@pytest.mark.parametrize(("before", "after", "absent"), [(0.0, 1.0, True), (1.0, 0.0, True), (1.0, 1.0, False)])
+def test_friction_that_sets_in_or_ends_is_absent_at_times(before: float, after: float, absent: bool) -> None:
+    likelihood = halfway("effects.coulomb_friction.motor.torque", before, after)
+    found = fitted(likelihood, (FRICTION,), 1e-2)
+    passing = absent_at_times(likelihood, found, slice(10, likelihood.stop), (FRICTION,))
+    assert passing == ((FRICTION,) if absent else ())
+    assert absent_at_times(likelihood, found, slice(10, likelihood.stop), ()) == ()
+
+
+def test_motion_of_few_rows_a_period_is_no_noise_of_an_encoder() -> None:
+    record = bench_record(20_000)
+    rng = np.random.default_rng(2)
+    assert record.theta_l is not None
+    noisy = replace(
+        record,
+        theta_m=record.theta_m + 1e-6 * rng.standard_normal(record.size),
+        theta_l=record.theta_l + 1e-6 * rng.standard_normal(record.size),
+    )
+    found = analysed(noisy, DRIVETRAIN, bench(), SETTINGS)
+    assert found.factor == 3
+    seen, _ = series([found.record], BENCH["tau"], SETTINGS, [found.most_noise])
+    assert np.all(seen.noise <= encoder_noise(noisy, 9))
+    assert np.all(seen.noise < 0.2 * encoder_noise(found.record, 9))
+
+
+def test_a_fit_that_blocks_disagree_on_gives_way_to_one_that_they_do_not() -> None:
+    likelihood, _ = axis_likelihood()
+    found = fitted(likelihood, (), 1e-3)
+    unsure = replace(found, covariance=25.0 * found.covariance)
+    assert _is_less_sure(unsure, found, 2.0)
+    assert not _is_less_sure(unsure, found, 6.0)
+    assert not _is_less_sure(found, unsure, 2.0)
+    assert not _is_less_sure(replace(found, covariance=0.0 * found.covariance), found, 2.0)
+
+
+@pytest.mark.parametrize(("gap", "tries"), [(0.0, 1), (0.01, 5)])
+def test_a_linear_run_has_one_best_start(monkeypatch: pytest.MonkeyPatch, gap: float, tries: int) -> None:
+    """A wrong model is not close from any start; only where teeth may part is it sought over parts of the run."""
+    record: Record = bench_record(1000)
+    assert record.theta_l is not None
+    p = bench(k=400.0, alpha=gap)
+    signals = replace(
+        signals_from(np.column_stack([record.theta_m, record.theta_l]), record.u, 2, np.full(2, 1e-6)), h=STEP
+    )
+    begun: list[slice] = []
+    from orchestrator.diagnosis.proof import free_run as module
+
+    closest = module._closest
+
+    def counted(*arguments, **named):  # type: ignore[no-untyped-def]
+        begun.append(arguments[4])
+        return closest(*arguments, **named)
+
+    monkeypatch.setattr(module, "_closest", counted)
+    free_run(DRIVETRAIN, p, np.zeros(8), signals, slice(0, 600), SETTINGS.proof.free_run)
+    assert len(begun) == tries
