@@ -300,7 +300,7 @@ class Plant:
         request = float(u[0])
         from orchestrator.plants.compiled import compiled  # numba takes its time to import
 
-        follow = compiled("effects").followed_request
+        follow = compiled("drive_request").followed_request
         for n, asked in enumerate(u.tolist()):
             begins[n] = request
             request, means[n] = follow(request, asked, lag, rate, h)
