@@ -25,7 +25,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     minutes = [item for item in items if item.path.name in LONG]
     slow = [item for item in items if item.get_closest_marker("slow") and item not in minutes]
     early = minutes + slow
-    others = iter([item for item in items if item not in set(early)])
+    long = set(early)
+    others = iter([item for item in items if item not in long])
     size = -(-len(items) // workers)
     parts = [early[worker::workers] for worker in range(workers)]
     items[:] = [item for part in parts for item in (*part, *islice(others, max(0, size - len(part))))]

@@ -341,8 +341,11 @@ class BoxSearch:
         """
         if self.fitter.ladder.share(fit.level) > self.settings.ahead_to:
             return False
-        seen = len(self.fitter.parts.looked_at) * len(self.fitter.problem.outputs)
-        return fit.fitted + fit.decided > -0.5 * seen - self.settings.noise_margin * np.sqrt(0.5 * seen)
+        return self._is_noise(fit.fitted + fit.decided, len(self.fitter.parts.looked_at))
+
+    def _is_noise(self, log_likelihood: float, rows: int) -> bool:
+        half = 0.5 * rows * len(self.fitter.problem.outputs)
+        return log_likelihood > -half - self.settings.noise_margin * np.sqrt(half)
 
     def idle(self, fit: BoxFit) -> bool:
         """Tell whether the fitted part is not explained, and no effect that was tried explains more of it.
@@ -353,8 +356,7 @@ class BoxSearch:
         Returns:
             True when nothing does: other rows would not change that.
         """
-        count = 0.5 * np.arange(self.fitter.problem.n)[self.fitter.parts.fitted].size * len(self.fitter.problem.outputs)
-        if fit.fitted > -count - self.settings.noise_margin * np.sqrt(count):
+        if self._is_noise(fit.fitted, np.arange(self.fitter.problem.n)[self.fitter.parts.fitted].size):
             return False
         tried = [other for step in self.steps if step.before is fit and not step.unkept for other in step.tried]
         asked = any(step.before is fit for step in self.steps)

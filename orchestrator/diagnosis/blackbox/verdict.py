@@ -252,7 +252,7 @@ def settled_names(search: BoxSearch, best: BoxFit) -> tuple[BoxFit, tuple[tuple[
         best = max(better, key=search.score)
     own = search.settings
     found = []
-    for k, near in enumerate(beside if best.model.effects else []):
+    for k, near in enumerate(beside):
         others = tuple(label for label, fit in near.items() if best.total - fit.total < own.family)
         for fit in search.richer(best, k):
             last, values = fit.model.effects[-1], fit.model.values[-1]
