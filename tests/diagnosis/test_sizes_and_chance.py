@@ -10,7 +10,7 @@ from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
-from orchestrator.diagnosis.passes import _harm_over_fewer, _is_weak, _larger_misfit, honest
+from orchestrator.diagnosis.passes import _better_in_free_runs, _harm_over_fewer, _is_weak, _larger_misfit, honest
 from orchestrator.diagnosis.proof.free_run import FreeRun
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.search.candidate import Candidate
@@ -149,9 +149,20 @@ def test_a_larger_misfit_of_held_out_data_is_harm() -> None:
     parts = Parts(slice(10, 120), slice(120, 160), slice(160, likelihood.stop))
     right = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
     wrong = replace(right, p=p + 0.5 * (np.arange(p.size) == likelihood.plant.index("b")))
-    assert _larger_misfit(likelihood, right, wrong, parts) == ("the misfit of theta_m",)
-    assert _larger_misfit(likelihood, wrong, right, parts) == ()
-    assert _larger_misfit(likelihood, right, right, parts) == ()
+    assert _larger_misfit(likelihood, [right.p], wrong, parts) == ("the misfit of theta_m",)
+    assert _larger_misfit(likelihood, [wrong.p], right, parts) == ()
+    assert _larger_misfit(likelihood, [right.p], right, parts) == ()
+    for bases in ([right.p, wrong.p], [wrong.p, right.p]):  # the best of them counts
+        assert _larger_misfit(likelihood, bases, wrong, parts) == ("the misfit of theta_m",)
+
+
+def test_effects_are_shown_beside_the_parameters_that_are_better_in_free_runs() -> None:
+    likelihood, p = axis_likelihood()
+    parts = Parts(slice(10, 120), slice(120, 160), slice(160, likelihood.stop))
+    right = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
+    wrong = replace(right, p=p + 0.5 * (np.arange(p.size) == likelihood.plant.index("b")))
+    for base, other in ((right, wrong), (wrong, right)):
+        assert _better_in_free_runs(likelihood, base, other, parts) is right.p
 
 
 @pytest.mark.parametrize(
@@ -276,6 +287,23 @@ def test_torque_noise_passes_the_lag_of_the_drive() -> None:
     start = np.zeros(8)
     quiet = still.drift(start, outputs, slice(0, 20), 0)
     assert noise.drift(start, outputs, slice(0, 20), 0) != pytest.approx(quiet, abs=1e-15)
+
+
+def test_a_true_model_may_be_off_by_its_own_standard_errors() -> None:
+    likelihood, p = axis_likelihood()
+    place = likelihood.plant.index("b")
+    free = (Free(place, 0.01, 0.0, 10.0),)
+    sure = Fit(p, 1e-3, np.zeros((1, 1)), free, np.zeros((1, 1)), 0.0, 0.0)
+    part, start, outputs = slice(10, 60), np.zeros(8), np.zeros((50, 1))
+
+    def drifts(model: Fit) -> np.ndarray:
+        noise = TorqueNoise(likelihood, model, np.zeros(10), p)
+        return np.array([noise.drift(start, outputs, part, draw)[-1, 0] for draw in range(8)])
+
+    assert np.ptp(drifts(sure)) == 0.0
+    small, large = (np.ptp(drifts(replace(sure, covariance=np.array([[s**2]])))) for s in (1e-4, 1e-2))
+    assert large == pytest.approx(100.0 * small, rel=0.2)
+    assert np.ptp(drifts(replace(sure, covariance=np.array([[np.nan]])))) == 0.0
 
 
 def test_a_shifted_log_is_put_right() -> None:

@@ -81,27 +81,21 @@ def _is_less_sure(efficient: Fit, robust: Fit, times: float) -> bool:
     return bool(np.mean(np.log(errors[0] / errors[1])) > 2.0 * np.log(times))
 
 
-def with_model_error(
-    likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect], levels: Sequence[float]
+def free_run_fit(
+    likelihood: RecordLikelihood, found: Fit, parts: Parts, effects: Sequence[Effect], levels: Sequence[float]
 ) -> Fit:
-    """Return a fit whose intervals hold what long predictions ask for, too.
-
-    A right model has one set of values for predictions of a sample and for runs over all of a record. Where a law is
-    not quite right, each asks for its own, and what they differ by is the size of the model's error.
+    """Return the values that long predictions ask for: a fit at so little process noise that they are nearly free runs.
 
     Args:
         likelihood: of the record.
-        found: the fit as it is reported.
-        part: the samples that it was fitted to.
+        found: the fit to start from.
+        parts: of the record.
         effects: of the model; of a wave, free runs are asked for the amplitude alone: they slip along the rest.
-        levels: of process noise that the model may have, falling; at the last, predictions are nearly free runs.
+        levels: of process noise that the model may have, falling; the last counts.
 
     Returns:
-        The fit; unchanged where no free run follows the record.
+        The fit.
     """
-    if not found.free:
-        return found
-    parts = Parts(part, part, part)
     slipping = {
         place
         for effect in effects
@@ -110,11 +104,38 @@ def with_model_error(
         if short not in effect.amplitudes
     }
     asked = tuple(entry for entry in found.free if entry.place not in slipping)
-    long = fit(likelihood, found.p, levels[-1], asked, parts, most=0)
+    return fit(likelihood, found.p, levels[-1], asked, parts, most=0)
+
+
+def with_model_error(
+    likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect], levels: Sequence[float]
+) -> Fit:
+    """Return a fit whose intervals hold what long predictions ask for, too.
+
+    A right model has one set of values for predictions of a sample and for runs over all of a record. Where a law is
+    not quite right, each asks for its own, and what they differ by is the size of the model's error. Under torque noise
+    free runs are off themselves: what their own error explains is none of the model's.
+
+    Args:
+        likelihood: of the record.
+        found: the fit as it is reported.
+        part: the samples that it was fitted to.
+        effects: of the model.
+        levels: of process noise that the model may have, falling.
+
+    Returns:
+        The fit; unchanged where no free run follows the record.
+    """
+    if not found.free:
+        return found
+    long = free_run_fit(likelihood, found, Parts(part, part, part), effects, levels)
     if not np.all(np.isfinite(long.z)):
         return found
-    places = [entry.place for entry in found.free]
-    return replace(found, covariance=found.covariance + np.diag((long.p[places] - found.p[places]) ** 2))
+    chance = np.diag(_with_robust_errors(likelihood, long, part).covariance)
+    beyond = np.zeros(len(found.free))
+    for entry, own in zip(long.free, chance, strict=True):
+        beyond[found.free.index(entry)] = max((long.p[entry.place] - found.p[entry.place]) ** 2 - own, 0.0)
+    return replace(found, covariance=found.covariance + np.diag(beyond))
 
 
 def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -> Fit:
