@@ -74,7 +74,7 @@ def diagnose(
     units = METRIC if in_metres(model) else {}
     position = units.get("rad", "rad")
     chosen = honest(likelihood, base_fit, (), parts) if unknown else final
-    stages = _stages(nominal, base_fit.p if unknown else found.alone, search.steps, best, chosen, unknown)
+    stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
     misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
     everything = [
         (named(plant, effect, final if unknown else chosen, search.steps, units, settings.verdict), effect.measurement)
@@ -160,9 +160,9 @@ def _changed(plant: Plant, nominal: Array, p: Array) -> list[str]:
 
 
 def _stages(
-    nominal: Array, alone: Array, steps: Sequence[ForwardStep], best: Candidate, chosen: Fit, unknown: bool
+    nominal: Array, base: Fit, steps: Sequence[ForwardStep], best: Candidate, chosen: Fit, unknown: bool
 ) -> list[tuple[str, Array]]:
-    stages = [("nominal", nominal), ("parameters", alone)]
+    stages = [("nominal", nominal), ("parameters", base.p)]
     if unknown or not best.effects:
         return stages
     for step in steps[1:]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
-from orchestrator.diagnosis.fit.sizes import Sized, free_run_fit, sized, with_model_error
+from orchestrator.diagnosis.fit.sizes import Sized, sized, with_model_error
 from orchestrator.diagnosis.fit.spread import absent_at_times
 from orchestrator.diagnosis.proof.horizons import Horizons, horizons
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
@@ -38,7 +38,6 @@ class Pass:
     """One pass of the search, with its fits to all that may be looked at.
 
     ``plain`` re-fits parameters alone; ``base`` is the same with its sizes as they are reported, ``final`` has effects.
-    ``alone`` are the parameters that effects are shown beside: re-fitted alone, as is best for free runs.
     """
 
     likelihood: RecordLikelihood
@@ -47,7 +46,6 @@ class Pass:
     best: Candidate
     plain: Fit
     base: Fit
-    alone: Array
     final: Fit
     left: Remainder
     floor_off: bool
@@ -147,7 +145,6 @@ def _search(
         best,
         plain,
         proven.base.fit,
-        proven.alone,
         final,
         left,
         floor_off,
@@ -177,7 +174,6 @@ class _Proven:
     best: Candidate
     efficient: Fit
     base: Sized
-    alone: Array
     final: Sized
     proof: Proof
     notes: tuple[str, ...]
@@ -197,8 +193,7 @@ def _proven(
     levels = likelihood.settings.levels
     sized_base = sized(likelihood, plain, whole, (), ladder(levels, (), plain.q))
     before = horizons(likelihood, sized_base.fit.p, plain.q, whole.held_out)
-    free_running = free_run_fit(likelihood, sized_base.fit, whole, (), levels) if best.effects else sized_base.fit
-    bases = (likelihood.nominal, sized_base.fit.p, free_running.p)
+    bases = (likelihood.nominal, sized_base.fit.p)
     notes: list[str] = []
     while best.effects:
         efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
@@ -216,14 +211,13 @@ def _proven(
         if weak is None and not harm:
             small = _minor(search, parts, plain, best, efficient, after)
             if small is None:
-                alone = _better_in_free_runs(likelihood, sized_base.fit, free_running, whole)
-                return _Proven(best, efficient, sized_base, alone, final, Proof(before, after), tuple(notes))
+                return _Proven(best, efficient, sized_base, final, Proof(before, after), tuple(notes))
             out, fewer = small
             why = "what is left is no noise, and more than it explains"
         notes.append(f"{out.name} ({out.site}) was withdrawn: {why}")
         best = fewer
     final = replace(sized_base, fit=honest(likelihood, sized_base.fit, (), whole))
-    return _Proven(base, plain, sized_base, final.fit.p, final, Proof(before, before), tuple(notes))
+    return _Proven(base, plain, sized_base, final, Proof(before, before), tuple(notes))
 
 
 def honest(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect], parts: Parts) -> Fit:
@@ -282,21 +276,12 @@ def _harm_over_fewer(
 def _larger_misfit(likelihood: RecordLikelihood, bases: Sequence[Array], final: Fit, whole: Parts) -> tuple[str, ...]:
     """Return the signals whose misfit on held-out data, as it is reported, is larger with effects than without.
 
-    Each of ``bases`` counts, parameters without effects: nominal values too, and those that free runs ask for. The
-    likeliest ones make up for what the model lacks over a sample, and may be worse than nominal ones in a free run.
+    Each of ``bases`` counts, parameters without effects, nominal ones too: the likeliest make up for what the model
+    lacks over a sample, and may be worse in free runs.
     """
     stages = [*(("", p) for p in bases), ("final", final.p)]
     found = held_out_misfit(likelihood, final.q, stages, whole.held_out, "")
-    # A base whose runs go astray counts for none.
-    least = {one.signal: float(np.nanmin([rms for _, rms in one.stages[:-1]])) for one in found}
-    return tuple(f"the misfit of {one.signal}" for one in found if not one.after <= least[one.signal])
-
-
-def _better_in_free_runs(likelihood: RecordLikelihood, base: Fit, free_running: Fit, whole: Parts) -> Array:
-    """Return the parameters of that fit whose free runs are closer to what both were fitted to, in every signal."""
-    stages = [("", base.p), ("", free_running.p)]
-    found = held_out_misfit(likelihood, base.q, stages, whole.fitted, "")
-    return free_running.p if all(one.after < one.before for one in found) else base.p
+    return tuple(f"the misfit of {one.signal}" for one in found if not one.after <= one.best_before)
 
 
 def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: float, whole: Parts) -> bool:

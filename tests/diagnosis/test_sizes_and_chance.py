@@ -10,7 +10,7 @@ from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
-from orchestrator.diagnosis.passes import _better_in_free_runs, _harm_over_fewer, _is_weak, _larger_misfit, honest
+from orchestrator.diagnosis.passes import _harm_over_fewer, _is_weak, _larger_misfit, honest
 from orchestrator.diagnosis.proof.free_run import FreeRun
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.search.candidate import Candidate
@@ -156,15 +156,6 @@ def test_a_larger_misfit_of_held_out_data_is_harm() -> None:
         assert _larger_misfit(likelihood, bases, wrong, parts) == ("the misfit of theta_m",)
 
 
-def test_effects_are_shown_beside_the_parameters_that_are_better_in_free_runs() -> None:
-    likelihood, p = axis_likelihood()
-    parts = Parts(slice(10, 120), slice(120, 160), slice(160, likelihood.stop))
-    right = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
-    wrong = replace(right, p=p + 0.5 * (np.arange(p.size) == likelihood.plant.index("b")))
-    for base, other in ((right, wrong), (wrong, right)):
-        assert _better_in_free_runs(likelihood, base, other, parts) is right.p
-
-
 @pytest.mark.parametrize(
     ("deviations", "kept", "lost", "weak"),
     [
@@ -248,6 +239,13 @@ def test_what_is_named_must_leave_the_stated_machine_and_follow_the_motion() -> 
     assert "without friction (motor)" in refuted(
         True, Proof(base, follows), (), ("friction (motor)",), SETTINGS.verdict
     )
+
+
+def test_the_best_model_before_the_last_is_the_one_to_beat() -> None:
+    misfit = Misfit("theta_m", "rad", 0.1, (("nominal", 0.3), ("parameters", 0.4), ("final", 0.2)))
+    assert misfit.best_before == 0.3
+    assert replace(misfit, stages=(("nominal", np.nan), *misfit.stages[1:])).best_before == 0.4
+    assert replace(misfit, stages=(("nominal", np.nan), ("final", 0.2))).best_before == np.inf
 
 
 def test_doubts_are_listed_once_and_worst_first() -> None:

@@ -81,32 +81,6 @@ def _is_less_sure(efficient: Fit, robust: Fit, times: float) -> bool:
     return bool(np.mean(np.log(errors[0] / errors[1])) > 2.0 * np.log(times))
 
 
-def free_run_fit(
-    likelihood: RecordLikelihood, found: Fit, parts: Parts, effects: Sequence[Effect], levels: Sequence[float]
-) -> Fit:
-    """Return the values that long predictions ask for: a fit at so little process noise that they are nearly free runs.
-
-    Args:
-        likelihood: of the record.
-        found: the fit to start from.
-        parts: of the record.
-        effects: of the model; of a wave, free runs are asked for the amplitude alone: they slip along the rest.
-        levels: of process noise that the model may have, falling; the last counts.
-
-    Returns:
-        The fit.
-    """
-    slipping = {
-        place
-        for effect in effects
-        if effect.phase
-        for short, place in effect.places(likelihood.plant).items()
-        if short not in effect.amplitudes
-    }
-    asked = tuple(entry for entry in found.free if entry.place not in slipping)
-    return fit(likelihood, found.p, levels[-1], asked, parts, most=0)
-
-
 def with_model_error(
     likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect], levels: Sequence[float]
 ) -> Fit:
@@ -120,15 +94,24 @@ def with_model_error(
         likelihood: of the record.
         found: the fit as it is reported.
         part: the samples that it was fitted to.
-        effects: of the model.
-        levels: of process noise that the model may have, falling.
+        effects: of the model; of a wave, free runs are asked for the amplitude alone: they slip along the rest.
+        levels: of process noise that the model may have, falling; at the last, predictions are nearly free runs.
 
     Returns:
         The fit; unchanged where no free run follows the record.
     """
     if not found.free:
         return found
-    long = free_run_fit(likelihood, found, Parts(part, part, part), effects, levels)
+    parts = Parts(part, part, part)
+    slipping = {
+        place
+        for effect in effects
+        if effect.phase
+        for short, place in effect.places(likelihood.plant).items()
+        if short not in effect.amplitudes
+    }
+    asked = tuple(entry for entry in found.free if entry.place not in slipping)
+    long = fit(likelihood, found.p, levels[-1], asked, parts, most=0)
     if not np.all(np.isfinite(long.z)):
         return found
     chance = np.diag(_with_robust_errors(likelihood, long, part).covariance)

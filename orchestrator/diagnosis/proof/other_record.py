@@ -72,8 +72,7 @@ def unharmed(diagnosis: Diagnosis, found: Validation) -> Diagnosis:
     worse = [
         misfit.signal
         for misfit in found.misfit
-        if misfit.after
-        > min(rms for _, rms in misfit.stages[:-1]) * (1.0 + settings.larger) + settings.of_noise * misfit.noise
+        if misfit.after > misfit.best_before * (1.0 + settings.larger) + settings.of_noise * misfit.noise
     ]
     if diagnosis.verdict != "effects" or not worse:
         return diagnosis
