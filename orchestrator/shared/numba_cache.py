@@ -2,22 +2,30 @@
 
 Numba's own cache (``cache=True``) runs whatever bytes lie there, ends with a traceback where they are cut short, and
 refuses to work where no folder can be written.
+
+Machine code is linked by names that end in a number, which numba counts up from one in every process. Code that two
+processes have kept of two functions of one name (the predictors of two plants) may have the same number, and a third
+process that loads both then runs one in the place of the other: here each process counts from a number of its own.
 """
 
 import contextlib
 import hashlib
+import itertools
+import os
 import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from numba import njit
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.code_digest import digest_of
 
 _DIGEST = hashlib.sha256().digest_size
+FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6), "big"))
 
 
 def kept(**options: Any) -> Callable[[Any], Any]:
@@ -91,8 +99,8 @@ class _Cache(FunctionCache):
     def __init__(self, function: Any) -> None:
         super().__init__(function)
         stamp = self._impl.locator.get_source_stamp()
-        # Another ending than numba's own, whose files a version without hashes may have left beside these.
-        self._cache_file = _Files(self._cache_path, f"{self._impl.filename_base}.checked", stamp)
+        # Another ending than numba's own, and than that of files whose names may meet.
+        self._cache_file = _Files(self._cache_path, f"{self._impl.filename_base}.apart", stamp)
 
 
 class _ClosureCache(_Cache):
@@ -103,7 +111,7 @@ class _ClosureCache(_Cache):
         self._cache_path = str(cache_directory("numba") / digest[:20])
         Path(self._cache_path).mkdir(exist_ok=True)
         self._digest = digest
-        self._cache_file = _Files(self._cache_path, f"{self._impl.filename_base}.checked", digest)
+        self._cache_file = _Files(self._cache_path, f"{self._impl.filename_base}.apart", digest)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return (sig, codegen.magic_tuple(), self._digest)

@@ -111,3 +111,12 @@ def test_predictors_are_compiled_once_per_machine(tmp_path: Path) -> None:
         for _ in range(2)
     ]
     assert hits == [0, 1]
+
+
+def test_names_of_machine_code_do_not_meet_those_of_other_processes() -> None:
+    code = (
+        "import orchestrator.shared.numba_cache, numba.core.bytecode as b; print(next(b.FunctionIdentity._unique_ids))"
+    )
+    found = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True) for _ in range(2)]
+    first, second = (int(run.stdout) for run in found)
+    assert abs(first - second) > 1_000_000  # more than a process compiles
