@@ -1,4 +1,4 @@
-"""A quantum acts in steps: combs lead to it, and its interval holds what rounds the same. A model is a gain and a quantum."""
+"""A quantum acts in steps: combs lead to it, and its interval holds what rounds the same."""
 
 from types import SimpleNamespace
 
