@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.example_record import copy_examples
+
 ROOT = Path(__file__).resolve().parents[1]
 MOST_FILES = 3
 PROGRAMS = {
@@ -77,8 +79,9 @@ def apply(edit, root):
 @pytest.mark.slow
 @pytest.mark.parametrize("title", PROGRAMS)
 def test_a_recipe_works_on_a_copy(tmp_path, title):
-    for package in ("orchestrator", "pyfmu_sources", "docs/examples"):
+    for package in ("orchestrator", "pyfmu_sources"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    copy_examples(tmp_path / "docs" / "examples")
     edits = recipe(title)
     assert edits
     touched = {apply(edit, tmp_path) for edit in edits}

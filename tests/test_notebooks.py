@@ -2,12 +2,13 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tests.support.example_record import copy_examples
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
@@ -39,7 +40,7 @@ def test_no_outputs_are_kept(path):
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
 def test_a_notebook_runs(path, tmp_path, fmus):
-    shutil.copytree(ROOT / "docs" / "examples", tmp_path / "here")
+    copy_examples(tmp_path / "here")
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     words = [sys.executable, "-W", "error", "-c", PROGRAM, str(path)]
     done = subprocess.run(words, cwd=tmp_path / "here", env=environment, capture_output=True, text=True, check=False)

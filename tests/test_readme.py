@@ -1,9 +1,9 @@
 """What README and docs tell a reader to type works as it stands there."""
 
+import json
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from orchestrator.records.record import read_record
-from tests.support.example_record import FILE, FRICTION, HALF_GAP, example_record
+from tests.support.example_record import FILE, FRICTION, HALF_GAP, copy_examples, example_record
 
 ROOT = Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -37,14 +37,34 @@ def test_there_are_commands_to_test():
     assert len(COMMANDS) >= 4
 
 
-@pytest.mark.parametrize("line", COMMANDS)
-def test_command_of_the_readme(line, tmp_path, fmus):
+def done_in(folder, line, whole):
+    """Run a command of the README where the examples are, with whole records or short ones; return what it found."""
     words = shlex.split(line)
-    shutil.copytree(ROOT / "docs" / "examples", tmp_path / "docs" / "examples")
-    done = run([sys.executable, *words[1:]], tmp_path)
+    copy_examples(folder / "docs" / "examples", whole)
+    done = run([sys.executable, *words[1:]], folder)
     assert done.returncode == 0, done.stderr
-    command = words[3]
-    assert (tmp_path / "results" / command / f"{command}.json").exists()
+    return json.loads((folder / "results" / words[3] / f"{words[3]}.json").read_text(encoding="utf-8"))["results"]
+
+
+@pytest.mark.parametrize("line", [line for line in COMMANDS if " diagnose " not in line])
+def test_command_of_the_readme(line, tmp_path, fmus):
+    assert done_in(tmp_path, line, whole=False)
+
+
+@pytest.mark.slow
+def test_the_diagnosis_finds_what_the_readme_says(tmp_path, fmus):
+    (line,) = (line for line in COMMANDS if " diagnose " in line)
+    found = done_in(tmp_path, line, whole=True)
+    gap, friction = (effect["parameters"] for effect in found["effects"])
+    sizes = [(gap["alpha"], 5, HALF_GAP), (friction["torque"], 3, FRICTION)]
+    rows = [
+        f"{size['value']:.{n}f} +- {size['standard_error']:.{n}f} {size['unit']} | {truth:g} {size['unit']} |"
+        for size, n, truth in sizes
+    ]
+    misfit = found["misfit"]["theta_m"]
+    rows += [f"{misfit['before']:.3g} rad -> {misfit['after']:.2g} rad | {misfit['noise']:.2g} rad of encoder noise |"]
+    said = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [row for row in rows if row not in said] == []
 
 
 @pytest.mark.slow
@@ -52,7 +72,7 @@ def test_the_five_steps_on_the_reader_s_own_machine(tmp_path, fmus):
     page = (ROOT / "docs" / "your-machine.md").read_text(encoding="utf-8")
     lines = re.findall(r"^ *(python -m orchestrator .*)$", page, re.MULTILINE)
     assert len(lines) == 5
-    shutil.copytree(ROOT / "docs" / "examples", tmp_path / "docs" / "examples")
+    copy_examples(tmp_path / "docs" / "examples")
     for line in lines:
         done = run([sys.executable, *shlex.split(line)[1:]], tmp_path)
         assert done.returncode == 0, done.stdout + done.stderr

@@ -16,7 +16,6 @@ from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
 from orchestrator.diagnosis.blackbox.diagnose import diagnose as diagnosing
 from orchestrator.diagnosis.blackbox.draft import drafted
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, validated
-from orchestrator.diagnosis.blackbox.figures import draw_signals
 from orchestrator.diagnosis.blackbox.mapping import read_map
 from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
@@ -177,6 +176,8 @@ class FmuDiagnosisResult(Result):
 
     def write_files(self, folder: Path) -> None:
         """Write the held-out part, a figure and the corrected system."""
+        from orchestrator.diagnosis.blackbox.figures import draw_signals
+
         write_signals(folder / "diagnose.csv", self.outcome, self.data)
         draw_signals(folder / "diagnose_signals.png", self.outcome, self.data)
         if self.outcome.verdict != "unknown":

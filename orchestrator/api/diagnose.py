@@ -23,14 +23,6 @@ from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.blackbox.settings import BoxSettings
 from orchestrator.diagnosis.diagnose import evidence_of
-from orchestrator.diagnosis.figures import (
-    draw_candidates,
-    draw_innovations,
-    draw_learned,
-    draw_lines,
-    draw_missing,
-    draw_signals,
-)
 from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Named, step_found
 from orchestrator.diagnosis.proof.corrected import BeforeAfter, before_and_after, build_corrected, fmu_name
 from orchestrator.diagnosis.proof.model_text import corrected_model
@@ -140,6 +132,8 @@ class DiagnosisResult(Result):
         Args:
             path: a PNG, SVG or PDF file.
         """
+        from orchestrator.diagnosis.figures import draw_signals
+
         draw_signals(Path(path), self.runs, self.diagnosis)
 
     def write_csv(self, path: Path | str) -> None:
@@ -209,6 +203,8 @@ class DiagnosisResult(Result):
 
     def write_files(self, folder: Path) -> None:
         """Write the corrected FMU, its model file ``corrected.toml``, ``diagnose.csv`` and the figures."""
+        from orchestrator.diagnosis.figures import draw_workings
+
         fmu = self.build(folder)
         if "runs" not in self.__dict__:  # else it would be built again
             self.__dict__["runs"] = self._co_simulated(fmu)
@@ -216,11 +212,7 @@ class DiagnosisResult(Result):
         if self.model is not None:
             (folder / "corrected.toml").write_text(corrected_model(self.model, self.diagnosis), encoding="utf-8")
         self.plot(folder / "diagnose_signals.png")
-        draw_innovations(folder / "diagnose_innovations.png", self.diagnosis)
-        draw_candidates(folder / "diagnose_candidates.png", self.diagnosis)
-        draw_missing(folder / "diagnose_missing_torque.png", self.diagnosis)
-        draw_learned(folder / "diagnose_learned_law.png", self.diagnosis)
-        draw_lines(folder / "diagnose_ripple.png", self.evidence, self.misfit[0].unit)
+        draw_workings(folder, self.diagnosis, self.evidence, self.misfit[0].unit)
 
 
 @overload

@@ -18,7 +18,6 @@ from orchestrator.estimation.inspection.channels import (
     excitation_of,
     reversals_of,
 )
-from orchestrator.estimation.inspection.figures import draw_record
 from orchestrator.estimation.inspection.machine import as_model, fits, rough_machine, visible_effects
 from orchestrator.estimation.inspection.starter import assumed_columns, starter
 from orchestrator.estimation.inspection.sufficiency import SEEN, SIZES, Sufficiency, sufficiency
@@ -81,6 +80,8 @@ class InspectResult(Result):
         Args:
             path: a PNG, SVG or PDF file.
         """
+        from orchestrator.estimation.inspection.figures import draw_record
+
         draw_record(Path(path), self.record, list(self.excitation))
 
     def verdict(self) -> list[str]:

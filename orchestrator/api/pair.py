@@ -19,7 +19,6 @@ from orchestrator.paired.apart import run_pair_within
 from orchestrator.paired.calibration import GapEstimate
 from orchestrator.paired.cosimulation import FMUS, LoopRun
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.figures import draw_pair
 from orchestrator.paired.pair import PairRun, with_settings
 from orchestrator.shared.play import Play
 from orchestrator.shared.results import GapFound, PairFound
@@ -99,6 +98,8 @@ class PairResult(Result):
         Args:
             path: a PNG, SVG or PDF file.
         """
+        from orchestrator.paired.figures import draw_pair
+
         title = f"Paired loops, {self.experiment.backlash_model}, half-gap {self.alpha:g} rad"
         draw_pair(Path(path), self.machine, self.twin, self.experiment.reference()[0], title)
 

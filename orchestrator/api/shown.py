@@ -6,7 +6,6 @@ from html import escape
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestrator.reporting import write_report
 from orchestrator.shared.output import staged, write_result
 
 
@@ -77,6 +76,8 @@ class Result:
             arguments: what was asked for, as the JSON file says it (default: the arguments of the call).
         """
         self.write_files(folder)
+        from orchestrator.reporting import write_report  # 0.3 s that a command without result need not take
+
         given = self.arguments if arguments is None else arguments
         write_result(folder, self.command, given, self.seed, self.results(place))
         write_report(folder, self.command)

@@ -12,7 +12,6 @@ from orchestrator.api.shown import Block, Result, table, write_columns
 from orchestrator.errors import ScenarioError
 from orchestrator.master import result as master
 from orchestrator.master.signals import Constant
-from orchestrator.paired.figures import draw_signals
 from orchestrator.scenarios import scenario as scenarios
 from orchestrator.scenarios.isolated import Safety, described
 from orchestrator.scenarios.scenario import Scenario, load_scenario
@@ -94,6 +93,8 @@ class SimulationResult(Result):
         Args:
             path: a PNG, SVG or PDF file.
         """
+        from orchestrator.paired.figures import draw_signals
+
         units = {name: self.units.get(name) or "" for name in self.names}
         draw_signals(Path(path), self.time, {name: self[name] for name in self.names}, units)
 

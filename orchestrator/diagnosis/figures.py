@@ -58,13 +58,24 @@ def draw_signals(path: Path, runs: BeforeAfter, diagnosis: Diagnosis) -> None:
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
-def draw_innovations(path: Path, diagnosis: Diagnosis) -> None:
-    """Draw normalised innovations of the re-fitted and the final model over time, and their spectra.
+def draw_workings(folder: Path, diagnosis: Diagnosis, found: Evidence, unit: str) -> None:
+    """Draw how the search came to its verdict, as ``diagnose_*.png``: innovations, candidates, laws and periods.
 
     Args:
-        path: the picture.
-        diagnosis: of the record.
+        folder: where to; it exists.
+        diagnosis: with its workings.
+        found: what is left, and what explains it.
+        unit: of the motor's position.
     """
+    _draw_innovations(folder / "diagnose_innovations.png", diagnosis)
+    _draw_candidates(folder / "diagnose_candidates.png", diagnosis)
+    _draw_missing(folder / "diagnose_missing_torque.png", diagnosis)
+    _draw_learned(folder / "diagnose_learned_law.png", diagnosis)
+    _draw_lines(folder / "diagnose_ripple.png", found, unit)
+
+
+def _draw_innovations(path: Path, diagnosis: Diagnosis) -> None:
+    """Draw normalised innovations of the re-fitted and the final model over time, and their spectra."""
     w = diagnosis.workings
     h = w.likelihood.signals.h
     figure = Figure(figsize=(10.0, 5.5), layout="constrained")
@@ -88,13 +99,8 @@ def draw_innovations(path: Path, diagnosis: Diagnosis) -> None:
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
-def draw_candidates(path: Path, diagnosis: Diagnosis) -> None:
-    """Draw what every candidate of every step gains.
-
-    Args:
-        path: the picture.
-        diagnosis: of the record.
-    """
+def _draw_candidates(path: Path, diagnosis: Diagnosis) -> None:
+    """Draw what every candidate of every step gains."""
     steps = [step for step in diagnosis.workings.steps if step.candidates]
     if not steps:
         return
@@ -117,19 +123,11 @@ def draw_candidates(path: Path, diagnosis: Diagnosis) -> None:
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
 
-def draw_missing(path: Path, diagnosis: Diagnosis) -> bool:
-    """Draw, for each named or suspected effect, the torque missing without it and the law's part; False: no effect.
-
-    Args:
-        path: the picture.
-        diagnosis: of the record.
-
-    Returns:
-        True when it was drawn.
-    """
+def _draw_missing(path: Path, diagnosis: Diagnosis) -> None:
+    """Draw, for each named or suspected effect, the torque missing without it and the law's part."""
     named = diagnosis.effects or diagnosis.suspects
     if not named:
-        return False
+        return
     w = diagnosis.workings
     fit = w.final if diagnosis.effects else w.best.fit
     figure = Figure(figsize=(8.0, 3.4 * len(named)), layout="constrained")
@@ -142,22 +140,13 @@ def draw_missing(path: Path, diagnosis: Diagnosis) -> bool:
         axis.set_title(f"{entry.name.replace('_', ' ')} ({entry.site})")
     _finish(list(axes))
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
-    return True
 
 
-def draw_learned(path: Path, diagnosis: Diagnosis) -> bool:
-    """Draw the law that was learned from what no effect explains, with its 95 % band.
-
-    Args:
-        path: of the picture.
-        diagnosis: that has learned it.
-
-    Returns:
-        False: there is none.
-    """
+def _draw_learned(path: Path, diagnosis: Diagnosis) -> None:
+    """Draw the law that was learned from what no effect explains, with its 95 % band."""
     law = diagnosis.learned
     if law is None:
-        return False
+        return
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")
     FigureCanvasAgg(figure)
     axis = figure.subplots()
@@ -168,17 +157,10 @@ def draw_learned(path: Path, diagnosis: Diagnosis) -> bool:
     axis.set_ylabel(f"torque [{law.unit}]")
     _finish([axis])
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
-    return True
 
 
-def draw_lines(path: Path, found: Evidence, unit: str) -> None:
-    """Draw the gain of a ripple at each period of the motor's position, with the lines that are sure.
-
-    Args:
-        path: the picture.
-        found: what the final model leaves.
-        unit: of the motor's position.
-    """
+def _draw_lines(path: Path, found: Evidence, unit: str) -> None:
+    """Draw the gain of a ripple at each period of the motor's position, with the lines that are sure."""
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")
     FigureCanvasAgg(figure)
     axis = figure.subplots()

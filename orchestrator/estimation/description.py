@@ -4,15 +4,15 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from orchestrator.estimation.cramer_rao import bound_of_fit
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.likelihood import GapFit, Likelihood
 from orchestrator.estimation.problem import LEAST_TORQUE_NOISE
 from orchestrator.estimation.profile import profile
-from orchestrator.estimation.protocol import LEVEL, Estimate
+from orchestrator.estimation.protocol import Estimate
 from orchestrator.estimation.settings import GapVerdictSettings
+from orchestrator.shared.inference.normal import NORMAL_95
 from pyfmu_sources.drivetrain_parameters import P_I
 
 
@@ -35,7 +35,7 @@ def describe(fit: GapFit) -> Estimate:
     # Torque noise above the least means that the model is not exact; what it lacks is not white, as the likelihood
     # takes it to be, so the interval is widened.
     inexact = max(likelihood.noise(fit.point.theta).torque) > 10.0 * LEAST_TORQUE_NOISE
-    limit = float(chi2.ppf(LEVEL, 1)) * (settings.misfit_widening**2 if inexact else 1.0)
+    limit = NORMAL_95**2 * (settings.misfit_widening**2 if inexact else 1.0)
     low, high = curve.interval(alpha, limit)
     # A profile point that is not quite the maximum makes the interval too short, never too long.
     half = math.sqrt(limit) * error

@@ -4,11 +4,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.likelihood import GapFit, Likelihood, maximise
-from orchestrator.estimation.protocol import LEVEL
+from orchestrator.shared.inference.normal import NORMAL_95
 
 
 @dataclass(frozen=True)
@@ -35,12 +34,11 @@ class Profile:
         return low, high
 
 
-def profile(fit: GapFit, level: float = LEVEL) -> Profile:
+def profile(fit: GapFit) -> Profile:
     """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0).
 
     Args:
         fit: the maximum.
-        level: of the interval.
 
     Returns:
         The profile.
@@ -51,7 +49,7 @@ def profile(fit: GapFit, level: float = LEVEL) -> Profile:
     deviation = math.sqrt(fit.covariance[column, column])
     slope = fit.covariance[:, column] / fit.covariance[column, column]
     best = float(fit.point.theta[place])
-    edge = likelihood.settings.verdict.misfit_widening * math.sqrt(float(chi2.ppf(level, 1)))
+    edge = likelihood.settings.verdict.misfit_widening * NORMAL_95
     entries = [(best, 0.0)]
     for side in (-1.0, 1.0):
         reach = 0.5 * edge * deviation

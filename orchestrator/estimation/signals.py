@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from orchestrator.estimation.innovations import Array
 from orchestrator.estimation.protocol import NotApplicableError
@@ -44,6 +43,8 @@ def shaft_signals(record: Record, model: Model) -> ShaftSignals:
     Raises:
         NotApplicableError: there is no load encoder.
     """
+    from scipy.signal import savgol_filter
+
     if record.theta_l is None:
         raise NotApplicableError("this method needs the load's angle `theta_l`")
     p = {name: entry.value for name, entry in model.parameters.items()}

@@ -7,7 +7,6 @@ encoder's noise moves the torque's sum only from one sample to the next, and doe
 """
 
 import numpy as np
-from scipy.signal import lfilter
 
 from orchestrator.records.arrays import lined
 from orchestrator.records.columns import Array, Column
@@ -39,6 +38,8 @@ def torque_of_voltage(voltage: Array, angle: Array, time: Array, column: Column)
 
 def _lagged(settled: Array, step: float, lag: float) -> Array:
     """Return the current's mean over each sample, where it goes towards ``settled`` with a time constant [s]."""
+    from scipy.signal import lfilter  # a second of importing that few records need
+
     missing = np.isnan(settled)
     target = lined(settled)
     keep = float(np.exp(-step / lag))

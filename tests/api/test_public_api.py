@@ -14,6 +14,7 @@ import pytest
 
 import orchestrator as oc
 from orchestrator.building.build import ensure_built
+from tests.support.example_record import copy_examples
 from tools import api_page
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,8 +27,7 @@ SLOW = {"diagnose", "benchmark", "calibrate", "design"}
 @pytest.fixture
 def place(tmp_path, monkeypatch):
     """A folder with the files that the docs speak of, as the current one."""
-    for name in ("machine.csv", "machine.toml", "loop.toml", "axis.csv", "axis_map.toml"):
-        shutil.copy(ROOT / "docs" / "examples" / name, tmp_path)
+    copy_examples(tmp_path)
     built = ensure_built(["Drivetrain", "ServoAxis"])
     shutil.copy(built["Drivetrain"], tmp_path / "other.fmu")
     shutil.copy(built["ServoAxis"], tmp_path / "axis.fmu")
@@ -90,6 +90,8 @@ def test_example_of_the_docstring(place, name):
     function = getattr(oc, name)
     example = doctest.DocTestParser().get_doctest(function.__doc__, {"oc": oc}, name, None, 0)
     assert example.examples, f"{name} has no example"
+    if name == "read_record":  # it shows how long the record is
+        copy_examples(place, whole=True)
     result = doctest.DocTestRunner(verbose=False).run(example)
     assert result.failed == 0
 

@@ -70,7 +70,7 @@ def model_description() -> str:
     return (HERE / "c_fmu.xml").read_text(encoding="utf-8")
 
 
-def reference_trajectory(stop: float = 2.0, step: float = 0.01) -> str:
+def reference_trajectory(stop: float = 0.5, step: float = 0.01) -> str:
     """The default experiment as CSV from the closed-form solution of the damped oscillator (force = 0)."""
     mass, stiffness, damping, x0, v0 = 1.0, 40.0, 0.8, 0.1, 0.0
     decay = damping / (2.0 * mass)
