@@ -1,4 +1,4 @@
-"""Do no harm: whether named effects predict held-out data worse than re-fitted parameters alone do."""
+"""Do no harm: whether named effects predict held-out data worse than nominal or re-fitted parameters do."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,7 +7,7 @@ from orchestrator.diagnosis.outcome import Diagnosis
 
 
 def harmed(found: Diagnosis) -> dict[str, float]:
-    """Return signal -> held-out misfit with the named effects over that of re-fitted parameters, where it is larger.
+    """Return signal -> held-out misfit with the named effects over the better one without, where it is larger.
 
     Args:
         found: the diagnosis.
@@ -15,7 +15,7 @@ def harmed(found: Diagnosis) -> dict[str, float]:
     Returns:
         Ratios above 1; empty where nothing gets larger, or nothing is named.
     """
-    ratios = {one.signal: one.after / dict(one.stages)["parameters"] for one in found.misfit if found.effects}
+    ratios = {one.signal: one.after / min(rms for _, rms in one.stages[:2]) for one in found.misfit if found.effects}
     return {name: ratio for name, ratio in ratios.items() if ratio > 1.0}
 
 

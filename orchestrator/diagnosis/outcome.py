@@ -1,5 +1,6 @@
 """What a diagnosis says: plain immutable values, with their form in ``diagnose.json``."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -83,6 +84,11 @@ class Misfit:
     def before(self) -> float:
         """Return the misfit of the nominal model."""
         return self.stages[0][1]
+
+    @property
+    def best_before(self) -> float:
+        """Return the least rms of the models before the last; infinite where the runs of all go astray."""
+        return min((rms for _, rms in self.stages[:-1] if math.isfinite(rms)), default=math.inf)
 
     @property
     def after(self) -> float:

@@ -186,12 +186,14 @@ def _proven(
 
     An effect is withdrawn when its size, within what the model's error leaves open, is not far from zero, or when with
     it the model predicts worse, at any horizon and by more than chance, than without it or than re-fitted parameters
-    alone, or its misfit on held-out data is larger than theirs, or what is left is no noise and more than it explains.
+    alone, or its misfit on held-out data is larger than that of nominal or re-fitted parameters, or what is left is no
+    noise and more than it explains.
     """
     likelihood = search.likelihood
     levels = likelihood.settings.levels
     sized_base = sized(likelihood, plain, whole, (), ladder(levels, (), plain.q))
     before = horizons(likelihood, sized_base.fit.p, plain.q, whole.held_out)
+    bases = (likelihood.nominal, sized_base.fit.p)
     notes: list[str] = []
     while best.effects:
         efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
@@ -204,7 +206,7 @@ def _proven(
         fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
         if weak is None and not harm and fewer.effects:
             harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
-        harm = harm or _larger_misfit(likelihood, sized_base.fit, final.fit, whole)
+        harm = harm or _larger_misfit(likelihood, bases, final.fit, whole)
         why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
         if weak is None and not harm:
             small = _minor(search, parts, plain, best, efficient, after)
@@ -271,11 +273,15 @@ def _harm_over_fewer(
     return harm(sized(likelihood, again, whole, fewer.effects, levels).fit.p)
 
 
-def _larger_misfit(likelihood: RecordLikelihood, base: Fit, final: Fit, whole: Parts) -> tuple[str, ...]:
-    """Return the signals whose misfit on held-out data, as it is reported, is larger with effects than without."""
-    stages = [("parameters", base.p), ("final", final.p)]
+def _larger_misfit(likelihood: RecordLikelihood, bases: Sequence[Array], final: Fit, whole: Parts) -> tuple[str, ...]:
+    """Return the signals whose misfit on held-out data, as it is reported, is larger with effects than without.
+
+    Each of ``bases`` counts, parameters without effects, nominal ones too: the likeliest make up for what the model
+    lacks over a sample, and may be worse in free runs.
+    """
+    stages = [*(("", p) for p in bases), ("final", final.p)]
     found = held_out_misfit(likelihood, final.q, stages, whole.held_out, "")
-    return tuple(f"the misfit of {one.signal}" for one in found if not one.after <= one.before)
+    return tuple(f"the misfit of {one.signal}" for one in found if not one.after <= one.best_before)
 
 
 def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: float, whole: Parts) -> bool:

@@ -149,9 +149,11 @@ def test_a_larger_misfit_of_held_out_data_is_harm() -> None:
     parts = Parts(slice(10, 120), slice(120, 160), slice(160, likelihood.stop))
     right = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
     wrong = replace(right, p=p + 0.5 * (np.arange(p.size) == likelihood.plant.index("b")))
-    assert _larger_misfit(likelihood, right, wrong, parts) == ("the misfit of theta_m",)
-    assert _larger_misfit(likelihood, wrong, right, parts) == ()
-    assert _larger_misfit(likelihood, right, right, parts) == ()
+    assert _larger_misfit(likelihood, [right.p], wrong, parts) == ("the misfit of theta_m",)
+    assert _larger_misfit(likelihood, [wrong.p], right, parts) == ()
+    assert _larger_misfit(likelihood, [right.p], right, parts) == ()
+    for bases in ([right.p, wrong.p], [wrong.p, right.p]):  # the best of them counts
+        assert _larger_misfit(likelihood, bases, wrong, parts) == ("the misfit of theta_m",)
 
 
 @pytest.mark.parametrize(
@@ -239,6 +241,13 @@ def test_what_is_named_must_leave_the_stated_machine_and_follow_the_motion() -> 
     )
 
 
+def test_the_best_model_before_the_last_is_the_one_to_beat() -> None:
+    misfit = Misfit("theta_m", "rad", 0.1, (("nominal", 0.3), ("parameters", 0.4), ("final", 0.2)))
+    assert misfit.best_before == 0.3
+    assert replace(misfit, stages=(("nominal", np.nan), *misfit.stages[1:])).best_before == 0.4
+    assert replace(misfit, stages=(("nominal", np.nan), ("final", 0.2))).best_before == np.inf
+
+
 def test_doubts_are_listed_once_and_worst_first() -> None:
     base = horizons([0.1, 1.0, 1.0, 1.0])
     misfit = (Misfit("theta_m", "rad", 0.1, (("nominal", 2.0), ("parameters", 0.4))),)
@@ -276,6 +285,23 @@ def test_torque_noise_passes_the_lag_of_the_drive() -> None:
     start = np.zeros(8)
     quiet = still.drift(start, outputs, slice(0, 20), 0)
     assert noise.drift(start, outputs, slice(0, 20), 0) != pytest.approx(quiet, abs=1e-15)
+
+
+def test_a_true_model_may_be_off_by_its_own_standard_errors() -> None:
+    likelihood, p = axis_likelihood()
+    place = likelihood.plant.index("b")
+    free = (Free(place, 0.01, 0.0, 10.0),)
+    sure = Fit(p, 1e-3, np.zeros((1, 1)), free, np.zeros((1, 1)), 0.0, 0.0)
+    part, start, outputs = slice(10, 60), np.zeros(8), np.zeros((50, 1))
+
+    def drifts(model: Fit) -> np.ndarray:
+        noise = TorqueNoise(likelihood, model, np.zeros(10), p)
+        return np.array([noise.drift(start, outputs, part, draw)[-1, 0] for draw in range(8)])
+
+    assert np.ptp(drifts(sure)) == 0.0
+    small, large = (np.ptp(drifts(replace(sure, covariance=np.array([[s**2]])))) for s in (1e-4, 1e-2))
+    assert large == pytest.approx(100.0 * small, rel=0.2)
+    assert np.ptp(drifts(replace(sure, covariance=np.array([[np.nan]])))) == 0.0
 
 
 def test_a_shifted_log_is_put_right() -> None:

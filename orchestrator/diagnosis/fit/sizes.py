@@ -87,7 +87,8 @@ def with_model_error(
     """Return a fit whose intervals hold what long predictions ask for, too.
 
     A right model has one set of values for predictions of a sample and for runs over all of a record. Where a law is
-    not quite right, each asks for its own, and what they differ by is the size of the model's error.
+    not quite right, each asks for its own, and what they differ by is the size of the model's error. Under torque noise
+    free runs are off themselves: what their own error explains is none of the model's.
 
     Args:
         likelihood: of the record.
@@ -113,8 +114,11 @@ def with_model_error(
     long = fit(likelihood, found.p, levels[-1], asked, parts, most=0)
     if not np.all(np.isfinite(long.z)):
         return found
-    places = [entry.place for entry in found.free]
-    return replace(found, covariance=found.covariance + np.diag((long.p[places] - found.p[places]) ** 2))
+    chance = np.diag(_with_robust_errors(likelihood, long, part).covariance)
+    beyond = np.zeros(len(found.free))
+    for entry, own in zip(long.free, chance, strict=True):
+        beyond[found.free.index(entry)] = max((long.p[entry.place] - found.p[entry.place]) ** 2 - own, 0.0)
+    return replace(found, covariance=found.covariance + np.diag(beyond))
 
 
 def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -> Fit:

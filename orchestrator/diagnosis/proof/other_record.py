@@ -57,7 +57,7 @@ def validate(record: Record, diagnosis: Diagnosis) -> Validation:
 
 
 def unharmed(diagnosis: Diagnosis, found: Validation) -> Diagnosis:
-    """Return a diagnosis whose effects make nothing worse on another record than re-fitted parameters alone.
+    """Return a diagnosis whose effects make nothing worse on another record than nominal or re-fitted parameters.
 
     Effects that do are suspects: the verdict is then "unknown", and the model that of re-fitted parameters.
 
@@ -72,7 +72,7 @@ def unharmed(diagnosis: Diagnosis, found: Validation) -> Diagnosis:
     worse = [
         misfit.signal
         for misfit in found.misfit
-        if misfit.after > dict(misfit.stages)["parameters"] * (1.0 + settings.larger) + settings.of_noise * misfit.noise
+        if misfit.after > misfit.best_before * (1.0 + settings.larger) + settings.of_noise * misfit.noise
     ]
     if diagnosis.verdict != "effects" or not worse:
         return diagnosis

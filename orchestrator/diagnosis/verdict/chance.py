@@ -3,7 +3,8 @@
 Over seconds a free run drifts under torques that are in no request, and a small effect that is really there may then
 predict worse than no effect at all. There are too few such runs in a record to tell from their scatter. The torque that
 the final model lacks is estimated (the filter's smoothed disturbance), drawn anew (turned round in time, its sign
-changed, begun elsewhere: the spectrum stays), and sent through the exact plant.
+changed, begun elsewhere: the spectrum stays), and sent through the exact plant. Its values are drawn within their
+covariance: those of a true model are known to their standard errors only, and over seconds errors add up.
 """
 
 from dataclasses import dataclass, replace
@@ -69,7 +70,7 @@ class TorqueNoise:
         return np.asarray(np.mean(changes, axis=0) + settings.sure * np.std(changes, axis=0))
 
     def drift(self, start: Array, outputs: Array, part: slice, draw: int) -> Array:
-        """Return (n, channels): what one draw of the torque noise adds to a free run.
+        """Return (n, channels): what one draw of the torque noise, and of the model's values, adds to a free run.
 
         Args:
             start: (8,) initial state of the run.
@@ -80,7 +81,7 @@ class TorqueNoise:
         Returns:
             What is added, in the units of the outputs.
         """
-        plant, signals, p = self.likelihood.plant, self.likelihood.signals, self.model.p.copy()
+        plant, signals, p = self.likelihood.plant, self.likelihood.signals, self._values(draw)
         begin, end, _ = part.indices(signals.size)
         limit = plant.index(plant.drive.limit)
         u = np.clip(signals.u, -p[limit], p[limit])
@@ -94,6 +95,17 @@ class TorqueNoise:
         rng = np.random.default_rng(draw)
         turned = np.roll(self.torque, rng.integers(self.torque.size))[:: rng.choice((-1, 1))]
         return np.asarray(rng.choice((-1.0, 1.0)) * np.resize(turned, size))
+
+    def _values(self, draw: int) -> Array:
+        """Return one draw (parameters,) of the model's values, within their covariance and bounds."""
+        p, covariance = self.model.p.copy(), self.model.covariance
+        if not np.all(np.isfinite(covariance)):
+            return p
+        variances, axes = np.linalg.eigh(covariance)
+        normal = np.random.default_rng([draw, 1]).standard_normal(len(variances))
+        for entry, change in zip(self.model.free, axes @ (np.sqrt(np.maximum(variances, 0.0)) * normal), strict=True):
+            p[entry.place] = min(max(p[entry.place] + change, entry.minimum), entry.maximum)
+        return p
 
     def _requested(self, torque: Array) -> Array:
         """Return the request (n,) that becomes ``torque`` behind the lag of the drive."""
