@@ -135,17 +135,19 @@ def _followed(fitter: Fitter, fit: BoxFit, rows: Rows, at: int, tried: Array) ->
     least = fitter.likelihood(fitter.whitened(fit.y, fit.level), fit.level, rows) + fitter.prior(fit.model)
     vectors = np.repeat(z[None], len(tried), axis=0)
     vectors[:, at] = tried
-    models = [fit.model.moved(vector) for vector in vectors]
-    for model, y in zip(models, fitter.problem.simulate(models, len(fit.y)), strict=True):
-        if y is None:
-            continue
-        change = fitter.step(model, y, J, fit.level, rows, 0.0)
-        vector = model.vector
-        vector[others] += change
-        left = fitter.whitened(y + (J @ change) * fitter.problem.noise, fit.level)
-        reached = fitter.likelihood(left, fit.level, rows) + fitter.prior(model.moved(vector))
-        if reached > least - fitter.settings.fit.alike:
-            found.append(vector)
+    for last in (False, True):  # along a ridge the first step goes astray
+        models = [fit.model.moved(vector) for vector in vectors]
+        for place, y in enumerate(fitter.problem.simulate(models, len(fit.y))):
+            if y is None:
+                continue
+            change = fitter.step(models[place], y, J, fit.level, rows, 0.0)
+            vectors[place, others] += change
+            if not last:
+                continue
+            left = fitter.whitened(y + (J @ change) * fitter.problem.noise, fit.level)
+            reached = fitter.likelihood(left, fit.level, rows) + fitter.prior(fit.model.moved(vectors[place]))
+            if reached > least - fitter.settings.fit.alike:
+                found.append(vectors[place])
     return np.stack(found)
 
 
