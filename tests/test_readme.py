@@ -13,6 +13,7 @@ import pytest
 
 from orchestrator.records.record import read_record
 from tests.support.example_record import FILE, FRICTION, HALF_GAP, copy_examples, example_record
+from tests.support.waiting import HANGS
 
 ROOT = Path(__file__).resolve().parents[1]
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
@@ -27,7 +28,9 @@ def blocks(page, language):
 
 def run(words, folder):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=3600, check=False)
+    return subprocess.run(
+        words, cwd=folder, env=environment, capture_output=True, text=True, timeout=HANGS, check=False
+    )
 
 
 COMMANDS = [line for body in blocks("README.md", "sh") for line in body.splitlines() if line.startswith("python -m")]

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.api.arguments import within
-from orchestrator.api.estimate import UNSEEN, require_linear
+from orchestrator.api.estimable import require_linear
+from orchestrator.api.estimate import UNSEEN
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.estimation import design as designing

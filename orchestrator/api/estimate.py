@@ -13,10 +13,10 @@ import msgspec
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.diagnose import DiagnosisResult
 from orchestrator.api.diagnose import diagnose as find_missing
+from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.live import fitted_live
 from orchestrator.api.methods import HEAD, MethodResult, described, method_entry, method_row
 from orchestrator.api.numerics import fitting
-from orchestrator.api.records import as_record
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation import cramer_rao
@@ -27,7 +27,6 @@ from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSetting
 from orchestrator.estimation.tables import write_tables
 from orchestrator.estimation.trust import FITTED, trust_of_estimates
 from orchestrator.records.model_file import Model, read_model
-from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.repeats import Repeats
 from orchestrator.shared.play import Play
@@ -357,50 +356,6 @@ def _fitted(
     if record.missing and name not in SKIPS_MISSING:
         raise NotApplicableError(f"takes records without missing samples, but {record.missing} rows have some")
     return estimator(name)(record, model)
-
-
-def plausible_record(record: Record | Path | str, model: Model, motor_only: bool, **reading: Any) -> Record:
-    """Return a record that fits the model at all.
-
-    Args:
-        record: a record or its path.
-        model: what it is compared with.
-        motor_only: leave the load encoder out.
-        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
-
-    Returns:
-        The record.
-
-    Raises:
-        RecordError: the record is wrong, or cannot be of this machine.
-    """
-    measured = as_record(record, model, **reading)
-    measured = measured.without_load_encoder() if motor_only else measured
-    check_plausible(measured, model)
-    return measured
-
-
-def require_linear(model: Model) -> None:
-    """Refuse models that the estimators would not see whole.
-
-    Args:
-        model: the model.
-
-    Raises:
-        ScenarioError: it has no gap, or nonlinear effects.
-    """
-    if model.fmu != "Drivetrain":
-        raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain to have a gap, but is {model.fmu}")
-    for name, entry in model.parameters.items():
-        active = name.startswith("effects.") and name.rsplit(".", 1)[1] in (
-            "delay", "amplitude", "coulomb", "breakaway", "cubic", "coefficient", "inertia"
-        )  # fmt: skip
-        active = active or (name.startswith("effects.coulomb") and name.endswith("torque"))
-        if active and (entry.value != 0.0 or entry.uncertainty > 0.0):
-            raise ScenarioError(
-                f"{model.source}: `estimate` fits the plant without nonlinear effects, but `{name}` is "
-                f"{entry.value:g}; `diagnose` fits the gap together with them"
-            )
 
 
 def _bound(record: Record, model: Model, estimates: Sequence[Estimate]) -> float:

@@ -241,9 +241,7 @@ def _job(
         steps=steps,
         budget=min(2.0, 0.2 * limits.time),
         flags=frozenset(f for f in _FLAGS if interface.flag(f)),
-        reference=None
-        if reference is None
-        else {"path": reference.path, "names": reference.names, "rows": reference.rows},
+        reference=reference,
     )
 
 

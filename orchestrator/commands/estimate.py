@@ -15,14 +15,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
-from orchestrator.api.estimate import (
-    DEFAULT_METHOD,
-    DIAGNOSIS,
-    EstimateResult,
-    estimate,
-    plausible_record,
-    require_linear,
-)
+from orchestrator.api.estimable import plausible_record, require_linear
+from orchestrator.api.estimate import DEFAULT_METHOD, DIAGNOSIS, EstimateResult, estimate
 from orchestrator.api.records import read_model
 from orchestrator.api.shown import Block
 from orchestrator.commands._console import print_blocks

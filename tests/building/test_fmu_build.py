@@ -21,6 +21,7 @@ from orchestrator.paired.experiment import Experiment
 from orchestrator.plants import design
 from pyfmu_sources.drivetrain_parameters import BACKLASH_MODELS
 from pyfmu_sources.model_xml import ENUMERATIONS
+from tests.support.waiting import HANGS
 
 BUILD_HERE = "from orchestrator.building.build import *; ensure_built(['Drivetrain'], Path('.'))"
 NAMES = ("Drivetrain", "LqrController", "KalmanEstimator")
@@ -221,7 +222,7 @@ def test_two_builds_at_a_time_do_no_harm(tmp_path: Path, fmus: dict[str, Path]) 
     words = [sys.executable, "-c", BUILD_HERE]
     environment = os.environ | {"PYTHONPATH": str(build.ROOT)}
     processes = [subprocess.Popen(words, cwd=tmp_path, env=environment) for _ in range(2)]
-    assert [process.wait(timeout=3600) for process in processes] == [0, 0]
+    assert [process.wait(timeout=HANGS) for process in processes] == [0, 0]
     assert [path.name for path in tmp_path.iterdir()] == ["Drivetrain.fmu"]
     assert (tmp_path / "Drivetrain.fmu").read_bytes() == fmus["Drivetrain"].read_bytes()
 

@@ -168,7 +168,7 @@ def test_an_interrupt_stops_the_fits_that_run(monkeypatch) -> None:
 
 
 def test_two_effects_in_a_closed_loop() -> None:
-    found = diagnose(record_of({"alpha": 0.004, "delay": 0.01}, 31, 20.0, excitation="closed_loop"), MODEL)
+    found = diagnose(record_of({"alpha": 0.004, "delay": 0.01}, 31, 12.0, excitation="closed_loop"), MODEL)
     assert sorted(labels(found)) == ["backlash@shaft", "input_delay@actuator"]
     stages = [name for name, _ in found.misfit[0].stages]
     assert stages[:2] == ["nominal", "parameters"]

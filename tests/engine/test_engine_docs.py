@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.support.waiting import HANGS
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -22,7 +24,7 @@ def run(code, folder):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=3600,
+        timeout=HANGS,
         check=False,
     )
 

@@ -13,6 +13,7 @@ import pytest
 
 from orchestrator.building.launcher import find_toolchain
 from tests.support.fmu_calls import DISCARD, ERROR, OK, RawFmu
+from tests.support.waiting import HANGS
 
 HOST = Path(__file__).resolve().parents[1] / "support" / "fmu_host.c"
 TOOLCHAIN = find_toolchain()
@@ -190,7 +191,7 @@ def test_misuse_never_kills_the_process(fmus: dict[str, Path], name: str) -> Non
         cwd=root,
         capture_output=True,
         text=True,
-        timeout=3600,
+        timeout=HANGS,
         check=False,
     )
     assert (run.returncode, run.stdout) == (0, "alive 3\n"), run.stderr[-500:]
@@ -215,7 +216,7 @@ def test_without_a_compiler_the_fmu_still_refuses_and_runs_in_python_hosts(stock
         cwd=root,
         capture_output=True,
         text=True,
-        timeout=3600,
+        timeout=HANGS,
         check=False,
     )
     assert (run.returncode, run.stdout) == (0, "alive None\n"), run.stderr[-500:]

@@ -25,6 +25,7 @@ from orchestrator.building.native_build import ensure_native
 from tests.support import paired_loop
 from tests.support.fmu_calls import OK, RawFmu
 from tests.support.paired_loop import CONNECTIONS, INSTANCES, RECORDED, START_VALUES, STEP
+from tests.support.waiting import HANGS
 
 STEPS = 300
 SIGNALS = ("theta_m", "theta_l", "omega_m", "T_shaft")
@@ -275,7 +276,7 @@ def run_in_package(code: str, package: str, fmus: dict[str, Path], folder: Path)
     }
     (folder / "job.json").write_text(json.dumps(job))
     words = [sys.executable, "-c", AROUND.format(code), str(folder / "job.json"), str(folder / "rows.json")]
-    run = subprocess.run(words, env=without_hints(), capture_output=True, text=True, check=False, timeout=3600)
+    run = subprocess.run(words, env=without_hints(), capture_output=True, text=True, check=False, timeout=HANGS)
     assert run.returncode == 0, run.stderr[-500:]
     rows: list[list[float]] = json.loads((folder / "rows.json").read_text())
     return rows

@@ -1,5 +1,6 @@
 """The probe that reproduces the reference result which an FMU carries."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +13,7 @@ _RELATIVE = 0.02
 _OUTSIDE = 0.02
 _PATIENCE = 20.0
 
-Row = list[float]
+Row = tuple[float, ...]
 Columns = list[tuple[int, ProbedVariable]]
 
 
@@ -22,7 +23,7 @@ class Tube:
     The band is 2 % of the range of each signal to either side, and at least a millionth of its size.
     """
 
-    def __init__(self, columns: Columns, rows: list[Row]) -> None:
+    def __init__(self, columns: Columns, rows: Sequence[Row]) -> None:
         self.columns = columns
         self.half_widths = [_half_width([r[i] for r in rows], v) for i, v in columns]
         self.outside = 0
@@ -57,7 +58,7 @@ def reference(context: Context) -> bool:
     job = context.bench.job
     if job.reference is None:
         return True
-    names, rows, path = job.reference["names"], job.reference["rows"], job.reference["path"]
+    names, rows, path = job.reference.names, job.reference.rows, job.reference.path
     by_name = {v.name: v for v in job.variables}
     columns = [(i, by_name[n]) for i, n in enumerate(names, 1) if by_name[n].base != "String"]
     inputs = [c for c in columns if c[1].causality == "input"]
@@ -72,7 +73,7 @@ def reference(context: Context) -> bool:
     return True
 
 
-def _simulate(context: Context, rows: list[Row], parameters: Columns, inputs: Columns, tube: Tube) -> bool:
+def _simulate(context: Context, rows: Sequence[Row], parameters: Columns, inputs: Columns, tube: Tube) -> bool:
     """Run over the times of ``rows``; False when it takes too long."""
     bench, job = context.bench, context.bench.job
     variables = [v for _, v in tube.columns]

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from orchestrator.checking.layered import ReferenceResult
 from orchestrator.checking.probing.binding import Library, ProbedSlave, StatusError
 
 _BASES = ("Real", "Integer", "Boolean", "String")
@@ -36,7 +37,7 @@ class ProbeJob:
         steps: number of communication steps of a test run.
         budget: seconds that a test run may take, of a :class:`Stopwatch`.
         flags: capability flags that are true.
-        reference: names, rows of the reference result, or None.
+        reference: the result to be reproduced, or None.
     """
 
     library: str
@@ -50,7 +51,7 @@ class ProbeJob:
     steps: int
     budget: float
     flags: frozenset[str]
-    reference: dict[str, Any] | None
+    reference: ReferenceResult | None
 
     def outputs(self) -> list[ProbedVariable]:
         """What a run records: the outputs, or all local variables when there are none.

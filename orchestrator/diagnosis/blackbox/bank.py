@@ -68,6 +68,7 @@ class Kind:
         lower: smallest value of each.
         amplitudes: in how many of the values, the first ones, the response is linear, where it is not in all.
         needs: the simpler effect that it contains.
+        grows: that one's values, scene -> values to try in its place.
         departs: values, scene -> share by which its law differs from that one's within the motion of the record.
         plausible: values -> False where the fit has left what the effect means.
         angular: only for angles.
@@ -89,6 +90,7 @@ class Kind:
     lower: Values = ()
     amplitudes: int = 0
     needs: str = ""
+    grows: Callable[[Values, Surroundings], tuple[Values, ...]] = lambda values, scene: ()
     departs: Callable[[Values, Surroundings], float] = lambda values, scene: 0.0
     plausible: Callable[[Values, Surroundings], bool] = lambda values, scene: True
     angular: bool = False
@@ -170,6 +172,11 @@ def _positive(values: Values, scene: Surroundings) -> bool:
     return values[0] > 0.0
 
 
+def _from_coulomb(values: Values, s: Surroundings) -> tuple[Values, ...]:
+    level, distance = values
+    return tuple((0.9 * level, 1.5 * level, share * s.speed, distance) for share in (0.05, 0.3))
+
+
 def _falls(values: Values, s: Surroundings) -> float:
     """Return the share of Stribeck's friction by which it falls from rest to the typical speed."""
     sliding, breakaway, speed = values[:3]
@@ -205,7 +212,7 @@ _FEEDBACK = (
          ("effort", "effort", "flow/s", "flow"),
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 * s.speed, 0.2 * s.speed * s.h), lambda s: (),
          law=laws.STRIBECK, lower=(0.0, 0.0, 1e-300, 1e-300), needs="coulomb_friction",
-         departs=_falls, plausible=lambda v, s: v[1] > 1.03 * v[0] > 0.0),
+         grows=_from_coulomb, departs=_falls, plausible=lambda v, s: v[1] > 1.03 * v[0] > 0.0),
     Kind("quadratic_drag", PORT, ("coefficient",), ("effort.s2/flow2",), lambda s: (0.01 * s.size / s.speed**2,),
          lambda s: ((0.01 * s.size / s.speed**2,),), True, laws.QUADRATIC, plausible=_positive),
     Kind("viscous_drag", PORT, ("coefficient",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),

@@ -11,9 +11,9 @@ from orchestrator.diagnosis.blackbox.estimates import OutputMisfit, ValueEstimat
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.parts import parts_of
+from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.subject import Subject
-from orchestrator.diagnosis.blackbox.verdict import Rest, rest_of
 from orchestrator.errors import ScenarioError
 
 

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,21 +22,14 @@ from orchestrator.diagnosis.blackbox.model import BoxModel, Data
 from orchestrator.diagnosis.blackbox.parts import BoxParts, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
+from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
 from orchestrator.diagnosis.blackbox.sites import effects_of
 from orchestrator.diagnosis.blackbox.subject import Subject
-from orchestrator.diagnosis.blackbox.verdict import (
-    Rest,
-    beginning_of,
-    followed,
-    predicted,
-    recovered,
-    rest_of,
-    settled_names,
-    stand_in,
-)
+from orchestrator.diagnosis.blackbox.verdict import recovered, settled_names
 from orchestrator.diagnosis.blackbox.whitening import Ladder
+from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows
 
 Array = NDArray[np.float64]
 
@@ -232,7 +225,11 @@ def _interleaved(
     """
     fitter, whole = search.fitter, search.explained(best)
     unkept = any(step.unkept for step in search.steps if step.before is best)
-    if search.late or search.idle(best) or (whole and not unkept and _goes_on(search, best, settings)):
+    if (
+        search.late
+        or search.idle(best)
+        or (whole and not unkept and on_all_rows(search, best, settings).rest.nothing_missing)
+    ):
         return search, base, best
     parts = interleaved(fitter.problem.n, fitter.settings.fit.pieces, whole)
     turns = BoxSearch(
@@ -248,30 +245,6 @@ def _interleaved(
     return (turns, turns.plain or plain, found) if explains else (search, base, best)
 
 
-def _last(search: BoxSearch, fit: BoxFit) -> BoxFit:
-    """Return a fit over all rows that were looked at."""
-    fitter = search.fitter
-    if search.last is None or search.last[0] is not fit:
-        seen = fitter.parts.looked_at
-        found = fitter.fit(fit.model, fit.level, None, seen, iterations=4)
-        at = len(fit.model.p)
-        for effect in fit.model.effects:  # the rows that decided tell more of a value that acts in steps
-            found = fitter.combed(found, at, seen) if found is not None and effect.kind.finer is not None else found
-            at += len(effect.kind.parameters)
-        search.last = fit, found or fit
-    return search.last[1]
-
-
-def _goes_on(search: BoxSearch, fit: BoxFit, settings: RestSettings) -> bool:
-    """Tell whether a model leaves nothing that must be explained over all of the record either."""
-    last, fitter = _last(search, fit), search.fitter
-    y = fitter.problem.simulate([last.model])[0]
-    if y is None:
-        return False
-    rest = rest_of(fitter, replace(last, y=y), slice(0, fitter.problem.n), settings)
-    return rest.nothing_missing
-
-
 def _judged(
     problem: BoxProblem,
     probe: Probe,
@@ -284,18 +257,12 @@ def _judged(
 ) -> BoxOutcome:
     fitter, parts = search.fitter, search.fitter.parts
     seen = parts.looked_at
-    last = _last(search, best)
-    whole = problem.simulate([problem.nominal, base.model, last.model])
+    on_all = on_all_rows(search, best, settings)
+    last, rest = on_all.last, doubted(search, on_all, settings)
+    whole = problem.simulate([problem.nominal, base.model])
     if whole[0] is None:
         raise problem.does_not_run()
-    if any(y is None for y in whole):
-        whole = [whole[0] if y is None else y for y in whole]
-    stages = (np.asarray(whole[0]), np.asarray(whole[1]), np.asarray(whole[2]))
-    J = fitter.jacobian(last.model, stages[2])
-    last = replace(last, y=stages[2], J=last.J if J is None else J)
-    rest = rest_of(fitter, last, slice(0, problem.n), settings)
-    if rest.disturbed:
-        rest = _doubted(search, best, last, rest, settings)
+    stages = (np.asarray(whole[0]), np.asarray(whole[0] if whole[1] is None else whole[1]), last.y)
     fine = rest.nothing_missing
     share = recovered(base, best, len(problem.outputs), len(seen))
     nominal = BoxFit(problem.nominal, last.level, stages[0], 0.0, 0.0, 0.0, last.J)
@@ -341,31 +308,6 @@ def _warned(probe: Probe, search: BoxSearch, verdict: str, best: BoxFit, share: 
             "the state that the FMU starts from is not the record's: the start is left out of the comparison"
         )
     return tuple(warnings)
-
-
-def _doubted(search: BoxSearch, best: BoxFit, fit: BoxFit, rest: Rest, settings: RestSettings) -> Rest:
-    """Return what is left of the best model, fitted to all rows as ``fit``: no disturbance where it has some shape.
-
-    Nor where it is large beside effects that are named, or one of them takes little of it away.
-    """
-    fitter = search.fitter
-    if best.model.effects and rest.share > settings.most_with_effects:
-        return replace(
-            rest, disturbed=False, reasons=(f"{100.0 * rest.share:.2g} % of the drive is left at the ports",)
-        )
-    if predicted(fitter, fit, settings) > settings.driven:
-        return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
-    gain, port = followed(fitter, fit, settings)
-    if gain > 0.0:
-        return replace(
-            rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`, or from the time",)
-        )
-    if label := stand_in(search, best, settings):
-        return replace(rest, disturbed=False, reasons=(f"`{label}` takes away little of what is left at the ports",))
-    gain, name, time = beginning_of(fitter, fit, settings)
-    if gain > settings.begins:
-        return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))
-    return rest
 
 
 def _where_of(problem: BoxProblem, rest: Rest, least: float) -> tuple[str, ...]:

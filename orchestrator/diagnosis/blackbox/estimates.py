@@ -86,7 +86,7 @@ def errors_of(fitter: Fitter, fit: BoxFit, rows: Rows) -> Array:
     """Return the standard errors of all values.
 
     What acts in steps (a quantum) has a likelihood with many teeth, of which derivatives see one: its interval holds
-    every value nearby that does as well.
+    every value nearby that does as well once the others have followed, and theirs hold where they went.
 
     Args:
         fitter: gives the filters and the FMU.
@@ -96,22 +96,59 @@ def errors_of(fitter: Fitter, fit: BoxFit, rows: Rows) -> Array:
     Returns:
         Shape (values,).
     """
-    own, problem = fitter.settings.fit, fitter.problem
     errors = np.sqrt(np.maximum(np.diag(fitter.covariance(fit, rows)), 0.0))
-    best = fitter.likelihood(fitter.whitened(fit.y, fit.level), fit.level, rows)
-    z, at = fit.model.vector, len(fit.model.p)
-    shares = np.geomspace(own.alike_from, own.alike_to, own.alike_tried)
+    at = len(fit.model.p)
     for effect, values in zip(fit.model.effects, fit.model.values, strict=True):
         if effect.kind.finer is not None:
-            offsets = z[at] * np.concatenate([-shares, shares])
-            models = [fit.model.moved(np.concatenate([z[:at], [z[at] + d], z[at + 1 :]])) for d in offsets]
-            runs = problem.simulate(models, len(fit.y))
-            found = [-np.inf if y is None else fitter.likelihood(fitter.whitened(y, fit.level), fit.level, rows)
-                     for y in runs]  # fmt: skip
-            alike = np.abs(offsets)[np.array(found) > best - own.alike]
-            errors[at] = max(errors[at], float(np.max(alike, initial=0.0)) / NORMAL_95)
+            reached = np.abs(alike(fitter, fit, rows, at) - fit.model.vector)
+            errors = np.hypot(errors, np.max(reached, axis=0) / NORMAL_95)
         at += len(values)
     return errors
+
+
+def alike(fitter: Fitter, fit: BoxFit, rows: Rows, at: int, finely: bool = False) -> Array:
+    """Return values near those of a fit that do as well, once the others have followed one that acts in steps.
+
+    Args:
+        fitter: gives the filters and the FMU.
+        fit: whose Jacobian is known over ``rows``.
+        rows: samples that were fitted.
+        at: place among all values of the one that acts in steps.
+        finely: look once more between the farthest that do as well.
+
+    Returns:
+        Shape (found, values); the first are those of the fit.
+    """
+    own, z = fitter.settings.fit, fit.model.vector
+    shares = np.geomspace(own.alike_from, own.alike_to, own.alike_tried)
+    found = _followed(fitter, fit, rows, at, z[at] * (1.0 + np.concatenate([-shares, shares])))
+    if finely:
+        between = np.linspace(found[:, at].min(), found[:, at].max(), 2 * own.alike_tried)
+        found = np.concatenate([found, _followed(fitter, fit, rows, at, between)])
+    return found
+
+
+def _followed(fitter: Fitter, fit: BoxFit, rows: Rows, at: int, tried: Array) -> Array:
+    """Return the values of a fit, and those with others in place ``at`` that do as well, one a row."""
+    z, others = fit.model.vector, np.arange(len(fit.model.vector)) != at
+    J, found = fit.J[: len(fit.y)][:, :, others], [z]
+    least = fitter.likelihood(fitter.whitened(fit.y, fit.level), fit.level, rows) + fitter.prior(fit.model)
+    vectors = np.repeat(z[None], len(tried), axis=0)
+    vectors[:, at] = tried
+    for last in (False, True):  # along a ridge the first step goes astray
+        models = [fit.model.moved(vector) for vector in vectors]
+        for place, y in enumerate(fitter.problem.simulate(models, len(fit.y))):
+            if y is None:
+                continue
+            change = fitter.step(models[place], y, J, fit.level, rows, 0.0)
+            vectors[place, others] += change
+            if not last:
+                continue
+            left = fitter.whitened(y + (J @ change) * fitter.problem.noise, fit.level)
+            reached = fitter.likelihood(left, fit.level, rows) + fitter.prior(fit.model.moved(vectors[place]))
+            if reached > least - fitter.settings.fit.alike:
+                found.append(vectors[place])
+    return np.stack(found)
 
 
 def estimates_of(

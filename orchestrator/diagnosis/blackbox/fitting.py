@@ -245,6 +245,7 @@ class Fitter(BoxLikelihood):
         self, model: BoxModel, y: Array, J: Array, k: int, rows: Rows, damping: float, value: float, until: int
     ) -> tuple[BoxModel, Array, float] | None:
         """Return the best of a whole step and parts of it that gains, with its run and likelihood."""
+        J = J * _smooth(model)
         step = self.step(model, y, J, k, rows, damping)
         e0 = self.whitened(y, k)
         change = self.ladder[k].whiten((J @ step)[:, :, None])[:, :, 0]
@@ -276,6 +277,16 @@ class Fitter(BoxLikelihood):
     def _both(self, y: Array, k: int) -> float:
         e = self.whitened(y, k)
         return self.likelihood(e, k, self.parts.fitted) + self.likelihood(e, k, self.parts.decides)
+
+
+def _smooth(model: BoxModel) -> Array:
+    """Return 1 for values that a derivative leads to, and 0 for those that act in steps: combs lead to them."""
+    return np.concatenate(
+        [
+            np.ones(len(model.p)),
+            *(np.full(len(v), float(e.kind.finer is None)) for e, v in zip(model.effects, model.values, strict=True)),
+        ]
+    )
 
 
 def _updated(J: Array, before: Array, after: Array, y: Array, run: Array, noise: Array) -> Array:

@@ -82,8 +82,12 @@ class ScreenSettings(Settings, frozen=True):
     sifted: Annotated[int, setting("small values of one effect that are put among those of its scan", ge=0)] = 3
     stands_out: Annotated[
         float,
-        setting("times what the best of as many would be by chance, from which a small value is no chance", ge=0),
-    ] = 1.0
+        setting(
+            "times what the best of as many would be by chance, from which a small value is tried: between two values "
+            "that are tried a little is lost, and its fit tells chance",
+            ge=0,
+        ),
+    ] = 0.8
     at_once: Annotated[int, setting("errors of small values that are held in memory at a time", ge=1)] = 500_000
     parts: Annotated[int, setting("parts into which the scan's step is cut around the best value", ge=1)] = 8
     straight: Annotated[float, share("of the record up to which a run that goes astray earlier is screened apart")] = (

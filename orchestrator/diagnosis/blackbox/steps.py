@@ -8,7 +8,8 @@ from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
-from orchestrator.diagnosis.blackbox.screening import Known, Pair
+from orchestrator.diagnosis.blackbox.promises import Known
+from orchestrator.diagnosis.blackbox.screening import Pair
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 from orchestrator.diagnosis.blackbox.calibrate import BoxCalibration
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit
+from orchestrator.diagnosis.blackbox.rest import Rest
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
-from orchestrator.diagnosis.blackbox.verdict import Rest
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 UNEXPLAINED = "something is missing that no effect at an input, an output or a port explains"

@@ -1,90 +1,17 @@
 """What a search means: explained or not, by what, how surely, and where the rest is."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
-from orchestrator.diagnosis.blackbox.screening import Known
+from orchestrator.diagnosis.blackbox.promises import Known
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
 from orchestrator.diagnosis.blackbox.steps import labels
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Rest:
-    """What a model leaves.
-
-    Attributes:
-        explained: nothing but measurement noise.
-        disturbed: small stationary noise at the ports beside it.
-        share: that noise, as a share of the drive.
-        reasons: what speaks against noise.
-        blocks: (blocks, outputs) mean square of the innovations over equal parts of the record; noise: 1.
-    """
-
-    explained: bool
-    disturbed: bool
-    share: float
-    reasons: tuple[str, ...]
-    blocks: Array
-
-    @property
-    def nothing_missing(self) -> bool:
-        """Whether nothing but noise, and at most a small disturbance, is left."""
-        return self.explained or self.disturbed
-
-
-def rest_of(fitter: Fitter, fit: BoxFit, rows: slice, settings: RestSettings = DEFAULT.rest) -> Rest:
-    """Return what a model leaves over ``rows``; ``fit.y`` must reach so far.
-
-    Args:
-        fitter: gives the filters and the record.
-        fit: of a model.
-        rows: samples to look at.
-        settings: the thresholds.
-
-    Returns:
-        The shares, and why it counts as unexplained.
-    """
-    ladder = fitter.ladder
-    e = fitter.whitened(fit.y, fit.level)[rows]
-    free = fitter.whitened(fit.y, 0)[rows]
-    count = e.size
-    square = float(np.sum(free * free))
-    explained = square < count + settings.deviations * np.sqrt(2.0 * count)
-    explained = bool(explained) and not _reasons(free, settings)
-    share = ladder.share(fit.level)
-    reasons = _reasons(e, settings)
-    blocks = np.array([np.mean(part * part, axis=0) for part in np.array_split(e, settings.blocks)])
-    disturbed = not explained and share <= settings.most_port_noise and not reasons
-    return Rest(explained, disturbed, share, tuple(reasons), blocks)
-
-
-def _reasons(e: Array, s: RestSettings) -> list[str]:
-    """Return what distinguishes innovations (n, outputs) from white noise of variance 1 (less: it was overstated)."""
-    found = []
-    n = len(e)
-    for k in range(e.shape[1]):
-        x = e[:, k]
-        mean_square = float(np.mean(x * x))
-        if mean_square - 1.0 > s.deviations * np.sqrt(2.0 / n):
-            found.append(f"output {k + 1}: {mean_square:.2f} times the expected power")
-        x = (x - x.mean()) / max(float(x.std()), 1e-300)
-        lags = [float(np.mean(x[lag:] * x[:-lag])) for lag in range(1, s.lags + 1)]
-        if float(np.sum(np.square(lags))) * n > s.lags + s.most_correlated * np.sqrt(2.0 * s.lags):
-            found.append(f"output {k + 1}: correlated from sample to sample")
-        if float(np.mean(x**4)) - 3 > s.most_kurtosis:
-            found.append(f"output {k + 1}: comes in bursts")
-        parts = np.array([np.mean(p * p) for p in np.array_split(e[:, k], s.blocks)])
-        if float(parts.max()) / mean_square - 1.0 > s.deviations * np.sqrt(2.0 * s.blocks / n):
-            found.append(f"output {k + 1}: changes with time")
-    return found
 
 
 def stand_in(search: BoxSearch, best: BoxFit, settings: RestSettings = DEFAULT.rest) -> str:

@@ -1,4 +1,4 @@
-"""What a record does not tell apart, for each effect; how surely a quantum is known. Fits are made by hand."""
+"""What a record does not tell apart, for each effect. Fits are made by hand."""
 
 from types import SimpleNamespace
 
@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
-from orchestrator.diagnosis.blackbox.estimates import errors_of
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
-from orchestrator.diagnosis.blackbox.series import quantised
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
 from orchestrator.diagnosis.blackbox.steps import SearchStep
 from orchestrator.diagnosis.blackbox.verdict import settled_names
@@ -87,24 +85,3 @@ def test_what_does_better_in_the_place_of_an_effect_stays_there() -> None:
     )
     assert [effect.kind.name for effect in found.model.effects] == ["spring", "input_delay"]
     assert families == ((), ())
-
-
-def error_of_a_quantum(rows: int) -> float:
-    u, true = SCENE.signal[:: 400 // rows], 0.1003
-    model = BoxModel(np.zeros(0)).extended(at("input_quantisation"), np.array([true]))
-
-    def run(model: BoxModel) -> np.ndarray:
-        return quantised(u, float(model.values[0][0]))[:, None]
-
-    fitter = SimpleNamespace(
-        settings=DEFAULT,
-        problem=SimpleNamespace(simulate=lambda models, rows: [run(m) for m in models]),
-        covariance=lambda found, rows: np.array([[1e-16]]),
-        whitened=lambda y, level: (y - run(model)) / 0.02,
-        likelihood=lambda e, level, rows: float(-0.5 * np.sum(e * e)),
-    )
-    return float(errors_of(fitter, BoxFit(model, 0, run(model), 0.0, 0.0, 0.0, NONE), slice(0, rows))[0])
-
-
-def test_the_interval_of_a_quantum_holds_what_rounds_the_same() -> None:
-    assert error_of_a_quantum(20) > 2.0 * error_of_a_quantum(400) > 1e-6

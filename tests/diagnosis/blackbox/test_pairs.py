@@ -10,7 +10,8 @@ from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.parts import parts_of
-from orchestrator.diagnosis.blackbox.screening import Known, Screened
+from orchestrator.diagnosis.blackbox.promises import Known
+from orchestrator.diagnosis.blackbox.screening import Screened
 from orchestrator.diagnosis.blackbox.verdict import followed
 from orchestrator.diagnosis.blackbox.whitening import Ladder, Surrogate
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit
+from orchestrator.diagnosis.blackbox.rest import Rest
 from orchestrator.diagnosis.blackbox.settings import RestSettings
 from orchestrator.diagnosis.blackbox.trust import SECOND, UNEXPLAINED, doubts, harm, statement
-from orchestrator.diagnosis.blackbox.verdict import Rest
 from orchestrator.shared.trust import Level
 
 NOISE = Rest(True, False, 0.0, (), np.ones((8, 1)))

@@ -1,0 +1,54 @@
+"""What the estimators take: records that can be of the machine, and models that they see whole."""
+
+from pathlib import Path
+from typing import Any
+
+from orchestrator.api.records import as_record
+from orchestrator.errors import ScenarioError
+from orchestrator.records.model_file import Model
+from orchestrator.records.plausibility import check_plausible
+from orchestrator.records.record import Record
+
+
+def plausible_record(record: Record | Path | str, model: Model, motor_only: bool, **reading: Any) -> Record:
+    """Return a record that fits the model at all.
+
+    Args:
+        record: a record or its path.
+        model: what it is compared with.
+        motor_only: leave the load encoder out.
+        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+
+    Returns:
+        The record.
+
+    Raises:
+        RecordError: the record is wrong, or cannot be of this machine.
+    """
+    measured = as_record(record, model, **reading)
+    measured = measured.without_load_encoder() if motor_only else measured
+    check_plausible(measured, model)
+    return measured
+
+
+def require_linear(model: Model) -> None:
+    """Refuse models that the estimators would not see whole.
+
+    Args:
+        model: the model.
+
+    Raises:
+        ScenarioError: it has no gap, or nonlinear effects.
+    """
+    if model.fmu != "Drivetrain":
+        raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain to have a gap, but is {model.fmu}")
+    for name, entry in model.parameters.items():
+        active = name.startswith("effects.") and name.rsplit(".", 1)[1] in (
+            "delay", "amplitude", "coulomb", "breakaway", "cubic", "coefficient", "inertia"
+        )  # fmt: skip
+        active = active or (name.startswith("effects.coulomb") and name.endswith("torque"))
+        if active and (entry.value != 0.0 or entry.uncertainty > 0.0):
+            raise ScenarioError(
+                f"{model.source}: `estimate` fits the plant without nonlinear effects, but `{name}` is "
+                f"{entry.value:g}; `diagnose` fits the gap together with them"
+            )

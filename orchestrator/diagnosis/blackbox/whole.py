@@ -1,0 +1,118 @@
+"""What a model leaves over all of a record, and whether that is a disturbance or has some shape."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from orchestrator.diagnosis.blackbox.estimates import alike
+from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.rest import Rest, Whole, rest_of
+from orchestrator.diagnosis.blackbox.search import BoxSearch
+from orchestrator.diagnosis.blackbox.settings import RestSettings
+from orchestrator.diagnosis.blackbox.verdict import beginning_of, followed, predicted, stand_in
+
+
+def on_all_rows(search: BoxSearch, best: BoxFit, settings: RestSettings) -> Whole:
+    """Return a model over all of the record, and what it leaves there.
+
+    Args:
+        search: that found it.
+        best: its fit.
+        settings: when what is left is noise, or a disturbance.
+
+    Returns:
+        The model, fitted to all rows that were looked at; the same again where it was asked for before.
+    """
+    fitter = search.fitter
+    if search.whole is None or search.whole.best is not best:
+        last = _last(search, best)
+        found = _over_all(fitter, last, settings)
+        if not found[1].nothing_missing:
+            at = len(last.model.p)
+            for effect in last.model.effects:
+                if effect.kind.finer is not None:
+                    found = max(found, of_alike(fitter, last, at, settings), key=lambda f: f[0].fitted)
+                at += len(effect.kind.parameters)
+        search.whole = Whole(best, *found)
+    return search.whole
+
+
+def _over_all(fitter: Fitter, last: BoxFit, settings: RestSettings) -> tuple[BoxFit, Rest]:
+    """Return a fit whose run, Jacobian and likelihood are those over all rows, and what it leaves there."""
+    problem = fitter.problem
+    y = problem.simulate([last.model])[0]
+    y = problem.must_simulate(problem.nominal) if y is None else y
+    J = fitter.jacobian(last.model, y)
+    rows = slice(0, problem.n)
+    fitted = fitter.likelihood(fitter.whitened(y, last.level), last.level, rows)
+    last = replace(last, y=y, fitted=fitted, J=last.J if J is None else J)
+    return last, rest_of(fitter, last, rows, settings)
+
+
+def of_alike(fitter: Fitter, last: BoxFit, at: int, settings: RestSettings) -> tuple[BoxFit, Rest]:
+    """Return the likeliest over all rows of those fits that do as well on the rows that were looked at.
+
+    A value that acts in steps is told by them up to a tooth of its likelihood: which sample further on falls on which
+    side of a threshold is open, and nothing that the model lacks.
+
+    Args:
+        fitter: gives the filters and the FMU.
+        last: a fit to the rows that were looked at.
+        at: place of the value among all.
+        settings: when what is left is noise, or a disturbance.
+
+    Returns:
+        The fit, its likelihood that over all rows, and what it leaves there.
+    """
+    rows, k = slice(0, fitter.problem.n), last.level
+    models = [last.model.moved(vector) for vector in alike(fitter, last, fitter.parts.looked_at, at, finely=True)]
+    runs = fitter.problem.simulate(models)
+    reached = [-np.inf if y is None else fitter.likelihood(fitter.whitened(y, k), k, rows) for y in runs]
+    return _over_all(fitter, replace(last, model=models[int(np.argmax(reached))]), settings)
+
+
+def _last(search: BoxSearch, fit: BoxFit) -> BoxFit:
+    """Return a fit over all rows that were looked at."""
+    fitter, seen = search.fitter, search.fitter.parts.looked_at
+    found = fitter.fit(fit.model, fit.level, None, seen, iterations=4)
+    at = len(fit.model.p)
+    for effect in fit.model.effects:  # the rows that decided tell more of a value that acts in steps
+        found = fitter.combed(found, at, seen) if found is not None and effect.kind.finer is not None else found
+        at += len(effect.kind.parameters)
+    return found or fit
+
+
+def doubted(search: BoxSearch, whole: Whole, settings: RestSettings) -> Rest:
+    """Return what is left of a model over all of the record: no disturbance where it has some shape.
+
+    Nor where it is large beside effects that are named, or one of them takes little of it away.
+
+    Args:
+        search: that found it.
+        whole: the model.
+        settings: when what is left is a disturbance.
+
+    Returns:
+        What is left.
+    """
+    fitter, best, fit, rest = search.fitter, whole.best, whole.last, whole.rest
+    if not rest.disturbed:
+        return rest
+    if best.model.effects and rest.share > settings.most_with_effects:
+        return replace(
+            rest, disturbed=False, reasons=(f"{100.0 * rest.share:.2g} % of the drive is left at the ports",)
+        )
+    if predicted(fitter, fit, settings) > settings.driven:
+        return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
+    gain, port = followed(fitter, fit, settings)
+    if gain > 0.0:
+        return replace(
+            rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`, or from the time",)
+        )
+    if label := stand_in(search, best, settings):
+        return replace(rest, disturbed=False, reasons=(f"`{label}` takes away little of what is left at the ports",))
+    gain, name, time = beginning_of(fitter, fit, settings)
+    if gain > settings.begins:
+        return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))
+    return rest
