@@ -96,10 +96,9 @@ class FitSettings(Settings, frozen=True):
         float, setting("times larger errors, blocks compared, from which coloured innovations mislead", ge=1)
     ] = 2.0
     blocks: Annotated[int, setting("blocks of the record whose disagreement widens intervals", ge=2)] = 4
-    absent: Annotated[float, share("of an effect's size below which a block of the record is without it")] = 0.5
     surely_absent: Annotated[
-        float, setting("standard errors of the block by which its size must lie below: it comes or goes", gt=0)
-    ] = 4.0
+        float, setting("gain in log-likelihood of a block without an effect over half of it: it comes or goes", gt=0)
+    ] = 8.0
     block_iterations: Annotated[int, setting("steps of a block's fit, which starts at the whole's", ge=1)] = 5
 
 

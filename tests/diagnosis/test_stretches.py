@@ -19,7 +19,9 @@ from pyfmu_sources import servo_axis
 from tests.diagnosis.test_analysis_rate import BENCH, STEP, bench, bench_record
 from tests.support.short_records import AXIS, DRIVETRAIN, SETTINGS, H, axis_likelihood, signals_from, torque
 
-FRICTION = next(effect for effect in AXIS.bank if effect.label == "coulomb_friction@motor")
+FRICTION, STRIBECK = (
+    next(effect for effect in AXIS.bank if effect.label == f"{law}_friction@motor") for law in ("coulomb", "stribeck")
+)
 NOISE = 1e-4
 
 
@@ -45,10 +47,11 @@ def halfway(name: str, before: float, after: float, size: int = 800) -> RecordLi
 
 def fitted(likelihood: RecordLikelihood, effects: tuple[Effect, ...], q: float) -> Fit:
     """Return a fit of drag, and of the sizes of effects, to all of a record."""
-    places = [AXIS.index("b"), *(effect.places(AXIS)[effect.size] for effect in effects)]
-    free = tuple(Free(place, 0.1, 0.0, 100.0) for place in places)
-    part = slice(10, likelihood.stop)
-    return fit(likelihood, likelihood.nominal, q, free, Parts(part, part, part), most=0)
+    levels = [place for effect in effects for place in effect.places(AXIS).values() if AXIS.entry(place).unit == "N.m"]
+    free = tuple(Free(place, 0.1, 0.0, 100.0) for place in (AXIS.index("b"), *levels))
+    start, part = likelihood.nominal.copy(), slice(10, likelihood.stop)
+    start[levels] = 0.5
+    return fit(likelihood, start, q, free, Parts(part, part, part), most=0)
 
 
 def test_a_stretch_is_not_ruled_by_what_came_before_it() -> None:
@@ -72,12 +75,16 @@ def test_a_drag_that_changes_widens_its_interval_by_what_it_changes() -> None:
     assert widened(halfway("b", 2.0, 2.0), same, slice(10, 800), ()).standard_error(place) < 0.02
 
 
-@pytest.mark.parametrize(("before", "after", "absent"), [(0.0, 1.0, True), (1.0, 0.0, True), (1.0, 1.0, False)])
-def test_friction_that_sets_in_or_ends_is_absent_at_times(before: float, after: float, absent: bool) -> None:
+@pytest.mark.parametrize("law", [FRICTION, STRIBECK])
+@pytest.mark.parametrize(
+    ("before", "after", "absent"), [(0.0, 1.0, True), (1.0, 0.0, True), (1.0, 1.0, False), (0.6, 1.2, False)]
+)
+def test_friction_that_sets_in_or_ends_is_absent_at_times(
+    law: Effect, before: float, after: float, absent: bool
+) -> None:
     likelihood = halfway("effects.coulomb_friction.motor.torque", before, after)
-    found = fitted(likelihood, (FRICTION,), 1e-2)
-    passing = absent_at_times(likelihood, found, slice(10, likelihood.stop), (FRICTION,))
-    assert passing == ((FRICTION,) if absent else ())
+    found = fitted(likelihood, (law,), 1e-2)
+    assert absent_at_times(likelihood, found, slice(10, likelihood.stop), (law,)) == ((law,) if absent else ())
     assert absent_at_times(likelihood, found, slice(10, likelihood.stop), ()) == ()
 
 

@@ -53,27 +53,33 @@ def absent_at_times(
 ) -> tuple[Effect, ...]:
     """Return the effects that one block of the record clearly is without, though it would have shown them.
 
+    Such a block is likelier with none of the effect than with all, or half, of what the whole has of it, all else
+    fitted again. One in which the effect rests, an uncrossed gap say, is as likely with as without.
+
     Args:
         likelihood: of the record.
         whole: the fit to all of ``part``.
         part: the samples that were fitted.
-        effects: of the model; those whose size is an amplitude are looked at: others may rest for a while.
+        effects: of the model; those that are off at zero are looked at.
 
     Returns:
         Those that come or go.
     """
-    settings = likelihood.settings.fit
-    looked_at = [effect for effect in effects if effect.size in effect.amplitudes]
-    if not looked_at:
-        return ()
-    blocks = _block_fits(likelihood, whole, part)
+    plant, settings = likelihood.plant, likelihood.settings.fit
 
-    def is_absent(effect: Effect) -> bool:
-        place = effect.places(likelihood.plant)[effect.size]
-        most = settings.absent * abs(float(whole.p[place]))
-        return any(abs(own.p[place]) + settings.surely_absent * own.standard_error(place) < most for own in blocks)
+    def gain_without(effect: Effect) -> float:
+        places = effect.places(plant)
+        rest = tuple(entry for entry in whole.free if entry.place not in places.values())
+        unit = plant.entry(places[effect.size]).unit
+        scaled = [place for place in places.values() if plant.entry(place).unit == unit]
+        half = whole.p.copy()
+        half[scaled] *= 0.5
+        none = effect.taken_out(plant, whole.p, likelihood.nominal, {entry.place for entry in rest})
+        fits = [_block_fits(likelihood, replace(whole, p=p, free=rest), part) for p in (none, half, whole.p)]
+        return max(own.fitted - max(one.fitted, other.fitted) for own, one, other in zip(*fits, strict=True))
 
-    return tuple(effect for effect in looked_at if is_absent(effect))
+    looked_at = (effect for effect in effects if plant.entry(effect.places(plant)[effect.size]).default == 0.0)
+    return tuple(effect for effect in looked_at if gain_without(effect) > settings.surely_absent)
 
 
 def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Refit = fit) -> Array:
