@@ -20,16 +20,31 @@ LONG = ("test_readme.py", "test_contributing.py", "test_notebooks.py", "test_pub
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Put the longest tests first in the part of each worker: the run does not wait for one of them at its end."""
+    """Put the longest tests first in the part of each worker: the run does not wait for one of them at its end.
+
+    Those that share a slow fixture go to one worker, which makes it once: ``@pytest.mark.slow(shares="fixture")``.
+    """
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     minutes = [item for item in items if item.path.name in LONG]
     slow = [item for item in items if item.get_closest_marker("slow") and item not in minutes]
-    early = minutes + slow
-    long = set(early)
+    together: dict[object, list[pytest.Item]] = {}
+    for item in minutes + slow:
+        together.setdefault(_work_of(item), []).append(item)
+    parts: list[list[pytest.Item]] = [[] for _ in range(workers)]
+    for place, group in enumerate(together.values()):
+        parts[place % workers] += group
+    long = {item for part in parts for item in part}
     others = iter([item for item in items if item not in long])
     size = -(-len(items) // workers)
-    parts = [early[worker::workers] for worker in range(workers)]
     items[:] = [item for part in parts for item in (*part, *islice(others, max(0, size - len(part))))]
+    items += others
+
+
+def _work_of(item: pytest.Item) -> object:
+    """Return what tests have in common that are run by one worker: the test itself where that is nothing."""
+    marker = item.get_closest_marker("slow")
+    shared = marker.kwargs.get("shares") if marker else None
+    return (item.path, shared) if shared else item
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -26,7 +26,7 @@ def result(tmp_path_factory) -> tuple[Path, dict]:
     return out, json.loads((out / "diagnose.json").read_text())
 
 
-@pytest.mark.slow
+@pytest.mark.slow(shares="result")
 def test_json_keeps_the_contract(result) -> None:
     _, document = result
     assert document["command"] == "diagnose"
@@ -51,7 +51,7 @@ def test_json_keeps_the_contract(result) -> None:
         assert results["validation"][signal]["after"] < 0.1 * results["validation"][signal]["before"]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(shares="result")
 def test_corrected_fmu_has_the_corrected_start_values(result) -> None:
     out, document = result
     path = Path(document["results"]["model"])

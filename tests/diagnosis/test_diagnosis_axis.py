@@ -117,7 +117,7 @@ def emps_effects(results: dict) -> dict[str, dict]:
     return {effect["name"]: effect["parameters"] for effect in results["effects"]}
 
 
-@pytest.mark.slow
+@pytest.mark.slow(shares="emps_results")
 def test_emps_lacks_dry_friction_first(emps_results: dict) -> None:
     assert emps_results["verdict"] == "effects"
     assert emps_results["effects"][0]["name"] == "coulomb_friction"
@@ -132,7 +132,7 @@ def test_emps_lacks_dry_friction_first(emps_results: dict) -> None:
     assert fit["after"] >= 0.995
 
 
-@pytest.mark.slow
+@pytest.mark.slow(shares="emps_results")
 def test_figures_of_emps_are_those_of_an_independent_inverse_and_free_run(emps_results: dict) -> None:
     found = emps_effects(emps_results)
     values = {name: entry["value"] for name, entry in emps_results["parameters"].items()}
@@ -153,7 +153,7 @@ def test_figures_of_emps_are_those_of_an_independent_inverse_and_free_run(emps_r
     )
 
 
-@pytest.mark.slow
+@pytest.mark.slow(shares="emps_results")
 def test_emps_friction_is_the_published_one(emps_results: dict) -> None:
     friction = emps_effects(emps_results)["coulomb_friction"]["torque"]["value"]
     assert friction == pytest.approx(20.39, rel=0.03)
