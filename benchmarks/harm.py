@@ -15,7 +15,7 @@ def harmed(found: Diagnosis) -> dict[str, float]:
     Returns:
         Ratios above 1; empty where nothing gets larger, or nothing is named.
     """
-    ratios = {one.signal: one.after / min(rms for _, rms in one.stages[:2]) for one in found.misfit if found.effects}
+    ratios = {one.signal: one.after / one.best_before for one in found.misfit if found.effects}
     return {name: ratio for name, ratio in ratios.items() if ratio > 1.0}
 
 

@@ -27,13 +27,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     minutes = [item for item in items if item.path.name in LONG]
     slow = [item for item in items if item.get_closest_marker("slow") and item not in minutes]
+    early = minutes + slow
     together: dict[object, list[pytest.Item]] = {}
-    for item in minutes + slow:
+    for item in early:
         together.setdefault(_work_of(item), []).append(item)
     parts: list[list[pytest.Item]] = [[] for _ in range(workers)]
     for place, group in enumerate(together.values()):
         parts[place % workers] += group
-    long = {item for part in parts for item in part}
+    long = set(early)
     others = iter([item for item in items if item not in long])
     size = -(-len(items) // workers)
     items[:] = [item for part in parts for item in (*part, *islice(others, max(0, size - len(part))))]

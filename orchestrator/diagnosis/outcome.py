@@ -87,8 +87,8 @@ class Misfit:
 
     @property
     def best_before(self) -> float:
-        """Return the least rms of the models before the last; infinite where the runs of all go astray."""
-        return min((rms for _, rms in self.stages[:-1] if math.isfinite(rms)), default=math.inf)
+        """Return the less of nominal and re-fitted parameters' rms; infinite where the runs of both go astray."""
+        return min((rms for _, rms in self.stages[:-1][:2] if math.isfinite(rms)), default=math.inf)
 
     @property
     def after(self) -> float:

@@ -241,9 +241,10 @@ def test_what_is_named_must_leave_the_stated_machine_and_follow_the_motion() -> 
     )
 
 
-def test_the_best_model_before_the_last_is_the_one_to_beat() -> None:
+def test_the_best_model_without_effects_is_the_one_to_beat() -> None:
     misfit = Misfit("theta_m", "rad", 0.1, (("nominal", 0.3), ("parameters", 0.4), ("final", 0.2)))
     assert misfit.best_before == 0.3
+    assert replace(misfit, stages=(*misfit.stages[:2], ("+ effect", 0.1), ("final", 0.2))).best_before == 0.3
     assert replace(misfit, stages=(("nominal", np.nan), *misfit.stages[1:])).best_before == 0.4
     assert replace(misfit, stages=(("nominal", np.nan), ("final", 0.2))).best_before == np.inf
 
