@@ -6,11 +6,12 @@ import numpy as np
 
 from orchestrator.diagnosis.blackbox.estimates import alike
 from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.lawful import dependence_of
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.rest import Rest, Whole, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import RestSettings
-from orchestrator.diagnosis.blackbox.verdict import beginning_of, followed, predicted, stand_in
+from orchestrator.diagnosis.blackbox.verdict import predicted, stand_in
 
 
 def on_all_rows(search: BoxSearch, best: BoxFit, settings: RestSettings) -> Whole:
@@ -105,14 +106,8 @@ def doubted(search: BoxSearch, whole: Whole, settings: RestSettings) -> Rest:
         )
     if predicted(fitter, fit, settings) > settings.driven:
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
-    gain, port = followed(fitter, fit, settings)
-    if gain > 0.0:
-        return replace(
-            rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`, or from the time",)
-        )
+    if (law := dependence_of(fitter, fit, settings)) is not None:
+        return replace(rest, disturbed=False, reasons=(law.statement,))
     if label := stand_in(search, best, settings):
         return replace(rest, disturbed=False, reasons=(f"`{label}` takes away little of what is left at the ports",))
-    gain, name, time = beginning_of(fitter, fit, settings)
-    if gain > settings.begins:
-        return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))
     return rest
