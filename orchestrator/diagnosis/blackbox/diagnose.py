@@ -30,7 +30,7 @@ from orchestrator.diagnosis.blackbox.steps import labels
 from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.verdict import recovered, settled_names
 from orchestrator.diagnosis.blackbox.whitening import Ladder
-from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows
+from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows, on_finer_steps
 
 Array = NDArray[np.float64]
 
@@ -279,7 +279,9 @@ def _judged(
     fitter, parts = search.fitter, search.fitter.parts
     seen = parts.looked_at
     on_all = on_all_rows(search, best, settings)
-    last, rest = on_all.last, doubted(search, on_all, settings)
+    rest = doubted(search, on_all, settings)
+    on_all = on_finer_steps(search, on_all) if rest.nothing_missing else on_all
+    last = on_all.last
     whole = problem.simulate([problem.nominal, base.model])
     if whole[0] is None:
         raise problem.does_not_run()

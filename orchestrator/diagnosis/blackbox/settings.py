@@ -132,6 +132,10 @@ class FitterSettings(Settings, frozen=True):
     alike_to: Annotated[float, share("of a quantum, the farthest")] = 0.03
     alike_tried: Annotated[int, setting("others that are tried on either side", ge=2)] = 30
     finer: Annotated[float, share("width of a comb over that of the one before")] = 0.1
+    shifted: Annotated[
+        float, setting("standard errors by which finer steps shift a value, from which it is fitted with them")
+    ] = 0.3
+    halvings: Annotated[int, setting("times that steps are halved for that", ge=0)] = 2
 
 
 class StartSettings(Settings, frozen=True):
