@@ -20,8 +20,8 @@ from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import far_off
-from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown, refuted, structured
-from orchestrator.diagnosis.verdict.remainder import Remainder, noise_floor, remainder, tails
+from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown, refuted
+from orchestrator.diagnosis.verdict.remainder import Remainder, noise_floor, remainder, structured, tails
 from orchestrator.plants.effects import Effect
 from orchestrator.records.model_file import Model
 from orchestrator.shared.inference.colour import colour_of

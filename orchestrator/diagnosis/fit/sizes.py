@@ -88,7 +88,7 @@ def with_model_error(
 
     A right model has one set of values for predictions of a sample and for runs over all of a record. Where a law is
     not quite right, each asks for its own, and what they differ by is the size of the model's error. Under torque noise
-    free runs are off themselves: what their own error explains is none of the model's.
+    free runs are off themselves: what chance explains of the difference (two standard errors) is no model's error.
 
     Args:
         likelihood: of the record.
@@ -115,9 +115,10 @@ def with_model_error(
     if not np.all(np.isfinite(long.z)):
         return found
     chance = np.diag(_with_robust_errors(likelihood, long, part).covariance)
-    beyond = np.zeros(len(found.free))
-    for entry, own in zip(long.free, chance, strict=True):
-        beyond[found.free.index(entry)] = max((long.p[entry.place] - found.p[entry.place]) ** 2 - own, 0.0)
+    beyond, own = np.zeros(len(found.free)), np.diag(found.covariance)
+    for entry, other in zip(long.free, chance, strict=True):
+        row, change = found.free.index(entry), float(long.p[entry.place] - found.p[entry.place])
+        beyond[row] = max(change**2 - likelihood.settings.fit.disputed**2 * (other + own[row]), 0.0)
     return replace(found, covariance=found.covariance + np.diag(beyond))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.settings import VerdictSettings
-from orchestrator.diagnosis.verdict.remainder import Remainder
+from orchestrator.diagnosis.verdict.remainder import Remainder, structured
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 Array = NDArray[np.float64]
@@ -31,24 +31,6 @@ class Proof:
     def even_skill(self) -> float:
         """Return the smallest share that they remove at any horizon but one sample."""
         return self.final.even_skill_over(self.base)
-
-
-def structured(left: Remainder, settings: VerdictSettings) -> bool:
-    """Tell whether what is left is something else than a coloured torque noise.
-
-    Args:
-        left: what the final model leaves.
-        settings: the rules' thresholds.
-
-    Returns:
-        True when it is.
-    """
-    if left.tails > settings.heavy:
-        return True
-    return any(
-        entry.gain > settings.structured or (entry.share > settings.large_share and entry.gain > settings.likely)
-        for entry in left.predictable
-    )
 
 
 def is_unknown(
