@@ -237,7 +237,13 @@ def honest(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect], 
     misfit = held_out_misfit(likelihood, found.q, [("", found.p)], parts.held_out, "")
     if all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit):
         return found
-    return with_model_error(likelihood, found, parts.seen, effects, ladder(settings.levels, effects, found.q))
+
+    def better(p: Array) -> bool:
+        stages = [("", found.p), ("long", p)]
+        runs = held_out_misfit(likelihood, found.q, stages, parts.fitted, "")
+        return any(one.after < one.stages[0][1] for one in runs)
+
+    return with_model_error(likelihood, found, parts.seen, effects, ladder(settings.levels, effects, found.q), better)
 
 
 def _dispute(names: tuple[str, ...]) -> str:

@@ -60,6 +60,8 @@ def test_an_interval_holds_what_free_runs_ask_for() -> None:
     low, high = wide.interval(place)
     assert low < long.p[place] < off.p[place] < high
     assert np.array_equal(wide.p, off.p)
+    lost = with_model_error(likelihood, off, part, (), (0.3, 1e-5), lambda p: False)  # runs of seconds are no better
+    assert np.array_equal(lost.covariance, off.covariance)
     parts = Parts(slice(10, 150), slice(150, 200), slice(200, likelihood.stop))
     assert honest(likelihood, long, (), parts) is long  # predicted almost to the encoder's noise
     far = replace(long, p=long.p + 20.0 * (np.arange(long.p.size) == place))
