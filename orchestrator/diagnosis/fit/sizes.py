@@ -97,7 +97,7 @@ def with_model_error(
         part: the samples that it was fitted to.
         effects: of the model; of a wave, free runs are asked for the amplitude alone: they slip along the rest.
         levels: of process noise that the model may have, falling; at the last, predictions are nearly free runs.
-        better: tells of values whether runs of a few seconds do get better with them. Those over all of a record are lost
+        better: tells of values whether runs of a few seconds get better with them. Those over all of a record are lost
             where the motion is unstable, and then ask for anything.
 
     Returns:
