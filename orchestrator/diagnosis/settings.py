@@ -227,7 +227,9 @@ class VerdictSettings(Settings, frozen=True):
     larger: Annotated[float, share("by which effects may make the held-out misfit larger: beyond, trust is amber")] = (
         0.01
     )
-    far_off: Annotated[float, setting("stated uncertainties by which a re-fitted value is implausible", gt=1)] = 2.0
+    far_off: Annotated[
+        float, setting("stated uncertainties by which a re-fitted value is implausible: upwards they are factors", gt=1)
+    ] = 2.0
     likely_gain: Annotated[
         float, setting("standard deviation of a drive's gain before a record is seen: data sheets say 10 %", gt=0)
     ] = 0.06

@@ -123,6 +123,32 @@ class Candidate:
         return decided > self.settings.least_decided_share * fitted
 
 
+def simplest_first(found: Sequence[Candidate], within: float) -> list[Candidate]:
+    """Return candidates in their order, but a simpler one of the first one's family before it where both fit alike.
+
+    A ripple of one cycle a turn is gravity, and one more parameter always finds something in a rest that is no
+    measurement noise.
+
+    Args:
+        found: candidates on top of one model, best first.
+        within: difference of scores within which both fit alike.
+
+    Returns:
+        The candidates.
+    """
+    first = found[0]
+    family = first.effects[-1].family
+    if not family or first.fit.q <= first.settings.noise_alone:
+        return list(found)
+    simpler = (
+        one for one in found[1:]
+        if one.effects[-1].family == family and one.effects[:-1] == first.effects[:-1]
+        and first.score - one.score < within and parameter_count(one) < parameter_count(first)
+    )  # fmt: skip
+    chosen = next(simpler, first)
+    return [chosen, *(one for one in found if one is not chosen)]
+
+
 def parameter_count(candidate: Candidate) -> int:
     """Return the number of parameters of a candidate's effects.
 

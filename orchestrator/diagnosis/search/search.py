@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from orchestrator.diagnosis.proof.horizons import horizons
-from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
 from orchestrator.diagnosis.search.fits import Fits, Guesses, TimeUpError
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
 from orchestrator.diagnosis.search.periodic import with_cycles
@@ -140,6 +140,7 @@ class Search(Fits):
         found = self.each(lambda candidate: self.rescued(candidate, current, base), found)
         found = self.possible(found, scene)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
+        found = simplest_first(found, self.likelihood.settings.verdict.alike_gain) if found else found
         if found and self.earns(found[0], current, base):
             return ForwardStep(current, tuple(found), True)
         shown = next((c for c in found if self.shows(c, current)), None)
