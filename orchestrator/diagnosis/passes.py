@@ -12,7 +12,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import Sized, sized, with_model_error
 from orchestrator.diagnosis.fit.spread import absent_at_times
-from orchestrator.diagnosis.proof.horizons import Horizons, horizons
+from orchestrator.diagnosis.proof.horizons import Horizons, horizons, is_driven
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder
 from orchestrator.diagnosis.search.scene import scene_of
@@ -20,8 +20,8 @@ from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import far_off
-from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown, refuted, structured
-from orchestrator.diagnosis.verdict.remainder import Remainder, noise_floor, remainder, tails
+from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown, refuted
+from orchestrator.diagnosis.verdict.remainder import Remainder, noise_floor, remainder, structured, tails
 from orchestrator.plants.effects import Effect
 from orchestrator.records.model_file import Model
 from orchestrator.shared.inference.colour import colour_of
@@ -126,7 +126,8 @@ def _search(
     if logged is not plain:  # what putting the log right explains is no proof of an effect
         proof = Proof(horizons(likelihood, logged.p, plain.q, whole.held_out), proof.final)
     passing = absent_at_times(likelihood, proven.efficient, whole.fitted, best.effects) if floor_off else ()
-    why = refuted(floor_off, proof, far, [f"{one.name} ({one.site})" for one in passing], verdict) if named else ""
+    follows = proof.final.follows(verdict.good) or is_driven(likelihood, final.p, proof.final, verdict.good)
+    why = refuted(floor_off, follows, far, [f"{one.name} ({one.site})" for one in passing]) if named else ""
     if why:
         withdrawn = (*withdrawn, f"nothing is named: {why}")
     unknown = search.stopped or bool(why) or is_unknown(left, floor_off, proof, named, bool(far), verdict)
@@ -236,7 +237,13 @@ def honest(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect], 
     misfit = held_out_misfit(likelihood, found.q, [("", found.p)], parts.held_out, "")
     if all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit):
         return found
-    return with_model_error(likelihood, found, parts.seen, effects, ladder(settings.levels, effects, found.q))
+
+    def better(p: Array) -> bool:
+        stages = [("", found.p), ("long", p)]
+        runs = held_out_misfit(likelihood, found.q, stages, parts.fitted, "")
+        return any(one.after < one.stages[0][1] for one in runs)
+
+    return with_model_error(likelihood, found, parts.seen, effects, ladder(settings.levels, effects, found.q), better)
 
 
 def _dispute(names: tuple[str, ...]) -> str:

@@ -153,10 +153,11 @@ class SearchSettings(Settings, frozen=True):
     worth: Annotated[float, share("least share of the best promise that a candidate must promise to be fitted")] = 0.03
     least_promise: Annotated[float, setting("least promised gain for a fit: below, noise promises as much")] = 3.0
     penalty: Annotated[float, setting("log-likelihood that each further parameter must earn")] = 5.0
-    pays: Annotated[float, setting("least gain of an effect where what is left is measurement noise")] = 10.0
+    pays: Annotated[float, setting("least gain of an effect where what is left is noise, of whatever colour")] = 10.0
     pays_above_noise: Annotated[float, setting("and where it is not, as what is left is then correlated")] = 22.0
     noise_alone: Annotated[float, setting("largest process noise at which what is left is measurement noise")] = 1e-4
     least_decided: Annotated[float, setting("least gain on the deciding part alone: it has not been fitted")] = 6.0
+    least_decided_of_noise: Annotated[float, setting("and where noise is left: its odds are below exp(-gain)")] = 3.0
     least_decided_share: Annotated[float, share("of the gain on the fitted part, which is twice as long")] = 0.08
     first_hidden: Annotated[
         float, setting("process noise at which a gap without an encoder behind it starts: right models get there", gt=0)
@@ -224,7 +225,9 @@ class VerdictSettings(Settings, frozen=True):
     larger: Annotated[float, share("by which effects may make the held-out misfit larger: beyond, trust is amber")] = (
         0.01
     )
-    far_off: Annotated[float, setting("stated uncertainties by which a re-fitted value is implausible", gt=1)] = 2.0
+    far_off: Annotated[
+        float, setting("stated uncertainties by which a re-fitted value is implausible: upwards they are factors", gt=1)
+    ] = 2.0
     likely_gain: Annotated[
         float, setting("standard deviation of a drive's gain before a record is seen: data sheets say 10 %", gt=0)
     ] = 0.06
@@ -235,6 +238,7 @@ class VerdictSettings(Settings, frozen=True):
     ] = 3.0
     alike: Annotated[float, share("share of the gain within which effects of a family look alike")] = 0.05
     alike_gain: Annotated[float, setting("or this gain, where that is more: what chance may add to one of two")] = 8.0
+    undecided: Annotated[float, setting("and within which any two do: odds of twenty to one")] = 3.0
     mostly_explained: Annotated[float, share("share explained below which a note speaks of the rest")] = 0.8
     follows: Annotated[float, setting("gain from which the rest is said to follow something: chance stays below")] = 8.0
     remainder: RemainderSettings = RemainderSettings()

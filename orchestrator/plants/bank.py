@@ -128,6 +128,10 @@ def _parts_of_the_load(scene: Scene) -> tuple[float, ...]:
     return tuple(f * scene.inertia for f in (3e-4, 1.2e-3, 5e-3, 0.02, 0.08))
 
 
+def _periodic_at(site: str) -> str:
+    return f"periodic, {site}"
+
+
 def _periodic(
     name: str, site: str, unit: Callable[[Scene], float], tolerance: float = 0.0, leaves: float = 0.01
 ) -> Effect:
@@ -135,7 +139,7 @@ def _periodic(
         name, site, group(name, "amplitude", "cycles_per_rev", "phase"), "amplitude", unit,
         lambda scene: {"cycles_per_rev": scene.cycles.get(name, ())}, amplitudes=("amplitude",), phase="phase",
         scales=lambda scene: {"cycles_per_rev": 0.01 / max(scene.turns, 1e-9), "phase": 0.05},
-        bounds=lambda scene: {"cycles_per_rev": (0.7 / max(scene.turns, 1e-9), 1e9)}, family=f"periodic, {site}",
+        bounds=lambda scene: {"cycles_per_rev": (0.7 / max(scene.turns, 1e-9), 1e9)}, family=_periodic_at(site),
         tolerance={f"effects.{name}.amplitude": tolerance}, leaves=leaves,
     )  # fmt: skip
 
@@ -201,7 +205,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "gravity_load", "load", group("gravity_load", "amplitude", "phase"), "amplitude", _load_torque,
         amplitudes=("amplitude",), phase="phase", scales=lambda s: {"phase": 0.05}, angular=True,
-        against="angle",
+        against="angle", family=_periodic_at("motor"),  # a ripple of one cycle a turn of the load
     ),
     Effect(
         "extra_resonance", "load", group("extra_resonance", "inertia", "frequency", "damping_ratio"), "inertia",

@@ -70,6 +70,14 @@ def test_more_must_be_gained_above_measurement_noise() -> None:
     assert candidate(15.0, 12.1, PLAIN, q=1.1e-4).pays_over(BASE, BASE)
 
 
+def test_less_must_be_gained_where_what_is_left_is_known_to_be_noise() -> None:
+    above = candidate(15.0, 3.1, PLAIN, q=1.1e-4)
+    assert not above.pays_over(BASE, BASE)
+    assert above.pays_over(BASE, BASE, noise=True)
+    assert not candidate(15.1, 3.0, PLAIN, q=1.1e-4).pays_over(BASE, BASE, noise=True)
+    assert not candidate(11.9, 3.1, PLAIN, q=1.1e-4).pays_over(BASE, BASE, noise=True)
+
+
 def test_a_later_effect_must_gain_more_than_earlier_laws_may_leave() -> None:
     """Friction's law leaves 4 % of what it gained over the base: 40 of 1000."""
     before = candidate(700.0, 300.0, FRICTION)

@@ -1,5 +1,6 @@
 """Standard errors under a colour, sizes on which fits disagree, harm by chance, and signals that a log has shifted."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,10 @@ from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.passes import _harm_over_fewer, _is_weak, _larger_misfit, honest
-from orchestrator.diagnosis.proof.free_run import FreeRun
+from orchestrator.diagnosis.proof import horizons as proof_horizons
+from orchestrator.diagnosis.proof.free_run import FreeRun, free_run
 from orchestrator.diagnosis.proof.horizons import Horizons
-from orchestrator.diagnosis.search.candidate import Candidate
+from orchestrator.diagnosis.search.candidate import Candidate, simplest_first
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
 from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED, Proof, doubts, is_unknown, refuted, structured
@@ -58,6 +60,8 @@ def test_an_interval_holds_what_free_runs_ask_for() -> None:
     low, high = wide.interval(place)
     assert low < long.p[place] < off.p[place] < high
     assert np.array_equal(wide.p, off.p)
+    lost = with_model_error(likelihood, off, part, (), (0.3, 1e-5), lambda p: False)  # runs of seconds are no better
+    assert np.array_equal(lost.covariance, off.covariance)
     parts = Parts(slice(10, 150), slice(150, 200), slice(200, likelihood.stop))
     assert honest(likelihood, long, (), parts) is long  # predicted almost to the encoder's noise
     far = replace(long, p=long.p + 20.0 * (np.arange(long.p.size) == place))
@@ -226,19 +230,56 @@ def test_a_rest_is_no_noise_where_a_basis_predicts_it_or_pulses_come() -> None:
 
 
 def test_what_is_named_must_leave_the_stated_machine_and_follow_the_motion() -> None:
-    base = horizons([0.1, 1.0, 1.0, 1.0])
     errors = horizons([0.1, 0.1, 0.1, 0.1])
-    plain = np.full_like(errors.errors, 0.2)
-    lost = replace(errors, plain=plain, r_squared=np.full(errors.r_squared.size, 0.6))
-    assert refuted(True, Proof(base, lost), (), (), SETTINGS.verdict).startswith("with it free runs")
-    assert not refuted(False, Proof(base, lost), (), (), SETTINGS.verdict)  # nothing but noise is left
-    assert not refuted(True, Proof(base, replace(lost, plain=4.0 * plain)), (), (), SETTINGS.verdict)
-    follows = replace(lost, r_squared=np.full(errors.r_squared.size, 0.99))
-    assert not refuted(True, Proof(base, follows), (), (), SETTINGS.verdict)
-    assert "`J`" in refuted(False, Proof(base, follows), ("J",), (), SETTINGS.verdict)
-    assert "without friction (motor)" in refuted(
-        True, Proof(base, follows), (), ("friction (motor)",), SETTINGS.verdict
-    )
+    lost = replace(errors, plain=np.full_like(errors.errors, 0.2), r_squared=np.full(errors.r_squared.size, 0.6))
+    assert not lost.follows(SETTINGS.verdict.good)
+    assert replace(lost, plain=4.0 * lost.plain).follows(SETTINGS.verdict.good)
+    assert replace(lost, r_squared=np.full(errors.r_squared.size, 0.99)).follows(SETTINGS.verdict.good)
+    assert refuted(True, False, (), ()).startswith("with it free runs")
+    assert not refuted(False, False, (), ())  # nothing but noise is left
+    assert not refuted(True, True, (), ())
+    assert "`J`" in refuted(False, True, ("J",), ())
+    assert "without friction (motor)" in refuted(True, True, (), ("friction (motor)",))
+
+
+def test_the_drive_must_matter_where_only_runs_of_seconds_follow() -> None:
+    likelihood, _ = axis_likelihood()
+    found = proof_horizons.horizons(likelihood, likelihood.nominal, 1e-3, slice(10, likelihood.stop))
+    part = slice(10, likelihood.stop)
+    run = free_run(likelihood.plant, likelihood.nominal, np.zeros(8), likelihood.signals, part, SETTINGS.proof.free_run)
+    pieces = replace(found, runs=(((run, part),), *found.runs[-1:]))
+    assert proof_horizons.is_driven(likelihood, likelihood.nominal, pieces, 0.9)
+    assert not proof_horizons.is_driven(likelihood, likelihood.nominal, replace(found, runs=found.runs[-1:]), 0.9)
+    idle = copy(likelihood)  # nothing drives it: coasting is as good
+    idle.signals = replace(likelihood.signals, u=np.zeros_like(likelihood.signals.u))
+    coasting = free_run(idle.plant, idle.nominal, run.start, idle.signals, part, SETTINGS.proof.free_run)
+    alone = replace(found, runs=(((coasting, part),), *found.runs[-1:]))
+    assert not proof_horizons.is_driven(idle, idle.nominal, alone, 0.9)
+
+
+def test_an_unstable_motion_is_lost_over_the_whole_and_not_over_seconds() -> None:
+    before, after = horizons([1.0, 1.0, 1.0, 1.0]), horizons([0.1, 0.1, 0.1, 1.0])
+    assert after.even_skill_over(before) < 0.1
+    pieces = replace(after, runs=((), ()))  # the third horizon is of runs of seconds, beside the whole
+    assert pieces.even_skill_over(before) > 0.9
+
+
+def test_one_cycle_a_turn_is_gravity_where_a_ripple_fits_alike() -> None:
+    likelihood, _ = axis_likelihood()
+    bank = {effect.name: effect for effect in likelihood.plant.bank}
+    plain = fit(likelihood, likelihood.nominal, 1e-3, (), Parts(*[slice(10, likelihood.stop)] * 3), most=0)
+
+    def candidate(name: str, gain: float, q: float = 1e-2) -> Candidate:
+        return Candidate((bank[name],), replace(plain, q=q, fitted=gain, validated=0.0), SETTINGS.search)
+
+    def first(found: list[Candidate]) -> str:
+        return simplest_first(found, 8.0)[0].effects[0].name
+
+    ripple, drag = candidate("torque_ripple", 110.0), candidate("quadratic_drag", 99.0)
+    assert first([ripple, drag, candidate("gravity_load", 100.0)]) == "gravity_load"
+    assert first([ripple, drag, candidate("gravity_load", 90.0)]) == "torque_ripple"
+    assert first([ripple, drag]) == "torque_ripple"
+    assert first([candidate("torque_ripple", 110.0, 1e-5), candidate("gravity_load", 105.0, 1e-5)]) == "torque_ripple"
 
 
 def test_the_best_model_without_effects_is_the_one_to_beat() -> None:
@@ -338,3 +379,7 @@ def test_one_gain_is_likelier_than_many_values_off_by_one_factor() -> None:
     assert far_off(model, p, SETTINGS.verdict) == []
     assert gain_of(model, one, SETTINGS.verdict) is None
     assert far_off(model, one, SETTINGS.verdict) == ["k"]
+    wide = replace(model, parameters={"J_l": replace(model.parameters["J_l"], uncertainty=0.5 * 5.6)})
+    for factor, far in ((2.2, []), (2.3, ["J_l"]), (0.5, []), (0.4, ["J_l"])):  # 1.5 squared, either way
+        one[model.plant.index("J_l")] = factor * 5.6
+        assert far_off(wide, one, SETTINGS.verdict) == far

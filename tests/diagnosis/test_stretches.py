@@ -14,15 +14,27 @@ from orchestrator.diagnosis.fit.spread import absent_at_times, widened
 from orchestrator.diagnosis.fit.together import series
 from orchestrator.diagnosis.proof.free_run import free_run
 from orchestrator.plants.effects import Effect
+from orchestrator.plants.measurement import LATE_LOAD
 from orchestrator.records.record import Record
 from pyfmu_sources import servo_axis
 from tests.diagnosis.test_analysis_rate import BENCH, STEP, bench, bench_record
-from tests.support.short_records import AXIS, DRIVETRAIN, SETTINGS, H, axis_likelihood, signals_from, torque
+from tests.support.short_records import (
+    AXIS,
+    DRIVETRAIN,
+    SETTINGS,
+    H,
+    axis_likelihood,
+    drivetrain_angles,
+    signals_from,
+    torque,
+)
+from tests.support.short_records import NOISE as ENCODERS
 
 FRICTION, STRIBECK = (
     next(effect for effect in AXIS.bank if effect.label == f"{law}_friction@motor") for law in ("coulomb", "stribeck")
 )
 NOISE = 1e-4
+LINEAR = ("J_m", "J_l", "k", "b_m", "b_l", "tau")
 
 
 def halfway(name: str, before: float, after: float, size: int = 800) -> RecordLikelihood:
@@ -86,6 +98,28 @@ def test_friction_that_sets_in_or_ends_is_absent_at_times(
     found = fitted(likelihood, (law,), 1e-2)
     assert absent_at_times(likelihood, found, slice(10, likelihood.stop), (law,)) == ((law,) if absent else ())
     assert absent_at_times(likelihood, found, slice(10, likelihood.stop), ()) == ()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_is_there_all_along_is_not_absent_for_a_colour_that_takes_it_up(seed: int) -> None:
+    """Of a block alone, an autoregression of its own may explain an encoder that is read late better than the delay."""
+    size, step, rng = 1600, 0.005, np.random.default_rng(seed)
+    nominal = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    u, push = torque(size, seed), np.zeros(size)
+    for n in range(1, size):
+        push[n] = 0.98 * push[n - 1] + 0.1 * rng.standard_normal()
+    y, rows = drivetrain_angles(nominal, u + push, h=step), np.arange(size)
+    y[:, 1] = np.interp(rows - 1.85, rows, y[:, 1])
+    signals = signals_from(y + ENCODERS * rng.standard_normal((size, 2)), u, 2, ENCODERS, step)
+    likelihood = RecordLikelihood(DRIVETRAIN, signals, nominal, size, SETTINGS)
+    place, part = LATE_LOAD.places(DRIVETRAIN)["shift"], slice(10, size)
+    values = [(likelihood.plant.index(name), nominal[likelihood.plant.index(name)]) for name in LINEAR]
+    free = (Free(place, 1e-4, -0.1, 0.1), *(Free(at, 0.01 * value, 0.0, 1e5) for at, value in values))
+    start = nominal.copy()
+    start[place] = 1.85 * step
+    found = fit(likelihood, start, 1e-2, free, Parts(part, part, part))
+    assert found.p[place] == pytest.approx(1.85 * step, rel=0.1)
+    assert absent_at_times(likelihood, found, part, (LATE_LOAD,)) == ()
 
 
 def test_motion_of_few_rows_a_period_is_no_noise_of_an_encoder() -> None:

@@ -209,9 +209,14 @@ def test_no_relative_no_family_and_the_last_step_counts() -> None:
     other = ForwardStep(fitted(5.0), (fitted(80.0, LOAD),), True)
     alone = named(AXIS, FRICTION, final_fit(), [early, late, other], {}, VERDICT)
     assert (alone.score, alone.runner_up, alone.margin, alone.family) == (55.0, "", 55.0, ())
-    first = named(AXIS, FRICTION, final_fit(), [early], {}, VERDICT)
-    assert first.family == ()
-    assert first.margin == 1.0
+    assert named(AXIS, FRICTION, final_fit(), [early], {}, VERDICT).margin == 1.0
+
+
+@pytest.mark.parametrize(("behind", "alike"), [(2.9, True), (3.0, False)])
+def test_effects_that_are_no_relatives_are_not_told_apart_by_chance(behind: float, alike: bool) -> None:
+    step = ForwardStep(fitted(0.0), (fitted(200.0, FRICTION), fitted(200.0 - behind, LOAD)), True)
+    found = named(AXIS, FRICTION, final_fit(), [step], {}, VERDICT)
+    assert found.family == (("coulomb_friction@motor", "load_torque@load") if alike else ())
 
 
 def test_units_of_a_position_in_metres() -> None:

@@ -259,7 +259,7 @@ def late(angles: Array, shifts: tuple[float, float]) -> Array:
     from scipy.interpolate import CubicSpline
 
     at = np.arange(len(angles))
-    moved = [CubicSpline(at, angles[:, n])(np.clip(at - shift, 0, at[-1])) for n, shift in enumerate(shifts)]
+    moved = [CubicSpline(at, angles[:, n])(at - shift) for n, shift in enumerate(shifts)]
     return np.column_stack([moved[n] if shift else angles[:, n] for n, shift in enumerate(shifts)])
 
 

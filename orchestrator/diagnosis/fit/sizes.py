@@ -8,7 +8,7 @@ is refuted (Hausman, Econometrica 46(6), 1978): sizes are then those of white in
 Where a model misses held-out data by far more than noise, intervals hold what free runs would ask for as well.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,13 +82,14 @@ def _is_less_sure(efficient: Fit, robust: Fit, times: float) -> bool:
 
 
 def with_model_error(
-    likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect], levels: Sequence[float]
-) -> Fit:
+    likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect], levels: Sequence[float],
+    better: Callable[[Array], bool] = lambda p: True,
+) -> Fit:  # fmt: skip
     """Return a fit whose intervals hold what long predictions ask for, too.
 
     A right model has one set of values for predictions of a sample and for runs over all of a record. Where a law is
     not quite right, each asks for its own, and what they differ by is the size of the model's error. Under torque noise
-    free runs are off themselves: what their own error explains is none of the model's.
+    free runs are off themselves: what chance explains of the difference (two standard errors) is no model's error.
 
     Args:
         likelihood: of the record.
@@ -96,6 +97,8 @@ def with_model_error(
         part: the samples that it was fitted to.
         effects: of the model; of a wave, free runs are asked for the amplitude alone: they slip along the rest.
         levels: of process noise that the model may have, falling; at the last, predictions are nearly free runs.
+        better: tells of values whether runs of a few seconds get better with them. Those over all of a record are lost
+            where the motion is unstable, and then ask for anything.
 
     Returns:
         The fit; unchanged where no free run follows the record.
@@ -112,12 +115,13 @@ def with_model_error(
     }
     asked = tuple(entry for entry in found.free if entry.place not in slipping)
     long = fit(likelihood, found.p, levels[-1], asked, parts, most=0)
-    if not np.all(np.isfinite(long.z)):
+    if not np.all(np.isfinite(long.z)) or not better(long.p):
         return found
     chance = np.diag(_with_robust_errors(likelihood, long, part).covariance)
-    beyond = np.zeros(len(found.free))
-    for entry, own in zip(long.free, chance, strict=True):
-        beyond[found.free.index(entry)] = max((long.p[entry.place] - found.p[entry.place]) ** 2 - own, 0.0)
+    beyond, own = np.zeros(len(found.free)), np.diag(found.covariance)
+    for entry, other in zip(long.free, chance, strict=True):
+        row, change = found.free.index(entry), float(long.p[entry.place] - found.p[entry.place])
+        beyond[row] = max(change**2 - likelihood.settings.fit.disputed**2 * (other + own[row]), 0.0)
     return replace(found, covariance=found.covariance + np.diag(beyond))
 
 

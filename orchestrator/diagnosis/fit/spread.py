@@ -13,9 +13,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
+from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit, log_prior
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.plants.effects import Effect
+from orchestrator.shared.inference.colour import Colour
 
 Array = NDArray[np.float64]
 Refit = Callable[[RecordLikelihood, Array, float, Sequence[Free], Parts, int], Fit]
@@ -54,7 +55,8 @@ def absent_at_times(
     """Return the effects that one block of the record clearly is without, though it would have shown them.
 
     Such a block is likelier with none of the effect than with all, or half, of what the whole has of it, all else
-    fitted again. One in which the effect rests, an uncrossed gap say, is as likely with as without.
+    fitted again. One in which the effect rests, an uncrossed gap say, is as likely with as without. The colour is the
+    whole's: one of the block's own takes up what the effect did.
 
     Args:
         likelihood: of the record.
@@ -76,7 +78,8 @@ def absent_at_times(
         half[scaled] *= 0.5
         none = effect.taken_out(plant, whole.p, likelihood.nominal, {entry.place for entry in rest})
         fits = [_block_fits(likelihood, replace(whole, p=p, free=rest), part) for p in (none, half, whole.p)]
-        return max(own.fitted - max(one.fitted, other.fitted) for own, one, other in zip(*fits, strict=True))
+        found = ([_in_colour(*block, whole.colour) for block in blocks] for blocks in fits)
+        return max(own - max(one, other) for own, one, other in zip(*found, strict=True))
 
     looked_at = (effect for effect in effects if plant.entry(effect.places(plant)[effect.size]).default == 0.0)
     return tuple(effect for effect in looked_at if gain_without(effect) > settings.surely_absent)
@@ -93,14 +96,22 @@ def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: 
         part: the samples that were fitted.
         refit: how ``whole`` was fitted.
     """
-    blocks = _block_fits(likelihood, whole, part, refit)
+    blocks = [own for _, _, own in _block_fits(likelihood, whole, part, refit)]
     places = [entry.place for entry in whole.free]
     squares = [(own.p[places] - whole.p[places]) ** 2 / np.maximum(np.diag(own.covariance), 1e-300) for own in blocks]
     return np.asarray(np.mean(squares, axis=0) * len(blocks) / (len(blocks) - 1))
 
 
-def _block_fits(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Refit = fit) -> list[Fit]:
-    """Return the fit repeated on each block of ``part``."""
+def _in_colour(likelihood: RecordLikelihood, part: slice, found: Fit, colour: Colour) -> float:
+    """Return the log-likelihood of a fit to ``part``, prior included, for innovations of a given colour."""
+    value = likelihood.log_likelihood(found.z, found.q, part, colour, found.p)
+    return value + log_prior(found.p, found.free) if np.isfinite(value) else -np.inf
+
+
+def _block_fits(
+    likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Refit = fit
+) -> list[tuple[RecordLikelihood, slice, Fit]]:
+    """Return, for each block of ``part``, its own likelihood, where it lies in that, and the fit repeated on it."""
     settings = likelihood.settings.fit
     blocks = settings.blocks
     edges = np.linspace(part.start, part.stop, blocks + 1).astype(int).tolist()
@@ -111,5 +122,6 @@ def _block_fits(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Re
     found = []
     for start, stop in itertools.pairwise(edges):
         own, block = likelihood.alone(slice(start, stop))
-        found.append(refit(own, whole.p, whole.q, free, Parts(block, block, block), settings.block_iterations))
+        fitted = refit(own, whole.p, whole.q, free, Parts(block, block, block), settings.block_iterations)
+        found.append((own, block, fitted))
     return found

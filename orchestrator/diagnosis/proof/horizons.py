@@ -6,7 +6,7 @@ the one that lies closest. All models of a diagnosis are started by the same fil
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,13 +135,16 @@ class Horizons:
     def even_skill_over(self, other: "Horizons") -> float:
         """Return the smallest share removed of the other model's squared error, noise apart, beyond one sample.
 
+        The whole part counts where there is no other long run only: an unstable motion is lost over it.
+
         Args:
             other: prediction errors of another model on the same samples.
 
         Returns:
             The share; negative where this model is worse.
         """
-        return float(np.min(self._removed(other, 1)))
+        removed = self._removed(other, 1)
+        return float(np.min(removed[:-1] if len(self.runs) > 1 else removed))
 
     def skill_over(self, other: "Horizons", first: int | None = None) -> float:
         """Return the largest share of the other's squared error that this one removes, at horizons beyond noise.
@@ -231,6 +234,34 @@ def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> H
         (*labels, "whole part"), np.array([*errors, whole]), np.array([*plain, none]), r_squared, signals.noise,
         tuple(squares), tuple(runs), settings,
     )  # fmt: skip
+
+
+def is_driven(likelihood: RecordLikelihood, p: Array, found: Horizons, share: float) -> bool:
+    """Tell whether the request of the drive is what makes a model follow the motion, over runs of a few seconds.
+
+    Where a motion is unstable (a pendulum upright), a right model is lost over a longer part, and over half a second
+    after a filter that knows the speed poorly. Over a few seconds from the closest state it follows, and does not
+    without the drive.
+
+    Args:
+        likelihood: of the record.
+        p: parameters of the model.
+        found: its prediction errors.
+        share: of the squared error without the drive that it must explain.
+
+    Returns:
+        True when it is, for one signal at least; False where the record is shorter than such a run.
+    """
+    signals, proof = likelihood.signals, likelihood.settings.proof
+    if len(found.runs) < 2:
+        return False
+    coasting = replace(signals, u=np.zeros_like(signals.u))
+    left = [
+        (run.rms, free_run(likelihood.plant, p, run.start, coasting, piece, proof.free_run).rms)
+        for run, piece in found.runs[0]
+    ]
+    own, without = (np.mean(np.square([pair[k][: signals.channels] for pair in left]), axis=0) for k in (0, 1))
+    return bool(np.any(own < (1.0 - share) * without))
 
 
 def _starts(stretches: Sequence[slice], reach: int, count: int) -> list[int]:

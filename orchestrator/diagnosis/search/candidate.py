@@ -72,7 +72,7 @@ class Candidate:
         """
         return self.score - other.score
 
-    def pays_over(self, other: "Candidate", base: "Candidate") -> bool:
+    def pays_over(self, other: "Candidate", base: "Candidate", noise: bool = False) -> bool:
         """Tell whether this model, which has more effects than ``other``, earns them on both parts.
 
         The gain must also be more than what the laws of the effects before may leave of what those have gained over
@@ -82,6 +82,7 @@ class Candidate:
         Args:
             other: the model before.
             base: the model without effects.
+            noise: what this model leaves is known to be noise, of whatever colour.
 
         Returns:
             True when it does.
@@ -90,9 +91,10 @@ class Candidate:
         fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
         left = max((effect.leaves for effect in other.effects), default=0.0)
         settings = self.settings
-        pays = settings.pays if self.fit.q <= settings.noise_alone else settings.pays_above_noise
+        pays = settings.pays if noise or self.fit.q <= settings.noise_alone else settings.pays_above_noise
+        least_decided = settings.least_decided_of_noise if noise else settings.least_decided
         least = max(pays, left * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
-        return self.gain_over(other) > least and fitted > more and decided > settings.least_decided
+        return self.gain_over(other) > least and fitted > more and decided > least_decided
 
     def nearly_pays_over(self, other: "Candidate") -> bool:
         """Tell whether this model earns its parameters on either part, so that predictions may decide.
@@ -119,6 +121,32 @@ class Candidate:
         """
         fitted, decided = self.fit.fitted - other.fit.fitted, self.fit.validated - other.fit.validated
         return decided > self.settings.least_decided_share * fitted
+
+
+def simplest_first(found: Sequence[Candidate], within: float) -> list[Candidate]:
+    """Return candidates in their order, but a simpler one of the first one's family before it where both fit alike.
+
+    A ripple of one cycle a turn is gravity, and one more parameter always finds something in a rest that is no
+    measurement noise.
+
+    Args:
+        found: candidates on top of one model, best first.
+        within: difference of scores within which both fit alike.
+
+    Returns:
+        The candidates.
+    """
+    first = found[0]
+    family = first.effects[-1].family
+    if not family or first.fit.q <= first.settings.noise_alone:
+        return list(found)
+    simpler = (
+        one for one in found[1:]
+        if one.effects[-1].family == family and one.effects[:-1] == first.effects[:-1]
+        and first.score - one.score < within and parameter_count(one) < parameter_count(first)
+    )  # fmt: skip
+    chosen = next(simpler, first)
+    return [chosen, *(one for one in found if one is not chosen)]
 
 
 def parameter_count(candidate: Candidate) -> int:

@@ -11,13 +11,14 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from orchestrator.diagnosis.proof.horizons import horizons
-from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
 from orchestrator.diagnosis.search.fits import Fits, Guesses, TimeUpError
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
 from orchestrator.diagnosis.search.periodic import with_cycles
 from orchestrator.diagnosis.search.plausible import implausible
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Guess, Screen
+from orchestrator.diagnosis.verdict.remainder import is_noise
 from orchestrator.plants.effects import Effect, Scene
 from orchestrator.shared.inference.colour import Colour, colour_of
 
@@ -139,6 +140,7 @@ class Search(Fits):
         found = self.each(lambda candidate: self.rescued(candidate, current, base), found)
         found = self.possible(found, scene)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
+        found = simplest_first(found, self.likelihood.settings.verdict.alike_gain) if found else found
         if found and self.earns(found[0], current, base):
             return ForwardStep(current, tuple(found), True)
         shown = next((c for c in found if self.shows(c, current)), None)
@@ -167,8 +169,7 @@ class Search(Fits):
         own = base if before.effects else again
         return ForwardStep(again, step.candidates, self.earns(first, again, own) or self.shows(first, again))
 
-    @staticmethod
-    def earns(candidate: Candidate, current: Candidate, base: Candidate) -> bool:
+    def earns(self, candidate: Candidate, current: Candidate, base: Candidate) -> bool:
         """Tell whether a candidate gains enough over the model before it, where it was fitted and where it was not.
 
         Args:
@@ -179,7 +180,22 @@ class Search(Fits):
         Returns:
             True when it does.
         """
-        return candidate.pays_over(current, base) and candidate.holds_over(current)
+        return self.pays(candidate, current, base) and candidate.holds_over(current)
+
+    def pays(self, candidate: Candidate, current: Candidate, base: Candidate) -> bool:
+        """Tell whether a candidate gains enough over the model before it; the less so the surer noise alone is left.
+
+        Args:
+            candidate: a fitted model.
+            current: the model before.
+            base: the model without effects.
+
+        Returns:
+            True when it does.
+        """
+        if candidate.pays_over(current, base):
+            return True
+        return candidate.pays_over(current, base, noise=True) and is_noise(self.likelihood, candidate.fit, self.parts)
 
     def shows(self, candidate: Candidate, current: Candidate) -> bool:
         """Tell whether a candidate that gains less predicts so much better that it may be named for that.
@@ -352,7 +368,7 @@ class Search(Fits):
         while len(current.effects) > 1:
             reduced = self.each(partial(self.reduced, current, scene), current.effects[:-1])
             best = max(reduced, key=lambda candidate: candidate.score)
-            if current.pays_over(best, base):
+            if self.pays(current, best, base):
                 break
             current = best
         return current

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.outcome import Named, ParameterEstimate
 from orchestrator.diagnosis.settings import VerdictSettings
-from orchestrator.records.model_file import Model
+from orchestrator.records.model_file import Model, ModelParameter
 from orchestrator.shared.inference.normal import interval_95
 
 Array = NDArray[np.float64]
@@ -85,9 +85,23 @@ def far_off(model: Model, p: Array, settings: VerdictSettings) -> list[str]:
     found = []
     for u in model.uncertain:
         factor = gain.value if gain is not None and _carries(model, u.name) else 1.0
-        if abs(factor * model.plant.value(p, u.name) - u.value) > settings.far_off * u.uncertainty:
+        if _uncertainties(model, u, factor * model.plant.value(p, u.name)) > settings.far_off:
             found.append(u.name)
     return found
+
+
+def _uncertainties(model: Model, u: ModelParameter, value: float) -> float:
+    """Return how many stated uncertainties a value lies off.
+
+    An uncertainty of half the value allows a factor of 1.5 either way. Frictions may vanish, inertias may not.
+    """
+    if u.value > 0.0 and (value > u.value or _is_inertia(model, u.name)):
+        return abs(math.log(max(value, 1e-300) / u.value)) / math.log1p(u.uncertainty / u.value)
+    return abs(value - u.value) / u.uncertainty
+
+
+def _is_inertia(model: Model, name: str) -> bool:
+    return model.plant.entry(model.plant.index(name)).unit == "kg.m2"
 
 
 def _carries(model: Model, name: str) -> bool:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.settings import VerdictSettings
-from orchestrator.diagnosis.verdict.remainder import Remainder
+from orchestrator.diagnosis.verdict.remainder import Remainder, structured
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 Array = NDArray[np.float64]
@@ -31,24 +31,6 @@ class Proof:
     def even_skill(self) -> float:
         """Return the smallest share that they remove at any horizon but one sample."""
         return self.final.even_skill_over(self.base)
-
-
-def structured(left: Remainder, settings: VerdictSettings) -> bool:
-    """Tell whether what is left is something else than a coloured torque noise.
-
-    Args:
-        left: what the final model leaves.
-        settings: the rules' thresholds.
-
-    Returns:
-        True when it is.
-    """
-    if left.tails > settings.heavy:
-        return True
-    return any(
-        entry.gain > settings.structured or (entry.share > settings.large_share and entry.gain > settings.likely)
-        for entry in left.predictable
-    )
 
 
 def is_unknown(
@@ -80,19 +62,16 @@ def is_unknown(
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
 
 
-def refuted(
-    floor_off: bool, proof: Proof, far_off: Sequence[str], passing: Sequence[str], settings: VerdictSettings
-) -> str:
+def refuted(floor_off: bool, follows: bool, far_off: Sequence[str], passing: Sequence[str]) -> str:
     """Return why what the final model has is no finding, in words; empty: nothing speaks against it.
 
     Effects make up for another machine too: a prescribed motion takes next to no inertia, and waves for a spring.
 
     Args:
         floor_off: more is left than measurement noise.
-        proof: of the final model, which has effects.
+        follows: the final model, which has effects, follows the motion of the held-out part.
         far_off: names of parameters whose re-fitted values lie far outside what the model file allows.
         passing: names of effects that a stretch of the record is without.
-        settings: the rules' thresholds.
 
     Returns:
         The words.
@@ -100,7 +79,7 @@ def refuted(
     if far_off:
         names = ", ".join(f"`{name}`" for name in far_off)
         return f"with it {names} would lie far outside what the model file allows: a value, or a unit, may be wrong"
-    if floor_off and not proof.final.follows(settings.good):
+    if floor_off and not follows:
         return "with it free runs over the held-out part do not follow the motion: `u` may not be what drives it"
     if passing:
         return f"a stretch of the record is without {' and '.join(passing)}: it changes with time"

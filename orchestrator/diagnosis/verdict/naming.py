@@ -41,7 +41,8 @@ def named(
     alike = [
         c.effects[-1].label
         for c in others
-        if effect.family and c.effects[-1].family == effect.family and own.score - c.score < within
+        if own.score - c.score
+        < (within if effect.family and c.effects[-1].family == effect.family else settings.undecided)
     ]
     family = (effect.label, *alike) if alike else ()
     parameters = {

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, jacobian, reaching_back
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.response import back_propagated, error_response, filtered
-from orchestrator.diagnosis.settings import RemainderSettings
+from orchestrator.diagnosis.settings import RemainderSettings, VerdictSettings
 from orchestrator.shared.inference.colour import Colour, colour_of
 from orchestrator.shared.numba_cache import kept
 
@@ -93,6 +93,41 @@ def remainder(likelihood: RecordLikelihood, base: Fit, best: Fit, parts: Parts, 
     growth = float(np.max(later / np.maximum(spread, 1e-300)))
     found = predictable(likelihood, best, parts)
     return Remainder(left, 1.0 - left / had if had > 0.0 else 0.0, growth, found, tails(likelihood, best, parts.seen))
+
+
+def structured(left: Remainder, settings: VerdictSettings) -> bool:
+    """Tell whether what is left is something else than a coloured torque noise.
+
+    Args:
+        left: what the final model leaves.
+        settings: the rules' thresholds.
+
+    Returns:
+        True when it is.
+    """
+    if left.tails > settings.heavy:
+        return True
+    return any(
+        entry.gain > settings.structured or (entry.share > settings.large_share and entry.gain > settings.likely)
+        for entry in left.predictable
+    )
+
+
+def is_noise(likelihood: RecordLikelihood, model: Fit, parts: Parts) -> bool:
+    """Tell whether a model leaves nothing but noise, white or coloured, on the parts that may be looked at.
+
+    Args:
+        likelihood: of the record.
+        model: the fit.
+        parts: of the record: fitted, deciding, held out.
+
+    Returns:
+        True when it does.
+    """
+    settings = likelihood.settings.verdict
+    growth = float(np.max(np.std(model.z[parts.validated], axis=0) / np.std(model.z[parts.fitted], axis=0)))
+    left = Remainder(0.0, 0.0, growth, predictable(likelihood, model, parts), tails(likelihood, model, parts.seen))
+    return growth < settings.grown and not structured(left, settings)
 
 
 def tails(likelihood: RecordLikelihood, model: Fit, part: slice) -> float:
