@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
+from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.passes import _harm_over_fewer, _is_weak, _larger_misfit, honest
 from orchestrator.diagnosis.proof import horizons as proof_horizons
