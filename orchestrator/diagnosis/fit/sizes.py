@@ -53,7 +53,8 @@ def sized(
     white = anneal(likelihood, found.p, found.q, found.free, parts, levels, most=0)
     if not np.all(np.isfinite(white.z)):
         return Sized(efficient)
-    robust = with_tolerances(likelihood, _with_robust_errors(likelihood, white, parts.fitted), effects)
+    blocks = likelihood.settings.fit.blocks
+    robust = with_tolerances(likelihood, _with_robust_errors(likelihood, white, parts.fitted, blocks), effects)
     places = [entry.place for entry in found.free]
     change = robust.p[places] - efficient.p[places]
     chance = np.sqrt(np.diag(robust.covariance) + np.diag(efficient.covariance))
@@ -125,7 +126,7 @@ def with_model_error(
     return replace(found, covariance=found.covariance + np.diag(beyond))
 
 
-def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -> Fit:
+def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice, blocks: int = 0) -> Fit:
     """Return a fit in white innovations with a covariance that holds whatever their colour.
 
     Where blocks of the record disagree by more than that explains, it is as wide as they ask for: they are left out one
@@ -135,6 +136,7 @@ def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -
         likelihood: of the record.
         white: fitted with innovations that count as white.
         part: the samples that were fitted.
+        blocks: of the record that are compared; 0: none are.
     """
     colour = colour_of(white.z, part, 0)
     if not white.free or not colour.usable:
@@ -146,14 +148,16 @@ def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -
     scores = np.einsum("nck,nc->nk", J, colour.white(white.z, part))
     prior = np.diag([(entry.scale / entry.prior[1]) ** 2 if entry.prior else 0.0 for entry in white.free])
     squares = np.einsum("nck,ncj->nkj", J, J)
-    bread = np.linalg.pinv(np.sum(squares, axis=0) + prior)
-    meat = long_run_covariance(scores) + prior
-    covariance = bread @ meat @ bread
-    blocks = np.array_split(np.arange(len(scores)), likelihood.settings.fit.blocks)
-    left_out = [
-        np.linalg.pinv(np.sum(squares, axis=0) - np.sum(squares[rows], axis=0) + prior) @ np.sum(scores[rows], axis=0)
-        for rows in blocks
-    ]
-    jackknife = (len(blocks) - 1.0) / len(blocks) * np.sum(np.square(left_out), axis=0)
-    stretch = np.sqrt(np.maximum(jackknife / np.maximum(np.diag(covariance), 1e-300), 1.0)) * scales
-    return replace(white, covariance=np.asarray(covariance * np.outer(stretch, stretch)))
+    information = np.sum(squares, axis=0) + prior
+    bread = np.linalg.pinv(information)
+    covariance = bread @ (long_run_covariance(scores) + prior) @ bread
+    stretch = np.ones(len(scales))
+    if blocks:
+        groups = np.array_split(np.arange(len(scores)), blocks)
+        changes = [
+            np.linalg.pinv(information - np.sum(squares[rows], axis=0)) @ np.sum(scores[rows], axis=0)
+            for rows in groups
+        ]
+        jackknife = (blocks - 1.0) / blocks * np.sum(np.square(changes), axis=0)
+        stretch = np.sqrt(np.maximum(jackknife / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return replace(white, covariance=np.asarray(covariance * np.outer(stretch * scales, stretch * scales)))
