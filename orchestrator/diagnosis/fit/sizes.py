@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, fit, jacobian
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.fit.spread import widened, with_tolerances
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.inference.colour import colour_of

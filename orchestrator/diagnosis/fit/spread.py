@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit, log_prior
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.inference.colour import Colour
 
