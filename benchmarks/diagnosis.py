@@ -100,9 +100,9 @@ def learned(diagnosis: Diagnosis) -> dict[str, Any]:
     return {"law": f"{law.argument} ({law.site})", "least": law.shrinks, "lacking": lacking, "left": left}
 
 
-def seen(case: Case, value: float, unit: str) -> float:
+def seen(case: Case, value: float, unit: str | None) -> float:
     """Return a true value as a record shows it: in torques of a drive whose gain is taken for one."""
-    return value / case.truth["gain"] if unit.startswith(CARRIERS) else value
+    return value / float(case.truth["gain"]) if unit and unit.startswith(CARRIERS) else value
 
 
 def errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, float, bool]]:
