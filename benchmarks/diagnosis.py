@@ -125,7 +125,7 @@ def linear_errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, bo
     """Return (parameter, relative error, inside the interval) of each linear parameter."""
     rows = []
     for name, entry in diagnosis.parameters.items():
-        true = seen(case, case.truth["linear"][name], entry.unit)
+        true: Any = seen(case, case.truth["linear"][name], entry.unit)
         assert entry.value is not None
         assert entry.interval is not None
         low, high = entry.interval
