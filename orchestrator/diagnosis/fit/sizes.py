@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal, fit, jacobian
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, fit, jacobian
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.fit.spread import widened
+from orchestrator.diagnosis.fit.spread import widened, with_tolerances
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.inference.colour import colour_of
 from orchestrator.shared.inference.long_run import long_run_covariance
+from orchestrator.shared.inference.normal import of_many
 
 Array = NDArray[np.float64]
 
@@ -53,11 +54,12 @@ def sized(
     white = anneal(likelihood, found.p, found.q, found.free, parts, levels, most=0)
     if not np.all(np.isfinite(white.z)):
         return Sized(efficient)
-    robust = widened(likelihood, _with_robust_errors(likelihood, white, parts.fitted), parts.fitted, effects, _refitted)
+    blocks = likelihood.settings.fit.blocks
+    robust = with_tolerances(likelihood, _with_robust_errors(likelihood, white, parts.fitted, blocks), effects)
     places = [entry.place for entry in found.free]
     change = robust.p[places] - efficient.p[places]
     chance = np.sqrt(np.diag(robust.covariance) + np.diag(efficient.covariance))
-    far = np.abs(change) > likelihood.settings.fit.disputed * chance
+    far = np.abs(change) > of_many(likelihood.settings.fit.disputed, len(places)) * chance
     disputed = tuple(
         likelihood.plant.names[place]
         for place, bad in zip(places, far, strict=True)
@@ -125,13 +127,17 @@ def with_model_error(
     return replace(found, covariance=found.covariance + np.diag(beyond))
 
 
-def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -> Fit:
+def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice, blocks: int = 0) -> Fit:
     """Return a fit in white innovations with a covariance that holds whatever their colour.
+
+    Where blocks of the record disagree by more than that explains, it is as wide as they ask for: they are left out one
+    after the other (a jackknife of groups, in one step; MacKinnon and White, Journal of Econometrics 29(3), 1985).
 
     Args:
         likelihood: of the record.
         white: fitted with innovations that count as white.
         part: the samples that were fitted.
+        blocks: of the record that are compared; 0: none are.
     """
     colour = colour_of(white.z, part, 0)
     if not white.free or not colour.usable:
@@ -142,12 +148,17 @@ def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -
         return white
     scores = np.einsum("nck,nc->nk", J, colour.white(white.z, part))
     prior = np.diag([(entry.scale / entry.prior[1]) ** 2 if entry.prior else 0.0 for entry in white.free])
-    bread = np.linalg.pinv(np.einsum("nck,ncj->kj", J, J) + prior)
-    meat = long_run_covariance(scores) + prior
-    return replace(white, covariance=np.asarray(bread @ meat @ bread * np.outer(scales, scales)))
-
-
-def _refitted(
-    likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, iterations: int
-) -> Fit:  # fmt: skip
-    return _with_robust_errors(likelihood, fit(likelihood, start, q, free, parts, iterations, 0), parts.fitted)
+    squares = np.einsum("nck,ncj->nkj", J, J)
+    information = np.sum(squares, axis=0) + prior
+    bread = np.linalg.pinv(information)
+    covariance = bread @ (long_run_covariance(scores) + prior) @ bread
+    stretch = np.ones(len(scales))
+    if blocks:
+        groups = np.array_split(np.arange(len(scores)), blocks)
+        changes = [
+            np.linalg.pinv(information - np.sum(squares[rows], axis=0)) @ np.sum(scores[rows], axis=0)
+            for rows in groups
+        ]
+        jackknife = (blocks - 1.0) / blocks * np.sum(np.square(changes), axis=0)
+        stretch = np.sqrt(np.maximum(jackknife / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return replace(white, covariance=np.asarray(covariance * np.outer(stretch * scales, stretch * scales)))
