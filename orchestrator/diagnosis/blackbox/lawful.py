@@ -3,7 +3,7 @@
 Noise at a port takes up what an effect outside the bank does. So efforts of any size that depend on the position, the
 speed, the time or an input are put beside less noise, their sizes integrated out (a Bayes factor has its cost of values
 built in). The same is done with copies of what is left whose phases are random: they have its spectrum, and follow
-nothing. What such copies reach is chance.
+nothing. What such copies reach is chance: no filter is just right, and a law must be likelier by more than that.
 """
 
 from collections.abc import Sequence
@@ -74,7 +74,7 @@ def dependence_of(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.
         for laws in (laws_of_motion(fitter.problem, read, settings), laws_of_time(fitter.problem, read, settings))
         if laws
     ]
-    sure = [d for d in found if d.gain > max(settings.lawful, d.by_chance)]
+    sure = [d for d in found if d.gain > settings.lawful + max(d.by_chance, 0.0)]
     return max(sure, key=lambda d: d.gain, default=None)
 
 

@@ -180,8 +180,8 @@ class RestSettings(Settings, frozen=True):
     lawful: Annotated[
         float,
         setting(
-            "log of how much likelier what is left must be with a law than as noise: chance alone gives that in one "
-            "record of a hundred"
+            "log of how much likelier what is left must be with a law than as noise, beyond what its copies reach: "
+            "odds of a hundred to one"
         ),
     ] = 4.6
     copies: Annotated[int, setting("copies of what is left, of random phases, that show what chance gives", ge=19)] = 39
