@@ -4,7 +4,8 @@ The autoregression that whitens innovations makes a fit efficient as long as wha
 it is the error of a law, whitening weighs the rare moments at which the law is worst, and gives away what it says of
 the rest. A fit in white innovations, weighed like white torques, is less efficient and needs neither: its standard
 errors hold whatever the colour (Newey and West). Where the two disagree by more than chance the first one's assumption
-is refuted (Hausman, Econometrica 46(6), 1978): sizes are then those of white innovations, and intervals hold both.
+is refuted (Hausman, Econometrica 46(6), 1978): sizes are then those of white innovations, and intervals hold both,
+unless predictions over many samples tell which of them is right.
 Where a model misses held-out data by far more than noise, intervals hold what free runs would ask for as well.
 """
 
@@ -33,8 +34,9 @@ class Sized:
 
 
 def sized(
-    likelihood: RecordLikelihood, found: Fit, parts: Parts, effects: Sequence[Effect], levels: Sequence[float]
-) -> Sized:
+    likelihood: RecordLikelihood, found: Fit, parts: Parts, effects: Sequence[Effect], levels: Sequence[float],
+    better: Callable[[Array, Array], bool] = lambda robust, efficient: False,
+) -> Sized:  # fmt: skip
     """Return the fit of a model as it is reported: widened, and in white innovations where the colour misleads.
 
     Args:
@@ -43,6 +45,8 @@ def sized(
         parts: parts of the record.
         effects: of the model.
         levels: of process noise that the model may have, falling.
+        better: tells of the values of both weightings whether predictions over many samples are surely better with the
+            first. What the second says is refuted then, and no interval need hold it.
 
     Returns:
         The fit, and what the two weightings dispute.
@@ -68,6 +72,8 @@ def sized(
         return Sized(replace(robust, colour=colour_of(robust.z, parts.fitted)))
     if not disputed:
         return Sized(efficient)
+    if better(robust.p, efficient.p):
+        return Sized(replace(robust, colour=colour_of(robust.z, parts.fitted)))
     covariance = robust.covariance + np.diag((0.5 * change) ** 2)
     colour = colour_of(robust.z, parts.fitted)
     return Sized(replace(robust, covariance=covariance, colour=colour), disputed)
