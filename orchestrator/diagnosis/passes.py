@@ -198,8 +198,7 @@ def _proven(
     notes: list[str] = []
     while best.effects:
         efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
-        steps = ladder(levels, best.effects, efficient.q)
-        final = sized(likelihood, efficient, whole, best.effects, steps, _told_by_horizons(likelihood, plain.q, whole))
+        final = sized(likelihood, efficient, whole, best.effects, ladder(levels, best.effects, efficient.q))
         final = replace(final, fit=honest(likelihood, final.fit, best.effects, whole))
         after = horizons(likelihood, final.fit.p, plain.q, whole.held_out)
         weak = next((e for e in reversed(best.effects) if _is_weak(search, e, final.fit, after, plain.q, whole)), None)
@@ -245,21 +244,6 @@ def honest(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect], 
         return any(one.after < one.stages[0][1] for one in runs)
 
     return with_model_error(likelihood, found, parts.seen, effects, ladder(settings.levels, effects, found.q), better)
-
-
-def _told_by_horizons(likelihood: RecordLikelihood, q: float, whole: Parts) -> Callable[[Array, Array], bool]:
-    """Return what tells of two sets of values whether the first predicts better, on all that was fitted.
-
-    It must, surely, at every horizon of many starts but one sample, which both were fitted to, and be no worse over
-    longer runs.
-    """
-
-    def told(first: Array, second: Array) -> bool:
-        one, other = (horizons(likelihood, p, q, whole.fitted) for p in (first, second))
-        surely = set(one.labels[1 : len(one.squares)]) <= set(one.surely_better_than(other))
-        return surely and bool(np.all(one.errors[len(one.squares) :] <= other.errors[len(other.squares) :]))
-
-    return told
 
 
 def _dispute(names: tuple[str, ...]) -> str:

@@ -9,7 +9,7 @@ from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
 from orchestrator.diagnosis.fit.rate import analysed
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import encoder_noise
-from orchestrator.diagnosis.fit.sizes import _is_less_sure
+from orchestrator.diagnosis.fit.sizes import _is_less_sure, _with_robust_errors
 from orchestrator.diagnosis.fit.spread import absent_at_times, widened
 from orchestrator.diagnosis.fit.together import series
 from orchestrator.diagnosis.proof.free_run import free_run
@@ -85,6 +85,14 @@ def test_a_drag_that_changes_widens_its_interval_by_what_it_changes() -> None:
     assert wide.standard_error(place) > 0.3
     same = fitted(halfway("b", 2.0, 2.0), (), 1e-5)
     assert widened(halfway("b", 2.0, 2.0), same, slice(10, 800), ()).standard_error(place) < 0.02
+
+
+@pytest.mark.parametrize(("after", "disagree"), [(2.0, False), (3.0, True)])
+def test_blocks_that_disagree_widen_robust_errors(after: float, disagree: bool) -> None:
+    likelihood, place = halfway("b", 2.0, after), AXIS.index("b")
+    found, part = fitted(likelihood, (), 1e-3), slice(10, likelihood.stop)
+    plain, wide = (_with_robust_errors(likelihood, found, part, blocks).standard_error(place) for blocks in (0, 4))
+    assert (wide > 1.5 * plain) == disagree
 
 
 @pytest.mark.parametrize("law", [FRICTION, STRIBECK])

@@ -26,10 +26,11 @@ from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
 from orchestrator.diagnosis.blackbox.sites import effects_of
+from orchestrator.diagnosis.blackbox.steps import labels
 from orchestrator.diagnosis.blackbox.subject import Subject
 from orchestrator.diagnosis.blackbox.verdict import recovered, settled_names
 from orchestrator.diagnosis.blackbox.whitening import Ladder
-from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows
+from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows, on_finer_steps
 
 Array = NDArray[np.float64]
 
@@ -209,10 +210,30 @@ def _diagnosed(
         if found is not None:
             tried = [tried[0], (plain, found, found)]
     for other, found, _ in tried[1:]:
-        if other is not search and best.model.effects and search.score(best) < found.total + settings.start.pays:
-            search, base, best = other, found, found if other.explained(found) else other.run(found)
+        if other is not search and best.model.effects:
+            fewer = _with_fewer(search, best, other, found)
+            if fewer is not None:
+                search, base, best = other, found, fewer if other.explained(fewer) else other.run(fewer, found)
     best, families = settled_names(search, best)
     return _judged(problem, probe, search, base, best, families, begun, settings.rest)
+
+
+def _with_fewer(search: BoxSearch, best: BoxFit, other: BoxSearch, base: BoxFit) -> BoxFit | None:
+    """Return the fit of fewer effects to which a start that is off brings ``best``; None where there is none.
+
+    Offsets on either side of an FMU make up for a start that is off, and pay: what came before them is tried without.
+    """
+    least = search.score(best) - other.fitter.settings.start.pays
+    if other.score(base) > least:
+        return base
+    steps = {labels(step.before): step.before for step in (*search.earlier, *search.steps)}
+    for names, before in sorted(steps.items(), key=lambda item: len(item[0])):
+        if names and names < labels(best):
+            fit = other.fitter.fit(before.model, before.level)
+            fit = None if fit is None else other.fitter.settled(fit)
+            if fit is not None and other.score(fit) > least:
+                return fit
+    return None
 
 
 def _interleaved(
@@ -258,7 +279,9 @@ def _judged(
     fitter, parts = search.fitter, search.fitter.parts
     seen = parts.looked_at
     on_all = on_all_rows(search, best, settings)
-    last, rest = on_all.last, doubted(search, on_all, settings)
+    rest = doubted(search, on_all, settings)
+    on_all = on_finer_steps(search, on_all) if rest.nothing_missing else on_all
+    last = on_all.last
     whole = problem.simulate([problem.nominal, base.model])
     if whole[0] is None:
         raise problem.does_not_run()

@@ -183,24 +183,6 @@ class BoxProblem:
         """
         return np.asarray((self.data.outputs[: len(y)] - y) / self.noise)
 
-    def pushed(self, model: BoxModel, pushes: Sequence[tuple[int, int, float]]) -> list[Array | None]:
-        """Return outputs where an effort (input, first sample, size) is added until the end, one after the other.
-
-        Args:
-            model: parameters, effects and their values.
-            pushes: the efforts.
-
-        Returns:
-            The outputs, (n, outputs) each.
-        """
-        plain = self.table(model, self._plain(self.n))
-        plans = []
-        for place, first, size in pushes:
-            table = plain.copy()
-            table[first * self.m :, place] += size
-            plans.append(Plan(self.starts(model), table, self._feedback(model)))
-        return [None if y is None else self._measured(y, model) for y in self._runs(plans)]
-
     def starts(self, model: BoxModel) -> dict[str, float]:
         """Return what is set before a run, by name.
 

@@ -132,6 +132,10 @@ class FitterSettings(Settings, frozen=True):
     alike_to: Annotated[float, share("of a quantum, the farthest")] = 0.03
     alike_tried: Annotated[int, setting("others that are tried on either side", ge=2)] = 30
     finer: Annotated[float, share("width of a comb over that of the one before")] = 0.1
+    shifted: Annotated[
+        float, setting("standard errors by which finer steps shift a value, from which it is fitted with them")
+    ] = 0.3
+    halvings: Annotated[int, setting("times that steps are halved for that", ge=0)] = 2
 
 
 class StartSettings(Settings, frozen=True):
@@ -161,9 +165,6 @@ class RestSettings(Settings, frozen=True):
         float,
         share("of the port noise without an effect, up to which it may be left beside it: more, it is a stand-in"),
     ] = 0.5
-    beginnings: Annotated[int, setting("times at which an effort that begins is tried", ge=1)] = 12
-    push: Annotated[float, share("of the drive, by which its response is measured")] = 0.02
-    begins: Annotated[float, setting("gain from which an effort that begins at some time is no chance")] = 12.0
     driven: Annotated[
         float, setting("standard deviations of chance from which what is left follows from the drive: no disturbance")
     ] = 5.5
@@ -175,6 +176,16 @@ class RestSettings(Settings, frozen=True):
         int,
         setting("parts of a position's range, or of time, in each of which what is left may act in its own way", ge=2),
     ] = 12
+    waves: Annotated[int, setting("periods of a position, in each of which it may come back", ge=1)] = 30
+    lawful: Annotated[
+        float,
+        setting(
+            "log of how much likelier what is left must be with a law than as noise: chance alone gives that in one "
+            "record of a hundred"
+        ),
+    ] = 4.6
+    copies: Annotated[int, setting("copies of what is left, of random phases, that show what chance gives", ge=19)] = 39
+    by_chance: Annotated[float, share("of them that may do as well: noise is never just as it is taken to be")] = 0.05
     stands_out: Annotated[float, setting("times the expected power from which a stretch of time is pointed at")] = 1.3
     worse: Annotated[
         float, setting("times the misfit without effects from which effects do harm on data not fitted", ge=1)

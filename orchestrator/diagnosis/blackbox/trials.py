@@ -202,6 +202,8 @@ class BoxTrials:
                     fits += self._extended(before, promise)
             if fits:
                 quick.append(max(fits, key=lambda fit: fit.total))
+        most = max((fit.fitted - before.fitted for fit in quick), default=0.0)
+        quick = [self._on_one_step(fit, before, self.settings.kept * most) for fit in quick]
         quick.sort(key=self.score, reverse=True)
         done: list[BoxFit] = []
         for fit in quick:
@@ -209,12 +211,31 @@ class BoxTrials:
             done.append(self._recombed(self.fitter.settled(fit)) if worth else fit)
         return done
 
+    def _on_one_step(self, fit: BoxFit, before: BoxFit, least: float) -> BoxFit:
+        """Return a fit whose earlier effects that act in steps suit the rows that decide too.
+
+        The fitted rows leave several values of a quantum open; the wrong one hides on the others what an effect gains.
+        """
+        places = self._stepping(fit.model.effects[:-1], len(fit.model.p))
+        if not places or fit.fitted - before.fitted < max(least, self.settings.penalty) or fit.decided > before.decided:
+            return fit
+        seen = self.fitter.parts.looked_at
+        again = self.fitter.fit(fit.model, fit.level, None, seen)
+        for at in places:
+            again = None if again is None else self.fitter.combed(again, at, seen)
+        again = None if again is None else self.fitter.fit(again.model, again.level, again.J)
+        return fit if again is None else max(fit, again, key=self.score)
+
+    @staticmethod
+    def _stepping(effects: Sequence[BoxEffect], at: int) -> list[int]:
+        """Return the places among all values of those that act in steps; ``at``: of the first effect's first value."""
+        starts = at + np.cumsum([0, *(len(effect.kind.parameters) for effect in effects)])
+        return [int(start) for start, e in zip(starts, effects, strict=False) if e.kind.finer is not None]
+
     def _recombed(self, fit: BoxFit) -> BoxFit:
         """Return a fit whose earlier effects that act in steps are looked for again: less hides their steps now."""
-        at = len(fit.model.p)
-        for effect in fit.model.effects[:-1]:
-            fit = self.fitter.combed(fit, at) if effect.kind.finer is not None else fit
-            at += len(effect.kind.parameters)
+        for at in self._stepping(fit.model.effects[:-1], len(fit.model.p)):
+            fit = self.fitter.combed(fit, at)
         return fit
 
     def _worth(self, fit: BoxFit, before: BoxFit, done: Sequence[BoxFit]) -> bool:

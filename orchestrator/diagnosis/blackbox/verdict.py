@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
-from orchestrator.diagnosis.blackbox.promises import Known
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
 from orchestrator.diagnosis.blackbox.steps import labels
@@ -37,42 +36,6 @@ def stand_in(search: BoxSearch, best: BoxFit, settings: RestSettings = DEFAULT.r
         if without is not None and left > settings.halved * share(fitter.settled(without).level):
             return effect.label
     return ""
-
-
-def beginning_of(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> tuple[float, str, float]:
-    """Return the gain, the input and the time of the effort that begins there and explains most of what is left.
-
-    A disturbance that is noise begins nowhere. Each effort's response is measured on the FMU.
-
-    Args:
-        fitter: gives the filters and the record.
-        fit: of a model.
-        settings: at how many moments an effort may begin, and of what size it is.
-
-    Returns:
-        Gain in log-likelihood, name of the input, time [s]; 0.0 and nothing where none explains any.
-    """
-    problem, n = fitter.problem, fitter.problem.n
-    starts = [int(s) for s in np.linspace(0, n, settings.beginnings + 2)[1:-1]]
-    places = problem.noise_places
-    sizes = settings.push * problem.drive(places)
-    runs = problem.pushed(fit.model, [(p, s, size) for p, size in zip(places, sizes, strict=True) for s in starts])
-    base = problem.simulate([fit.model])[0]
-    if base is None or len(fit.J) < n:
-        return 0.0, "", 0.0
-    columns = [(run - base) / problem.noise if run is not None else np.zeros_like(base) for run in runs]
-    block = np.concatenate([problem.residual(base)[:, :, None], fit.J, np.stack(columns, axis=2)], axis=2)
-    white = fitter.ladder[fit.level].whiten(block).reshape(-1, block.shape[2])
-    known = 1 + fit.J.shape[2]
-    J = white[:, 1:known]
-    Q, _ = np.linalg.qr(J / np.maximum(np.sqrt(np.sum(J * J, axis=0)), 1e-300))
-    e = white[:, 0] - Q @ (Q.T @ white[:, 0])
-    D = white[:, known:] - Q @ (Q.T @ white[:, known:])
-    power = np.sum(D * D, axis=0)
-    gains = np.where(power > 0.0, 0.5 * (D.T @ e) ** 2 / np.maximum(power, 1e-300), 0.0)
-    best = int(np.argmax(gains))
-    name = problem.runner.inputs[places[best // len(starts)]]
-    return float(gains[best]), name, float(problem.data.time[starts[best % len(starts)]])
 
 
 def predicted(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> float:
@@ -112,49 +75,6 @@ def predicted(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest
     together = float((np.sum(power) - count) / np.sqrt(2.0 * count))
     alone = np.abs(block.T @ e) / size / np.sqrt(len(e))
     return max(together, float(np.max(alone)))
-
-
-def followed(fitter: Fitter, fit: BoxFit, settings: RestSettings = DEFAULT.rest) -> tuple[float, str]:
-    """Return how much better a law of the motion or of time does than noise at a port, its values paid for.
-
-    Noise at a port takes up what an effect outside the bank does. Efforts of any size in each stretch of the position,
-    in proportion to the speed, constant, or both, and in each stretch of time, are fitted in its place, with less
-    noise, on the FMU's surrogate.
-
-    Args:
-        fitter: gives the filters, the surrogate and the record.
-        fit: of a model.
-        settings: in how many stretches of the position.
-
-    Returns:
-        The gain in log-likelihood beyond Schwarz's (1978) cost of its values, and the port.
-    """
-    problem, ladder, n = fitter.problem, fitter.ladder, fitter.problem.n
-    read = problem.read([fit.model])[0]
-    share = ladder.share(fit.level)
-    if read is None or len(fit.J) < n or ladder.surrogate.order == 0 or share <= settings.solver:
-        return -np.inf, ""
-    known = Known(fitter, fit, n)
-    levels = {fit.level, *(k for k in range(ladder.size) if ladder.colour(k) == 0.0 and ladder.share(k) <= share)}
-    alone = {k: known.explains(k) for k in levels}
-    best = -np.inf, ""
-    for name, port in problem.map.ports.items():
-        y = read[:, problem.runner.reads.index(port.position)]
-        cells = np.quantile(y, np.linspace(0.0, 1.0, settings.stretches + 1)[1:-1])
-        here = np.searchsorted(cells, y)[:, None] == np.arange(settings.stretches)
-        when = (np.arange(n) * settings.stretches // n)[:, None] == np.arange(settings.stretches)
-        pushes = np.hstack([here * np.gradient(y)[:, None], here, when])[:-1]
-        place = problem.noise_places.index(problem.runner.inputs.index(port.input))
-        answers = ladder.surrogate.response(pushes / np.maximum(np.max(np.abs(pushes), axis=0), 1e-300), place)
-        for k in levels:
-            white, e = known.beside(k, answers), known.at(k)[1]
-            count = settings.stretches
-            for part in (slice(count), slice(count, 2 * count), slice(2 * count), slice(2 * count, 3 * count)):
-                U, s, _ = np.linalg.svd(white[:, part], full_matrices=False)
-                U = U[:, s > 1e-9 * s[0]]
-                gain = alone[k] - max(alone.values()) + 0.5 * float(np.sum((U.T @ e) ** 2))
-                best = max(best, (gain - 0.5 * U.shape[1] * float(np.log(n)), name))
-    return best
 
 
 def settled_names(search: BoxSearch, best: BoxFit) -> tuple[BoxFit, tuple[tuple[str, ...], ...]]:

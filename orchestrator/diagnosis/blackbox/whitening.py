@@ -124,6 +124,22 @@ class NoiseLevel:
         """
         return np.asarray(_filtered(self.A, self.C, self.K, self.R, np.ascontiguousarray(columns)))
 
+    def coloured(self, e: Array) -> Array:
+        """Return columns whose whitened ones are ``e`` (n, outputs, c): the inverse of :meth:`whiten`.
+
+        Args:
+            e: innovations.
+
+        Returns:
+            Shape (n, outputs, c), in units of the noise.
+        """
+        x, found = np.zeros((len(self.A), e.shape[2])), np.empty_like(e)
+        for k in range(len(e)):
+            new = np.linalg.solve(self.R[k], e[k])
+            found[k] = new + self.C @ x
+            x = self.A @ x + self.K[k] @ new
+        return found
+
     def transposed(self, e: Array) -> Array:
         """Return the product of each sample's whitened response with ``e``: the transpose of :meth:`whiten`.
 

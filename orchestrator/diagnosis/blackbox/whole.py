@@ -3,14 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.estimates import alike
 from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.lawful import dependence_of
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.rest import Rest, Whole, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import RestSettings
-from orchestrator.diagnosis.blackbox.verdict import beginning_of, followed, predicted, stand_in
+from orchestrator.diagnosis.blackbox.verdict import predicted, stand_in
+
+Array = NDArray[np.float64]
 
 
 def on_all_rows(search: BoxSearch, best: BoxFit, settings: RestSettings) -> Whole:
@@ -83,6 +87,43 @@ def _last(search: BoxSearch, fit: BoxFit) -> BoxFit:
     return found or fit
 
 
+def on_finer_steps(search: BoxSearch, whole: Whole) -> Whole:
+    """Return a model fitted at finer communication steps, where those of the search shift its values.
+
+    Steps that cost little misfit may shift a well known value by several of its standard errors. The problem keeps the
+    steps that were found; one that has a grid of its own (finer steps fit worse) keeps what it had.
+
+    Args:
+        search: that found it.
+        whole: the model, by which nothing is missing.
+
+    Returns:
+        The model; what it leaves is as it was.
+    """
+    problem, fitter, settings = search.fitter.problem, search.fitter, search.fitter.settings.fit
+    for _ in range(settings.halvings):
+        last, steps = whole.last, problem.m
+        y = replace(problem, m=2 * steps).simulate([last.model])[0]
+        if search.late or y is None or np.max(np.abs(_shift(fitter, last, y)), initial=0.0) < settings.shifted:
+            break
+        problem.m = 2 * steps
+        finer, _ = _over_all(fitter, _last(search, last), search.fitter.settings.rest)
+        if finer.fitted < last.fitted - settings.alike:
+            problem.m = steps
+            break
+        whole = replace(whole, last=finer)
+    return whole
+
+
+def _shift(fitter: Fitter, fit: BoxFit, y: Array) -> Array:
+    """Return by how many standard errors the values of a fit would move where its run were ``y``."""
+    seen, level = fitter.parts.looked_at, fitter.ladder[fit.level]
+    covariance = fitter.covariance(fit, seen)
+    change = level.whiten(((y - fit.y) / fitter.problem.noise)[:, :, None])[seen].ravel()
+    moved = covariance @ (level.whiten(fit.J)[seen].reshape(len(change), -1).T @ change)
+    return np.asarray(moved / np.sqrt(np.maximum(np.diag(covariance), 1e-300)))
+
+
 def doubted(search: BoxSearch, whole: Whole, settings: RestSettings) -> Rest:
     """Return what is left of a model over all of the record: no disturbance where it has some shape.
 
@@ -105,14 +146,8 @@ def doubted(search: BoxSearch, whole: Whole, settings: RestSettings) -> Rest:
         )
     if predicted(fitter, fit, settings) > settings.driven:
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
-    gain, port = followed(fitter, fit, settings)
-    if gain > 0.0:
-        return replace(
-            rest, disturbed=False, reasons=(f"what is left follows from the motion at `{port}`, or from the time",)
-        )
+    if (law := dependence_of(fitter, fit, settings)) is not None:
+        return replace(rest, disturbed=False, reasons=(law.statement,))
     if label := stand_in(search, best, settings):
         return replace(rest, disturbed=False, reasons=(f"`{label}` takes away little of what is left at the ports",))
-    gain, name, time = beginning_of(fitter, fit, settings)
-    if gain > settings.begins:
-        return replace(rest, disturbed=False, reasons=(f"an effort at `{name}` begins or ends at about {time:.4g} s",))
     return rest

@@ -4,8 +4,7 @@ The autoregression that whitens innovations makes a fit efficient as long as wha
 it is the error of a law, whitening weighs the rare moments at which the law is worst, and gives away what it says of
 the rest. A fit in white innovations, weighed like white torques, is less efficient and needs neither: its standard
 errors hold whatever the colour (Newey and West). Where the two disagree by more than chance the first one's assumption
-is refuted (Hausman, Econometrica 46(6), 1978): sizes are then those of white innovations, and intervals hold both,
-unless predictions over many samples tell which of them is right.
+is refuted (Hausman, Econometrica 46(6), 1978): sizes are then those of white innovations, and intervals hold both.
 Where a model misses held-out data by far more than noise, intervals hold what free runs would ask for as well.
 """
 
@@ -15,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal, fit, jacobian
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, fit, jacobian
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.fit.spread import widened
+from orchestrator.diagnosis.fit.spread import widened, with_tolerances
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.inference.colour import colour_of
 from orchestrator.shared.inference.long_run import long_run_covariance
@@ -34,9 +33,8 @@ class Sized:
 
 
 def sized(
-    likelihood: RecordLikelihood, found: Fit, parts: Parts, effects: Sequence[Effect], levels: Sequence[float],
-    better: Callable[[Array, Array], bool] = lambda robust, efficient: False,
-) -> Sized:  # fmt: skip
+    likelihood: RecordLikelihood, found: Fit, parts: Parts, effects: Sequence[Effect], levels: Sequence[float]
+) -> Sized:
     """Return the fit of a model as it is reported: widened, and in white innovations where the colour misleads.
 
     Args:
@@ -45,8 +43,6 @@ def sized(
         parts: parts of the record.
         effects: of the model.
         levels: of process noise that the model may have, falling.
-        better: tells of the values of both weightings whether predictions over many samples are surely better with the
-            first. What the second says is refuted then, and no interval need hold it.
 
     Returns:
         The fit, and what the two weightings dispute.
@@ -57,7 +53,8 @@ def sized(
     white = anneal(likelihood, found.p, found.q, found.free, parts, levels, most=0)
     if not np.all(np.isfinite(white.z)):
         return Sized(efficient)
-    robust = widened(likelihood, _with_robust_errors(likelihood, white, parts.fitted), parts.fitted, effects, _refitted)
+    blocks = likelihood.settings.fit.blocks
+    robust = with_tolerances(likelihood, _with_robust_errors(likelihood, white, parts.fitted, blocks), effects)
     places = [entry.place for entry in found.free]
     change = robust.p[places] - efficient.p[places]
     chance = np.sqrt(np.diag(robust.covariance) + np.diag(efficient.covariance))
@@ -72,8 +69,6 @@ def sized(
         return Sized(replace(robust, colour=colour_of(robust.z, parts.fitted)))
     if not disputed:
         return Sized(efficient)
-    if better(robust.p, efficient.p):
-        return Sized(replace(robust, colour=colour_of(robust.z, parts.fitted)))
     covariance = robust.covariance + np.diag((0.5 * change) ** 2)
     colour = colour_of(robust.z, parts.fitted)
     return Sized(replace(robust, covariance=covariance, colour=colour), disputed)
@@ -131,13 +126,17 @@ def with_model_error(
     return replace(found, covariance=found.covariance + np.diag(beyond))
 
 
-def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -> Fit:
+def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice, blocks: int = 0) -> Fit:
     """Return a fit in white innovations with a covariance that holds whatever their colour.
+
+    Where blocks of the record disagree by more than that explains, it is as wide as they ask for: they are left out one
+    after the other (a jackknife of groups, in one step; MacKinnon and White, Journal of Econometrics 29(3), 1985).
 
     Args:
         likelihood: of the record.
         white: fitted with innovations that count as white.
         part: the samples that were fitted.
+        blocks: of the record that are compared; 0: none are.
     """
     colour = colour_of(white.z, part, 0)
     if not white.free or not colour.usable:
@@ -148,12 +147,17 @@ def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice) -
         return white
     scores = np.einsum("nck,nc->nk", J, colour.white(white.z, part))
     prior = np.diag([(entry.scale / entry.prior[1]) ** 2 if entry.prior else 0.0 for entry in white.free])
-    bread = np.linalg.pinv(np.einsum("nck,ncj->kj", J, J) + prior)
-    meat = long_run_covariance(scores) + prior
-    return replace(white, covariance=np.asarray(bread @ meat @ bread * np.outer(scales, scales)))
-
-
-def _refitted(
-    likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, iterations: int
-) -> Fit:  # fmt: skip
-    return _with_robust_errors(likelihood, fit(likelihood, start, q, free, parts, iterations, 0), parts.fitted)
+    squares = np.einsum("nck,ncj->nkj", J, J)
+    information = np.sum(squares, axis=0) + prior
+    bread = np.linalg.pinv(information)
+    covariance = bread @ (long_run_covariance(scores) + prior) @ bread
+    stretch = np.ones(len(scales))
+    if blocks:
+        groups = np.array_split(np.arange(len(scores)), blocks)
+        changes = [
+            np.linalg.pinv(information - np.sum(squares[rows], axis=0)) @ np.sum(scores[rows], axis=0)
+            for rows in groups
+        ]
+        jackknife = (blocks - 1.0) / blocks * np.sum(np.square(changes), axis=0)
+        stretch = np.sqrt(np.maximum(jackknife / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return replace(white, covariance=np.asarray(covariance * np.outer(stretch * scales, stretch * scales)))

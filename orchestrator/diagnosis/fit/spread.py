@@ -7,24 +7,21 @@ Nelder, Generalized Linear Models, 1989, ch. 9).
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit, log_prior
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit, log_prior
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.inference.colour import Colour
 
 Array = NDArray[np.float64]
-Refit = Callable[[RecordLikelihood, Array, float, Sequence[Free], Parts, int], Fit]
 
 
-def widened(
-    likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect], refit: Refit = fit
-) -> Fit:
+def widened(likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequence[Effect]) -> Fit:
     """Return a fit whose covariance allows for laws that are not exact.
 
     Args:
@@ -32,16 +29,30 @@ def widened(
         found: the fit to all of ``part``.
         part: the samples that were fitted.
         effects: those that the fit has; each says how far its law leaves the parameters undefined.
-        refit: how ``found`` was fitted, and its covariance found.
 
     Returns:
         The fit.
     """
     if not found.free:
         return found
-    stretch = np.sqrt(np.maximum(_block_ratios(likelihood, found, part, refit), 1.0))
-    names = likelihood.plant.names
-    covariance = found.covariance * np.outer(stretch, stretch)
+    stretch = np.sqrt(np.maximum(_block_ratios(likelihood, found, part), 1.0))
+    return with_tolerances(
+        likelihood, replace(found, covariance=found.covariance * np.outer(stretch, stretch)), effects
+    )
+
+
+def with_tolerances(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect]) -> Fit:
+    """Return a fit whose covariance allows for how far the effects' laws leave the parameters undefined.
+
+    Args:
+        likelihood: of the record.
+        found: the fit.
+        effects: those that it has.
+
+    Returns:
+        The fit.
+    """
+    names, covariance = likelihood.plant.names, found.covariance.copy()
     for effect in effects:
         for row, entry in enumerate(found.free):
             share = effect.tolerance.get(names[entry.place], 0.0)
@@ -85,7 +96,7 @@ def absent_at_times(
     return tuple(effect for effect in looked_at if gain_without(effect) > settings.surely_absent)
 
 
-def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Refit = fit) -> Array:
+def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice) -> Array:
     """Return, for each free parameter, the mean square of how far blocks lie from the whole, in standard errors.
 
     About one when the model is right.
@@ -94,9 +105,8 @@ def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice, refit: 
         likelihood: of the record.
         whole: the fit to all of ``part``.
         part: the samples that were fitted.
-        refit: how ``whole`` was fitted.
     """
-    blocks = [own for _, _, own in _block_fits(likelihood, whole, part, refit)]
+    blocks = [own for _, _, own in _block_fits(likelihood, whole, part)]
     places = [entry.place for entry in whole.free]
     squares = [(own.p[places] - whole.p[places]) ** 2 / np.maximum(np.diag(own.covariance), 1e-300) for own in blocks]
     return np.asarray(np.mean(squares, axis=0) * len(blocks) / (len(blocks) - 1))
@@ -108,9 +118,7 @@ def _in_colour(likelihood: RecordLikelihood, part: slice, found: Fit, colour: Co
     return value + log_prior(found.p, found.free) if np.isfinite(value) else -np.inf
 
 
-def _block_fits(
-    likelihood: RecordLikelihood, whole: Fit, part: slice, refit: Refit = fit
-) -> list[tuple[RecordLikelihood, slice, Fit]]:
+def _block_fits(likelihood: RecordLikelihood, whole: Fit, part: slice) -> list[tuple[RecordLikelihood, slice, Fit]]:
     """Return, for each block of ``part``, its own likelihood, where it lies in that, and the fit repeated on it."""
     settings = likelihood.settings.fit
     blocks = settings.blocks
@@ -122,6 +130,6 @@ def _block_fits(
     found = []
     for start, stop in itertools.pairwise(edges):
         own, block = likelihood.alone(slice(start, stop))
-        fitted = refit(own, whole.p, whole.q, free, Parts(block, block, block), settings.block_iterations)
+        fitted = fit(own, whole.p, whole.q, free, Parts(block, block, block), settings.block_iterations)
         found.append((own, block, fitted))
     return found

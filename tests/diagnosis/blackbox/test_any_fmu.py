@@ -11,7 +11,7 @@ from orchestrator.api.any_fmu import draft_map
 from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
-from orchestrator.diagnosis.blackbox.settings import BoxSettings, ProcessSettings
+from orchestrator.diagnosis.blackbox.settings import BoxSettings, FitterSettings, ProcessSettings
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import BoxCalibrationFound, BoxDiagnosisFound
@@ -204,6 +204,19 @@ def test_an_fmu_with_a_step_of_its_own_is_stepped_by_it(made):
     found.close()
     assert found.outcome.problem.m == 1
     assert any("step of its own" in note for note in found.outcome.warnings)
+
+
+def test_steps_are_finer_where_they_shift_what_is_well_known(made):
+    case, *files = made(CIRCUIT, ("input_delay",))
+    coarse = diagnose(*files, settings=BoxSettings(fit=FitterSettings(halvings=0)))
+    found = diagnose(*files)
+    coarse.close(), found.close()
+    assert found.outcome.problem.m > coarse.outcome.problem.m
+    off, before = (
+        max(abs(e.value - p) / e.standard_error for e, p in zip(r.outcome.parameters, case.parameters, strict=True))
+        for r in (found, coarse)
+    )
+    assert off < min(3.0, before)
 
 
 def test_a_second_record_shows_the_misfit_and_settings_are_followed(made, tmp_path):
