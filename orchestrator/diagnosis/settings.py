@@ -315,17 +315,6 @@ class HorizonSettings(Settings, frozen=True):
     ruled_by_noise: Annotated[float, setting("horizons below this [s] say little of skill: noise rules them")] = 0.1
 
 
-class ZeroSettings(Settings, frozen=True):
-    """The zero of another record's encoders, where a model's waves tell it."""
-
-    trials: Annotated[int, setting("zeros tried within the shortest wave: a sine is seen between them", ge=4)] = 8
-    halvings: Annotated[int, setting("steps, each half the one before, towards the best of them", ge=0)] = 10
-    most_trials: Annotated[int, setting("zeros tried at most, as each is a run of the predictor", ge=8)] = 400
-    sure: Annotated[float, setting("gain in log-likelihood from which it has moved: as of an effect above noise")] = (
-        22.0
-    )
-
-
 class ProofSettings(Settings, frozen=True):
     """The misfit on data that no fit has touched."""
 
@@ -336,7 +325,9 @@ class ProofSettings(Settings, frozen=True):
     ] = 0.02
     horizons: HorizonSettings = HorizonSettings()
     free_run: FreeRunSettings = FreeRunSettings()
-    zero: ZeroSettings = ZeroSettings()
+    moved_zero: Annotated[
+        float, setting("gain from which another record's zero has moved: an effect's above noise")
+    ] = 22.0
     first_guess: Annotated[int, setting("samples after which the filter's state is a fair first guess", ge=1)] = 20
 
 

@@ -18,6 +18,9 @@ from orchestrator.shared.inference.colour import colour_of
 
 Array = NDArray[np.float64]
 
+TRIALS, MOST_TRIALS = 8, 400  # zeros tried within the shortest wave, and in all
+HALVINGS = 10  # of the step between them, towards the best
+
 
 def moved_zero(likelihood: RecordLikelihood, p: Array, q: float) -> float:
     """Return by how much a record's zero has moved against the one that a model's waves count from.
@@ -30,7 +33,6 @@ def moved_zero(likelihood: RecordLikelihood, p: Array, q: float) -> float:
     Returns:
         The distance of the motor's encoder [rad]; 0.0 where the model has no wave, or the record does not tell.
     """
-    settings = likelihood.settings.proof.zero
     waves = _waves(likelihood.plant, p)
     if not waves:
         return 0.0
@@ -41,17 +43,17 @@ def moved_zero(likelihood: RecordLikelihood, p: Array, q: float) -> float:
         z = there.whitened(p, q)
         return there.log_likelihood(z, q, part, colour_of(z, part), p)
 
-    step = min(waves.values()) / settings.trials
-    reach = min(math.ceil(0.5 * max(waves.values()) / step), settings.most_trials // 2)
+    step = min(waves.values()) / TRIALS
+    reach = min(math.ceil(0.5 * max(waves.values()) / step), MOST_TRIALS // 2)
     best, most = max(((n * step, told(n * step)) for n in range(-reach, reach + 1)), key=lambda one: one[1])
-    for _ in range(settings.halvings):
+    for _ in range(HALVINGS):
         step *= 0.5
         nearer = ((zero, told(zero)) for zero in (best - step, best + step))
         best, most = max(((best, most), *nearer), key=lambda one: one[1])
     without = p.copy()
     without[list(waves)] = 0.0
     # A wave that this record has not would move to where it does least.
-    return best if most - max(told(0.0), told(0.0, without)) > settings.sure else 0.0
+    return best if most - max(told(0.0), told(0.0, without)) > likelihood.settings.proof.moved_zero else 0.0
 
 
 def _waves(plant: Plant, p: Array) -> dict[int, float]:
