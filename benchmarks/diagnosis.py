@@ -26,6 +26,7 @@ import numpy as np
 from benchmarks.harm import counted, harmed
 from orchestrator.diagnosis.diagnose import diagnose
 from orchestrator.diagnosis.outcome import Diagnosis
+from orchestrator.diagnosis.verdict.gain import CARRIERS
 from orchestrator.plants.bank import DRIVETRAIN_BANK
 from orchestrator.records.model_file import Model, default_model
 from tests.support import hidden_effects
@@ -99,14 +100,20 @@ def learned(diagnosis: Diagnosis) -> dict[str, Any]:
     return {"law": f"{law.argument} ({law.site})", "least": law.shrinks, "lacking": lacking, "left": left}
 
 
+def seen(case: Case, value: float, unit: str | None) -> float:
+    """Return a true value as a record shows it: in torques of a drive whose gain is taken for one."""
+    return value / float(case.truth["gain"]) if unit and unit.startswith(CARRIERS) else value
+
+
 def errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, float, bool]]:
     """Return (parameter, relative error, error in standard errors, inside the interval) of each size that was named."""
     rows = []
-    for short, value in case.truth["effects"].items():
+    for short, true in case.truth["effects"].items():
         name, parameter = RECOVERED.get(short, ("", ""))
         for effect in diagnosis.effects:
             if effect.name == name and parameter in effect.parameters:
                 estimate = effect.parameters[parameter]
+                value = true if short == "sat" else seen(case, true, estimate.unit)  # a limit is one of the request
                 off = abs(estimate.value) - abs(value)
                 low, high = estimate.interval
                 inside = low <= value <= high or low <= -value <= high  # a sign can be in the phase
@@ -118,7 +125,7 @@ def linear_errors(case: Case, diagnosis: Diagnosis) -> list[tuple[str, float, bo
     """Return (parameter, relative error, inside the interval) of each linear parameter."""
     rows = []
     for name, entry in diagnosis.parameters.items():
-        true = case.truth["linear"][name]
+        true: Any = seen(case, case.truth["linear"][name], entry.unit)
         assert entry.value is not None
         assert entry.interval is not None
         low, high = entry.interval

@@ -88,7 +88,11 @@ class FitSettings(Settings, frozen=True):
     ridge: Annotated[
         float, setting("added to the normal equations' diagonal: keeps blind directions solvable", gt=0)
     ] = 1e-9
+    astray: Annotated[
+        float, share("by which a step's gain may miss what was foretold; else derivatives are taken anew")
+    ] = 0.3
     enough: Annotated[float, setting("gain in log-likelihood below which a fit has converged")] = 0.05
+    nearly: Annotated[float, setting("and below which it nearly has: enough to choose between levels of noise")] = 0.5
     disputed: Annotated[
         float, setting("standard errors by which sizes may differ as innovations count as coloured or white")
     ] = 2.0
@@ -151,6 +155,7 @@ class SearchSettings(Settings, frozen=True):
         int, setting("candidates fitted in full: the right one was among them in development", ge=1)
     ] = 6
     worth: Annotated[float, share("least share of the best promise that a candidate must promise to be fitted")] = 0.03
+    followed: Annotated[float, share("of the best gain, from which other levels are tried: winners had half")] = 0.2
     least_promise: Annotated[float, setting("least promised gain for a fit: below, noise promises as much")] = 3.0
     penalty: Annotated[float, setting("log-likelihood that each further parameter must earn")] = 5.0
     pays: Annotated[float, setting("least gain of an effect where what is left is noise, of whatever colour")] = 10.0
@@ -170,9 +175,7 @@ class SearchSettings(Settings, frozen=True):
     most_in_a_repeat: Annotated[
         int, setting("effects in a search with exchanged parts: one part explains few", ge=0)
     ] = 2
-    rescued: Annotated[float, setting("gain from which a candidate that fails to decide is fitted to both parts")] = (
-        60.0
-    )
+    rescued: Annotated[float, setting("gain from which one that fails to decide is fitted to both parts")] = 60.0
 
 
 class RemainderSettings(Settings, frozen=True):

@@ -1,6 +1,12 @@
-"""How many cores this process may use."""
+"""How many cores this process may use, and work that is spread over them."""
 
 import os
+from collections.abc import Callable, Sequence
+from threading import Semaphore, Thread
+from typing import TypeVar
+
+T = TypeVar("T")
+R = TypeVar("R")
 
 
 def usable_cores() -> int:
@@ -12,3 +18,56 @@ def usable_cores() -> int:
     if hasattr(os, "sched_getaffinity"):  # not on every system
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+_SPARE = Semaphore(usable_cores() - 1)
+
+
+def spread(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """Return ``function`` of each item, in order; threads help where cores of this process are idle.
+
+    Work that is spread may spread its own: what helps is counted over the whole process. After an error no item is
+    begun any more.
+
+    Args:
+        function: spends its time outside the interpreter's lock.
+        items: what it is called with.
+
+    Returns:
+        The results.
+
+    Raises:
+        BaseException: the first that ``function`` has raised.
+    """
+    waiting = list(enumerate(items))[::-1]
+    results: dict[int, R] = {}
+    errors: list[BaseException] = []
+
+    def work() -> None:
+        while not errors:
+            try:
+                place, item = waiting.pop()
+            except IndexError:
+                return
+            try:
+                results[place] = function(item)
+            except BaseException as error:
+                errors.append(error)
+
+    def help_out() -> None:
+        try:
+            work()
+        finally:
+            _SPARE.release()
+
+    helpers: list[Thread] = []
+    while len(helpers) < len(waiting) - 1 and _SPARE.acquire(blocking=False):
+        helpers.append(Thread(target=help_out, daemon=True))
+    for helper in helpers:
+        helper.start()
+    work()
+    for helper in helpers:
+        helper.join()
+    if errors:
+        raise errors[0]
+    return [results[place] for place in range(len(items))]

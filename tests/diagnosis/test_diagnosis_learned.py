@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.fit.fitting import Free, Parts, fit
+from orchestrator.diagnosis.fit.fitting import Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.proof.clocked import cycle_of
 from orchestrator.diagnosis.proof.learned import formula_of, knots_of, learned_law
 from orchestrator.plants.learned import (

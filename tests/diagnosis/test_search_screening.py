@@ -105,7 +105,7 @@ def test_a_ripples_period_is_found_by_the_scan() -> None:
 def screen_of(likelihood, free=()):
     model = fit(likelihood, likelihood.nominal, 0.01, free, PARTS)
     white = colour_of(model.z, PARTS.fitted, 0)  # so that gains can be computed by hand
-    return Screen(likelihood, model, PARTS, white), scene_of(likelihood, model), model
+    return Screen(likelihood, model, PARTS).coloured(white), scene_of(likelihood, model), model
 
 
 def test_amplitudes_come_from_regression() -> None:
@@ -165,7 +165,11 @@ def test_what_free_parameters_explain_promises_nothing() -> None:
     (held,) = screen_of(likelihood)[0].guesses(BANK["quadratic_drag@load"], screen_of(likelihood)[1])
     freed = fit(likelihood, likelihood.nominal, 0.01, search.linear(), PARTS)
     white = colour_of(freed.z, PARTS.fitted, 0)
-    found = Screen(likelihood, freed, PARTS, white).guesses(BANK["quadratic_drag@load"], scene_of(likelihood, freed))
+    found = (
+        Screen(likelihood, freed, PARTS)
+        .coloured(white)
+        .guesses(BANK["quadratic_drag@load"], scene_of(likelihood, freed))
+    )
     assert held.gain > 4.0 * (found[0].gain if found else 0.0)
 
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
+from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.passes import _harm_over_fewer, _is_weak, _larger_misfit, honest
 from orchestrator.diagnosis.proof import horizons as proof_horizons
@@ -24,6 +25,7 @@ from orchestrator.plants.known.drivetrain import PLANT
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.model_file import default_model
 from orchestrator.shared.inference.long_run import long_run_covariance
+from orchestrator.shared.inference.normal import of_many
 from tests.support.short_records import SETTINGS, axis_likelihood, drivetrain_likelihood
 from tests.support.small_search import search_of
 
@@ -46,6 +48,12 @@ def test_white_innovations_have_nothing_to_dispute() -> None:
     assert np.array_equal(same.fit.p, found.p)
     robust = _with_robust_errors(likelihood, found, parts.fitted)
     assert robust.standard_error(free[0].place) == pytest.approx(found.standard_error(free[0].place), rel=1.0)
+
+
+def test_the_largest_of_many_is_held_against_a_higher_bar() -> None:
+    assert of_many(2.0, 1) == pytest.approx(2.0)
+    assert of_many(2.0, 0) == pytest.approx(2.0)
+    assert of_many(1.959964, 10) == pytest.approx(2.807034, abs=1e-5)  # two-sided 5 % over ten: 0.5 %
 
 
 def test_an_interval_holds_what_free_runs_ask_for() -> None:

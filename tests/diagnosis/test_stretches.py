@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
 from orchestrator.diagnosis.fit.rate import analysed
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import encoder_noise
 from orchestrator.diagnosis.fit.sizes import _is_less_sure, _with_robust_errors
+from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.fit.spread import absent_at_times, widened
 from orchestrator.diagnosis.fit.together import series
 from orchestrator.diagnosis.proof.free_run import free_run

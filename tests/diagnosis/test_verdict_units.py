@@ -9,7 +9,8 @@ import pytest
 
 from orchestrator.diagnosis import passes as rules
 from orchestrator.diagnosis import verdict
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, fit, split
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit, split
+from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.outcome import Named
 from orchestrator.diagnosis.passes import _growth, _left, passes
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep

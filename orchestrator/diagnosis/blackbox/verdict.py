@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
 from orchestrator.diagnosis.blackbox.steps import labels
@@ -91,6 +92,7 @@ def settled_names(search: BoxSearch, best: BoxFit) -> tuple[BoxFit, tuple[tuple[
     Returns:
         The model, and the labels for each of its effects in their order.
     """
+    best = _alone(search, best)
     for _ in range(1 + len(best.model.effects)):
         beside = [_beside(search, best, effect) for effect in best.model.effects]
         better = [fit for near in beside for fit in near.values() if search.score(fit) > search.score(best)]
@@ -108,6 +110,24 @@ def settled_names(search: BoxSearch, best: BoxFit) -> tuple[BoxFit, tuple[tuple[
                 others = (*others, last.label)
         found.append(others)
     return best, tuple(found)
+
+
+def _alone(search: BoxSearch, best: BoxFit) -> BoxFit:
+    """Return the fit of one effect that does better than several: theirs may be the way to where it is found.
+
+    What stood beside the first effect is fitted alone, from the parameters and the noise of the best model.
+    """
+    if len(best.model.effects) < 2:
+        return best
+    first = [fit for s in (*search.earlier, *search.steps) if not s.before.model.effects for fit in s.tried]
+    first.sort(key=search.score, reverse=True)
+    tried: dict[str, BoxFit | None] = {}
+    for fit in first:
+        effect, values = fit.model.effects[-1], fit.model.values[-1]
+        if effect.label not in tried and effect.label not in labels(best) and len(tried) < search.settings.rivals:
+            tried[effect.label] = search.fitter.fit(BoxModel(best.model.p).extended(effect, values), best.level)
+    found = [search.fitter.settled(fit) for fit in tried.values() if fit is not None]
+    return max([best, *found], key=search.score)
 
 
 def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, BoxFit]:

@@ -144,7 +144,9 @@ def doubted(search: BoxSearch, whole: Whole, settings: RestSettings) -> Rest:
         return replace(
             rest, disturbed=False, reasons=(f"{100.0 * rest.share:.2g} % of the drive is left at the ports",)
         )
-    if predicted(fitter, fit, settings) > settings.driven:
+    # The error of a solver follows from the drive; effects leave it where it was.
+    asked = not best.model.effects or rest.share > settings.solver
+    if asked and predicted(fitter, fit, settings) > settings.driven:
         return replace(rest, disturbed=False, reasons=("what is left follows from the drive",))
     if (law := dependence_of(fitter, fit, settings)) is not None:
         return replace(rest, disturbed=False, reasons=(law.statement,))

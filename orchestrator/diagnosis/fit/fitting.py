@@ -7,23 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.slope import Free, Slope, taken
 from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.colour import ORDERS, WHITE, Colour, colour_of
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
 from orchestrator.shared.inference.normal import NORMAL_95
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Free:
-    """A parameter that a fit may change: its place in ``p``, scale, bounds and prior (mean, standard deviation)."""
-
-    place: int
-    scale: float
-    minimum: float
-    maximum: float
-    prior: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -38,6 +29,7 @@ class Fit:
     fitted: float  # log-likelihood of the part that was fitted, prior included
     validated: float  # log-likelihood of the part after it
     colour: Colour = WHITE  # of the innovations of the part that was fitted
+    slope: Slope | None = None  # near it, while fits go on from here
 
     def rank(self, parts: "Parts") -> float:
         """Return what fits of one model are chosen by: the log-likelihood of all that it was fitted to or decides.
@@ -146,16 +138,7 @@ def jacobian(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Fr
     Returns:
         The derivative.
     """
-    columns = np.empty((*z[part].shape, len(free)))
-    until = likelihood.over(min(likelihood.stop, part.stop))
-    for n, entry in enumerate(free):
-        moved = p.copy()
-        step = likelihood.settings.fit.difference * entry.scale
-        if moved[entry.place] + step > entry.maximum:
-            step = -step
-        moved[entry.place] += step
-        columns[:, :, n] = (until.whitened(moved, q)[part] - z[part]) / (step / entry.scale)
-    return columns
+    return taken(likelihood, p, q, free, z, part).columns
 
 
 Point = tuple[Array, Array]  # parameters, innovations
@@ -164,12 +147,13 @@ Point = tuple[Array, Array]  # parameters, innovations
 @np.errstate(over="ignore", invalid="ignore")  # a step into instability is seen by its cost
 def fit(
     likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts,
-    iterations: int | None = None, most: int = ORDERS[-1], bar: float = -np.inf,
+    iterations: int | None = None, most: int = ORDERS[-1], bar: float = -np.inf, known: Slope | None = None,
+    exact: bool = True,
 ) -> Fit:  # fmt: skip
     """Maximise the likelihood of ``parts.fitted`` over the ``free`` parameters at process noise ``q``.
 
     Covariance and colour of the innovations are re-estimated at every iteration, so that the determinant of what an
-    autoregression leaves of them is minimised.
+    autoregression leaves of them is minimised. The derivative is taken anew where steps gain less than it foretells.
 
     Args:
         likelihood: of the record.
@@ -180,42 +164,60 @@ def fit(
         iterations: most Levenberg-Marquardt steps; None: as in the settings.
         most: largest order of the autoregression; 0: innovations count as white.
         bar: rank that the fit must reach: it is given up where steps as large as its last would not get there.
+        known: derivative near ``start``; None: it is taken there.
+        exact: the fit is to end where a derivative taken there foretells no gain; else where steps gain little.
 
     Returns:
         The fit.
     """
     settings, part = likelihood.settings.fit, parts.fitted
+    enough = settings.enough if exact else settings.nearly
     scales = np.array([f.scale for f in free])
     seen: list[Fit] = []  # at every point of the descent
+    rows, inner = reaching_back(part, ORDERS[-1])
+    slope, held, foretold = known, known, 0.0
 
     def linearise(point: Point) -> Linearised[Point] | None:
+        nonlocal slope, held
         p, z = point
         colour = colour_of(z, part, most)
         seen.append(_fit_at(likelihood, p, q, z, free, parts, colour))
         if not free or not colour.usable:
             return None
         residual = colour.white(z, part).ravel()
-        wide, inner = reaching_back(part, colour.order)
-        J = colour.white(jacobian(likelihood, p, q, free, z, wide), inner).reshape(residual.size, len(free))
+        slope = taken(likelihood, p, q, free, z, rows) if slope is None else slope.moved(p, z, free)
+        held = near = slope
+        J = colour.white(near.columns, inner).reshape(residual.size, len(free))
         if not np.all(np.isfinite(J)):
             return None
         pull = np.array([(p[f.place] - f.prior[0]) / f.prior[1] if f.prior else 0.0 for f in free])
         weight = np.array([f.scale / f.prior[1] if f.prior else 0.0 for f in free])
-        hessian = J.T @ J + np.diag(weight**2)
-        seen[-1] = replace(seen[-1], covariance=np.asarray(np.linalg.pinv(hessian) * np.outer(scales, scales)))
+        hessian, gradient = J.T @ J + np.diag(weight**2), J.T @ residual + weight * pull
+        seen[-1] = replace(
+            seen[-1], covariance=np.asarray(np.linalg.pinv(hessian) * np.outer(scales, scales)), slope=near
+        )
 
         def moved(step: Array) -> tuple[Point, float]:
+            nonlocal foretold
             there = _moved(p, step * scales, free)
+            done = np.array([there[f.place] - p[f.place] for f in free]) / scales
+            foretold = float(-gradient @ done - 0.5 * done @ hessian @ done)
             z_there = likelihood.whitened(there, q)
             new = colour.white(z_there, part).ravel()
             return (there, z_there), float(0.5 * new @ new - log_prior(there, free))
 
         cost = 0.5 * residual @ residual - log_prior(p, free)
-        return Linearised(hessian, J.T @ residual + weight * pull, float(cost), moved)
+        return Linearised(hessian, gradient, float(cost), moved, near.taken)
 
     def converged(gain: float, cost: float) -> bool:
+        nonlocal slope
+        sure = (slope is not None and slope.taken) or (not exact and foretold < enough)
         risen = max(gain, seen[-1].rank(parts) - seen[-2].rank(parts)) if len(seen) > 1 else np.inf
-        return gain < settings.enough or seen[-1].rank(parts) + settings.iterations * risen < bar
+        if seen[-1].rank(parts) + settings.iterations * risen < bar:
+            return True
+        if gain < enough or abs(gain - foretold) > settings.astray * foretold:
+            slope = None
+        return gain < enough and sure
 
     damping = Damping(settings.damping, settings.damping, lambda hessian: settings.ridge, settings.patience)
     first = np.array(start, dtype=float)
@@ -224,6 +226,7 @@ def fit(
         settings.iterations if iterations is None else iterations, converged,
     )  # fmt: skip
     last = _fit_at(likelihood, p, q, z, free, parts, colour_of(z, part, most))
+    last = replace(last, slope=held.moved(p, z, free) if held else None)
     seen.append(replace(last, covariance=seen[-1].covariance) if seen else last)
     return max(seen, key=lambda found: found.fitted)
 
@@ -245,11 +248,17 @@ def settled(likelihood: RecordLikelihood, start: Array, q: float, free: Sequence
     Returns:
         The fit.
     """
-    direct = fit(likelihood, start, q, free, parts)
-    white = fit(likelihood, start, q, free, parts, most=0)
+    first = np.array(start, dtype=float)
+    known = None
+    if free:
+        rows, _ = reaching_back(parts.fitted, ORDERS[-1])
+        known = taken(likelihood, first, q, free, likelihood.whitened(first, q), rows)
+    direct, white = spread(
+        lambda most: fit(likelihood, first, q, free, parts, most=most, known=known, exact=False), (ORDERS[-1], 0)
+    )
     if not np.all(np.isfinite(white.z)):
         return direct
-    again = fit(likelihood, white.p, q, free, parts)
+    again = fit(likelihood, white.p, q, free, parts, known=white.slope, exact=False)
     colour = colour_of(white.z, parts.fitted)
     there = replace(_fit_at(likelihood, white.p, q, white.z, free, parts, colour), covariance=white.covariance)
     return max((direct, again, there), key=lambda found: found.rank(parts))
@@ -284,10 +293,7 @@ def anneal(
     likelihood: RecordLikelihood, start: Array, q: float, free: Sequence[Free], parts: Parts, levels: Sequence[float],
     most: int = ORDERS[-1],
 ) -> Fit:  # fmt: skip
-    """Fit at ``q``, then at other levels of process noise, in long strides and then in short ones.
-
-    Long strides down go on where the likelihood of the fitted part falls: a colour that was estimated at a high level
-    holds part of what a right model explains at a low one.
+    """Fit at ``q``, then at other levels of process noise, and once more, to the end, at the best.
 
     Args:
         likelihood, start, free, parts: as in :func:`fit`.
@@ -298,12 +304,33 @@ def anneal(
     Returns:
         The fit.
     """
+    first = settled(likelihood, start, q, free, parts) if most else fit(likelihood, start, q, free, parts, most=0)
+    return followed(likelihood, first, parts, levels, most)
+
+
+def followed(
+    likelihood: RecordLikelihood, first: Fit, parts: Parts, levels: Sequence[float], most: int = ORDERS[-1]
+) -> Fit:
+    """Fit at other levels of process noise, in long strides and then in short ones, and to the end at the best.
+
+    Long strides down go on where the likelihood of the fitted part falls: a colour that was estimated at a high level
+    holds part of what a right model explains at a low one.
+
+    Args:
+        likelihood: of the record.
+        first: fit at one of the levels.
+        parts: of the record: fitted, deciding, held out.
+        levels: the ladder of process noise, falling.
+        most: largest order of the autoregression of innovations; 0: they count as white.
+
+    Returns:
+        The fit.
+    """
 
     def at_level(fitted: Fit) -> Fit:
         return replace(fitted, validated=decided(likelihood, fitted, parts, levels)) if most and parts.apart else fitted
 
-    first = settled(likelihood, start, q, free, parts) if most else fit(likelihood, start, q, free, parts, most=0)
-    at, best = list(levels).index(q), at_level(first)
+    at, best, free = list(levels).index(first.q), at_level(first), first.free
     known = {at}
     settings = likelihood.settings.fit
     for stride in settings.strides:
@@ -316,12 +343,16 @@ def anneal(
                     misses += 1
                     continue
                 known.add(place)
-                tried = at_level(fit(likelihood, best.p, levels[place], free, parts, most=most, bar=best.rank(parts)))
-                if tried.rank(parts) > best.rank(parts):
+                rank, q = best.rank(parts), levels[place]
+                tried = at_level(fit(likelihood, best.p, q, free, parts, most=most, bar=rank, exact=False))
+                if tried.rank(parts) > rank:
                     best, at, misses = tried, place, 0
                 else:
                     misses += 1
-    return best
+    if free:
+        last = at_level(fit(likelihood, best.p, best.q, free, parts, most=most))
+        best = max(best, last, key=lambda found: found.rank(parts))
+    return replace(best, slope=None)
 
 
 def decided(likelihood: RecordLikelihood, best: Fit, parts: Parts, levels: Sequence[float]) -> float:

@@ -136,6 +136,11 @@ class RecordLikelihood:
         """Let every run of the predictor from now on, in whatever thread, raise ``CancelledError``."""
         self._halted.set()
 
+    @property
+    def halted(self) -> bool:
+        """Tell whether :meth:`halt` has been called."""
+        return self._halted.is_set()
+
     def innovations(self, p: Array, q: float) -> tuple[Array, Array]:
         """Return raw innovations (stop, 2) and corrected states (stop, 8).
 

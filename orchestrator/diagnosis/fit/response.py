@@ -64,7 +64,7 @@ def back_propagated(response: ErrorResponse, raw: Array) -> Array:
     return np.asarray(_adjoint(np.ascontiguousarray(e), response.F, response.B, response.W))
 
 
-@kept()
+@kept(nogil=True)
 def _adjoint(e: Array, F: Array, B: Array, W: Array) -> Array:
     n = e.shape[0]
     out = np.zeros((n, B.shape[1]))
@@ -75,7 +75,7 @@ def _adjoint(e: Array, F: Array, B: Array, W: Array) -> Array:
     return out
 
 
-@kept()
+@kept(nogil=True)
 def filtered(basis: Array, F: Array, column: Array, W: Array) -> Array:
     """Return (n, channels, k): the whitened innovations that a torque along each basis function would cause.
 

@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 STEADY = 1e-12  # relative change of gains from sample to sample at which they stay as they are
 
 
-@kept()
+@kept(nogil=True)
 def riccati(A: Array, C: Array, Q: Array, R: Array, P: Array, gains: Array, roots: Array) -> None:
     """Fill the filter gains (n, states, channels) and inverse Cholesky factors of the innovations' covariance.
 

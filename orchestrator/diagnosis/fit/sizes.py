@@ -20,6 +20,7 @@ from orchestrator.diagnosis.fit.spread import widened, with_tolerances
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.inference.colour import colour_of
 from orchestrator.shared.inference.long_run import long_run_covariance
+from orchestrator.shared.inference.normal import of_many
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def sized(
     places = [entry.place for entry in found.free]
     change = robust.p[places] - efficient.p[places]
     chance = np.sqrt(np.diag(robust.covariance) + np.diag(efficient.covariance))
-    far = np.abs(change) > likelihood.settings.fit.disputed * chance
+    far = np.abs(change) > of_many(likelihood.settings.fit.disputed, len(places)) * chance
     disputed = tuple(
         likelihood.plant.names[place]
         for place, bad in zip(places, far, strict=True)

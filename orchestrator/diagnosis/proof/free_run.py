@@ -20,6 +20,7 @@ from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.settings import FreeRunSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.predictor import FINER, coarse_runner_of, runs_coarsely
+from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
 from pyfmu_sources.drive_request import UNASKED
 
@@ -206,7 +207,8 @@ def _answers(
     outputs: Callable[[Array], Array], start: Array, out: Array, free: tuple[int, ...], steps: Sequence[float],
     plant: Plant,
 ) -> Array:  # fmt: skip
-    moved = [outputs(_followed(plant, _nudged(start, place, step))) for place, step in zip(free, steps, strict=True)]
+    nudged = [_followed(plant, _nudged(start, place, step)) for place, step in zip(free, steps, strict=True)]
+    moved = spread(outputs, nudged)
     return np.column_stack([((new - out) / step).ravel() for new, step in zip(moved, steps, strict=True)])
 
 

@@ -15,6 +15,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.proof.free_run import FreeRun, free_run, simulate
 from orchestrator.diagnosis.proof.misfit import segments
 from orchestrator.diagnosis.settings import HorizonSettings
+from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.long_run import long_run_covariance
 from orchestrator.shared.results.diagnose import HorizonFound
 
@@ -64,8 +65,8 @@ class Horizons:
             + settings.of_noise * self.noise
         )
         worse = np.any(~(self.errors <= most), axis=1)
-        for row, (change, spread) in enumerate(self._changes_over(other)):
-            worse[row] &= not change <= settings.sure * spread
+        for row, (change, scatter) in enumerate(self._changes_over(other)):
+            worse[row] &= not change <= settings.sure * scatter
         if chance is not None:
             for row, (mine, theirs) in enumerate(zip(self.runs, other.runs, strict=True), start=len(self.squares)):
                 if worse[row]:
@@ -216,16 +217,18 @@ def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> H
         plain.append(np.sqrt(np.mean(moved, axis=0)))
         squares.append(ran)
     none = np.full(m, np.nan)
+
+    def closest(rows: slice) -> tuple[FreeRun, slice]:
+        return free_run(plant, p, states[rows.start], signals, rows, proof.free_run), rows
+
     pieces = segments(part, signals, proof)
     runs: list[tuple[tuple[FreeRun, slice], ...]] = []
     if len(pieces) > 1:
-        runs.append(tuple((free_run(plant, p, states[piece.start], signals, piece, proof.free_run), piece)
-                          for piece in pieces[: settings.most_segments]))  # fmt: skip
+        runs.append(tuple(spread(closest, pieces[: settings.most_segments])))
         labels.append(f"{proof.segment:g} s")
         errors.append(np.sqrt(np.mean(np.square([run.rms[:m] for run, _ in runs[0]]), axis=0)))
         plain.append(none)
-    runs.append(tuple((free_run(plant, p, states[rows.start], signals, rows, proof.free_run), rows)
-                      for rows in stretches))  # fmt: skip
+    runs.append(tuple(spread(closest, stretches)))
     rows_of = [rows.stop - rows.start for _, rows in runs[-1]]
     whole = np.sqrt(np.average([run.rms[:m] ** 2 for run, _ in runs[-1]], axis=0, weights=rows_of))
     spreads = [np.var(signals.y[rows, :m], axis=0) for _, rows in runs[-1]]

@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts
+from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.fit.spread import widened
 from orchestrator.diagnosis.outcome import LearnedLaw
 from orchestrator.diagnosis.proof.clocked import cycle_of
@@ -43,6 +44,7 @@ from orchestrator.plants.learned import (
     names,
     with_law,
 )
+from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.normal import NORMAL_95
 
 Array = NDArray[np.float64]
@@ -202,7 +204,8 @@ def _begun_better(wide: RecordLikelihood, fitted: Fit, parts: Parts) -> Fit:
 
     for _ in range(2):
         times = np.linspace(h * parts.fitted.start, h * parts.fitted.stop, wide.settings.learned.refined + 2)[1:-1]
-        fitted = annealed(wide, at(max(times, key=likelihood_of)), fitted.q, fitted.free, parts, ())
+        likeliest = times[int(np.argmax(spread(likelihood_of, times.tolist())))]
+        fitted = annealed(wide, at(likeliest), fitted.q, fitted.free, parts, ())
     return fitted
 
 

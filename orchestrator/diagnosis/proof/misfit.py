@@ -1,6 +1,7 @@
 """The misfit of models on a part of a record that no fit has touched: rms of free runs against the measurement."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +9,9 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.outcome import Misfit
-from orchestrator.diagnosis.proof.free_run import free_run
+from orchestrator.diagnosis.proof.free_run import FreeRun, free_run
 from orchestrator.diagnosis.settings import ProofSettings
+from orchestrator.shared.cores import spread
 
 Array = NDArray[np.float64]
 
@@ -56,9 +58,14 @@ def held_out_misfit(
     rows = []
     for name, p in stages:
         _, states = whole.innovations(p, q)
-        squares = [free_run(plant, p, states[s.start], signals, s, settings.free_run).rms ** 2 for s in runs]
-        rows.append((name, np.sqrt(np.mean(squares, axis=0))))
+        found = spread(partial(_segment, likelihood, p, states), runs)
+        rows.append((name, np.sqrt(np.mean([run.rms**2 for run in found], axis=0))))
     return tuple(
         Misfit(signal, unit, float(signals.noise[n]), tuple((name, float(rms[n])) for name, rms in rows))
         for n, signal in enumerate(plant.encoders[: signals.channels])
     )
+
+
+def _segment(likelihood: RecordLikelihood, p: Array, states: Array, part: slice) -> FreeRun:
+    settings = likelihood.settings.proof.free_run
+    return free_run(likelihood.plant, p, states[part.start], likelihood.signals, part, settings)

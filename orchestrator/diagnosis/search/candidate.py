@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Free, Parts, anneal
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, settled
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.settings import SearchSettings
 from orchestrator.plants.effects import Effect
 
@@ -46,6 +47,21 @@ def annealed(
         The fit.
     """
     return anneal(likelihood, start, q, free, parts, ladder(likelihood.settings.levels, effects, q))
+
+
+def best_settled(
+    likelihood: RecordLikelihood, starts: Sequence[Array], q: float, free: Sequence[Free], parts: Parts
+) -> Fit:
+    """Fit at one level of process noise from several starts; starts that lead to one optimum are followed once.
+
+    Args:
+        likelihood, q, free, parts: as in :func:`annealed`.
+        starts: (parameters,) to start from, each.
+
+    Returns:
+        The best fit.
+    """
+    return max((settled(likelihood, p, q, free, parts) for p in starts), key=lambda found: found.rank(parts))
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ Fits run in threads, one per core; the predictor runs outside the interpreter's 
 """
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, field, replace
 from threading import Lock
 from typing import TypeVar
@@ -12,12 +12,12 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Parts
-from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed
+from orchestrator.diagnosis.fit.fitting import Parts, followed
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, best_settled, ladder
 from orchestrator.diagnosis.search.model_space import ModelSpace
 from orchestrator.diagnosis.search.screening import Guess
 from orchestrator.plants.effects import Effect, Scene
-from orchestrator.shared.cores import usable_cores
+from orchestrator.shared.cores import spread
 from orchestrator.shared.stopwatch import Stopwatch
 
 Array = NDArray[np.float64]
@@ -90,20 +90,18 @@ class Fits(ModelSpace):
         effects = tuple(effect if e is simpler else e for e in source.effects)
         values = {short: float(source.fit.p[place]) for short, place in simpler.places(self.plant).items()}
         bare = self.without(source.fit.p, simpler)
-        best: Fit | None = None
-        for start in effect.refine(values, scene):
-            p = effect.put(self.plant, bare, start, self.refitted)
-            fitted = annealed(self.likelihood, p, source.fit.q, self.free(effects, scene), self.parts, effects)
-            if best is None or fitted.rank(self.parts) > best.rank(self.parts):
-                best = fitted
+        starts = [effect.put(self.plant, bare, start, self.refitted) for start in effect.refine(values, scene)]
         self.tick(effect.label)
-        if best is None:
+        if not starts:
             return None
+        first = best_settled(self.likelihood, starts, source.fit.q, self.free(effects, scene), self.parts)
+        levels = ladder(self.likelihood.settings.levels, effects, source.fit.q)
+        best = followed(self.likelihood, first, self.parts, levels)
         final = {short: float(best.p[place]) for short, place in effect.places(self.plant).items()}
         return self.candidate(effects, best) if effect.plausible(final) else None
 
-    def extend(self, current: Candidate, effect: Effect, guesses: Guesses, scene: Scene) -> Candidate:
-        """Return ``current`` with one more effect: the best of the fits from the guesses.
+    def begin(self, current: Candidate, effect: Effect, guesses: Guesses, scene: Scene) -> Candidate:
+        """Return ``current`` with one more effect: the best of the fits from the guesses, at its level of noise.
 
         Args:
             current: the model to build on.
@@ -119,9 +117,26 @@ class Fits(ModelSpace):
             return self.hidden
         free = self.free(effects, scene)
         starts = [effect.put(self.plant, current.fit.p, guess.values, self.refitted) for guess in guesses]
-        fits = [annealed(self.likelihood, p, current.fit.q, free, self.parts, effects) for p in starts]
-        self.tick(effect.label)
-        return self.candidate(effects, max(fits, key=lambda fitted: fitted.rank(self.parts)))
+        return self.candidate(effects, best_settled(self.likelihood, starts, current.fit.q, free, self.parts))
+
+    def follow(self, begun: Candidate, current: Candidate, least: float) -> Candidate:
+        """Return a candidate fitted down the ladder of process noise; as it is where it has gained too little for that.
+
+        Args:
+            begun: fitted at the level of ``current``.
+            current: the model to build on.
+            least: gain from which it is followed.
+
+        Returns:
+            The candidate.
+        """
+        self.tick(begun.effects[-1].label)
+        if begun is self.hidden:
+            return begun
+        if begun.gain_over(current) < least:
+            return self.candidate(begun.effects, replace(begun.fit, slope=None))
+        levels = ladder(self.likelihood.settings.levels, begun.effects, current.fit.q)
+        return self.candidate(begun.effects, followed(self.likelihood, begun.fit, self.parts, levels))
 
     def reduced(self, current: Candidate, scene: Scene, effect: Effect) -> Candidate:
         """Return ``current`` without one of its effects: fitted again from there, or as it was found on the way.
@@ -170,18 +185,22 @@ class Fits(ModelSpace):
         def in_time(item: T) -> R:
             if self.allowed.over:
                 raise TimeUpError
-            return function(item)
-
-        with ThreadPoolExecutor(usable_cores()) as pool:
             try:
-                return list(pool.map(in_time, items))
-            except TimeUpError:
-                pool.shutdown(cancel_futures=True)
+                return function(item)
+            except CancelledError:
                 raise
             except BaseException:
                 self.likelihood.halt()  # an interrupt need not wait for the fits that run
-                pool.shutdown(cancel_futures=True)
                 raise
+
+        try:
+            return spread(in_time, items)
+        except TimeUpError:
+            raise
+        except BaseException:
+            if not self.likelihood.halted:  # the interrupt came while this thread waited for another
+                self.likelihood.halt()
+            raise
 
     def tick(self, what: str) -> None:
         """Tell of one more fit.

@@ -82,7 +82,7 @@ def _gain_table(response: ErrorResponse, column: int, points: int) -> tuple[Arra
     return np.array(gains), float(grid[1])
 
 
-@kept(parallel=False)
+@kept(parallel=False, nogil=True)
 def _scan(effort: Array, theta: Array, omega: Array, cycles: Array, gains: Array, spacing: float) -> Array:
     """Return the gain in log-likelihood of a line at each number of cycles per revolution."""
     power = np.empty(cycles.size)

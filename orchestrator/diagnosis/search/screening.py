@@ -5,6 +5,7 @@ as well is projected out (their Jacobian is known from the fit), and the rest is
 """
 
 import itertools
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, jacobian, reaching_back
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.plants.effects import Effect, Scene
-from orchestrator.shared.inference.colour import Colour
+from orchestrator.shared.inference.colour import ORDERS, Colour
 
 Array = NDArray[np.float64]
 
@@ -29,14 +30,32 @@ class Guess:
 class Screen:
     """Screens effects against one fitted model."""
 
-    def __init__(self, likelihood: RecordLikelihood, model: Fit, parts: Parts, colour: Colour | None = None) -> None:
-        """Take the Jacobian of the model's free parameters once; ``colour`` (or the model's) whitens innovations."""
+    def __init__(self, likelihood: RecordLikelihood, model: Fit, parts: Parts) -> None:
+        """Take the Jacobian of the model's free parameters once; the model's colour whitens innovations."""
         self._plant, self._model, self._part = likelihood.plant, model, parts.fitted
         self._likelihood = likelihood.over(min(likelihood.stop, parts.fitted.stop))  # nothing else is looked at
-        colour = colour or model.colour
-        self._colour = colour
-        wide, inner = reaching_back(parts.fitted, colour.order)
-        J = colour.white(jacobian(likelihood, model.p, model.q, model.free, model.z, wide), inner)
+        self._wide, self._inner = reaching_back(parts.fitted, ORDERS[-1])
+        self._columns = jacobian(likelihood, model.p, model.q, model.free, model.z, self._wide)
+        self._ran: dict[tuple[str, tuple[float, ...]], Array] = {}  # responses, for screens in other colours
+        self._take(model.colour)
+
+    def coloured(self, colour: Colour) -> "Screen":
+        """Return the same screen for innovations of another colour.
+
+        Args:
+            colour: autoregression of the innovations.
+
+        Returns:
+            The screen; responses that either has run serve both.
+        """
+        other = copy(self)
+        other._take(colour)
+        return other
+
+    def _take(self, colour: Colour) -> None:
+        """Take what is regressed on, whitened by ``colour``."""
+        model, self._colour = self._model, colour
+        J = colour.white(self._columns, self._inner)
         columns = J.reshape(J.shape[0] * J.shape[1], len(model.free))
         self._pull = np.array([(model.p[f.place] - f.prior[0]) / f.prior[1] if f.prior else 0.0 for f in model.free])
         prior = np.diag([f.scale / f.prior[1] if f.prior else 0.0 for f in model.free])
@@ -103,8 +122,11 @@ class Screen:
         return [values | zeros | {name: unit} for name in effect.amplitudes]
 
     def _run(self, effect: Effect, values: dict[str, float]) -> Array:
-        p = effect.put(self._plant, self._model.p, values, [free.place for free in self._model.free])
-        return self._likelihood.whitened(p, self._model.q)
+        key = effect.label, tuple(values.values())
+        if key not in self._ran:
+            p = effect.put(self._plant, self._model.p, values, [free.place for free in self._model.free])
+            self._ran[key] = self._likelihood.whitened(p, self._model.q)
+        return self._ran[key]
 
     def _white(self, z: Array) -> Array:
         return np.concatenate([self._colour.white(z, self._part).ravel(), self._pull])

@@ -135,7 +135,9 @@ class Search(Fits):
             What was tried and what was accepted.
         """
         scene, guesses = self.screen(current)
-        found = self.each(lambda pair: self.extend(current, *pair, scene), guesses)
+        begun = self.each(lambda pair: self.begin(current, *pair, scene), guesses)
+        least = self.settings.followed * max((one.gain_over(current) for one in begun), default=0.0)
+        found = self.each(lambda one: self.follow(one, current, least), begun)
         found += self.refined(found, current, base, scene)
         found = self.each(lambda candidate: self.rescued(candidate, current, base), found)
         found = self.possible(found, scene)
@@ -253,20 +255,21 @@ class Search(Fits):
         """
         scene = scene_of(self.likelihood, current.fit)
         scene = with_cycles(scene, self.likelihood, current.fit, self.parts)
-        return scene, self.shortlist(*(self.guessed(current, scene, colour) for colour in self.colours(current)))
+        screen = Screen(self.likelihood, current.fit, self.parts)
+        screens = [screen, *(screen.coloured(colour) for colour in self.colours(current)[1:])]
+        return scene, self.shortlist(*(self.guessed(current, scene, one) for one in screens))
 
-    def guessed(self, current: Candidate, scene: Scene, colour: Colour) -> list[tuple[Effect, Guesses]]:
+    def guessed(self, current: Candidate, scene: Scene, screen: Screen) -> list[tuple[Effect, Guesses]]:
         """Return the guesses of every effect that is not in ``current``, most promising first.
 
         Args:
             current: the model to build on.
             scene: sizes of the record's signals.
-            colour: autoregression of the innovations.
+            screen: of it.
 
         Returns:
             Effects with their guesses.
         """
-        screen = Screen(self.likelihood, current.fit, self.parts, colour)
         pairs = self.each(
             lambda effect: (effect, self.guesses(screen, effect, scene, current)), list(self.eligible(current))
         )

@@ -267,7 +267,7 @@ def _plays(values: Array, settings: RemainderSettings) -> Array:
     return np.column_stack([play(values, float(width)) / reach for width in widths])
 
 
-@kept()
+@kept(nogil=True)
 def play(values: Array, width: float) -> Array:
     """Return the play (backlash) operator of half-width ``width`` applied to ``values``.
 

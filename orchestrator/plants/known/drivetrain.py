@@ -93,7 +93,7 @@ def _runner() -> Any:
         source.advance, source.initial_mode, source.prepare, source.consistent_start,
     )  # fmt: skip
 
-    @kept()
+    @kept(nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = consistent((start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0), p)
         x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], start[7], start[8])

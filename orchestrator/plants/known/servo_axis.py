@@ -64,7 +64,7 @@ def runner() -> Any:
     source = compiled("servo_axis")
     advance, initial_mode, begin = source.advance, source.initial_mode, source.start
 
-    @kept()
+    @kept(nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = begin(start[0], start[1], start[4], p)
         x = (x[0], x[1], x[2], x[3], start[8])

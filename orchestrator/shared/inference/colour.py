@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.shared.numba_cache import kept
+
 Array = NDArray[np.float64]
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12)  # that are compared
@@ -57,11 +59,9 @@ class Colour:
         """
         begin = max(part.start - self.order, 0)
         given = z[begin : part.stop]
-        out = given.copy()
-        for n, lag in enumerate(self.lags, start=1):
-            out[n:] -= lag @ given[:-n] if z.ndim == 3 else given[:-n] @ lag.T
-        out = out[part.start - begin :]
-        return np.asarray(self.root @ out if z.ndim == 3 else out @ self.root.T)
+        wide = np.ascontiguousarray(given if z.ndim == 3 else given[:, :, None])
+        out = _whitened(wide, self.lags, self.root, part.start - begin)
+        return out if z.ndim == 3 else out[:, :, 0]
 
     def adjoint(self, e: Array) -> Array:
         """Return the transpose of :meth:`white` applied to a whole series (n, channels).
@@ -130,6 +130,30 @@ def colour_of(z: Array, part: slice, most: int = ORDERS[-1]) -> Colour:
         return Colour(found, np.asarray(np.linalg.inv(np.linalg.cholesky(residual.T @ residual / n))))
     except np.linalg.LinAlgError:  # a model that lets the innovations of one channel vanish, or follow the other's
         return _nothing(m)
+
+
+@kept(nogil=True)
+def _whitened(given: Array, lags: Array, root: Array, first: int) -> Array:
+    """Return the scaled residuals of (n, channels, k) innovations from sample ``first`` on."""
+    n, m, k = given.shape
+    out = np.empty((n - first, m, k))
+    row = np.empty((m, k))
+    for t in range(first, n):
+        for c in range(m):
+            for j in range(k):
+                row[c, j] = given[t, c, j]
+            for lag in range(min(lags.shape[0], t)):
+                for i in range(m):
+                    weight = lags[lag, c, i]
+                    for j in range(k):
+                        row[c, j] -= weight * given[t - lag - 1, i, j]
+        for c in range(m):
+            for j in range(k):
+                out[t - first, c, j] = 0.0
+            for i in range(m):
+                for j in range(k):
+                    out[t - first, c, j] += root[c, i] * row[i, j]
+    return out
 
 
 def _nothing(channels: int) -> Colour:

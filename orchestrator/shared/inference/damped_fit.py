@@ -20,12 +20,14 @@ class Linearised(Generic[T]):
         gradient: (k,) of the cost.
         cost: at the point.
         moved: (k,) step -> the point there and its cost, which may be infinite or NaN.
+        exact: the derivatives are those of this point; where they are not, a step that fails says nothing of damping.
     """
 
     hessian: Array
     gradient: Array
     cost: float
     moved: Callable[[Array], tuple[T, float]]
+    exact: bool = True
 
 
 @dataclass(frozen=True)
@@ -73,14 +75,15 @@ def damped_fit(
         hessian = near.hessian
         ridge = damping.ridge(hessian)
         gain, cost = 0.0, near.cost
-        for _ in range(damping.tries):
+        for _ in range(damping.tries if near.exact else 1):
             damped = hessian + np.diag(strength * np.diag(hessian) + ridge)
             step: Array = np.asarray(-np.linalg.solve(damped, near.gradient))
             moved, new = near.moved(step)
             if np.isfinite(new) and new < cost:
                 gain, cost, point, strength = float(cost - new), new, moved, strength / 10.0
                 break
-            strength = max(strength * 10.0, damping.floor)
+            if near.exact:
+                strength = max(strength * 10.0, damping.floor)
         if converged(gain, cost):
             break
     return point, hessian

@@ -28,9 +28,14 @@ def fit(total: float, *names: str) -> BoxFit:
 
 
 def search(totals: dict[str, float], *steps: SearchStep) -> SimpleNamespace:
-    """Return a search whose fits of further models have the totals given, by their last effect."""
+    """Return a search whose fits of further models have the totals given, by all effects or by their last one."""
+
+    def fitted(model: BoxModel, level: int) -> BoxFit:
+        names = [e.kind.name for e in model.effects]
+        return fit(totals.get("+".join(names), totals[names[-1]]), *names)
+
     fitter = SimpleNamespace(
-        fit=lambda model, level: fit(totals[model.effects[-1].kind.name], *(e.kind.name for e in model.effects)),
+        fit=fitted,
         settled=lambda found: found,
     )
     return SimpleNamespace(
@@ -81,7 +86,17 @@ def test_what_stood_beside_an_effect_in_an_earlier_search_is_fitted_anew() -> No
 def test_what_does_better_in_the_place_of_an_effect_stays_there() -> None:
     first = SearchStep(fit(-90.0), (fit(-50.0, "input_lag"), fit(-52.0, "input_delay"), fit(-80.0, "load")), True)
     found, families = settled_names(
-        search({"input_delay": -5.0, "input_lag": -30.0, "load": -70.0}, first), fit(-30.0, "input_lag", "spring")
+        search({"spring+input_delay": -5.0, "input_delay": -52.0, "input_lag": -30.0, "load": -70.0}, first),
+        fit(-30.0, "input_lag", "spring"),
     )
     assert [effect.kind.name for effect in found.model.effects] == ["spring", "input_delay"]
     assert families == ((), ())
+
+
+def test_one_effect_that_does_better_than_two_is_named_alone() -> None:
+    first = SearchStep(fit(-90.0), (fit(-50.0, "hardening_spring"), fit(-52.0, "spring"), fit(-80.0, "load")), True)
+    found, families = settled_names(
+        search({"spring": -9.0, "load": -70.0}, first), fit(-10.0, "hardening_spring", "input_offset")
+    )
+    assert [effect.kind.name for effect in found.model.effects] == ["spring"]
+    assert families == ((),)

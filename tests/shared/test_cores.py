@@ -1,0 +1,54 @@
+"""Work that is spread over cores: in order, once each, and with the first error."""
+
+import threading
+import time
+
+import pytest
+
+from orchestrator.shared import cores
+from orchestrator.shared.cores import spread
+
+
+def test_results_come_in_order_of_their_items() -> None:
+    def slow(n: int) -> int:
+        time.sleep(0.002 * (5 - n % 5))
+        return n * n
+
+    assert spread(slow, range(20)) == [n * n for n in range(20)]
+    assert spread(slow, []) == []
+
+
+def test_helpers_are_counted_over_the_whole_process(monkeypatch) -> None:
+    monkeypatch.setattr(cores, "_SPARE", threading.Semaphore(2))
+    running, most, lock = set(), [], threading.Lock()
+
+    def inner(n: int) -> int:
+        with lock:
+            running.add(threading.get_ident())
+            most.append(len(running))
+        time.sleep(0.005)
+        with lock:
+            running.discard(threading.get_ident())
+        return n
+
+    def outer(n: int) -> list[int]:
+        return spread(inner, range(4))
+
+    assert spread(outer, range(6)) == [[0, 1, 2, 3]] * 6
+    assert 2 <= max(most) <= 3
+    assert all(cores._SPARE.acquire(blocking=False) for _ in range(2))  # both have been given back
+
+
+def test_after_an_error_nothing_is_begun() -> None:
+    begun = []
+
+    def fails(n: int) -> int:
+        begun.append(n)
+        if n == 1:
+            raise ValueError("one")
+        time.sleep(0.01)
+        return n
+
+    with pytest.raises(ValueError, match="one"):
+        spread(fails, range(50))
+    assert len(begun) < 10
