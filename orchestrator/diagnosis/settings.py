@@ -328,9 +328,6 @@ class ProofSettings(Settings, frozen=True):
     ] = 0.02
     horizons: HorizonSettings = HorizonSettings()
     free_run: FreeRunSettings = FreeRunSettings()
-    moved_zero: Annotated[
-        float, setting("gain from which another record's zero has moved: an effect's above noise")
-    ] = 22.0
     first_guess: Annotated[int, setting("samples after which the filter's state is a fair first guess", ge=1)] = 20
 
 

@@ -53,7 +53,8 @@ def moved_zero(likelihood: RecordLikelihood, p: Array, q: float) -> float:
     without = p.copy()
     without[list(waves)] = 0.0
     # A wave that this record has not would move to where it does least.
-    return best if most - max(told(0.0), told(0.0, without)) > likelihood.settings.proof.moved_zero else 0.0
+    gained = most - max(told(0.0), told(0.0, without))
+    return best if gained > likelihood.settings.search.pays_above_noise else 0.0
 
 
 def _waves(plant: Plant, p: Array) -> dict[int, float]:
