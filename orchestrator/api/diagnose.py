@@ -349,7 +349,12 @@ def comparable_record(given: Record | Path | str, model: Model, settings: Diagno
 def _signals(found: Validation) -> dict[str, ValidatedFound]:
     return {
         one.signal: ValidatedFound(
-            one.before, one.after, one.noise, one.unit, {name: values[n] for name, values in found.r_squared.items()}
+            one.before,
+            one.after,
+            one.noise,
+            one.unit,
+            {name: values[n] for name, values in found.r_squared.items()},
+            found.moved_zero if n == 0 else 0.0,
         )
         for n, one in enumerate(found.misfit)
     }
@@ -387,6 +392,8 @@ def _tables(found: DiagnosisResult) -> Iterator[Block]:
         yield table("Misfit on the other record", head, rows)
         rows = [[m.signal, *(f"{fits[stage][n]:.4f}" for stage in STAGES)] for n, m in enumerate(misfits)]
         yield table("R2 of one free run over all of the other record", ("signal", *STAGES), rows)
+        if found.validation.moved_zero != 0.0:
+            yield f"The other record counts from another zero, which lies {found.validation.moved_zero:.4g} {unit} off."
     errors = _torque_errors(found)
     if errors:
         rows = [[name, *(f"{100.0 * of[stage]:.2f} %" for stage in STAGES)] for name, of in errors.items()]

@@ -319,6 +319,8 @@ def test_bounds_hold() -> None:
     assert found.interval(place)[1] == 1.1
     lower = replace(found, p=np.where(np.arange(found.p.size) == place, 0.9, found.p))
     assert lower.interval(place)[0] == 0.9
+    passed = replace(found, p=np.where(np.arange(found.p.size) == place, 1.2, found.p), covariance=np.eye(1) * 1e-4)
+    assert passed.interval(place) == (pytest.approx(1.2 - 1.96e-2, abs=1e-4), 1.2)  # a bound that has moved since
     # At the upper bound the difference quotient is taken downwards.
     z = found.z
     column = jacobian(likelihood, found.p, 1e-4, found.free, z, PARTS.fitted)[:, :, 0]

@@ -67,8 +67,9 @@ class Fit:
         """
         entry = next(entry for entry in self.free if entry.place == place)
         reach = NORMAL_95 * self.standard_error(place)
-        low, high = float(self.p[place]) - reach, float(self.p[place]) + reach
-        return (max(low, entry.minimum), min(high, entry.maximum))
+        value = float(self.p[place])
+        # Bounds come from the signals of a model before, and may have moved past the value since.
+        return (min(max(value - reach, entry.minimum), value), max(min(value + reach, entry.maximum), value))
 
 
 @dataclass(frozen=True)

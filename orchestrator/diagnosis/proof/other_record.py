@@ -10,6 +10,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals, signals_of
 from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Workings
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
+from orchestrator.diagnosis.proof.moved_zero import from_zero, moved_zero
 from orchestrator.diagnosis.proof.whole_record import r_squared, torque_error
 from orchestrator.diagnosis.verdict.judgement import without_effects
 from orchestrator.records.record import Record
@@ -27,11 +28,14 @@ class Validation:
         misfit: of each signal, over free runs of two seconds.
         r_squared: model -> coefficient of determination of each encoder, over one free run of the whole record.
         torque_error: model -> relative error of the inverse model's torque; empty for plants without one.
+        moved_zero: how far the motor's encoder counts from another zero than in the first record [rad], where the final
+            model tells; runs and torques of each model count from its own.
     """
 
     misfit: tuple[Misfit, ...]
     r_squared: dict[str, tuple[float, ...]]
     torque_error: dict[str, float]
+    moved_zero: float = 0.0
 
 
 def validate(record: Record, diagnosis: Diagnosis) -> Validation:
@@ -50,10 +54,21 @@ def validate(record: Record, diagnosis: Diagnosis) -> Validation:
     signals = _signals(analysis.record, w, analysis.most_noise)
     likelihood = RecordLikelihood(w.plant, signals, w.nominal, signals.size, settings)
     models = _models(w)
+    zeros = {name: moved_zero(likelihood, p, w.final.q) for name, p in models.items()}
+    own = {name: replace(likelihood, signals=from_zero(signals, w.plant, p, zeros[name])) for name, p in models.items()}
     part = slice(settings.likelihood.head, signals.size)
-    misfit = held_out_misfit(likelihood, w.final.q, tuple(models.items()), part, diagnosis.misfit[0].unit)
-    fits = {name: r_squared(likelihood, p, w.final.q) for name, p in models.items()}
-    return Validation(misfit, fits, _torque_errors(w, signals))
+    stages = [
+        held_out_misfit(own[name], w.final.q, [(name, p)], part, diagnosis.misfit[0].unit)
+        for name, p in models.items()
+    ]  # fmt: skip
+    misfit = tuple(
+        replace(each[0], stages=tuple(stage for one in each for stage in one.stages))
+        for each in zip(*stages, strict=True)
+    )
+    fits = {name: r_squared(own[name], p, w.final.q) for name, p in models.items()}
+    errors = {name: torque_error(w.plant, p, own[name].signals, settings.inverse) for name, p in models.items()}
+    found = {name: value for name, value in errors.items() if value is not None}
+    return Validation(misfit, fits, found, zeros[STAGES[-1]])
 
 
 def unharmed(diagnosis: Diagnosis, found: Validation) -> Diagnosis:

@@ -26,7 +26,9 @@ def free_runs(validation: Mapping[str, ValidatedFound]) -> list[Section]:
         if g.r_squared
     )
     columns = tuple(TableColumn(n, "", 6) for n in ("signal", *COMPARED.values()))
-    return [ReportTable("R² of one free run over all of the other record", columns, rows)] if rows else []
+    moved = [f"{g.moved_zero:.4g} {g.unit}" for g in validation.values() if g.moved_zero]
+    note = f"The other record counts from another zero, which lies {moved[0]} off." if moved else ""
+    return [ReportTable("R² of one free run over all of the other record", columns, rows, note)] if rows else []
 
 
 def horizons(found: Sequence[HorizonFound], misfit: Mapping[str, MisfitFound]) -> list[Section]:

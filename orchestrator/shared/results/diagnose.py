@@ -67,13 +67,14 @@ class MisfitFound(msgspec.Struct, frozen=True):
 
 
 class ValidatedFound(msgspec.Struct, frozen=True):
-    """The same on another record, with the R2 of one free run over all of it, by model."""
+    """The same on another record, with the R2 of one free run over all of it, by model, and a zero that has moved."""
 
     before: float | None
     after: float | None
     noise: float | None
     unit: str
     r_squared: dict[str, float | None] = {}
+    moved_zero: float | None = 0.0
 
 
 class EvidenceFound(msgspec.Struct, frozen=True):
