@@ -66,8 +66,8 @@ def absent_at_times(
     """Return the effects that one block of the record clearly is without, though it would have shown them.
 
     Such a block is likelier with none of the effect than with all, or half, of what the whole has of it, all else
-    fitted again. One in which the effect rests, an uncrossed gap say, is as likely with as without. The colour is the
-    whole's: one of the block's own takes up what the effect did.
+    fitted again. One in which the effect rests, an uncrossed gap say, is as likely with as without. It must be likelier
+    under the colour of the whole, too: one of the block's own may take up what the effect did.
 
     Args:
         likelihood: of the record.
@@ -89,8 +89,9 @@ def absent_at_times(
         half[scaled] *= 0.5
         none = effect.taken_out(plant, whole.p, likelihood.nominal, {entry.place for entry in rest})
         fits = [_block_fits(likelihood, replace(whole, p=p, free=rest), part) for p in (none, half, whole.p)]
-        found = ([_in_colour(*block, whole.colour) for block in blocks] for blocks in fits)
-        return max(own - max(one, other) for own, one, other in zip(*found, strict=True))
+        own = _gains([[block.fitted for _, _, block in blocks] for blocks in fits])
+        same = _gains([[_in_colour(*block, whole.colour) for block in blocks] for blocks in fits])
+        return max((gain for gain, too in zip(own, same, strict=True) if too > 0.0), default=0.0)
 
     looked_at = (effect for effect in effects if plant.entry(effect.places(plant)[effect.size]).default == 0.0)
     return tuple(effect for effect in looked_at if gain_without(effect) > settings.surely_absent)
@@ -110,6 +111,11 @@ def _block_ratios(likelihood: RecordLikelihood, whole: Fit, part: slice) -> Arra
     places = [entry.place for entry in whole.free]
     squares = [(own.p[places] - whole.p[places]) ** 2 / np.maximum(np.diag(own.covariance), 1e-300) for own in blocks]
     return np.asarray(np.mean(squares, axis=0) * len(blocks) / (len(blocks) - 1))
+
+
+def _gains(found: Sequence[Sequence[float]]) -> list[float]:
+    """Return, for each block, the log-likelihood without an effect over the better one with half and with all of it."""
+    return [none - max(half, full) for none, half, full in zip(*found, strict=True)]
 
 
 def _in_colour(likelihood: RecordLikelihood, part: slice, found: Fit, colour: Colour) -> float:
