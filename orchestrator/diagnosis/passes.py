@@ -126,7 +126,8 @@ def _search(
     if logged is not plain:  # what putting the log right explains is no proof of an effect
         proof = Proof(horizons(likelihood, logged.p, plain.q, whole.held_out), proof.final)
     passing = absent_at_times(likelihood, proven.efficient, whole.fitted, best.effects) if floor_off else ()
-    follows = proof.final.follows(verdict.good) or is_driven(likelihood, final.p, proof.final, verdict.good)
+    follows = not (named and floor_off) or proof.final.follows(verdict.good)  # asked beside a rest alone
+    follows = follows or is_driven(likelihood, final.p, proof.final, verdict.good)
     why = refuted(floor_off, follows, far, [f"{one.name} ({one.site})" for one in passing]) if named else ""
     if why:
         withdrawn = (*withdrawn, f"nothing is named: {why}")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, decided, fit, jacobian, log_prior, settled, split
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, decided, fit, log_prior, settled, split
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, _largest_speed, measurement_matrix
 from orchestrator.diagnosis.fit.signals import Signals, noise_level, signals_of
-from orchestrator.diagnosis.fit.slope import Free
+from orchestrator.diagnosis.fit.slope import Free, taken
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import record_from_columns
 from orchestrator.shared.inference.colour import colour_of
@@ -323,7 +323,7 @@ def test_bounds_hold() -> None:
     assert passed.interval(place) == (pytest.approx(1.2 - 1.96e-2, abs=1e-4), 1.2)  # a bound that has moved since
     # At the upper bound the difference quotient is taken downwards.
     z = found.z
-    column = jacobian(likelihood, found.p, 1e-4, found.free, z, PARTS.fitted)[:, :, 0]
+    column = taken(likelihood, found.p, 1e-4, found.free, z, PARTS.fitted).columns[:, :, 0]
     down = found.p.copy()
     down[place] -= 1e-3 * 0.3
     assert np.allclose(column, -(likelihood.whitened(down, 1e-4)[PARTS.fitted] - z[PARTS.fitted]) / 1e-3)
@@ -336,7 +336,7 @@ def test_a_jacobian_is_a_difference_quotient() -> None:
     up = p.copy()
     up[place] += 1e-3 * free[0].scale
     expected = (likelihood.whitened(up, 1e-3)[20:60] - z[20:60]) / 1e-3
-    assert np.allclose(jacobian(likelihood, p, 1e-3, free, z, slice(20, 60))[:, :, 0], expected)
+    assert np.allclose(taken(likelihood, p, 1e-3, free, z, slice(20, 60)).columns[:, :, 0], expected)
 
 
 def test_without_free_parameters_a_fit_is_an_evaluation() -> None:

@@ -124,23 +124,6 @@ def log_prior(p: Array, free: Sequence[Free]) -> float:
     return -0.5 * sum(((p[f.place] - f.prior[0]) / f.prior[1]) ** 2 for f in free if f.prior is not None)
 
 
-def jacobian(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Free], z: Array, part: slice) -> Array:
-    """Return the derivative (samples, channels, parameters) of whitened innovations by the scaled parameters.
-
-    Args:
-        likelihood: of the record.
-        p: (parameters,) of the predictor.
-        q: process noise, as a share of the drive's rms torque.
-        free: parameters to fit.
-        z: (samples, channels) whitened innovations at ``p``.
-        part: the samples.
-
-    Returns:
-        The derivative.
-    """
-    return taken(likelihood, p, q, free, z, part).columns
-
-
 Point = tuple[Array, Array]  # parameters, innovations
 
 

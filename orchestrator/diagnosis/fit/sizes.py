@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, fit, jacobian
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.slope import taken
 from orchestrator.diagnosis.fit.spread import widened, with_tolerances
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.inference.colour import colour_of
@@ -143,7 +144,9 @@ def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice, b
     if not white.free or not colour.usable:
         return white
     scales = np.array([entry.scale for entry in white.free])
-    J = colour.white(jacobian(likelihood, white.p, white.q, white.free, white.z, part), slice(0, len(white.z[part])))
+    J = colour.white(
+        taken(likelihood, white.p, white.q, white.free, white.z, part).columns, slice(0, len(white.z[part]))
+    )
     if not np.all(np.isfinite(J)):
         return white
     scores = np.einsum("nck,nc->nk", J, colour.white(white.z, part))

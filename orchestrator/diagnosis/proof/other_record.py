@@ -1,5 +1,6 @@
 """A second record, of which only initial states are fitted: misfit, one free run of all of it, inverse torque."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,9 +67,8 @@ def validate(record: Record, diagnosis: Diagnosis) -> Validation:
         for each in zip(*stages, strict=True)
     )
     fits = {name: r_squared(own[name], p, w.final.q) for name, p in models.items()}
-    errors = {name: torque_error(w.plant, p, own[name].signals, settings.inverse) for name, p in models.items()}
-    found = {name: value for name, value in errors.items() if value is not None}
-    return Validation(misfit, fits, found, zeros[STAGES[-1]])
+    errors = _torque_errors(w, {name: each.signals for name, each in own.items()})
+    return Validation(misfit, fits, errors, zeros[STAGES[-1]])
 
 
 def unharmed(diagnosis: Diagnosis, found: Validation) -> Diagnosis:
@@ -118,7 +118,7 @@ def torque_errors(record: Record, diagnosis: Diagnosis) -> dict[str, float]:
     Returns:
         The errors, 0.0 for none.
     """
-    return _torque_errors(diagnosis.workings, _signals(record, diagnosis.workings))
+    return _torque_errors(diagnosis.workings, dict.fromkeys(STAGES, _signals(record, diagnosis.workings)))
 
 
 def _signals(record: Record, w: Workings, most_noise: Array | None = None) -> Signals:
@@ -126,10 +126,11 @@ def _signals(record: Record, w: Workings, most_noise: Array | None = None) -> Si
     return signals_of(record, lag, w.likelihood.settings.likelihood, most_noise)
 
 
-def _torque_errors(w: Workings, signals: Signals) -> dict[str, float]:
+def _torque_errors(w: Workings, signals: Mapping[str, Signals]) -> dict[str, float]:
+    """Return model -> relative torque error on its own signals, where the plant has an inverse."""
     found = {
-        name: torque_error(w.plant, p, signals, w.likelihood.settings.inverse) for name, p in _models(w).items()
-    }  # fmt: skip
+        name: torque_error(w.plant, p, signals[name], w.likelihood.settings.inverse) for name, p in _models(w).items()
+    }
     return {name: value for name, value in found.items() if value is not None}
 
 

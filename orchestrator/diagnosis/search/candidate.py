@@ -152,6 +152,8 @@ def simplest_first(found: Sequence[Candidate], within: float) -> list[Candidate]
     Returns:
         The candidates.
     """
+    if not found:
+        return []
     first = found[0]
     family = first.effects[-1].family
     if not family or first.fit.q <= first.settings.noise_alone:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Parts, jacobian, reaching_back
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, reaching_back
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.slope import taken
 from orchestrator.plants.effects import Effect, Scene
 from orchestrator.shared.inference.colour import ORDERS, Colour
 
@@ -35,7 +36,7 @@ class Screen:
         self._plant, self._model, self._part = likelihood.plant, model, parts.fitted
         self._likelihood = likelihood.over(min(likelihood.stop, parts.fitted.stop))  # nothing else is looked at
         self._wide, self._inner = reaching_back(parts.fitted, ORDERS[-1])
-        self._columns = jacobian(likelihood, model.p, model.q, model.free, model.z, self._wide)
+        self._columns = taken(likelihood, model.p, model.q, model.free, model.z, self._wide).columns
         self._ran: dict[tuple[str, tuple[float, ...]], Array] = {}  # responses, for screens in other colours
         self._take(model.colour)
 

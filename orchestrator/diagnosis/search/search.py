@@ -142,7 +142,7 @@ class Search(Fits):
         found = self.each(lambda candidate: self.rescued(candidate, current, base), found)
         found = self.possible(found, scene)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
-        found = simplest_first(found, self.likelihood.settings.verdict.alike_gain) if found else found
+        found = simplest_first(found, self.likelihood.settings.verdict.alike_gain)
         if found and self.earns(found[0], current, base):
             return ForwardStep(current, tuple(found), True)
         shown = next((c for c in found if self.shows(c, current)), None)

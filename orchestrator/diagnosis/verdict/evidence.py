@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Parts, jacobian, reaching_back
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, reaching_back
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.response import error_response, filtered
+from orchestrator.diagnosis.fit.slope import taken
 from orchestrator.diagnosis.search.periodic import cycle_grid, line_spectrum
 from orchestrator.diagnosis.settings import EvidenceSettings
 from orchestrator.shared.inference.noise import rms
@@ -98,7 +99,7 @@ class _Regression:
         _, self.states = likelihood.innovations(model.p, model.q)
         e = model.colour.white(model.z, looked)
         wide, inner = reaching_back(looked, model.colour.order)
-        J = model.colour.white(jacobian(likelihood, model.p, model.q, model.free, model.z, wide), inner)
+        J = model.colour.white(taken(likelihood, model.p, model.q, model.free, model.z, wide).columns, inner)
         self._basis, _ = np.linalg.qr(J.reshape(e.size, len(model.free)))
         self._residual = self._clean(e.reshape(-1, 1))[:, 0]
 

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Parts, jacobian, reaching_back
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, reaching_back
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.response import back_propagated, error_response, filtered
+from orchestrator.diagnosis.fit.slope import taken
 from orchestrator.diagnosis.settings import RemainderSettings, VerdictSettings
 from orchestrator.shared.inference.colour import Colour, colour_of
 from orchestrator.shared.numba_cache import kept
@@ -177,7 +178,7 @@ def _predicted(likelihood: RecordLikelihood, model: Fit, parts: Parts, colour: C
     looked = parts.seen
     white = colour.white(model.z, looked)
     wide, inner = reaching_back(looked, colour.order)
-    nuisance = colour.white(jacobian(likelihood, model.p, model.q, model.free, model.z, wide), inner)
+    nuisance = colour.white(taken(likelihood, model.p, model.q, model.free, model.z, wide).columns, inner)
     cut = parts.validated.start - parts.fitted.start
     sites = likelihood.plant.sites
     for site in sorted(sites, key=lambda name: name == "shaft"):  # the shaft's bases are tried last
