@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
 LAGGED = 4  # place of the drive's torque in the state
 FINER = 8  # times more steps of a free run in a sample in which dry friction may turn round, as in fits
+WAVE = 0.05  # of a wave's period: the farthest that a Runge-Kutta step of a free run goes
 CALM = 0.02  # distances of presliding per sample below which it hardly changes
 
 
@@ -264,8 +265,7 @@ def coarse_runner_of(plant: Plant) -> Any:
 def runs_coarsely(plant: Plant, p: Array) -> bool:
     """Tell whether the predictor's own steps follow a model closely, at far less than its exact runs cost.
 
-    So it is for two bodies with nonlinear effects of the bank, but none that makes impacts, a resonance of its own, or
-    waves that may be short against a sample.
+    So it is for two bodies with nonlinear effects of the bank, but none that makes impacts or a resonance of its own.
 
     Args:
         plant: the plant.
@@ -281,8 +281,44 @@ def runs_coarsely(plant: Plant, p: Array) -> bool:
         return False
     quick = {*plant.linear, *plant.offsets, *plant.enumerations, drive.delay, drive.limit}
     on = {entry.name for n, entry in enumerate(plant.table) if p[n] != entry.default} - quick
-    known = {name for effect in plant.bank if not effect.phase for name in effect.parameters.values()}
+    known = {name for effect in plant.bank for name in effect.parameters.values()}
     return bool(on) and on <= known
+
+
+def waves_of(plant: Plant, p: Array) -> dict[int, float]:
+    """Return the periods, in the motor's angle [rad], of what repeats in a model with position.
+
+    Args:
+        plant: the plant.
+        p: the predictor's parameters.
+
+    Returns:
+        Place of each amplitude -> period.
+    """
+    found = {}
+    for effect in plant.bank:
+        place = effect.places(plant)[effect.size]
+        if effect.phase and p[place] != 0.0:
+            cycles = effect.parameters.get("cycles_per_rev")
+            period = 2.0 * math.pi * (1.0 / abs(plant.value(p, cycles)) if cycles else plant.ratio(p))
+            found[place] = period
+    return found
+
+
+def coarse_steps(plant: Plant, p: Array, h: float, turn: float) -> int:
+    """Return the predictor's own steps in a sample with which a free run follows a model's modes and its waves.
+
+    Args:
+        plant: the plant.
+        p: the predictor's parameters.
+        h: a sample [s].
+        turn: the farthest that the motor turns in it [rad].
+
+    Returns:
+        At least 1.
+    """
+    shortest = min(waves_of(plant, p).values(), default=math.inf)
+    return max(plant.substeps(p, h), math.ceil(turn / (WAVE * shortest)))
 
 
 @cache

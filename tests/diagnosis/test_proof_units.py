@@ -67,6 +67,20 @@ def test_steps_of_the_predictor_are_driven_by_what_the_drives_filter_lets_throug
     assert np.max(np.abs(coarse - exact)) < 0.05 * np.max(np.abs(unfiltered - exact))
 
 
+@pytest.mark.parametrize("cycles", [3.0, 60.0])
+def test_steps_of_the_predictor_follow_waves_however_short(cycles: float) -> None:
+    u = np.full(60, 25.0)
+    p = drivetrain(effects__torque_ripple__amplitude=8.0, effects__torque_ripple__cycles_per_rev=cycles)
+    still = signals_from(np.zeros((60, 2)), u, 2)
+    exact = simulate(DRIVETRAIN, p, START, still, slice(0, 60), history=False)
+    signals = replace(still, y=exact)
+    assert runs_coarsely(DRIVETRAIN, p)
+    assert signals.turn * cycles / (2.0 * np.pi) > (0.5 if cycles > 9.0 else 0.02)  # periods in a sample
+    rippleless = simulate(DRIVETRAIN, drivetrain(), START, signals, slice(0, 60))
+    coarse = simulate(DRIVETRAIN, p, START, signals, slice(0, 60))
+    assert np.max(np.abs(coarse - exact)) < 0.02 * np.max(np.abs(rippleless - exact))
+
+
 @pytest.mark.parametrize("samples", [1, 2])
 @pytest.mark.parametrize("history", [True, False])
 def test_a_dead_time_of_whole_samples(samples: int, history: bool) -> None:

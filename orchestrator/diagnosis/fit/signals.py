@@ -59,6 +59,13 @@ class Signals:
         """Return the number of samples."""
         return int(self.u.size)
 
+    @cached_property
+    def turn(self) -> float:
+        """Return the farthest that the motor turns within a sample [rad], of its angle by a sliding mean."""
+        ahead = max(1, min(SMOOTHED, self.size - 1))
+        moves = [self.y[rows][ahead:, 0] - self.y[rows][:-ahead, 0] for rows in self.stretches(slice(0, self.size))]
+        return max((float(np.max(np.abs(move))) for move in moves if move.size), default=0.0) / ahead
+
     def aligned(self, plant: Plant, p: Array) -> "Signals":
         """Return the signals as they were, from how the log has them: what is early put later, what is late earlier.
 

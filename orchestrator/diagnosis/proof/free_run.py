@@ -19,7 +19,7 @@ from orchestrator.diagnosis.fit.runs import in_time
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.settings import FreeRunSettings
 from orchestrator.plants.description import Plant
-from orchestrator.plants.predictor import FINER, coarse_runner_of, runs_coarsely
+from orchestrator.plants.predictor import FINER, coarse_runner_of, coarse_steps, runs_coarsely
 from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
 from pyfmu_sources.drive_request import UNASKED
@@ -74,7 +74,7 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
     out = np.empty((end - begin, 2))
     first = max(first, 0.0)
     if by_the_predictor:
-        steps = plant.substeps(p, signals.h)
+        steps = coarse_steps(plant, p, signals.h, signals.turn)
         coarse = coarse_runner_of(plant)
         coarse(tuple(start.tolist()), p, early, late, first, signals.h, (steps, FINER * steps), out)
         return _offset(plant, p, out)

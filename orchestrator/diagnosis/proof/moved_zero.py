@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.plants.description import Plant
+from orchestrator.plants.predictor import waves_of
 from orchestrator.shared.inference.colour import colour_of
 
 Array = NDArray[np.float64]
@@ -33,7 +34,7 @@ def moved_zero(likelihood: RecordLikelihood, p: Array, q: float) -> float:
     Returns:
         The distance of the motor's encoder [rad]; 0.0 where the model has no wave, or the record does not tell.
     """
-    waves = _waves(likelihood.plant, p)
+    waves = waves_of(likelihood.plant, p)
     if not waves:
         return 0.0
     part = slice(likelihood.settings.likelihood.settled, likelihood.signals.size)
@@ -55,26 +56,6 @@ def moved_zero(likelihood: RecordLikelihood, p: Array, q: float) -> float:
     # A wave that this record has not would move to where it does least.
     gained = most - max(told(0.0), told(0.0, without))
     return best if gained > likelihood.settings.search.pays_above_noise else 0.0
-
-
-def _waves(plant: Plant, p: Array) -> dict[int, float]:
-    """Return the periods, in the motor's angle [rad], of a model's torques that repeat with position.
-
-    Args:
-        plant: the plant.
-        p: (parameters,) of the model.
-
-    Returns:
-        Place of each amplitude -> period.
-    """
-    found = {}
-    for effect in plant.bank:
-        place = effect.places(plant)[effect.size]
-        if effect.phase and p[place] != 0.0:
-            cycles = effect.parameters.get("cycles_per_rev")
-            period = 2.0 * math.pi * (1.0 / abs(plant.value(p, cycles)) if cycles else plant.ratio(p))
-            found[place] = period
-    return found
 
 
 def from_zero(signals: Signals, plant: Plant, p: Array, zero: float) -> Signals:
