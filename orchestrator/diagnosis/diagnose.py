@@ -16,6 +16,7 @@ from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
+from orchestrator.diagnosis.search.finer import finer_of
 from orchestrator.diagnosis.search.model_space import in_metres
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.admission import check_comparable, check_diagnosable, check_resolved
@@ -68,7 +69,8 @@ def diagnose(
     check_resolved(plant, nominal, given[0].step, model.source, settings)
     lag = plant.value(nominal, plant.drive.lag)
     signals, parts = series(given, lag, settings, [one.most_noise for one in analyses])
-    found = passes(model, signals, parts, nominal, settings, progress)
+    finer = finer_of(analyses, plant, nominal, settings)
+    found = passes(model, signals, parts, nominal, settings, progress, finer)
     likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
     base_fit, final = found.base, found.final
     units = METRIC if in_metres(model) else {}

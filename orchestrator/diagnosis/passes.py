@@ -15,6 +15,7 @@ from orchestrator.diagnosis.fit.spread import absent_at_times
 from orchestrator.diagnosis.proof.horizons import Horizons, horizons, is_driven
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder
+from orchestrator.diagnosis.search.finer import Finer
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -60,8 +61,9 @@ class Pass:
 
 
 def passes(
-    model: Model, signals: Signals, parts: Parts, nominal: Array, settings: DiagnosisSettings, progress: Progress
-) -> Pass:
+    model: Model, signals: Signals, parts: Parts, nominal: Array, settings: DiagnosisSettings, progress: Progress,
+    finer: Finer | None = None,
+) -> Pass:  # fmt: skip
     """Run the search; where nothing is found but a misfit, search again with the parts of the record in other roles.
 
     Args:
@@ -71,6 +73,7 @@ def passes(
         nominal: parameters of the model, the predictor's own included.
         settings: of the diagnosis.
         progress: called as candidates are fitted.
+        finer: the records as they were measured; None: at the same rate.
 
     Returns:
         The pass that decides.
@@ -80,7 +83,7 @@ def passes(
     limit = settings.search.time_limit
     allowed = Stopwatch(limit or math.inf)
     likelihood = RecordLikelihood(model.plant, signals, nominal, parts.validated.stop, settings)
-    found = _search(model, likelihood, parts, parts, settings.search.most_effects, progress, allowed)
+    found = _search(model, likelihood, parts, parts, settings.search.most_effects, progress, allowed, finer)
     first = int(size * (1.0 - settings.fit.looked_at))  # as many samples as are held out
     if found.unknown and not found.search.stopped and allowed.over:
         note = f"a search with the record's parts exchanged was not begun after {limit:g} s"
@@ -88,25 +91,25 @@ def passes(
     if found.unknown and not found.hopeless and not allowed.over:
         # What shows on the deciding part alone (a limit that is reached once) must be fitted to be found.
         exchanged = Parts(slice(first, parts.validated.stop), slice(head, first), parts.held_out)
-        other = _search(model, likelihood, parts, exchanged, again, progress, allowed)
+        other = _search(model, likelihood, parts, exchanged, again, progress, allowed, finer)
         found = found if other.unknown else other
     if found.unknown and found.left.growth > settings.verdict.grown and not allowed.over:
         # What shows on the held-out part alone must be looked at: the first part is held out in its place.
         held_out = slice(head, first)
         turned = Parts(slice(first, parts.held_out.start), parts.held_out, held_out)
         exchanged = Parts(slice(parts.fitted.stop, size), slice(first, parts.fitted.stop), held_out)
-        other = _search(model, likelihood.over(size), turned, exchanged, again, progress, allowed)
+        other = _search(model, likelihood.over(size), turned, exchanged, again, progress, allowed, finer)
         found = found if other.unknown else other
     return found
 
 
 def _search(
     model: Model, likelihood: RecordLikelihood, parts: Parts, used: Parts, most: int, progress: Progress,
-    allowed: Stopwatch,
+    allowed: Stopwatch, finer: Finer | None,
 ) -> Pass:  # fmt: skip
     """Search for at most ``most`` effects with the parts ``used``; judge what is left on ``parts``."""
     settings = likelihood.settings
-    search = Search(likelihood, model, used, progress, allowed, most=most)
+    search = Search(likelihood, model, used, progress, allowed, most=most, finer=finer)
     base, best = search.run()
     likelihood = search.likelihood  # its gains may be those of a gap now
     whole = Parts(parts.seen, parts.validated, parts.held_out)

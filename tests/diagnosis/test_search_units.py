@@ -259,6 +259,19 @@ def test_superfluous_effects_are_taken_out(friction) -> None:
     assert labels(search.prune(needed, base).effects) == labels(both)
 
 
+def test_a_simpler_law_takes_the_place_of_a_richer_one_that_gains_nothing(friction) -> None:
+    search, p, base, best, _ = friction
+    scene = scene_of(search.likelihood, best.fit)
+    richer = search.refine(best, FRICTION, replace(STRIBECK, plausible=lambda values: True), scene)
+    pruned = search.prune(richer, base)
+    assert labels(pruned.effects) == {FRICTION.label}
+    place = AXIS.index("effects.coulomb_friction.motor.torque")
+    assert pruned.fit.p[place] == pytest.approx(p[place], rel=0.02)
+    assert pruned.fit.p[AXIS.index("effects.stribeck_friction.motor.coulomb")] == 0.0
+    needed = search.candidate(richer.effects, replace(richer.fit, fitted=richer.fit.fitted + 20.0))
+    assert search.prune(needed, base) is needed
+
+
 def test_an_effect_is_judged_against_the_best_fit_without_it(friction) -> None:
     """A poor fit of the model before must not lend its gain to an effect that only led the fit out of it."""
     search, _, base, best, _ = friction

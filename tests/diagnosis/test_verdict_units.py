@@ -252,6 +252,7 @@ def warned(
         parts=parts,
         withdrawn=(),
         search=SimpleNamespace(refused={}),
+        best=SimpleNamespace(effects=()),
     )
     return warnings_of(found, effects, channels, 2)  # type: ignore[arg-type]
 

@@ -28,12 +28,14 @@ class Analysis:
 
     Attributes:
         record: the record.
+        measured: the rows that were measured, at the record's own rate.
         factor: rows of the file for one that is analysed.
         interpolated: rows of the file for one that was measured; 1: none was interpolated.
         most_noise: (channels,) standard deviation of the encoders' noise in the rows as they were measured.
     """
 
     record: Record
+    measured: Record
     factor: int
     interpolated: int
     most_noise: Array
@@ -89,7 +91,7 @@ def analysed(
     factor = max(factor, min(measured.size // own.many_rows, math.floor(rate / enough)))
     factor = factor if most is None else max(1, min(factor, most // native))
     most_noise = encoder_noise(measured, settings.likelihood.noise_window)
-    return Analysis(decimated(measured, factor, own), factor * native, native, most_noise)
+    return Analysis(decimated(measured, factor, own), measured, factor * native, native, most_noise)
 
 
 def _interpolated_by(record: Record, settings: RateSettings) -> int:

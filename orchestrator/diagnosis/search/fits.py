@@ -155,6 +155,28 @@ class Fits(ModelSpace):
         self.tick(f"without {effect.label}")
         return max((self.candidate(kept, fitted), *self.known(kept)), key=lambda candidate: candidate.score)
 
+    def simplified(self, current: Candidate, scene: Scene, effect: Effect, simpler: Effect) -> Candidate:
+        """Return ``current`` with a simpler law of one size in the place of one of its effects, fitted again.
+
+        Args:
+            current: the model to build on.
+            scene: sizes of the record's signals.
+            effect: of the model.
+            simpler: the law that it contains.
+
+        Returns:
+            The candidate.
+        """
+        kept = tuple(simpler if one is effect else one for one in current.effects)
+        own = {short: float(current.fit.p[place]) for short, place in effect.places(self.plant).items()}
+        values = {short: value for short, value in own.items() if short in simpler.nuisances}
+        p = simpler.put(
+            self.plant, self.without(current.fit.p, effect), values | {simpler.size: own[effect.size]}, self.refitted
+        )
+        fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
+        self.tick(f"{simpler.label} for {effect.label}")
+        return self.candidate(kept, fitted)
+
     def known(self, effects: Sequence[Effect]) -> list[Candidate]:
         """Return the models with the same effects, in whatever order, that the search has met.
 

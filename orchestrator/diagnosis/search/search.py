@@ -12,6 +12,7 @@ from functools import partial
 
 from orchestrator.diagnosis.proof.horizons import horizons
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
+from orchestrator.diagnosis.search.finer import Finer, is_timed
 from orchestrator.diagnosis.search.fits import Fits, Guesses, TimeUpError
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
 from orchestrator.diagnosis.search.periodic import with_cycles
@@ -31,11 +32,13 @@ class Search(Fits):
         most: effects that are named at most.
         stopped: its time was up before its end.
         refused: effects that were not named, by label, and why.
+        finer: the records as they were measured; None: they are searched at that rate.
     """
 
     most: int = field(kw_only=True)
     stopped: bool = False
     refused: dict[str, str] = field(default_factory=dict)
+    finer: Finer | None = None
 
     def run(self) -> tuple[Candidate, Candidate]:
         """Return the model with re-fitted parameters only, and the best model found.
@@ -140,7 +143,7 @@ class Search(Fits):
         found = self.each(lambda one: self.follow(one, current, least), begun)
         found += self.refined(found, current, base, scene)
         found = self.each(lambda candidate: self.rescued(candidate, current, base), found)
-        found = self.possible(found, scene)
+        found = self.on_time(self.possible(found, scene), current, scene)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
         found = simplest_first(found, self.likelihood.settings.verdict.alike_gain)
         if found and self.earns(found[0], current, base):
@@ -229,6 +232,32 @@ class Search(Fits):
             elif candidate.effects[-1].label not in self.refused:
                 self.refused[candidate.effects[-1].label] = why
         return kept
+
+    def on_time(self, found: Sequence[Candidate], current: Candidate, scene: Scene) -> list[Candidate]:
+        """Return the candidates whose last effect, where it is one of the drive's timing, shows at the measured rate.
+
+        Args:
+            found: fitted candidates.
+            current: the model to build on.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The candidates; one that gains too little to be named is not looked at.
+        """
+        finer = self.finer
+
+        def stands(candidate: Candidate) -> bool:
+            effect = candidate.effects[-1]
+            if finer is None or not is_timed(self.plant, effect) or not candidate.nearly_pays_over(current):
+                return True
+            free = (self.free(candidate.effects, scene), self.free(current.effects, scene))
+            self.tick(f"{effect.label}, as it was measured")
+            if not finer.refutes(candidate, current, free):
+                return True
+            self.refused.setdefault(effect.label, finer.words(effect))
+            return False
+
+        return [candidate for candidate, good in zip(found, self.each(stands, found), strict=True) if good]
 
     def predicts(self, candidate: Candidate, current: Candidate) -> bool:
         """Tell whether a candidate predicts the deciding part far better than the model before it, at long horizons.
@@ -358,7 +387,7 @@ class Search(Fits):
         return [candidate for candidate in refined if candidate is not None]
 
     def prune(self, current: Candidate, base: Candidate) -> Candidate:
-        """Take out earlier effects that the last one has made superfluous.
+        """Take out earlier effects that the last one has made superfluous; put simpler laws in place of richer ones.
 
         Args:
             current: the model to build on.
@@ -374,4 +403,8 @@ class Search(Fits):
             if self.pays(current, best, base):
                 break
             current = best
+        for effect in current.effects:
+            simpler = next((one for one in self.plant.bank if one.label == effect.needs), None)
+            if simpler is not None:
+                current = max(current, self.simplified(current, scene, effect, simpler), key=lambda one: one.score)
         return current

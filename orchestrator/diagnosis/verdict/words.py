@@ -34,7 +34,9 @@ def warnings_of(found: Pass, named: Sequence[Named], channels: int, encoders: in
             warnings.append(f"{names} would take {share} of it{little}")
     elif found.floor_off and left.missing > 0.0 and left.explained < settings.mostly_explained:
         warnings.append(f"{100 * (1 - left.explained):.0f} % {LEFT_OVER}; it {kind_of_rest(left, settings)}")
-    warnings += [*found.withdrawn, *(f"refused: {why}" for why in found.search.refused.values())]
+    present = {effect.label for effect in found.best.effects}  # what was refused at first may have been found later
+    refused = (why for label, why in found.search.refused.items() if label not in present)
+    warnings += [*found.withdrawn, *(f"refused: {why}" for why in refused)]
     for effect in named:
         if effect.family:
             warnings.append(f"this record cannot tell {' from '.join(effect.family)}; {_experiment(effect)}")
