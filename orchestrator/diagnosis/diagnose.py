@@ -69,8 +69,7 @@ def diagnose(
     check_resolved(plant, nominal, given[0].step, model.source, settings)
     lag = plant.value(nominal, plant.drive.lag)
     signals, parts = series(given, lag, settings, [one.most_noise for one in analyses])
-    finer = finer_of(analyses, plant, nominal, settings)
-    found = passes(model, signals, parts, nominal, settings, progress, finer)
+    found = passes(model, signals, parts, nominal, settings, progress, finer_of(analyses, plant, nominal, settings))
     likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
     base_fit, final = found.base, found.final
     units = METRIC if in_metres(model) else {}
