@@ -60,9 +60,7 @@ class RateSettings(Settings, frozen=True):
         float, setting("of the rms of second differences: rows so close to a line were interpolated")
     ] = 1e-3
     least_bends: Annotated[int, setting("measured rows at least that lie on no line between others", ge=10)] = 50
-    most_measured: Annotated[
-        int, setting("rows fitted at the measured rate at most: its short steps need more than 3000", ge=500)
-    ] = 9000
+    most_measured: Annotated[int, setting("rows fitted at the measured rate: short steps say less", ge=500)] = 9000
     rounding: Annotated[float, share("of a rate that time stamps may be off by")] = 0.02
     cut_off: Annotated[float, share("of half the lower rate at which the filter before it cuts off")] = 0.8
     all_but: Annotated[float, share("share of the bends that must lie at measured rows")] = 0.98
