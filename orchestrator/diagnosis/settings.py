@@ -41,9 +41,7 @@ class LikelihoodSettings(Settings, frozen=True):
 class RateSettings(Settings, frozen=True):
     """The rate at which a record is analysed: from its content, not from how often it was sampled."""
 
-    least_rate: Annotated[
-        float, setting("analysis rate that is kept [Hz]: friction turns round within 10 ms", gt=0)
-    ] = 100.0
+    least_rate: Annotated[float, setting("analysis rate that is kept [Hz]: friction turns in 10 ms", gt=0)] = 100.0
     least_rows: Annotated[int, setting("rows that a record keeps in any case", ge=200)] = 500
     per_band: Annotated[float, setting("rate over the frequency below which nearly all motion lies", gt=2)] = 16.0
     per_mode: Annotated[float, setting("rate over the model's fastest oscillation", gt=2)] = 30.0
