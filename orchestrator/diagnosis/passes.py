@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
-from orchestrator.diagnosis.fit.sizes import Sized, sized, with_model_error
+from orchestrator.diagnosis.fit.sizes import Sized, with_model_error
 from orchestrator.diagnosis.fit.spread import absent_at_times
 from orchestrator.diagnosis.proof.horizons import Horizons, horizons, is_driven
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
+from orchestrator.diagnosis.proof.reported import reported
+from orchestrator.diagnosis.proof.torque import torque_proof
 from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder
 from orchestrator.diagnosis.search.finer import Finer
 from orchestrator.diagnosis.search.scene import scene_of
@@ -127,9 +129,10 @@ def _search(
     named = any(not effect.measurement for effect in best.effects)
     proof = proven.proof
     if logged is not plain:  # what putting the log right explains is no proof of an effect
-        proof = Proof(horizons(likelihood, logged.p, plain.q, whole.held_out), proof.final)
+        proof = replace(proof, base=horizons(likelihood, logged.p, plain.q, whole.held_out))
     passing = absent_at_times(likelihood, proven.efficient, whole.fitted, best.effects) if floor_off else ()
     follows = not (named and floor_off) or proof.final.follows(verdict.good)  # asked beside a rest alone
+    follows = follows or proof.torque.decides(verdict.proven, verdict.good)
     follows = follows or is_driven(likelihood, final.p, proof.final, verdict.good)
     why = refuted(floor_off, follows, far, [f"{one.name} ({one.site})" for one in passing]) if named else ""
     if why:
@@ -195,19 +198,22 @@ def _proven(
     noise and more than it explains.
     """
     likelihood = search.likelihood
-    levels = likelihood.settings.levels
-    sized_base = sized(likelihood, plain, whole, (), ladder(levels, (), plain.q))
+    levels, verdict = likelihood.settings.levels, likelihood.settings.verdict
+    sized_base = reported(likelihood, plain, whole, (), ladder(levels, (), plain.q))
     before = horizons(likelihood, sized_base.fit.p, plain.q, whole.held_out)
     bases = (likelihood.nominal, sized_base.fit.p)
     notes: list[str] = []
     while best.effects:
         efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
-        final = sized(likelihood, efficient, whole, best.effects, ladder(levels, best.effects, efficient.q))
+        final = reported(likelihood, efficient, whole, best.effects, ladder(levels, best.effects, efficient.q))
         final = replace(final, fit=honest(likelihood, final.fit, best.effects, whole))
         after = horizons(likelihood, final.fit.p, plain.q, whole.held_out)
         weak = next((e for e in reversed(best.effects) if _is_weak(search, e, final.fit, after, plain.q, whole)), None)
         noise = torque_noise(likelihood, final.fit, whole.fitted, sized_base.fit.p)
+        torque = torque_proof(likelihood, plain, final.fit, whole)
         out, harm = weak or best.effects[-1], after.harm_over(before, noise)
+        if harm == after.labels[-1:] and torque.decides(verdict.proven, verdict.good):
+            harm = ()  # one run, which adds up every disturbance
         fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
         if weak is None and not harm and fewer.effects:
             harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
@@ -216,7 +222,7 @@ def _proven(
         if weak is None and not harm:
             small = _minor(search, parts, plain, best, efficient, after)
             if small is None:
-                return _Proven(best, efficient, sized_base, final, Proof(before, after), tuple(notes))
+                return _Proven(best, efficient, sized_base, final, Proof(before, after, torque), tuple(notes))
             out, fewer = small
             why = "what is left is no noise, and more than it explains"
         notes.append(f"{out.name} ({out.site}) was withdrawn: {why}")
@@ -281,7 +287,7 @@ def _harm_over_fewer(
         return found
     again = annealed(likelihood, fewer.fit.p, fewer.fit.q, fewer.fit.free, whole, fewer.effects)
     levels = ladder(likelihood.settings.levels, fewer.effects, again.q)
-    return harm(sized(likelihood, again, whole, fewer.effects, levels).fit.p)
+    return harm(reported(likelihood, again, whole, fewer.effects, levels).fit.p)
 
 
 def _larger_misfit(likelihood: RecordLikelihood, bases: Sequence[Array], final: Fit, whole: Parts) -> tuple[str, ...]:

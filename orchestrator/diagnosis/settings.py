@@ -108,9 +108,7 @@ class FitSettings(Settings, frozen=True):
 class ScanSettings(Settings, frozen=True):
     """The scan for torques that are periodic in the motor's position."""
 
-    peaks: Annotated[
-        int, setting("peaks that become starting values: the true line is rarely below the third", ge=1)
-    ] = 5
+    peaks: Annotated[int, setting("peaks that become starts: the true line is rarely below the third", ge=1)] = 5
     separation: Annotated[int, setting("grid points within which peaks are one: a line is three wide", ge=0)] = 3
     highest: Annotated[float, setting("cycles per revolution looked for: teeth and poles lie below", gt=0)] = 60.0
     highest_per_travel: Annotated[float, setting("or cycles over the whole travel, where that is more", gt=0)] = 300.0
@@ -364,6 +362,8 @@ class InverseSettings(Settings, frozen=True):
     order: Annotated[int, setting("of the Butterworth filter", ge=1)] = 4
     cut_off: Annotated[float, setting("of half the sampling rate", gt=0, le=0.99)] = 0.2
     decimation: Annotated[int, setting("factor by which torques are decimated", ge=2)] = 10
+    least_rows: Annotated[int, setting("filtered rows for each value that is fitted to them", ge=2)] = 10
+    closer: Annotated[float, share("of prediction errors (geometric mean) below which its values are told")] = 0.9
     border: Annotated[int, setting("samples at either end where the filters settle", ge=1)] = 50
 
 

@@ -40,7 +40,7 @@ def late(found: Diagnosis) -> dict[str, float]:
     }
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [2, 4])
 def test_a_controller_that_answers_within_a_row_is_no_late_drive(seed: int, model: Model) -> None:
     found = diagnose(joint_record(seed), model)
     assert found.analysis.rows_of_the_file > 1

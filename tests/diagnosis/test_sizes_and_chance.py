@@ -16,6 +16,7 @@ from orchestrator.diagnosis.passes import _harm_over_fewer, _is_weak, _larger_mi
 from orchestrator.diagnosis.proof import horizons as proof_horizons
 from orchestrator.diagnosis.proof.free_run import FreeRun, free_run
 from orchestrator.diagnosis.proof.horizons import Horizons
+from orchestrator.diagnosis.proof.torque import TorqueProof
 from orchestrator.diagnosis.search.candidate import Candidate, simplest_first
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
@@ -221,6 +222,9 @@ def test_pulses_are_outweighed_by_skill_at_every_horizon_only() -> None:
     even, late = (Proof(base, horizons([0.1, short, 0.1, 0.1])) for short in (0.1, 0.9))
     assert not is_unknown(left, True, even, True, False, SETTINGS.verdict)
     assert is_unknown(left, True, late, True, False, SETTINGS.verdict)
+    settled = replace(late, torque=TorqueProof(0.9, 0.97, sure=True))
+    assert not is_unknown(left, True, settled, True, False, SETTINGS.verdict)
+    assert is_unknown(left, True, settled, False, False, SETTINGS.verdict)
 
 
 def test_skill_counts_from_the_horizon_that_is_asked_for() -> None:

@@ -1,13 +1,14 @@
 """The rules of the verdict: when nothing is named, and how far a result can be trusted."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.proof.horizons import Horizons
+from orchestrator.diagnosis.proof.torque import TorqueProof
 from orchestrator.diagnosis.settings import VerdictSettings
 from orchestrator.diagnosis.verdict.remainder import Remainder, structured
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
@@ -17,10 +18,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Proof:
-    """Prediction errors on the held-out part: of re-fitted parameters alone, and of the final model."""
+    """What a model does on the held-out part: prediction errors without effects and with them, and its torque."""
 
     base: Horizons
     final: Horizons
+    torque: TorqueProof = field(default_factory=TorqueProof)
 
     @property
     def skill(self) -> float:
@@ -56,7 +58,7 @@ def is_unknown(
         return True
     if not floor_off:
         return left.growth > settings.grown
-    if proven:
+    if proven or (named and proof.torque.decides(settings.proven, settings.good)):
         return False
     no_noise = structured(left, settings) or (far_off and not named)
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)

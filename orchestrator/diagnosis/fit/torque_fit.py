@@ -1,0 +1,115 @@
+"""Sizes from the torque that a motion needs: of a single axis under position control, the least disturbed ones.
+
+A controller that holds an axis on its path answers every disturbance with its torque: the motion hardly knows of it,
+the torque does. Predictions of the motion from that torque take the answer for a drive, and inertia and friction for
+larger than they are, however what is left is whitened. The torque that the motion needs, compared with the measured
+one, does not (inverse dynamic identification; Gautier and Poignet, Control Engineering Practice 9(12), 2001). In open
+loop it is the other way round; predictions tell which of both holds.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.shared.inference.colour import colour_of
+from orchestrator.shared.inference.long_run import long_run_covariance
+
+Array = NDArray[np.float64]
+
+
+def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | None:
+    """Return a fit whose sizes are those of the smallest torque error, in the plant's inverse model.
+
+    Args:
+        likelihood: of the record.
+        found: the fit whose model it is.
+        part: the samples that are fitted.
+
+    Returns:
+        The fit, its errors whatever the colour of the torque; None: the plant has no inverse, or lags, or some of what
+        is fitted has no part in it.
+    """
+    plant, settings = likelihood.plant, likelihood.settings.inverse
+    inverse = plant.inverse
+    free = tuple(entry for entry in found.free if entry.place < len(plant.table))
+    late = any(plant.entry(entry.place).unit == "s" for entry in found.free)
+    if inverse is None or late or not free or plant.value(found.p, plant.drive.lag) > 0.0:
+        return None
+    position, speed, acceleration, given = motion(likelihood, part)
+    if given.size < settings.least_rows * len(free):
+        return None
+    scales = np.array([entry.scale for entry in free])
+    places = [entry.place for entry in free]
+
+    def missing(values: Array) -> Array:
+        p = found.p.copy()
+        p[places] = values * scales
+        return np.asarray(given - inverse(position, speed, acceleration, p))
+
+    from scipy.optimize import least_squares
+
+    low, high = (np.array([getattr(entry, end) for entry in free]) / scales for end in ("minimum", "maximum"))
+    start = np.clip(found.p[places] / scales, low, high)
+    solved = least_squares(missing, start, bounds=(low, np.maximum(high, low + 1e-9)), x_scale="jac")
+    if not np.all(np.isfinite(solved.x)):
+        return None
+    p = found.p.copy()
+    p[places] = solved.x * scales
+    z = likelihood.whitened(p, found.q)
+    if not np.all(np.isfinite(z)):
+        return None
+    covariance = found.covariance.copy()
+    own = [found.free.index(entry) for entry in free]
+    scaled = _covariance(np.asarray(solved.jac), solved.fun, likelihood.settings.fit.blocks)
+    covariance[np.ix_(own, own)] = scaled * np.outer(scales, scales)
+    return replace(found, p=p, z=z, covariance=covariance, colour=colour_of(z, part))
+
+
+def motion(likelihood: RecordLikelihood, part: slice) -> tuple[Array, Array, Array, Array]:
+    """Return position, speed, acceleration and measured torque of a part, all behind one filter.
+
+    Rows around a reversal are left out: behind the filter, dry friction turns round slowly.
+
+    Args:
+        likelihood: of the record.
+        part: the samples.
+
+    Returns:
+        Each, (n,).
+    """
+    rows = [_filtered(likelihood, stretch) for stretch in likelihood.signals.stretches(part)]
+    position, speed, acceleration, given = (np.concatenate(each) for each in zip(*rows, strict=True))
+    return position, speed, acceleration, given
+
+
+def _filtered(likelihood: RecordLikelihood, rows: slice) -> tuple[Array, Array, Array, Array]:
+    """Return what :func:`motion` does, of one stretch."""
+    from scipy.signal import butter, filtfilt
+
+    settings, signals = likelihood.settings.inverse, likelihood.signals
+    b, a = butter(settings.order, settings.cut_off)
+    padding = {"padlen": min(3 * max(len(a), len(b)), rows.stop - rows.start - 1)}
+    position, given = (filtfilt(b, a, values[rows], **padding) for values in (signals.y[:, 0], signals.u))
+    speed = np.gradient(position, signals.h)
+    acceleration = np.gradient(speed, signals.h)
+    reach = round(1.0 / settings.cut_off)
+    reversals = np.diff(np.sign(speed), prepend=np.sign(speed[0])) != 0.0
+    away = np.convolve(reversals, np.ones(2 * reach + 1), "same") < 0.5
+    border = 4 * reach  # where the filter settles
+    kept = np.flatnonzero(away[border:-border])[:: max(reach // 2, 1)] + border
+    return position[kept], speed[kept], acceleration[kept], given[kept]
+
+
+def _covariance(J: Array, missing: Array, blocks: int) -> Array:
+    """Return the covariance of scaled parameters, whatever the colour; as wide as blocks left out ask for."""
+    bread = np.linalg.pinv(J.T @ J)
+    scores = J * missing[:, None]
+    covariance = bread @ long_run_covariance(scores) @ bread
+    groups = np.array_split(np.arange(len(scores)), blocks)
+    changes = [np.linalg.pinv(J.T @ J - J[rows].T @ J[rows]) @ scores[rows].sum(axis=0) for rows in groups]
+    spread = (blocks - 1.0) / blocks * np.sum(np.square(changes), axis=0)
+    stretch = np.sqrt(np.maximum(spread / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return np.asarray(covariance * np.outer(stretch, stretch))

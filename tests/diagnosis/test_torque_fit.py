@@ -1,0 +1,116 @@
+"""Sizes from the torque that a motion needs, and when they are told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.diagnose import DEFAULT_SETTINGS
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.slope import Free
+from orchestrator.diagnosis.fit.together import at_one_rate, series
+from orchestrator.diagnosis.fit.torque_fit import torque_fit
+from orchestrator.diagnosis.proof.reported import reported
+from orchestrator.diagnosis.proof.torque import TorqueProof, torque_proof
+from orchestrator.plants.effects import Effect
+from tests.support.robot_joint import DRY, INERTIA, VISCOUS, joint_record
+from tests.support.short_records import AXIS, axis_likelihood, drivetrain_likelihood
+
+FRICTION = "effects.coulomb_friction.motor.torque"
+DELAY = "effects.input_delay.delay"
+BANK: dict[str, Effect] = {effect.name: effect for effect in AXIS.bank}
+TRUE = {"J": INERTIA, "b": VISCOUS, FRICTION: DRY}
+
+
+def free_of(*names: str) -> tuple[Free, ...]:
+    return tuple(Free(AXIS.index(name), 0.1 * TRUE.get(name, 0.1), 0.0, 1e3) for name in names)
+
+
+def joint_of(seed: int, share: float) -> tuple[RecordLikelihood, Parts, Fit]:
+    """Return a joint under position control, and its fit by likelihood."""
+    nominal = AXIS.extended([entry.default for entry in AXIS.table])
+    nominal[[AXIS.index("J"), AXIS.index("b")]] = 1.0, 2.4
+    analyses = at_one_rate([joint_record(seed, share=share)], AXIS, nominal, DEFAULT_SETTINGS)
+    signals, parts = series([one.record for one in analyses], 0.0, DEFAULT_SETTINGS)
+    likelihood = RecordLikelihood(AXIS, signals, nominal, parts.validated.stop, DEFAULT_SETTINGS)
+    start = nominal.copy()
+    start[AXIS.index(FRICTION)], start[AXIS.index("presliding.motor")] = 1.0, np.log(2e-4)
+    whole = Parts(parts.seen, parts.validated, parts.held_out)
+    return likelihood, whole, fit(likelihood, start, 3.0, free_of(*TRUE), whole)
+
+
+@pytest.fixture(scope="module")
+def joint() -> tuple[RecordLikelihood, Parts, Fit]:
+    return joint_of(1, 0.12)
+
+
+def test_a_controller_misleads_predictions_not_the_torque_that_is_needed(joint) -> None:
+    likelihood, parts, found = joint
+    needed = torque_fit(likelihood, found, parts.fitted)
+    place = AXIS.index("J")
+    assert abs(found.p[place] - INERTIA) > 0.15 * INERTIA
+    for name, true in TRUE.items():
+        own = AXIS.index(name)
+        assert needed.p[own] == pytest.approx(true, rel=0.15)
+        assert abs(needed.p[own] - true) < 3.0 * needed.standard_error(own)
+    assert needed.p[AXIS.index("presliding.motor")] == found.p[AXIS.index("presliding.motor")]
+
+
+def test_values_are_told_with_which_a_model_predicts_best(joint) -> None:
+    likelihood, parts, found = joint
+    effects = (BANK["coulomb_friction"],)
+    told = reported(likelihood, found, parts, effects, [found.q])
+    assert np.array_equal(told.fit.p, torque_fit(likelihood, found, parts.fitted).p)
+    assert told.disputed == ()
+    near = likelihood.settings.__class__(inverse=likelihood.settings.inverse.__class__(closer=0.0))
+    kept = reported(replace(likelihood, settings=near), found, parts, effects, [found.q])
+    assert not np.array_equal(kept.fit.p, told.fit.p)
+
+
+def test_the_torque_of_the_held_out_part_settles_what_free_runs_cannot() -> None:
+    likelihood, parts, found = joint_of(2, 0.05)
+    bare = likelihood.nominal.copy()
+    base = fit(likelihood, bare, 3.0, free_of("J", "b"), parts)
+    right = torque_proof(likelihood, base, torque_fit(likelihood, found, parts.fitted), parts)
+    assert right.decides(0.75, 0.9)
+    assert right.removed > 0.8
+    drag = "effects.quadratic_drag.coefficient"
+    other = fit(likelihood, bare, 3.0, free_of("J", "b", drag), parts)
+    assert not torque_proof(likelihood, base, other, parts).decides(0.75, 0.9)
+    assert not torque_proof(likelihood, base, base, parts).sure
+    two, p = drivetrain_likelihood(size=240)
+    own = replace(found, p=p, free=(Free(0, 0.1, 0.0, 1e3),))
+    assert torque_proof(two, own, own, Parts(slice(10, 120), slice(120, 180), slice(180, 240))) == TorqueProof()
+
+
+@pytest.mark.parametrize(
+    ("removed", "explained", "sure", "decides"),
+    [(0.76, 0.91, True, True), (0.75, 0.91, True, False), (0.76, 0.9, True, False), (0.76, 0.91, False, False)],
+)
+def test_what_settles_it(removed: float, explained: float, sure: bool, decides: bool) -> None:
+    assert TorqueProof(removed, explained, sure).decides(0.75, 0.9) is decides
+
+
+def test_in_open_loop_the_likelihood_is_kept() -> None:
+    likelihood, p = axis_likelihood(size=2000, effects__coulomb_friction__motor__torque=0.8, J=1.04)
+    part = slice(10, 1500)
+    parts = Parts(part, slice(1000, 1500), slice(1500, 2000))
+    found = fit(likelihood, p, 1e-3, free_of("J", FRICTION), parts)
+    kept = reported(likelihood, found, parts, (BANK["coulomb_friction"],), [1e-3])
+    needed = torque_fit(likelihood, found, part)
+    told, other = (abs(one.p[AXIS.index("J")] - 1.04) for one in (kept.fit, needed))
+    assert told < 0.005 < other
+
+
+def test_only_an_axis_without_lag_or_delay_is_asked(joint) -> None:
+    likelihood, parts, found = joint
+    assert torque_fit(likelihood, replace(found, free=free_of("J", DELAY)), parts.fitted) is None
+    lagging = found.p.copy()
+    lagging[AXIS.index("tau")] = 0.01
+    assert torque_fit(likelihood, replace(found, p=lagging), parts.fitted) is None
+    assert torque_fit(likelihood, replace(found, free=()), parts.fitted) is None
+    assert torque_fit(likelihood, found, slice(10, 60)) is None
+    two, p = drivetrain_likelihood(size=240)
+    own = replace(found, p=p, free=(Free(0, 0.1, 0.0, 1e3),))
+    assert torque_fit(two, own, slice(10, 200)) is None
