@@ -29,19 +29,26 @@ def scanned(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> dic
     own, run = fitter.settings.screen, _Sight(fitter, before)
     chosen: dict[BoxEffect, list[tuple[float, ...]]] = {}
     for effect in effects:
-        values = (*run.sifted(effect), *effect.kind.scan(effect.scene))
+        scan = effect.kind.scan(effect.scene)
+        values = (*run.sifted(effect), *scan)
         gains = run.gains(effect, values) if values else {}
         kept: list[int] = []
         for k in sorted(gains, key=lambda k: -gains[k].gain):
             if len(kept) < own.scanned and all(abs(k - other) >= own.apart for other in kept):
                 kept.append(k)
+        grid = np.sort(np.concatenate([effect.kind.small(effect.scene), scan]))
         for k in kept:
-            edges = values[max(k - 1, 0)], values[min(k + 1, len(values) - 1)]
-            finer = tuple(float(v) for v in np.linspace(*edges, 2 * own.parts + 1))
+            finer = tuple(float(v) for v in np.linspace(*_around(grid, values[k]), 2 * own.parts + 1))
             close = run.gains(effect, finer, (gains[k].level,))
             best = finer[max(close, key=lambda n: close[n].gain)] if close else values[k]
             chosen.setdefault(effect, []).append(_with(effect, best))
     return chosen
+
+
+def _around(grid: Array, value: float) -> tuple[float, float]:
+    """Return the neighbours of a value in a grid that holds it, the value itself where there is none."""
+    k = int(np.argmin(np.abs(grid - value)))
+    return float(grid[max(k - 1, 0)]), float(grid[min(k + 1, len(grid) - 1)])
 
 
 def _with(effect: BoxEffect, value: float) -> tuple[float, ...]:
