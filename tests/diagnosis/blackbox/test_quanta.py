@@ -3,7 +3,9 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from orchestrator.diagnosis.blackbox import scanning
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.estimates import errors_of
 from orchestrator.diagnosis.blackbox.fitting import Fitter
@@ -96,3 +98,25 @@ def test_rows_further_on_choose_among_quanta_that_do_as_well_before() -> None:
     assert not np.array_equal(np.rint(u / off.model.values[0][0]), rounded)
     chosen, _ = of_alike(fitter, off, 1, DEFAULT.rest)
     assert np.array_equal(np.rint(u / chosen.model.values[0][0]), rounded)
+
+
+def test_a_sifted_quantum_is_refined_between_its_own_neighbours(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The list that is scanned holds clusters of sifted quanta: next to the edge of one lies another, far off."""
+    effect = model_of(0.0, QUANTUM).effects[0]
+    grid = effect.kind.small(effect.scene)
+    true = 0.7 * grid[1204] + 0.3 * grid[1205]  # the edge of its cluster is nearest
+
+    class Sight:
+        def __init__(self, *given: object) -> None:
+            pass
+
+        def sifted(self, effect: BoxEffect) -> tuple[float, ...]:
+            return tuple(float(v) for k in (300, 1203, 5000) for v in grid[k - 1 : k + 2])
+
+        def gains(self, effect: BoxEffect, values: tuple[float, ...], levels: tuple[int, ...] = ()) -> dict:
+            return {k: SimpleNamespace(gain=-abs(v / true - 1.0), level=0) for k, v in enumerate(values)}
+
+    monkeypatch.setattr(scanning, "_Sight", Sight)
+    fitter = SimpleNamespace(settings=SimpleNamespace(screen=DEFAULT.screen))
+    starts = scanning.scanned(fitter, [effect], None)[effect]
+    assert abs(starts[0][-1] / true - 1.0) < 0.1 * (grid[1205] / grid[1204] - 1.0)
