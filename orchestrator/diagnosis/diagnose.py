@@ -1,6 +1,6 @@
 """The diagnosis of one record: search, verdict, where, misfit."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.together import at_one_rate, series
-from orchestrator.diagnosis.outcome import Diagnosis, Workings
-from orchestrator.diagnosis.passes import Progress, honest, passes
+from orchestrator.diagnosis.outcome import Diagnosis, Named, Workings
+from orchestrator.diagnosis.passes import Pass, Progress, honest, passes
 from orchestrator.diagnosis.proof.by_record import by_record, repeats
 from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
@@ -77,10 +77,7 @@ def diagnose(
     chosen = honest(likelihood, base_fit, (), parts) if unknown else final
     stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
     misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
-    everything = [
-        (named(plant, effect, final if unknown else chosen, search.steps, units, settings.verdict), effect.measurement)
-        for effect in best.effects
-    ]
+    everything = _named(found, final if unknown else chosen, units)
     effects = tuple(one for one, of_the_log in everything if not of_the_log)
     nuisances = tuple(one for one, of_the_log in everything if of_the_log)
     if unknown or effects or nuisances:
@@ -130,6 +127,15 @@ def evidence_of(diagnosis: Diagnosis) -> Evidence:
     """
     w = diagnosis.workings
     return evidence(w.likelihood, w.final, w.parts)
+
+
+def _named(found: Pass, final: Fit, units: Mapping[str, str]) -> list[tuple[Named, bool]]:
+    """Return the effects of a pass by name, and whether they are the log's."""
+    search, verdict = found.search, found.likelihood.settings.verdict
+    return [
+        (named(search.plant, one, final, search.steps, units, verdict, search.not_tried(one)), one.measurement)
+        for one in found.best.effects
+    ]
 
 
 def _plain_verdict(likelihood: RecordLikelihood, nominal: Array, base: Fit, parts: Parts) -> str:

@@ -145,6 +145,8 @@ def test_a_motor_that_hardly_turns_back_turns_one_way(sign: float, back: float, 
     search.likelihood = replace(search.likelihood, signals=signals)
     assert search.one_way is alone
     assert ("load_torque@load" in labels(search.eligible(BASE))) is not alone
+    assert search.not_tried(FRICTION) == (("load_torque@load",) if alone else ())
+    assert search.not_tried(STRIBECK) == ()
 
 
 def test_offsets_between_encoders_need_both() -> None:

@@ -191,6 +191,8 @@ def test_a_name_carries_its_estimate_and_its_rivals() -> None:
     estimate = found.parameters["torque"]
     assert (estimate.value, estimate.standard_error, estimate.unit) == (0.8, pytest.approx(0.01), "N.m")
     assert estimate.interval == pytest.approx((0.8 - 0.0196, 0.8 + 0.0196), abs=1e-5)
+    one_way = named(AXIS, FRICTION, final_fit(), [step], {}, VERDICT, ("load_torque@load",))
+    assert one_way.family == (*found.family, "load_torque@load")
     metric = named(AXIS, FRICTION, final_fit(), [step], METRIC, VERDICT)
     assert metric.parameters["torque"].unit == "N"
 

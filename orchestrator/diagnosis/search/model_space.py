@@ -17,6 +17,10 @@ from orchestrator.records.model_file import Model
 
 Array = NDArray[np.float64]
 
+# In one direction dry friction and a constant torque are the same, and so are viscous friction and its difference
+# between the directions: what machines have is tried, and what is not tried stands beside its name.
+ALIKE_ONE_WAY = {"load_torque": ("coulomb_friction",), "directional_friction": ()}
+
 
 @dataclass
 class ModelSpace:
@@ -56,11 +60,21 @@ class ModelSpace:
             if effect.needs or (effect.angular and in_metres(self.model)):
                 continue
             blind = effect.both_encoders and self.likelihood.signals.channels < 2
-            # In one direction dry friction and a constant torque are the same, and so are viscous friction and its
-            # difference between the directions: the first of each is what machines have.
-            alike = one_way and effect.name in ("load_torque", "directional_friction")
+            alike = one_way and effect.name in ALIKE_ONE_WAY
             if effect.label not in present | replaced and not blind and not alike:
                 yield effect
+
+    def not_tried(self, effect: Effect) -> tuple[str, ...]:
+        """Return the labels of effects that were not tried beside ``effect``, as this record cannot tell them from it.
+
+        Args:
+            effect: of the bank.
+
+        Returns:
+            The labels.
+        """
+        kin = [one.label for one in self.plant.bank if effect.name in ALIKE_ONE_WAY.get(one.name, ())]
+        return tuple(kin) if kin and self.one_way else ()
 
     @property
     def one_way(self) -> bool:

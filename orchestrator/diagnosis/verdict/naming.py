@@ -17,7 +17,7 @@ PERIODIC_METRIC = {"phase": "rad", "cycles_per_rev": "rad/m"}
 
 def named(
     plant: Plant, effect: Effect, final: Fit, steps: Sequence[ForwardStep], units: Mapping[str, str],
-    settings: VerdictSettings,
+    settings: VerdictSettings, not_tried: Sequence[str] = (),
 ) -> Named:  # fmt: skip
     """Return an effect with its estimates, its gain and what it may be confused with.
 
@@ -28,6 +28,7 @@ def named(
         steps: the forward steps of the search.
         units: units of the table -> units of the model's position; empty: those of the table.
         settings: of the verdict.
+        not_tried: labels of effects that this record cannot tell from it, and that were left out.
 
     Returns:
         The effect, with 95 % intervals.
@@ -44,6 +45,7 @@ def named(
         if own.score - c.score
         < (within if effect.family and c.effects[-1].family == effect.family else settings.undecided)
     ]
+    alike += [label for label in not_tried if label not in alike]
     family = (effect.label, *alike) if alike else ()
     parameters = {
         short: ParameterEstimate(
