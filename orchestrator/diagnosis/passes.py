@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
-from orchestrator.diagnosis.fit.sizes import Sized, with_model_error
+from orchestrator.diagnosis.fit.sizes import Sized, sized, with_model_error
 from orchestrator.diagnosis.fit.spread import absent_at_times
 from orchestrator.diagnosis.proof.horizons import Horizons, horizons, is_driven
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
@@ -199,7 +199,7 @@ def _proven(
     """
     likelihood = search.likelihood
     levels, verdict = likelihood.settings.levels, likelihood.settings.verdict
-    sized_base = reported(likelihood, plain, whole, (), ladder(levels, (), plain.q))
+    sized_base = sized(likelihood, plain, whole, (), ladder(levels, (), plain.q))
     before = horizons(likelihood, sized_base.fit.p, plain.q, whole.held_out)
     bases = (likelihood.nominal, sized_base.fit.p)
     notes: list[str] = []

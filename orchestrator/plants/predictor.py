@@ -300,8 +300,9 @@ def waves_of(plant: Plant, p: Array) -> dict[int, float]:
         place = effect.places(plant)[effect.size]
         if effect.phase and p[place] != 0.0:
             cycles = effect.parameters.get("cycles_per_rev")
-            period = 2.0 * math.pi * (1.0 / abs(plant.value(p, cycles)) if cycles else plant.ratio(p))
-            found[place] = period
+            turns = abs(plant.value(p, cycles)) if cycles else 1.0 / plant.ratio(p)
+            if turns > 0.0:  # else it is one torque everywhere
+                found[place] = 2.0 * math.pi / turns
     return found
 
 

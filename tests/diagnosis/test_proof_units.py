@@ -9,7 +9,7 @@ import pytest
 from orchestrator.diagnosis import proof
 from orchestrator.diagnosis.proof.free_run import _steps, free_run, simulate
 from orchestrator.diagnosis.proof.misfit import held_out_misfit, segments
-from orchestrator.plants.predictor import runs_coarsely
+from orchestrator.plants.predictor import runs_coarsely, waves_of
 from tests.support.short_records import (
     AXIS,
     DRIVETRAIN,
@@ -79,6 +79,14 @@ def test_steps_of_the_predictor_follow_waves_however_short(cycles: float) -> Non
     rippleless = simulate(DRIVETRAIN, drivetrain(), START, signals, slice(0, 60))
     coarse = simulate(DRIVETRAIN, p, START, signals, slice(0, 60))
     assert np.max(np.abs(coarse - exact)) < 0.02 * np.max(np.abs(rippleless - exact))
+
+
+def test_a_wave_without_cycles_is_none() -> None:
+    p = drivetrain(effects__torque_ripple__amplitude=8.0, effects__torque_ripple__cycles_per_rev=4.0, i=2.0,
+                   effects__gravity_load__amplitude=1.0)  # fmt: skip
+    assert sorted(waves_of(DRIVETRAIN, p).values()) == pytest.approx([np.pi / 2.0, 4.0 * np.pi])
+    p[DRIVETRAIN.index("effects.torque_ripple.cycles_per_rev")] = 0.0
+    assert list(waves_of(DRIVETRAIN, p).values()) == pytest.approx([4.0 * np.pi])
 
 
 @pytest.mark.parametrize("samples", [1, 2])

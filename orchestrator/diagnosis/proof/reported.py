@@ -24,15 +24,14 @@ def reported(
         likelihood: of the record.
         found: the efficient fit to ``parts.fitted``.
         parts: parts of the record.
-        effects: of the model.
+        effects: of the model; one without is what theirs are compared with, and stays the likeliest one.
         levels: of process noise that the model may have, falling.
 
     Returns:
         The fit, and what its two weightings dispute.
     """
     likely = sized(likelihood, found, parts, effects, levels)
-    # Without effects, a model is what theirs are compared with: it stays the likeliest one.
-    needed = torque_fit(likelihood, likely.fit, parts.fitted) if effects else None
+    needed = torque_fit(likelihood, likely.fit, parts.fitted)
     if needed is None:
         return likely
     before, after = (horizons(likelihood, one.p, found.q, parts.validated) for one in (likely.fit, needed))

@@ -89,8 +89,7 @@ class Finer:
         Returns:
             The words.
         """
-        rates = (1.0 / (one.record.step) for one in self.analyses), (1.0 / one.measured.step for one in self.analyses)
-        coarse, fine = (next(each) for each in rates)
+        coarse, fine = (1.0 / record.step for record in (self.analyses[0].record, self.analyses[0].measured))
         return (
             f"{effect.name} ({effect.site}) shows at the {coarse:.4g} Hz of the analysis, not at the {fine:.4g} Hz of "
             "the record: a controller that answers within a row looks like it"
