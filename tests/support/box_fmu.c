@@ -58,7 +58,7 @@ static void g(const double *x, double *y) { y[0] = x[0]; y[1] = x[1]; }
 static const double LONGEST = 2e-3;
 #endif
 
-typedef struct { double p[NP], u[NU], x[NX], time, stop; int steps; } C;
+typedef struct { double p[NP], u[NU], x[NX], time, stop; int steps, was_reset; } C;
 static int life = 0;
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return "2.0"; }
@@ -71,6 +71,13 @@ fmi2Status fmi2Reset(fmi2Component c) {
     return fmi2Error;
 #elif defined(FAULT_reset_hangs)
     for (;;) sleep(1);
+#elif defined(FAULT_reset_crashes)
+    abort();
+#elif defined(FAULT_reset_keeps_parameters)
+    C *m = c;
+    memset(m->x, 0, sizeof m->x);
+    m->was_reset = 1;
+    return fmi2OK;
 #endif
     fresh(c);
     return fmi2OK;
@@ -152,6 +159,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, 
 #ifdef FAULT_read_once
             if (m->steps > 0) continue;
 #endif
+            if (m->was_reset) continue;
             m->p[k] = v[i];
         } else if (k < NP + NU) {
 #ifdef FAULT_input_refused

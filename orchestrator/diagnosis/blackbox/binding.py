@@ -39,7 +39,6 @@ class Member:
         inputs, tunables: variables that are set at every step, the latter only where a run asks for it.
         reads: variables that are read after every step.
         tolerance: of the FMU's own solver; None: its own.
-        fresh: make a new instance for every run.
 
     Raises:
         FmuError: the FMU cannot be read, loaded or instantiated, or lacks a variable.
@@ -52,9 +51,8 @@ class Member:
         tunables: Sequence[str],
         reads: Sequence[str],
         tolerance: float | None,
-        fresh: bool,
     ) -> None:
-        self._path, self._tolerance, self._fresh = path, tolerance, fresh
+        self._path, self._tolerance = path, tolerance
         self._description = read_description(path)
         variables = self._description.model.variables
         for name in (*inputs, *tunables, *reads):
@@ -62,9 +60,9 @@ class Member:
                 raise FmuError(f"{path}: `{name}` must be a variable of type Real, but is not")
         self.inputs, self.tunables, self.reads = list(inputs), list(tunables), list(reads)
         self._slave: FmuSlave | None = None
-        self._used = self._broken = False
+        self._used = self._broken = self._refused = False  # the last: it refuses a reset
         self._only_before = False  # start values are refused in initialisation mode
-        self._prepare()
+        self._prepare(False)
 
     @property
     def slave(self) -> FmuSlave:
@@ -76,10 +74,10 @@ class Member:
         """Note that the run went well: the instance may be reset."""
         self._broken = False
 
-    def _prepare(self) -> FmuSlave:
-        """Return an instance in the condition of a new one."""
+    def _prepare(self, fresh: bool) -> FmuSlave:
+        """Return an instance in the condition of a new one, or a new one."""
         if self._slave is not None and self._used:
-            if not self._fresh and not self._broken and self._came_back(self._slave):
+            if not fresh and not self._refused and not self._broken and self._came_back(self._slave):
                 self._used = False
                 return self._slave
             slave, self._slave = self._slave, None
@@ -101,10 +99,10 @@ class Member:
         try:
             slave.reset()
         except OrchestratorError:
-            self._fresh = self._broken = True
-        return not self._fresh
+            self._refused = self._broken = True
+        return not self._refused
 
-    def begun(self, starts: Mapping[str, float], start: float, stop: float) -> FmuSlave:
+    def begun(self, starts: Mapping[str, float], start: float, stop: float, fresh: bool) -> FmuSlave:
         """Return an instance in initialisation mode, its start values set.
 
         They are set twice: some FMUs want them before the experiment is set up, others (20-sim's) forget them then.
@@ -112,6 +110,7 @@ class Member:
         Args:
             starts: value by name.
             start, stop: of the run [s].
+            fresh: make a new instance instead of a reset.
 
         Returns:
             The instance.
@@ -119,7 +118,7 @@ class Member:
         Raises:
             OrchestratorError: the FMU refused or failed a call.
         """
-        slave = self._prepare()
+        slave = self._prepare(fresh)
         self._used = self._broken = True
         slave.set(starts)
         slave.begin(start, stop, self._tolerance)
@@ -128,7 +127,7 @@ class Member:
                 slave.set(starts)
             except OrchestratorError:
                 self._only_before = True
-                return self.begun(starts, start, stop)
+                return self.begun(starts, start, stop, fresh)
         return slave
 
 
@@ -152,7 +151,7 @@ class Box:
         self._members = {
             name: Member(
                 Path(path), of(name, request.inputs), of(name, request.tunables), of(name, request.reads),
-                request.tolerance, request.fresh,
+                request.tolerance,
             )
             for name, path in members.items()
         }  # fmt: skip
@@ -184,7 +183,7 @@ class Box:
             OrchestratorError: an FMU refused or failed a call.
         """
         values, start, step, per_row = batch.tables[job.table], batch.start, batch.step, batch.per_row
-        self._begin(job, values, start, step)
+        self._begin(job, values, batch)
         calls, counts, where = self._tables(values.shape[1] > len(self._request.inputs))
         out = np.empty((len(values) // per_row + 1, len(self._request.reads)))
         ports = np.array([[e.input, e.law, e.position, e.velocity] for e in job.effects], dtype=np.int64).reshape(-1, 4)
@@ -205,14 +204,14 @@ class Box:
             member.done()
         return out
 
-    def _begin(self, job: Job, values: Array, start: float, step: float) -> None:
+    def _begin(self, job: Job, values: Array, batch: Batch) -> None:
         """Bring all members to where the first step begins."""
         names = [*self._request.inputs, *self._request.tunables][: values.shape[1]]
         first = {} if not len(values) else dict(zip(names, values[0].tolist(), strict=True))
-        stop = start + BEYOND * step * len(values)
+        stop = batch.start + BEYOND * batch.step * len(values)
         begun = {}
         for name, member in self._members.items():
-            begun[name] = member.begun(self._of(name, job.starts), start, stop)
+            begun[name] = member.begun(self._of(name, job.starts), batch.start, stop, batch.fresh)
             if mine := self._of(name, first):
                 begun[name].set(mine)
         for slave in begun.values():

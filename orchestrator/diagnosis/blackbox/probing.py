@@ -82,26 +82,15 @@ def opened(
         FmuError: the FMU cannot be used: it does not load, run or repeat.
     """
     inputs, reads = _names_of(given, subject)
-    runner = Runner(
-        subject, inputs, reads, given.tunable, given.options.tolerance, workers=workers, settings=settings.process
-    )
+    runner = Runner(subject, inputs, reads, given.tunable, given.options.tolerance, True, workers, settings.process)
     try:
         rough = noise_of(given, data.outputs, data.outputs)
         runner.through = through = _passing(runner, given, data, settings)
         problem = BoxProblem(
             data, given, runner, _affordable(runner, given, data, progress, settings), rough, settings=settings
         )
-        fresh = _repeats(problem)
-        if fresh:
-            runner.close()
-            runner = Runner(
-                subject, inputs, reads, given.tunable, given.options.tolerance, True, workers, settings.process
-            )
-            runner.through = through
-            problem.runner = runner
-            if _repeats(problem):
-                raise FmuError(f"{subject.path}: must give the same outputs for the same inputs, but does not")
-        return problem, _pushed(problem, fresh)
+        _settle_resets(problem)
+        return problem, _pushed(problem)
     except BaseException:
         runner.close()
         raise
@@ -215,22 +204,47 @@ def _steps_in_a_sample(runner: Runner, given: Map, data: Data, stuck: float) -> 
     return m
 
 
-def _repeats(problem: BoxProblem) -> bool:
-    """Tell whether a run after a reset differs from the first, with another run in between."""
+def _settle_resets(problem: BoxProblem) -> None:
+    """Let the runner reset the FMU where runs after a reset are those of new instances, with other values, too.
+
+    An FMU may take a reset and leave its old parameters at work, or end up in memory that is not its own.
+
+    Raises:
+        SlaveError: it does not run.
+        FmuError: new instances give different outputs for the same inputs.
+    """
     other = problem.nominal.p + np.array([0.5 * u.standard_deviation for u in problem.map.uncertain])
     plain = series_of(problem, problem.n)
     mine = Plan(problem.starts(problem.nominal), plain)
     between = Plan(problem.starts(BoxModel(other)), plain * 1.1)
-    start, step = float(problem.data.time[0]), problem.h / problem.m
-    first, _, again = problem.runner.run([mine, between, mine], start, step, problem.m, together=True)
-    if first is None or again is None:
+    runner, grid = problem.runner, (float(problem.data.time[0]), problem.h / problem.m, problem.m)
+    count, bar = len(problem.outputs), problem.settings.probe.repeats
+
+    def alike(one: Array | None, two: Array | None) -> bool:
+        return one is None or two is None or bool(np.max(np.abs(one - two)[:, :count] / problem.noise) <= bar)
+
+    lost = runner.lost
+    first, changed, second = runner.run([mine, between, mine], *grid, together=True)
+    if first is None:
         raise problem.does_not_run()
-    count = len(problem.outputs)
-    return bool(np.max(np.abs(again - first)[:, :count] / problem.noise) > problem.settings.probe.repeats)
+    again_and_again = runner.lost == lost  # new instances can be made in one process
+    if again_and_again and not alike(first, second):
+        raise FmuError(f"{runner.path}: must give the same outputs for the same inputs, but does not")
+    lost, runner.fresh = runner.lost, False
+    back, same, back_again, still = runner.run([between, mine, between, mine], *grid, together=True)
+    right = same is not None and alike(first, same) and alike(first, still) and alike(back, back_again)
+    if again_and_again:
+        right = right and runner.lost == lost and alike(changed, back)
+    elif not right:
+        raise FmuError(f"{runner.path}: must give the same outputs for the same inputs, but does not")
+    if not right:
+        runner.fresh = True
+        runner.renew()  # what a reset has spoilt
 
 
-def _pushed(problem: BoxProblem, fresh: bool) -> Probe:
+def _pushed(problem: BoxProblem) -> Probe:
     """Return what ports and parameters do."""
+    fresh = problem.runner.fresh
     base = problem.must_read(problem.nominal)
     size = np.maximum(np.max(np.abs(base), axis=0), 1e-300)
     notes = ["reset is not followed: a new instance is made for every run"] if fresh else []

@@ -42,7 +42,7 @@ class Plan:
     effects: tuple[Feedback, ...] = ()
 
 
-Grid = tuple[float, float, int, float]
+Grid = tuple[float, float, int, float, bool]
 
 
 class Runner:
@@ -53,7 +53,7 @@ class Runner:
         inputs, reads: what is set before and read after every step.
         tunables: parameters that are set at every step in runs that ask for it.
         tolerance: of the FMU's own solver; None: its own.
-        fresh: make a new instance for every run instead of a reset.
+        fresh: make a new instance for every run instead of a reset; may be changed between batches.
         workers: children (default: one a core, two at most).
         settings: how long it is waited for, and what it may take.
 
@@ -145,7 +145,7 @@ class Runner:
         if together or len(plans) * self.step_cost * len(plans[0].table) < own.small:
             size = len(plans)  # the latter: not worth a second child
         waiting = deque(list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size))
-        grid = (start, step, per_row, lead)
+        grid = (start, step, per_row, lead, self.fresh)
 
         def work() -> None:
             while True:
@@ -165,6 +165,11 @@ class Runner:
                 jail.interrupt()
             raise
         return results
+
+    def renew(self) -> None:
+        """End the children; the next runs start others."""
+        for thread in self._threads:
+            thread.submit(self._drop).result()
 
     def close(self) -> None:
         """End the children and remove their files."""
@@ -193,7 +198,7 @@ class Runner:
                 for c in self.subject.connections
             ]
             request = Load(
-                members, list(self.inputs), list(self.reads), self.tolerance, self.fresh, list(self.tunables), wires
+                members, list(self.inputs), list(self.reads), self.tolerance, list(self.tunables), wires
             )
             own = self.settings
             limits = Limits(time=own.loading, memory=own.memory * MEBIBYTE, total=own.total)
@@ -256,16 +261,20 @@ class Runner:
             text = text.replace(str(folder), str(self.subject.members[name]))
         return text
 
-    def _lose(self, reason: str) -> None:
-        """Close this thread's jail.
-
-        Raises:
-            SlaveError: too many have been lost.
-        """
+    def _drop(self) -> None:
+        """Close this thread's jail."""
         jail = self._jails.pop(threading.get_ident(), None)
         self._warm.discard(threading.get_ident())
         if jail is not None:
             jail.close()
+
+    def _lose(self, reason: str) -> None:
+        """Close this thread's jail, which was lost.
+
+        Raises:
+            SlaveError: too many have been lost.
+        """
+        self._drop()
         with self._lock:
             self.reason = reason
             self.lost += 1
@@ -284,8 +293,8 @@ def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid, through: list[Th
             tables.append(np.ascontiguousarray(plan.table))
         starts = {name: float(value) for name, value in plan.starts.items()}
         jobs.append(Job(starts, places[id(plan.table)], list(plan.effects)))
-    start, step, per_row, lead = grid
-    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through)
+    start, step, per_row, lead, fresh = grid
+    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through, fresh)
 
 
 def _worded(error: ChildError, allowed: float) -> str:

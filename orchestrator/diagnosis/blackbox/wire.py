@@ -29,7 +29,7 @@ class Through:
 
 @dataclass(frozen=True)
 class Load:
-    """Load the FMUs; set ``inputs``, read ``reads``; ``fresh``: a new instance for every run, no reset.
+    """Load the FMUs; set ``inputs``, read ``reads``.
 
     ``members``: folder by name; variables of a member are called ``name.variable``, those of a lone FMU, whose name is
     empty, as they are. ``tunables``: parameters that runs with further columns in their table set at every step.
@@ -39,7 +39,6 @@ class Load:
     inputs: list[str]
     reads: list[str]
     tolerance: float | None = None
-    fresh: bool = False
     tunables: list[str] = field(default_factory=list)
     wires: list[Wire] = field(default_factory=list)
 
@@ -67,7 +66,10 @@ class Job:
 
 @dataclass(frozen=True)
 class Batch:
-    """Runs on one grid: ``step`` [s] of the communication, ``per_row`` of them for each row that is returned."""
+    """Runs on one grid: ``step`` [s] of the communication, ``per_row`` of them for each row that is returned.
+
+    ``fresh``: a new instance for every run, no reset.
+    """
 
     start: float
     step: float
@@ -76,3 +78,4 @@ class Batch:
     jobs: list[Job]
     lead: float = 0.5
     through: list[Through] = field(default_factory=list)
+    fresh: bool = False
