@@ -85,7 +85,7 @@ def opened(
     runner = Runner(subject, inputs, reads, given.tunable, given.options.tolerance, True, workers, settings.process)
     try:
         rough = noise_of(given, data.outputs, data.outputs)
-        runner.through = through = _passing(runner, given, data, settings)
+        runner.through = _passing(runner, given, data, settings)
         problem = BoxProblem(
             data, given, runner, _affordable(runner, given, data, progress, settings), rough, settings=settings
         )

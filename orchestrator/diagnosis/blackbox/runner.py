@@ -197,9 +197,7 @@ class Runner:
                 Wire(self.reads.index(c.source), self.inputs.index(c.target), c.factor, c.offset)
                 for c in self.subject.connections
             ]
-            request = Load(
-                members, list(self.inputs), list(self.reads), self.tolerance, list(self.tunables), wires
-            )
+            request = Load(members, list(self.inputs), list(self.reads), self.tolerance, list(self.tunables), wires)
             own = self.settings
             limits = Limits(time=own.loading, memory=own.memory * MEBIBYTE, total=own.total)
             folders = list(self._folders.values())
