@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.diagnosis.blackbox.loop import GET, SET, STEP, run_loop
+from orchestrator.diagnosis.blackbox.loop import AWAY, GET, SET, STEP, run_loop
 from orchestrator.diagnosis.blackbox.wire import Array, Batch, Job, Load
-from orchestrator.errors import FmuError, OrchestratorError
+from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 from orchestrator.fmi.model_description import read_description
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.system import split
@@ -189,15 +189,22 @@ class Box:
         ports = np.array([[e.input, e.law, e.position, e.velocity] for e in job.effects], dtype=np.int64).reshape(-1, 4)
         sign = np.array([e.sign for e in job.effects], dtype=float)
         q = np.array([e.q for e in job.effects], dtype=float).reshape(-1, 4)
+        most = np.array([e.most for e in job.effects], dtype=float)
         grid = np.array([start, step, per_row], dtype=float)
         passing = np.array([[t.wire, t.by] for t in batch.through], dtype=np.int64).reshape(-1, 2)
         passed = np.array([t.gain for t in batch.through], dtype=float)
         into = self._into[: values.shape[1]]
         status, call, k, n = run_loop(
             calls, counts, where, self._sent, self._read, into, self._outof, values, grid, self._wires, self._gains,
-            passing, passed, ports, sign, q, batch.lead, out,
+            passing, passed, ports, sign, q, most, batch.lead, out,
         )  # fmt: skip
         members = list(self._members.values())
+        if call == AWAY:
+            for member in members:
+                member.done()
+            raise SlaveError(
+                f"efforts at ports must stay within those of the drive, but run away at {start + k * step:g} s"
+            )
         if status > 1:
             members[n].slave.failed(int(status), CALLS[call], start + k * step)
         for member in members:

@@ -21,8 +21,8 @@ _resistance: Any = _laws.resistance
 _cuts: Any = _laws.cuts
 _across: Any = _laws.across
 
-SET, STEP, GET = 1, 2, 3
-"""The call that failed, as ``run_loop`` returns it."""
+SET, STEP, GET, AWAY = 1, 2, 3, 4
+"""The call that failed, as ``run_loop`` returns it; ``AWAY``: none did, but an effort ran away."""
 
 
 @kept()
@@ -41,8 +41,9 @@ def _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, h
 
 
 @kept()
-def _act(k, sent, read, into, outof, ports, sign, q, last, built, step, lead):  # type: ignore[no-untyped-def]
-    """Let the effects at ports and cuts act on the inputs."""
+def _act(k, sent, read, into, outof, ports, sign, q, most, last, built, step, lead):  # type: ignore[no-untyped-def]
+    """Let the effects at ports and cuts act on the inputs; tell whether all efforts are within their bounds."""
+    bounded = True
     for e in range(len(ports)):
         kind, target = ports[e, 1], into[ports[e, 0]]
         x = read[outof[ports[e, 2]]]
@@ -68,8 +69,11 @@ def _act(k, sent, read, into, outof, ports, sign, q, last, built, step, lead):  
             built[e] = _built_up(kind, built[e], middle, distance, step)
         else:
             half = 0.0
-        sent[target] -= sign[e] * _resistance(kind, place, middle, a, half, q[e, 0], q[e, 1], q[e, 2])
+        effort = _resistance(kind, place, middle, a, half, q[e, 0], q[e, 1], q[e, 2])
+        bounded = bounded and abs(effort) <= most[e]
+        sent[target] -= sign[e] * effort
         last[e, 1] = v
+    return bounded
 
 
 @kept()
@@ -94,7 +98,25 @@ def _step(calls, counts, where, time, step):  # type: ignore[no-untyped-def]
 
 @kept()
 def run_loop(  # type: ignore[no-untyped-def]
-    calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, sign, q, lead, out
+    calls,
+    counts,
+    where,
+    sent,
+    read,
+    into,
+    outof,
+    table,
+    grid,
+    wires,
+    gains,
+    passing,
+    passed,
+    ports,
+    sign,
+    q,
+    most,
+    lead,
+    out,
 ):
     """Run one record; return ``(status, call, step, member)``, status at most 1 when all went well.
 
@@ -114,6 +136,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         ports: (effects, 4) input, law, place of the position, place of the speed (-1: differentiated).
         sign: (effects,) direction in which the input pushes.
         q: (effects, 4) parameters.
+        most: (effects,) effort at a port from which the run is given up: its loop is unstable.
         lead: steps by which the fed-back signal is extrapolated.
         out: (rows, variables read), row 0 the initial values.
     """
@@ -130,7 +153,8 @@ def run_loop(  # type: ignore[no-untyped-def]
         for i in range(len(into)):
             sent[into[i]] = table[k, i]
         _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, handed, lead)
-        _act(k, sent, read, into, outof, ports, sign, q, last, built, step, lead)
+        if not _act(k, sent, read, into, outof, ports, sign, q, most, last, built, step, lead):
+            return np.int32(2), AWAY, k, 0
         for w in range(len(wires)):
             fed[w, 1] = fed[w, 0]
             fed[w, 0] = sent[into[wires[w, 0]]]

@@ -247,7 +247,8 @@ class BoxProblem:
             velocity = -1 if port.velocity is None else reads.index(port.velocity)
             place = self.runner.inputs.index(port.input)
             sign = self.sign.get(effect.place, 1.0)
-            found.append(Feedback(place, effect.kind.law, reads.index(port.position), velocity, sign, q))
+            most = self.settings.process.runaway * float(self.drive([place])[0])
+            found.append(Feedback(place, effect.kind.law, reads.index(port.position), velocity, sign, q, most))
         return tuple(found)
 
     def beyond(self, effect: BoxEffect) -> str:

@@ -317,7 +317,7 @@ def _compile_loop() -> None:
     whole, real = numba.int64, numba.float64
     run_loop.compile(
         (whole[:, ::1], whole[:, ::1], whole[:, ::1], real[::1], real[::1], whole[::1], whole[::1], real[:, ::1],
-         real[::1], whole[:, ::1], real[:, ::1], whole[:, ::1], real[::1], whole[:, ::1], real[::1], real[:, ::1], real,
-         real[:, ::1])
+         real[::1], whole[:, ::1], real[:, ::1], whole[:, ::1], real[::1], whole[:, ::1], real[::1], real[:, ::1],
+         real[::1], real, real[:, ::1])
     )  # fmt: skip
     _compiled.append(True)

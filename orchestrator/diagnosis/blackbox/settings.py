@@ -267,6 +267,9 @@ class ProcessSettings(Settings, frozen=True):
     small: Annotated[float, setting("seconds of work below which a second process is not asked")] = 0.01
     total: Annotated[float, setting("seconds that a process may live", gt=0.0)] = 86_400.0
     memory: Annotated[int, setting("MiB that a process may use", ge=1)] = 4096
+    runaway: Annotated[
+        float, setting("effort of an effect over the drive's, beyond which a run is given up: it is unstable", gt=1)
+    ] = 1e4
 
 
 class ReadSettings(Settings, frozen=True):

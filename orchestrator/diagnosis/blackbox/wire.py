@@ -1,5 +1,6 @@
 """What the owner of a black box asks of its child processes: plain data and arrays."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,7 +46,10 @@ class Load:
 
 @dataclass(frozen=True)
 class Feedback:
-    """One effect at a port or a cut: places in the lists of inputs and of what is read, law, direction, parameters."""
+    """One effect at a port or a cut: places in the lists of inputs and of what is read, law, direction, parameters.
+
+    ``most``: effort from which the run is given up.
+    """
 
     input: int
     law: int
@@ -53,6 +57,7 @@ class Feedback:
     velocity: int
     sign: float
     q: list[float]
+    most: float = math.inf
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,12 @@ from orchestrator.api.any_fmu import draft_map
 from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
+from orchestrator.diagnosis.blackbox.diagnose import prepared
+from orchestrator.diagnosis.blackbox.mapping import read_map
+from orchestrator.diagnosis.blackbox.reading import read_data
 from orchestrator.diagnosis.blackbox.settings import BoxSettings, FitterSettings, ProcessSettings
+from orchestrator.diagnosis.blackbox.sites import effects_of
+from orchestrator.diagnosis.blackbox.subject import subject_of
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import BoxCalibrationFound, BoxDiagnosisFound
@@ -181,6 +186,23 @@ def test_an_fmu_that_hangs_is_ended(made, fault):
     _, *files = made(SPRING, rows=300, fault=fault)
     with pytest.raises(OrchestratorError, match="hangs"):
         diagnose(*files, settings=BoxSettings(process=ProcessSettings(loading=3.0, patience=2.0, most_lost=1)))
+
+
+def test_a_run_whose_fed_back_effort_runs_away_is_given_up_before_the_fmu_meets_it(made):
+    _, record_path, fmu, map_path = made(SPRING, rows=300, fault="hangs_when_pushed_hard")
+    subject = subject_of(fmu)
+    given = read_map(map_path, subject)
+    problem, _ = prepared(subject, given, read_data(record_path, given), workers=1)
+    try:
+        effects = effects_of(problem, problem.must_read(problem.nominal))
+        inertia = next(e for e in effects if e.kind.name == "added_inertia")
+        heavier, unstable = (problem.nominal.extended(inertia, np.array([m])) for m in (0.1, 5.0))
+        assert problem.simulate([heavier])[0] is not None
+        assert problem.simulate([unstable])[0] is None
+        assert "run away" in problem.runner.reason
+        assert problem.runner.lost == 0
+    finally:
+        problem.runner.close()
 
 
 def test_an_fmu_that_is_too_slow_for_its_budget_is_refused_with_an_estimate(made):
