@@ -39,7 +39,7 @@ def at_input(effect: BoxEffect, fine: Array, step: float, value: float) -> Array
     return series.quantised(fine, value)
 
 
-def at_output(effect: BoxEffect, rows: Array, h: float, value: float) -> Array:
+def at_output(effect: BoxEffect, rows: Array, h: float, value: float, m: int) -> Array:
     """Return an output behind an effect in series with it.
 
     Args:
@@ -47,6 +47,7 @@ def at_output(effect: BoxEffect, rows: Array, h: float, value: float) -> Array:
         rows: (rows,) values of the output.
         h: time from one to the next [s].
         value: of the effect's parameter.
+        m: of them in a sample of the inputs.
 
     Returns:
         Shape (rows,).
@@ -57,7 +58,7 @@ def at_output(effect: BoxEffect, rows: Array, h: float, value: float) -> Array:
     if name == "output_offset":
         return np.asarray(rows + value)
     if name == "output_delay":
-        return series.later(rows, h, value)
+        return series.later(rows, h, value, m)
     if name == "output_lag":
         return np.asarray(series.smoothed(rows, h, value))
     return series.quantised(rows, value)

@@ -277,7 +277,7 @@ class BoxProblem:
             if y.base is not None:
                 y = y.copy()
             column = self.outputs.index(effect.place)
-            y[:, column] = at_output(effect, y[:, column], self.h / self.m, float(values[0]))
+            y[:, column] = at_output(effect, y[:, column], self.h / self.m, float(values[0]), self.m)
         return y[:: self.m]
 
     def impulses(self, model: BoxModel, length: int, places: Sequence[int] | None = None) -> tuple[Surrogate, Array]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.followed import answers
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.promises import Known, Promise, Trial, promised
@@ -144,20 +145,32 @@ def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> Sc
     for effect in free:
         for start in found.get(effect) or effect.kind.starts(effect.scene):
             values = np.array(start)
-            amplitudes = effect.amplitudes
-            trials.append((effect, values, amplitudes))
-            for a in range(max(amplitudes, 1)):
-                one = values.copy()
-                if amplitudes > 1:
-                    one[[b for b in range(amplitudes) if b != a]] = 0.0
-                models.append(before.model.extended(effect, one))
+            trials.append((effect, values, effect.amplitudes))
+            models += [before.model.extended(effect, one) for one in _one_by_one(values, effect.amplitudes)]
     rows = len(before.y)
     runs = fitter.problem.simulate(models, rows)
     columns: list[Array | None] = [None if run is None else (run - before.y) / fitter.problem.noise for run in runs]
     known = Known(fitter, before, rows)
+    for effect, values, amplitudes in tuple(trials):
+        along = [answers(fitter.problem, fitter.ladder.surrogate, effect, one, rows)
+                 for one in _one_by_one(values, amplitudes)]  # fmt: skip
+        if along[0] is not None:
+            trials.append((effect, values, amplitudes))
+            columns += along
     promises = promised(known, trials, columns)
     near = max(fitter.horizon(before.y), rows // 16)
     if near < fitter.settings.screen.straight * rows:  # beyond it nothing is linear any more
         close = promised(Known(fitter, before, near), trials, [None if c is None else c[:near] for c in columns])
         promises = [p for pair in itertools.zip_longest(close, promises) for p in pair if p is not None]
     return Screened(promises, known, trials, columns, frozenset(n for n, t in enumerate(trials) if t[0] in found))
+
+
+def _one_by_one(values: Array, amplitudes: int) -> list[Array]:
+    """Return values with all but one of the leading amplitudes at zero, for each of these."""
+    found = []
+    for a in range(max(amplitudes, 1)):
+        one = values.copy()
+        if amplitudes > 1:
+            one[[b for b in range(amplitudes) if b != a]] = 0.0
+        found.append(one)
+    return found

@@ -144,20 +144,25 @@ def quantised(fine: Array, quantum: float) -> Array:
     return np.asarray(quantum * np.rint(fine / quantum)) if quantum > 0.0 else fine
 
 
-def later(rows: Array, step: float, delay: float) -> Array:
+def later(rows: Array, step: float, delay: float, m: int = 1) -> Array:
     """Return samples of an output that is read ``delay`` [s] late, by cubics through four of its samples.
 
     Args:
         rows: (n,) samples.
         step: length of a part, or sample time [s].
         delay: [s].
+        m: parts of a sample of the inputs: where it is 3 or more, no cubic reaches beyond a jump of these.
 
     Returns:
         Shape (n,).
     """
     n = len(rows)
     place = np.clip(np.arange(n) - delay / step, 0.0, n - 1.0)
-    first = np.clip(np.floor(place).astype(int) - 1, 0, n - 4)
+    first = np.floor(place).astype(int) - 1
+    if m >= 3:
+        begin = m * np.floor(place / m).astype(int)
+        first = np.clip(first, begin, begin + m - 3)
+    first = np.clip(first, 0, n - 4)
     t = place - first
     weights = (
         -(t - 1) * (t - 2) * (t - 3) / 6,

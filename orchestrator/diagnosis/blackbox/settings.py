@@ -252,6 +252,9 @@ class PortNoiseSettings(Settings, frozen=True):
         int, setting("states of the surrogate at most: what is measured determines no more", ge=1)
     ] = 6
     least_singular: Annotated[float, share("of the largest singular value from which a state is kept")] = 1e-4
+    grows: Annotated[
+        float, share("by which a mode may grow over the responses: rounding, and nothing is made of it")
+    ] = 0.01
     blocks: Annotated[int, setting("rows and columns of blocks of the Hankel matrix, about", ge=4)] = 40
     reach: Annotated[int, setting("samples over which efforts may have led to the start of the record", ge=1)] = 400
 

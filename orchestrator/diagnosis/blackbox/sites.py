@@ -12,6 +12,7 @@ from orchestrator.diagnosis.blackbox.bank import (
     BoxEffect,
     Surroundings,
 )
+from orchestrator.diagnosis.blackbox.followed import Motion, measured_motion
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
 
 Array = NDArray[np.float64]
@@ -44,11 +45,15 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
         scene = Surroundings(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
         found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
     for name, port in problem.map.ports.items():
-        x = nominal[:, runner.reads.index(port.position)]
-        v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]
+        motion = measured_motion(problem, port)
+        if motion is None:
+            x = nominal[:, runner.reads.index(port.position)]
+            v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]
+            motion = Motion(x, v, np.gradient(v, h))
+        x, v = motion.x, motion.v
         effort = float(problem.drive([runner.inputs.index(port.input)])[0])
         angular = problem.units.get(port.position, "") in ANGLES
-        a = _rms(np.gradient(v, h))
+        a = _rms(motion.a)
         span = float(np.ptp(x)) or 1.0
         # From two thirds of a cycle within the span to what the samples still follow, half a radian of it apart.
         top = 0.5 * np.pi / max(float(np.quantile(np.abs(v), 0.8)) * h, 1e-300)

@@ -43,6 +43,15 @@ def test_an_output_that_is_read_late_follows_a_cubic_exactly():
     assert late[5:] == pytest.approx((s**3 - s)[5:], abs=1e-12)
 
 
+def test_an_output_that_is_read_late_keeps_its_kinks_where_inputs_jump():
+    t = np.arange(81) * STEP
+    kinked = np.abs(t - 40 * STEP) + 3.0 * np.maximum(t - 20 * STEP, 0.0) ** 2
+    late = series.later(kinked, STEP, 0.7 * STEP, m=4)
+    s = t - 0.7 * STEP
+    assert late[4:] == pytest.approx((np.abs(s - 40 * STEP) + 3.0 * np.maximum(s - 20 * STEP, 0.0) ** 2)[4:], abs=1e-12)
+    assert np.max(np.abs(series.later(kinked, STEP, 0.7 * STEP) - late)) > 0.01 * STEP
+
+
 def test_an_output_behind_a_lag_follows_a_ramp():
     t = np.arange(500) * STEP
     out = series.smoothed(t, STEP, 0.1)

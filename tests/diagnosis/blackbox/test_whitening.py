@@ -33,6 +33,15 @@ def test_the_surrogate_answers_a_push_as_the_system_does():
     assert realised(impulses(400)).response(pushes, 0) == pytest.approx(np.stack(rows), abs=1e-7)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_two_integrators_in_a_row_stay_two(seed):
+    t = np.arange(1, 601)
+    rounding = 1.0 + 1e-9 * np.random.default_rng(seed).standard_normal(600)
+    found = realised(((t - 0.5) * rounding)[:, None, None])
+    ramp = found.response(np.ones((600, 1)), 0)[:, 0, 0]
+    assert ramp[1:] == pytest.approx(0.5 * t**2, rel=1e-3)
+
+
 @pytest.mark.parametrize("colour", [0.0, 0.7])
 def test_a_product_with_whitened_responses_needs_no_response(colour):
     rng = np.random.default_rng(3)

@@ -1,0 +1,93 @@
+"""What effects at ports would push along the measured motion: no run of the FMU has to come close to the record first.
+
+A free run of a model that lacks an effect may go astray, most of all where the inputs were recorded in a closed loop.
+What effects answer to its motion says little then. Where a port's position is measured, they answer to that instead.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.bank import PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.mapping import PortEntry
+from orchestrator.diagnosis.blackbox.problem import BoxProblem
+from orchestrator.plants.compiled import compiled
+from orchestrator.shared.numba_cache import kept
+
+Array = NDArray[np.float64]
+
+_laws = compiled("port_laws")
+_built_up: Any = _laws.built_up
+_has_memory: Any = _laws.has_memory
+_distance: Any = _laws.distance_of
+_resistance: Any = _laws.resistance
+
+WINDOW, DEGREE = 7, 3
+"""Samples and degree of the sliding polynomial that gives speed and acceleration."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Position, speed and acceleration (n,) of a port, in its own units."""
+
+    x: Array
+    v: Array
+    a: Array
+
+
+def measured_motion(problem: BoxProblem, port: PortEntry) -> Motion | None:
+    """Return the motion of a port from the record; None where its position is not measured.
+
+    Args:
+        problem: the FMU and the record.
+        port: of the map.
+
+    Returns:
+        The motion, its speed and acceleration those of a sliding cubic.
+    """
+    if port.position not in problem.outputs or problem.n < WINDOW:
+        return None
+    from scipy.signal import savgol_filter
+
+    y = problem.data.outputs[:, problem.outputs.index(port.position)]
+    x, v, a = (savgol_filter(y, WINDOW, DEGREE, deriv=order, delta=problem.h) for order in range(3))
+    return Motion(x, v, a)
+
+
+def answers(problem: BoxProblem, surrogate: Any, effect: BoxEffect, values: Array, rows: int) -> Array | None:
+    """Return what an effect at a port changes of the outputs (rows, outputs), by the surrogate, in units of the noise.
+
+    Args:
+        problem: the FMU and the record.
+        surrogate: of the FMU, from its ports.
+        effect: of the bank.
+        values: of its parameters.
+        rows: samples.
+
+    Returns:
+        The change; None where the effect is at no port, or the port's position is not measured.
+    """
+    if effect.kind.where != PORT or surrogate.order == 0:
+        return None
+    port = problem.map.ports[effect.place]
+    motion = measured_motion(problem, port)
+    if motion is None:
+        return None
+    at = problem.runner.inputs.index(port.input)
+    q = np.array([*values, *[0.0] * (4 - len(values))])
+    effort = _efforts(effect.kind.law, motion.x[:rows], motion.v[:rows], motion.a[:rows], q, problem.h)
+    push = -problem.sign.get(effect.place, 1.0) * 0.5 * (effort[:-1] + effort[1:]) / problem.drive([at])[0]
+    return np.asarray(surrogate.response(push[:, None], problem.noise_places.index(at))[:, :, 0])
+
+
+@kept()
+def _efforts(law, x, v, a, q, h):  # type: ignore[no-untyped-def]
+    """Return the effort against the motion in each sample."""
+    found, built = np.zeros(len(x)), 0.0
+    for k in range(len(x)):
+        if _has_memory(law):
+            built = _built_up(law, built, v[k], _distance(law, q[1], q[3]), h)
+        found[k] = _resistance(law, x[k], v[k], a[k], built, q[0], q[1], q[2])
+    return found

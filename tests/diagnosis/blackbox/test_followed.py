@@ -1,0 +1,73 @@
+"""Effects along the measured motion, against the motion itself: free runs that go astray, and what takes them there."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
+from orchestrator.diagnosis.blackbox.followed import answers, measured_motion
+from orchestrator.diagnosis.blackbox.mapping import PortEntry
+from orchestrator.diagnosis.blackbox.whitening import realised
+
+H, N, FINE, MASS, NOISE = 0.01, 800, 50, 2.0, 1e-4
+
+
+def controlled(push):
+    """Return force and position of a mass that a controller keeps on its way, against ``push(x, v)``."""
+    x, v, u, rows = 0.0, 0.0, np.zeros(N), np.zeros(N)
+    for k in range(N):
+        rows[k] = x
+        u[k] = 400.0 * (0.1 * np.sin(3.0 * k * H) + 0.04 * np.sin(11.0 * k * H) - x) - 40.0 * v
+        for _ in range(FINE):
+            a = (u[k] - push(x + 0.5 * v * H / FINE, v)) / MASS
+            x, v = x + v * H / FINE + 0.5 * a * (H / FINE) ** 2, v + a * H / FINE
+    return u, rows
+
+
+def free(u):
+    """Return the position of the mass under the force alone."""
+    x, v, rows = 0.0, 0.0, np.zeros(N)
+    for k in range(N):
+        rows[k] = x
+        x, v = x + v * H + 0.5 * u[k] / MASS * H * H, v + u[k] / MASS * H
+    return rows
+
+
+def problem_of(x):
+    return SimpleNamespace(
+        outputs=("x",), n=N, h=H, data=SimpleNamespace(outputs=x[:, None]), sign={"port": 1.0}, noise_places=[0],
+        map=SimpleNamespace(ports={"port": PortEntry(input="F", position="x")}),
+        runner=SimpleNamespace(inputs=("F",)), drive=lambda places: np.ones(len(places)),
+    )  # fmt: skip
+
+
+def effect_of(name):
+    return BoxEffect(BANK[name], "port", Surroundings(H, 1.0, 1.0, np.zeros(N)))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "push"),
+    [
+        ("spring", (120.0,), lambda x, v: 120.0 * x),
+        ("ripple", (3.0, 1.0, 60.0), lambda x, v: 3.0 * np.sin(60.0 * x) + np.cos(60.0 * x)),
+        ("quadratic_drag", (30.0,), lambda x, v: 30.0 * v * abs(v)),
+        ("directional_friction", (20.0,), lambda x, v: 20.0 * abs(v)),
+    ],
+)
+def test_what_an_effect_pushes_along_the_measured_motion_is_what_a_free_run_lacks(name, values, push):
+    u, x = controlled(push)
+    astray = x - free(u)
+    assert np.max(np.abs(astray)) > 3.0 * np.std(x)
+    impulses = ((np.arange(1, N // 2) - 0.5) * H * H / MASS / NOISE)[:, None, None]
+    measured = x + NOISE * np.random.default_rng(2).standard_normal(N)
+    found = answers(problem_of(measured), realised(impulses), effect_of(name), np.array(values), N)
+    assert np.max(np.abs(NOISE * found[:, 0] - astray)) < 0.05 * np.max(np.abs(astray))
+
+
+def test_nothing_is_said_where_the_position_is_not_measured():
+    problem = problem_of(np.zeros(N))
+    problem.outputs = ("y",)
+    assert measured_motion(problem, problem.map.ports["port"]) is None
+    surrogate = realised(np.ones((20, 1, 1)))
+    assert answers(problem, surrogate, effect_of("spring"), np.array([1.0]), N) is None
