@@ -170,7 +170,9 @@ def judged(tally: Tally, kind: str, label: str, names: tuple[str, ...], sizes: t
     verdict = right(kind, names, found)
     tally.take(kind, verdict, names, sizes, parameters, found, told)
     o, level = found.outcome, found.trust.level.word
-    shown = ", ".join(f"{f.effect.label}={f.estimates[0].value:.5g}" for f in found.effects)
+    shown = ", ".join(
+        f"{f.effect.label}={f.estimates[0].value:.5g} +- {f.estimates[0].standard_error:.2g}" for f in found.effects
+    )
     print(
         f"{kind:8s}{label} {verdict:7s}{found.verdict:10s} {level:5s} {shown} "
         f"true {', '.join(f'{s:.5g}' for s in sizes)} "

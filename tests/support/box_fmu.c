@@ -179,6 +179,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean ns) {
     C *m = c;
 #ifdef FAULT_step_hangs
     if (m->steps > 100) for (;;) sleep(1);
+#elif defined(FAULT_hangs_without_a_push)
+    if (m->steps > 0 && m->u[0] == 0.0) for (;;) sleep(1);
 #elif defined(FAULT_hangs_when_pushed_hard)
     if (!(fabs(m->u[0]) < 1e12)) for (;;) sleep(1);
 #elif defined(FAULT_step_crashes)

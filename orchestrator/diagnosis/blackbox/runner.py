@@ -85,6 +85,7 @@ class Runner:
         self._warm: set[int] = set()
         self._lock = threading.Lock()
         self._starting = self._spent = 0.0  # s: what the first child took to start, and all runs so far
+        self._first = 0.0  # s, until the first answer of a child
         self._scratch = Scratch("box")
         self._folders = {name: self._scratch.path / f"fmu_{k}" for k, name in enumerate(subject.members)}
         # A jail dies with the thread that made it: the threads live as long as this.
@@ -213,11 +214,11 @@ class Runner:
     def _chunk(self, chunk: list[int], plans: Sequence[Plan], grid: Grid, results: list[Array | None]) -> None:
         """Run some of the plans in this thread's jail; where that is lost, each of them alone in a new one."""
         steps = sum(len(plans[k].table) for k in chunk)
-        own = self.settings
-        allowed = own.patience + own.slower * steps * self.step_cost + (own.loading if self.step_cost == 0.0 else 0.0)
+        allowed = self._allowed(steps)
         count = (len(plans[chunk[0]].table) // grid[2] + 1) * len(self.reads)
         try:
             jail = self._jail()
+            begun = time.monotonic()
             answer = jail.call(
                 _batch(chunk, plans, grid, self.through), time=allowed, most=8 * count * len(chunk) + SLACK
             )
@@ -229,7 +230,16 @@ class Runner:
             return
         except OrchestratorError as error:
             raise SlaveError(self._named(error)) from None
+        if threading.get_ident() not in self._warm:  # it includes what the child loads
+            self._first = max(self._first, time.monotonic() - begun)
         self._take(answer, chunk, plans, grid, results, steps)
+
+    def _allowed(self, steps: int) -> float:
+        """Return the seconds that so many steps may take in this thread's child."""
+        own, expected = self.settings, self.settings.slower * steps * self.step_cost
+        if self.step_cost == 0.0:
+            return expected + own.loading + own.patience
+        return expected + own.known + (0.0 if threading.get_ident() in self._warm else own.again * self._first)
 
     def _take(
         self, answer: Any, chunk: list[int], plans: Sequence[Plan], grid: Grid, results: list[Array | None], steps: int

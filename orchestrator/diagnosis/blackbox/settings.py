@@ -263,9 +263,15 @@ class ProcessSettings(Settings, frozen=True):
     """How long the FMU's process is waited for, and what it may take."""
 
     loading: Annotated[float, setting("seconds that loading may take: some FMUs unpack a whole tool", gt=0.0)] = 60.0
-    patience: Annotated[float, setting("seconds that a batch of runs may take beyond what is expected")] = 20.0
+    patience: Annotated[float, setting("seconds that the first runs may take beyond loading")] = 20.0
+    known: Annotated[float, setting("the same of any batch, beyond what is expected, once runs were timed")] = 5.0
+    again: Annotated[
+        float, setting("times as long as the first answer of the first process that of another may take more", ge=0)
+    ] = 5.0
     slower: Annotated[float, setting("how many times as long as expected a batch may take", ge=1)] = 20.0
-    most_lost: Annotated[int, setting("processes that an FMU may cost", ge=0)] = 5
+    most_lost: Annotated[
+        int, setting("processes that an FMU may cost: one effect that it cannot stand costs a few", ge=0)
+    ] = 25
     chunk: Annotated[int, setting("runs that are sent to a process at a time", ge=1)] = 3
     small: Annotated[float, setting("seconds of work below which a second process is not asked")] = 0.01
     total: Annotated[float, setting("seconds that a process may live", gt=0.0)] = 86_400.0

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import shutil
+import time
 
 import numpy as np
 import pytest
@@ -201,6 +202,26 @@ def test_a_run_whose_fed_back_effort_runs_away_is_given_up_before_the_fmu_meets_
         assert problem.simulate([unstable])[0] is None
         assert "run away" in problem.runner.reason
         assert problem.runner.lost == 0
+    finally:
+        problem.runner.close()
+
+
+def test_a_run_that_hangs_is_given_up_soon_and_others_go_on(made):
+    _, record_path, fmu, map_path = made(SPRING, rows=300, fault="hangs_without_a_push")
+    subject = subject_of(fmu)
+    given = read_map(map_path, subject)
+    settings = BoxSettings(process=ProcessSettings(known=0.3, again=1.0, patience=300.0))
+    problem, _ = prepared(subject, given, read_data(record_path, given), workers=1, settings=settings)
+    try:
+        zone = next(
+            e for e in effects_of(problem, problem.must_read(problem.nominal)) if e.kind.name == "input_dead_zone"
+        )
+        wide = problem.nominal.extended(zone, np.array([1e9]))
+        begun = time.monotonic()
+        runs = problem.simulate([problem.nominal, wide, problem.nominal])
+        assert time.monotonic() - begun < 60.0
+        assert [run is None for run in runs] == [False, True, False]
+        assert "hangs" in problem.runner.reason
     finally:
         problem.runner.close()
 
