@@ -93,6 +93,7 @@ class FmuSlave(Slave):
         self._reached: float | None = None  # s, in a run
         self._once = ""
         self._sets: dict[tuple[str, ...], tuple[list[_Batch], list[Value]]] = {}
+        self._early: list[Mapping[str, Value]] | None = []  # set before the experiment was set up; None: it is
         self._reserve()
         try:
             self._fmu = self._load()
@@ -202,8 +203,10 @@ class FmuSlave(Slave):
         return batches
 
     def set(self, values: Mapping[str, Value]) -> None:
-        """Set variables of any type by name."""
+        """Set variables of any type by name; what is set before :meth:`begin` is set once more by that."""
         self._alive("fmi2Set")
+        if self._early is not None:
+            self._early.append(dict(values))
         names = tuple(values)
         kept = self._sets.get(names)
         if kept is None:
@@ -297,6 +300,9 @@ class FmuSlave(Slave):
             ctypes.c_int(stop is not None),
             ctypes.c_double(stop or 0.0),
         )
+        early, self._early = self._early or [], None
+        for values in early:  # 20-sim's FMUs forget in fmi2SetupExperiment what was set before it
+            self.set(values)
         self._call("fmi2EnterInitializationMode")
         self._reached = start
 
@@ -335,7 +341,7 @@ class FmuSlave(Slave):
     def reset(self) -> None:
         """Return to the condition of a new instance."""
         self._call("fmi2Reset")
-        self._reached = None
+        self._reached, self._early = None, []
 
     def close(self) -> None:
         """Free the instance, unless it failed fatally; its library stays loaded when it runs Python."""

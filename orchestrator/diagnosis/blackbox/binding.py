@@ -61,7 +61,6 @@ class Member:
         self.inputs, self.tunables, self.reads = list(inputs), list(tunables), list(reads)
         self._slave: FmuSlave | None = None
         self._used = self._broken = self._refused = False  # the last: it refuses a reset
-        self._only_before = False  # start values are refused in initialisation mode
         self._prepare(False)
 
     @property
@@ -105,8 +104,6 @@ class Member:
     def begun(self, starts: Mapping[str, float], start: float, stop: float, fresh: bool) -> FmuSlave:
         """Return an instance in initialisation mode, its start values set.
 
-        They are set twice: some FMUs want them before the experiment is set up, others (20-sim's) forget them then.
-
         Args:
             starts: value by name.
             start, stop: of the run [s].
@@ -122,12 +119,6 @@ class Member:
         self._used = self._broken = True
         slave.set(starts)
         slave.begin(start, stop, self._tolerance)
-        if starts and not self._only_before:
-            try:
-                slave.set(starts)
-            except OrchestratorError:
-                self._only_before = True
-                return self.begun(starts, start, stop, fresh)
         return slave
 
 
