@@ -24,9 +24,6 @@ _has_memory: Any = _laws.has_memory
 _distance: Any = _laws.distance_of
 _resistance: Any = _laws.resistance
 
-WINDOW, DEGREE = 7, 3
-"""Samples and degree of the sliding polynomial that gives speed and acceleration."""
-
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -47,12 +44,13 @@ def measured_motion(problem: BoxProblem, port: PortEntry) -> Motion | None:
     Returns:
         The motion, its speed and acceleration those of a sliding cubic.
     """
-    if port.position not in problem.outputs or problem.n < WINDOW:
+    window = problem.settings.screen.window
+    if port.position not in problem.outputs or problem.n < window:
         return None
     from scipy.signal import savgol_filter
 
     y = problem.data.outputs[:, problem.outputs.index(port.position)]
-    x, v, a = (savgol_filter(y, WINDOW, DEGREE, deriv=order, delta=problem.h) for order in range(3))
+    x, v, a = (savgol_filter(y, window, 3, deriv=order, delta=problem.h) for order in range(3))
     return Motion(x, v, a)
 
 

@@ -90,6 +90,9 @@ class ScreenSettings(Settings, frozen=True):
     ] = 0.8
     at_once: Annotated[int, setting("errors of small values that are held in memory at a time", ge=1)] = 500_000
     parts: Annotated[int, setting("parts into which the scan's step is cut around the best value", ge=1)] = 8
+    window: Annotated[
+        int, setting("samples of the sliding cubic that gives speed and acceleration of a measured motion", ge=5)
+    ] = 7
     straight: Annotated[float, share("of the record up to which a run that goes astray earlier is screened apart")] = (
         0.9
     )

@@ -8,6 +8,7 @@ import pytest
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.followed import answers, measured_motion
 from orchestrator.diagnosis.blackbox.mapping import PortEntry
+from orchestrator.diagnosis.blackbox.settings import BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import realised
 
 H, N, FINE, MASS, NOISE = 0.01, 800, 50, 2.0, 1e-4
@@ -38,7 +39,7 @@ def problem_of(x):
     return SimpleNamespace(
         outputs=("x",), n=N, h=H, data=SimpleNamespace(outputs=x[:, None]), sign={"port": 1.0}, noise_places=[0],
         map=SimpleNamespace(ports={"port": PortEntry(input="F", position="x")}),
-        runner=SimpleNamespace(inputs=("F",)), drive=lambda places: np.ones(len(places)),
+        runner=SimpleNamespace(inputs=("F",)), settings=BoxSettings(), drive=lambda places: np.ones(len(places)),
     )  # fmt: skip
 
 
