@@ -132,6 +132,12 @@ class FmuSlave(Slave):
         identifier = self._description.identifier
         library = folder / "binaries" / platform / f"{identifier}{sharedLibraryExtension}"
         if not library.is_file():
+            others = sorted(p.name for p in library.parent.glob(f"*{sharedLibraryExtension}"))
+            if others:
+                raise FmuError(
+                    f"{self.name}: {self.path} must have `binaries/{platform}/{library.name}`, after its "
+                    f"modelIdentifier, but has {', '.join(others)} there: a name of either must be changed"
+                )
             raise FmuError(f"{self.name}: {self.path} must have a binary for {platform}, but has none")
         try:
             return FMU2Slave(

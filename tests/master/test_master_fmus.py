@@ -218,6 +218,19 @@ def test_an_fmu_without_a_binary_for_this_platform(tmp_path: Path, fmus) -> None
         FmuSlave("plant", path)
 
 
+def test_an_fmu_whose_binary_has_another_name_than_its_model(tmp_path: Path, fmus) -> None:
+    path = tmp_path / "renamed.fmu"
+    with zipfile.ZipFile(fmus["Drivetrain"]) as source:
+        content = {name: source.read(name) for name in source.namelist() if not name.endswith("/")}
+    renamed = {
+        name.replace("/Drivetrain.", "/other.") if name.startswith("binaries/") else name: data
+        for name, data in content.items()
+    }
+    archive(path, renamed)
+    with pytest.raises(FmuError, match=r"must have `binaries/.*/Drivetrain\..*modelIdentifier, but has `other\."):
+        FmuSlave("plant", path)
+
+
 def test_error_controlled_master_rolls_fmus_back(fmus) -> None:
     """A plant under a smooth torque: ever smaller fixed steps converge to what the adaptive master gives."""
     instances = (fmu_instance("plant", fmus["Drivetrain"], {"alpha": 0.02}),)
