@@ -136,7 +136,7 @@ class FmuSlave(Slave):
             if others:
                 raise FmuError(
                     f"{self.name}: {self.path} must have `binaries/{platform}/{library.name}`, after its "
-                    f"modelIdentifier, but has {', '.join(others)} there: a name of either must be changed"
+                    f"modelIdentifier, but has {', '.join(others)}: rename the binary, or correct the identifier"
                 )
             raise FmuError(f"{self.name}: {self.path} must have a binary for {platform}, but has none")
         try:
