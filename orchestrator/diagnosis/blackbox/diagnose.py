@@ -1,7 +1,7 @@
 """Diagnosis of any FMU: probe, fit, search, proof on held-out data, verdict."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -282,6 +282,12 @@ def _judged(
     rest = doubted(search, on_all, settings)
     on_all = on_finer_steps(search, on_all) if rest.nothing_missing else on_all
     last = on_all.last
+    parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen))
+    nothing = _of_no_size(last, values, search.settings.least_errors) if rest.nothing_missing else None
+    fewer = None if nothing is None else fitter.fit(best.model.without(best.model.effects[nothing].label), best.level)
+    if nothing is not None and fewer is not None:
+        others = families[:nothing] + families[nothing + 1 :]
+        return _judged(problem, probe, search, base, fitter.settled(fewer), others, begun, settings)
     whole = problem.simulate([problem.nominal, base.model])
     if whole[0] is None:
         raise problem.does_not_run()
@@ -294,7 +300,6 @@ def _judged(
     else:
         as_given = rest_of(fitter, nominal, slice(0, problem.n), settings).explained
         verdict = ("none" if as_given else "parameters") if fine else "unknown"
-    parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen))
     named: tuple[FoundEffect, ...] = ()
     if verdict == "effects":
         named = tuple(
@@ -311,6 +316,18 @@ def _judged(
         base.model, problem, stages, search,
         time.monotonic() - begun, problem.runner.runs,
     )  # fmt: skip
+
+
+def _of_no_size(last: BoxFit, values: Sequence[Sequence[ValueEstimate]], least: float) -> int | None:
+    """Return the place of an effect whose sizes may all be zero, given all rows; None where there is none.
+
+    It made up for the steps of the search, or for the rows that were left out.
+    """
+    for k, (effect, found) in enumerate(zip(last.model.effects, values, strict=True)):
+        sizes = found[: max(effect.amplitudes, 1)]
+        if effect.kind.finer is None and all(abs(e.value) < least * e.standard_error for e in sizes):
+            return k
+    return None
 
 
 def _warned(probe: Probe, search: BoxSearch, verdict: str, best: BoxFit, share: float) -> tuple[str, ...]:

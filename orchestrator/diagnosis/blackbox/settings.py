@@ -16,6 +16,9 @@ class BoxSearchSettings(Settings, frozen=True):
     pays_disturbed: Annotated[
         float, setting("the same where noise at the ports is left: it is not as white as it is taken to be")
     ] = 30.0
+    least_errors: Annotated[
+        float, setting("standard errors by which a size must differ from zero once all rows are fitted, in fine steps")
+    ] = 2.0
     quiet: Annotated[float, share("port noise, of the drive, up to which that does not apply")] = 3e-4
     decided: Annotated[float, setting("least gain on the deciding part alone")] = 5.0
     decided_share: Annotated[float, share("and its least share of the gain on the fitted part")] = 0.06

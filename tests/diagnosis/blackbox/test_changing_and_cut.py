@@ -53,6 +53,17 @@ def test_a_parameter_that_is_read_once_is_not_looked_at_for_drift(tmp_path):
     assert any("does not change within a run" in note for note in found.outcome.warnings)
 
 
+def test_what_made_up_for_coarse_steps_is_not_named_beside_a_gap(tmp_path):
+    loop, map_path = write_scenario(tmp_path)
+    record = coupled_record(tmp_path / "record.csv", np.random.default_rng(3), 700, gap=0.006)
+    found = oc.diagnose(record, loop, map_path)
+    found.close()
+    (effect,) = found.effects
+    assert effect.effect.label == "backlash@coupling"
+    low, high = effect.estimates[0].interval
+    assert low < 0.006 < high
+
+
 def test_a_gap_between_two_fmus_is_named_and_delivered(tmp_path):
     loop, map_path = write_scenario(tmp_path)
     record = coupled_record(tmp_path / "record.csv", np.random.default_rng(3), 500, gap=0.006)

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit
+from orchestrator.diagnosis.blackbox.diagnose import _of_no_size
+from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate
 from orchestrator.diagnosis.blackbox.rest import Rest
 from orchestrator.diagnosis.blackbox.settings import RestSettings
 from orchestrator.diagnosis.blackbox.trust import SECOND, UNEXPLAINED, doubts, harm, statement
@@ -70,6 +71,16 @@ def test_thresholds_are_those_of_the_settings():
     worse = (replace(GOOD, refitted=1.0, corrected=1.15),)
     assert harm(worse, SECOND)
     assert not harm(worse, SECOND, RestSettings(worse=1.3))
+
+
+@pytest.mark.parametrize(
+    ("sizes", "expected"),
+    [([(3.0, 0.1), (1.0, 0.6)], 1), ([(3.0, 0.1), (-1.3, 0.6)], None), ([(0.1, 0.2), (0.1, 0.2)], 0), ([], None)],
+)
+def test_an_effect_whose_size_may_be_zero_is_found(sizes, expected):
+    effects = [SimpleNamespace(kind=SimpleNamespace(finer=None), amplitudes=1) for _ in sizes]
+    values = [(ValueEstimate("size", value, error, (0.0, 0.0), "N"),) for value, error in sizes]
+    assert _of_no_size(SimpleNamespace(model=SimpleNamespace(effects=effects)), values, 2.0) == expected
 
 
 def test_without_effects_nothing_can_do_harm():
