@@ -68,3 +68,32 @@ def _private_root() -> Path:
         _root = (os.getpid(), Scratch("fmus"))
         atexit.register(_root[1].close)
     return _root[1].path
+
+
+def library_of(name: str, path: Path, folder: Path, identifier: str) -> Path:
+    """Return the shared library of an FMU for this platform.
+
+    Args:
+        name: of the instance, for messages.
+        path: of the FMU.
+        folder: into which it has been unpacked.
+        identifier: its ``modelIdentifier``.
+
+    Returns:
+        The library.
+
+    Raises:
+        FmuError: there is none, or it has another name.
+    """
+    from fmpy import platform, sharedLibraryExtension
+
+    library = folder / "binaries" / platform / f"{identifier}{sharedLibraryExtension}"
+    if library.is_file():
+        return library
+    others = sorted(p.name for p in library.parent.glob(f"*{sharedLibraryExtension}"))
+    if others:
+        raise FmuError(
+            f"{name}: {path} must have `binaries/{platform}/{library.name}`, after its modelIdentifier, but has "
+            f"{', '.join(others)}: rename the binary, or correct the identifier"
+        )
+    raise FmuError(f"{name}: {path} must have a binary for {platform}, but has none")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import FmuError, SlaveError
-from orchestrator.fmi.extraction import content_hash, extracted
+from orchestrator.fmi.extraction import content_hash, extracted, library_of
 from orchestrator.fmi.farewell import ends_cleanly
 from orchestrator.fmi.messages import logging_callbacks
 from orchestrator.fmi.model_description import FmuDescription, read_description
@@ -125,20 +125,11 @@ class FmuSlave(Slave):
         self._closed = True
 
     def _load(self) -> Any:
-        from fmpy import platform, sharedLibraryExtension
         from fmpy.fmi2 import FMU2Slave
 
         folder = extracted(self.path)
         identifier = self._description.identifier
-        library = folder / "binaries" / platform / f"{identifier}{sharedLibraryExtension}"
-        if not library.is_file():
-            others = sorted(p.name for p in library.parent.glob(f"*{sharedLibraryExtension}"))
-            if others:
-                raise FmuError(
-                    f"{self.name}: {self.path} must have `binaries/{platform}/{library.name}`, after its "
-                    f"modelIdentifier, but has {', '.join(others)}: rename the binary, or correct the identifier"
-                )
-            raise FmuError(f"{self.name}: {self.path} must have a binary for {platform}, but has none")
+        library = library_of(self.name, self.path, folder, identifier)
         try:
             return FMU2Slave(
                 guid=self._description.guid,
