@@ -284,10 +284,11 @@ def _judged(
     last = on_all.last
     parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen))
     nothing = _of_no_size(last, values, search.settings.least_errors) if rest.nothing_missing else None
-    fewer = None if nothing is None else fitter.fit(best.model.without(best.model.effects[nothing].label), best.level)
-    if nothing is not None and fewer is not None:
-        others = families[:nothing] + families[nothing + 1 :]
-        return _judged(problem, probe, search, base, fitter.settled(fewer), others, begun, settings)
+    if nothing is not None:
+        fewer = fitter.fit(best.model.without(best.model.effects[nothing].label), best.level)
+        if fewer is not None:
+            others = families[:nothing] + families[nothing + 1 :]
+            return _judged(problem, probe, search, base, fitter.settled(fewer), others, begun, settings)
     whole = problem.simulate([problem.nominal, base.model])
     if whole[0] is None:
         raise problem.does_not_run()

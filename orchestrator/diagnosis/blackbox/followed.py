@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import PORT, BoxEffect
-from orchestrator.diagnosis.blackbox.mapping import PortEntry
+from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
+from orchestrator.diagnosis.blackbox.whitening import Surrogate
 from orchestrator.plants.compiled import compiled
 from orchestrator.shared.numba_cache import kept
 
@@ -34,46 +34,42 @@ class Motion:
     a: Array
 
 
-def measured_motion(problem: BoxProblem, port: PortEntry) -> Motion | None:
-    """Return the motion of a port from the record; None where its position is not measured.
+def measured_motions(problem: BoxProblem) -> dict[str, Motion]:
+    """Return the motion of each port whose position is a column of the record, by its name.
 
     Args:
         problem: the FMU and the record.
-        port: of the map.
 
     Returns:
-        The motion, its speed and acceleration those of a sliding cubic.
+        The motions, speed and acceleration those of a sliding cubic.
     """
-    window = problem.settings.screen.window
-    if port.position not in problem.outputs or problem.n < window:
-        return None
     from scipy.signal import savgol_filter
 
-    y = problem.data.outputs[:, problem.outputs.index(port.position)]
-    x, v, a = (savgol_filter(y, window, 3, deriv=order, delta=problem.h) for order in range(3))
-    return Motion(x, v, a)
+    window, found = problem.settings.screen.window, {}
+    for name, port in problem.map.ports.items():
+        if port.position in problem.outputs and problem.n >= window:
+            y = problem.data.outputs[:, problem.outputs.index(port.position)]
+            found[name] = Motion(*(savgol_filter(y, window, 3, deriv=order, delta=problem.h) for order in range(3)))
+    return found
 
 
-def answers(problem: BoxProblem, surrogate: Any, effect: BoxEffect, values: Array, rows: int) -> Array | None:
+def answers(
+    problem: BoxProblem, surrogate: Surrogate, motion: Motion, effect: BoxEffect, values: Array, rows: int
+) -> Array:
     """Return what an effect at a port changes of the outputs (rows, outputs), by the surrogate, in units of the noise.
 
     Args:
         problem: the FMU and the record.
         surrogate: of the FMU, from its ports.
+        motion: of the port, as measured.
         effect: of the bank.
         values: of its parameters.
         rows: samples.
 
     Returns:
-        The change; None where the effect is at no port, or the port's position is not measured.
+        The change.
     """
-    if effect.kind.where != PORT or surrogate.order == 0:
-        return None
-    port = problem.map.ports[effect.place]
-    motion = measured_motion(problem, port)
-    if motion is None:
-        return None
-    at = problem.runner.inputs.index(port.input)
+    at = problem.runner.inputs.index(problem.map.ports[effect.place].input)
     q = np.array([*values, *[0.0] * (4 - len(values))])
     effort = _efforts(effect.kind.law, motion.x[:rows], motion.v[:rows], motion.a[:rows], q, problem.h)
     push = -problem.sign.get(effect.place, 1.0) * 0.5 * (effort[:-1] + effort[1:]) / problem.drive([at])[0]

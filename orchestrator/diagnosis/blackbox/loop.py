@@ -98,26 +98,9 @@ def _step(calls, counts, where, time, step):  # type: ignore[no-untyped-def]
 
 @kept()
 def run_loop(  # type: ignore[no-untyped-def]
-    calls,
-    counts,
-    where,
-    sent,
-    read,
-    into,
-    outof,
-    table,
-    grid,
-    wires,
-    gains,
-    passing,
-    passed,
-    ports,
-    sign,
-    q,
-    most,
-    lead,
-    out,
-):
+    calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, sign, q, most,
+    lead, out,
+):  # fmt: skip
     """Run one record; return ``(status, call, step, member)``, status at most 1 when all went well.
 
     Args:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import INPUT, BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
-from orchestrator.diagnosis.blackbox.followed import measured_motion
+from orchestrator.diagnosis.blackbox.followed import measured_motions
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.passed import at_input
 from orchestrator.diagnosis.blackbox.problem import series_of
@@ -65,6 +65,7 @@ class _Sight:
         problem, self._rows = fitter.problem, len(before.y)
         self._table = problem.table(before.model, series_of(problem, self._rows))
         self._read = problem.read_finely(before.model, self._rows)
+        self._motions = measured_motions(problem)
         self._known = Known(fitter, before, self._rows)
 
     def gains(self, effect: BoxEffect, values: Sequence[float], levels: Sequence[int] = ()) -> dict[int, Promise]:
@@ -122,11 +123,10 @@ class _Sight:
         """Return the efforts, sine and cosine, of a ripple of this wavenumber over the motion."""
         problem = self._fitter.problem
         assert self._read is not None
-        port = problem.map.ports[effect.place]
-        motion = measured_motion(problem, port)
-        x = self._read[:-1, problem.runner.reads.index(port.position)]
-        if motion is not None:
-            x = np.interp(np.arange(len(x)) / problem.m, np.arange(self._rows), motion.x[: self._rows])
+        x = self._read[:-1, problem.runner.reads.index(problem.map.ports[effect.place].position)]
+        if effect.place in self._motions:
+            measured = self._motions[effect.place].x[: self._rows]
+            x = np.interp(np.arange(len(x)) / problem.m, np.arange(self._rows), measured)
         size = -problem.sign.get(effect.place, 1.0) * effect.kind.starts(effect.scene)[0][0]
         return [size * np.sin(value * x), size * np.cos(value * x)]
 

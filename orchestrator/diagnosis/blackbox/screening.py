@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import BoxEffect
+from orchestrator.diagnosis.blackbox.bank import PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
-from orchestrator.diagnosis.blackbox.followed import answers
+from orchestrator.diagnosis.blackbox.followed import answers, measured_motions
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.promises import Known, Promise, Trial, promised
@@ -151,12 +151,14 @@ def screened(fitter: Fitter, effects: Sequence[BoxEffect], before: BoxFit) -> Sc
     runs = fitter.problem.simulate(models, rows)
     columns: list[Array | None] = [None if run is None else (run - before.y) / fitter.problem.noise for run in runs]
     known = Known(fitter, before, rows)
+    surrogate = fitter.ladder.surrogate
+    motions = measured_motions(fitter.problem) if surrogate.order else {}
     for effect, values, amplitudes in tuple(trials):
-        along = [answers(fitter.problem, fitter.ladder.surrogate, effect, one, rows)
-                 for one in _one_by_one(values, amplitudes)]  # fmt: skip
-        if along[0] is not None:
+        if effect.kind.where == PORT and effect.place in motions:
+            motion = motions[effect.place]
             trials.append((effect, values, amplitudes))
-            columns += along
+            columns += [answers(fitter.problem, surrogate, motion, effect, one, rows)
+                        for one in _one_by_one(values, amplitudes)]  # fmt: skip
     promises = promised(known, trials, columns)
     near = max(fitter.horizon(before.y), rows // 16)
     if near < fitter.settings.screen.straight * rows:  # beyond it nothing is linear any more

@@ -12,7 +12,7 @@ from orchestrator.diagnosis.blackbox.bank import (
     BoxEffect,
     Surroundings,
 )
-from orchestrator.diagnosis.blackbox.followed import Motion, measured_motion
+from orchestrator.diagnosis.blackbox.followed import Motion, measured_motions
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
 
 Array = NDArray[np.float64]
@@ -32,6 +32,7 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
     """
     found = []
     h, runner, own = problem.h, problem.runner, problem.settings.place
+    motions = measured_motions(problem)
     for k, name in enumerate(problem.inputs):
         u = problem.data.inputs[:, k]
         if float(np.ptp(u)) == 0.0:
@@ -45,7 +46,7 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
         scene = Surroundings(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
         found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
     for name, port in problem.map.ports.items():
-        motion = measured_motion(problem, port)
+        motion = motions.get(name)
         if motion is None:
             x = nominal[:, runner.reads.index(port.position)]
             v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]

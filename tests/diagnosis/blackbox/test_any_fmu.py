@@ -210,7 +210,7 @@ def test_a_run_that_hangs_is_given_up_soon_and_others_go_on(made):
     _, record_path, fmu, map_path = made(SPRING, rows=300, fault="hangs_without_a_push")
     subject = subject_of(fmu)
     given = read_map(map_path, subject)
-    settings = BoxSettings(process=ProcessSettings(known=0.3, again=1.0, patience=300.0))
+    settings = BoxSettings(process=ProcessSettings(known=3.0, again=1.0, patience=300.0))
     problem, _ = prepared(subject, given, read_data(record_path, given), workers=1, settings=settings)
     try:
         zone = next(

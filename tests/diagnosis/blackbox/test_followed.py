@@ -5,11 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import orchestrator as oc
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
-from orchestrator.diagnosis.blackbox.followed import answers, measured_motion
+from orchestrator.diagnosis.blackbox.followed import answers, measured_motions
 from orchestrator.diagnosis.blackbox.mapping import PortEntry
 from orchestrator.diagnosis.blackbox.settings import BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import realised
+from tests.support.box_fmu import DOMAINS, write_fmu
+from tests.support.c_fmu import have_compiler
 
 H, N, FINE, MASS, NOISE = 0.01, 800, 50, 2.0, 1e-4
 
@@ -62,13 +65,40 @@ def test_what_an_effect_pushes_along_the_measured_motion_is_what_a_free_run_lack
     assert np.max(np.abs(astray)) > 3.0 * np.std(x)
     impulses = ((np.arange(1, N // 2) - 0.5) * H * H / MASS / NOISE)[:, None, None]
     measured = x + NOISE * np.random.default_rng(2).standard_normal(N)
-    found = answers(problem_of(measured), realised(impulses), effect_of(name), np.array(values), N)
+    problem = problem_of(measured)
+    motion = measured_motions(problem)["port"]
+    found = answers(problem, realised(impulses), motion, effect_of(name), np.array(values), N)
     assert np.max(np.abs(NOISE * found[:, 0] - astray)) < 0.05 * np.max(np.abs(astray))
 
 
-def test_nothing_is_said_where_the_position_is_not_measured():
+def test_a_port_has_no_motion_where_its_position_is_not_measured():
     problem = problem_of(np.zeros(N))
     problem.outputs = ("y",)
-    assert measured_motion(problem, problem.map.ports["port"]) is None
-    surrogate = realised(np.ones((20, 1, 1)))
-    assert answers(problem, surrogate, effect_of("spring"), np.array([1.0]), N) is None
+    assert measured_motions(problem) == {}
+
+
+@pytest.mark.skipif(not have_compiler(), reason="no C compiler")
+def test_a_spring_beside_a_mass_that_a_controller_keeps_is_named(tmp_path):
+    """The FMU's free run leaves the record by metres."""
+    u, x = controlled(lambda x, v: 120.0 * x)
+    x += NOISE * np.random.default_rng(4).standard_normal(N)
+    record, map_path = tmp_path / "record.csv", tmp_path / "map.toml"
+    np.savetxt(record, np.column_stack([np.arange(N) * H, u, x]), delimiter=",", header="time,F,x", comments="")
+    map_path.write_text(
+        """[inputs]
+F = { hold = "zero" }
+[outputs]
+x = { noise = 1e-4 }
+[parameters]
+m = { value = 2.04, uncertainty = "5 %" }
+k = { value = 0.0 }
+c = { value = 0.0 }
+[ports.mass]
+input = "F"
+position = "x"
+"""
+    )
+    found = oc.diagnose(record, write_fmu(tmp_path / "Spring.fmu", DOMAINS[0]), map_path)
+    found.close()
+    assert [f.name for f in found.effects] == ["spring"]
+    assert found.effects[0].estimates[0].value == pytest.approx(120.0, rel=0.01)
