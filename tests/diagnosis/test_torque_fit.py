@@ -8,10 +8,11 @@ import pytest
 from orchestrator.diagnosis.diagnose import DEFAULT_SETTINGS
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.sizes import sized
 from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.fit.together import at_one_rate, series
 from orchestrator.diagnosis.fit.torque_fit import torque_fit
-from orchestrator.diagnosis.proof.reported import reported
+from orchestrator.diagnosis.proof.reported import _between, reported
 from orchestrator.diagnosis.proof.torque import TorqueProof, torque_proof
 from orchestrator.plants.effects import Effect
 from tests.support.robot_joint import DRY, INERTIA, VISCOUS, joint_record
@@ -66,6 +67,41 @@ def test_values_are_told_with_which_a_model_predicts_best(joint) -> None:
     near = likelihood.settings.__class__(inverse=likelihood.settings.inverse.__class__(closer=0.0))
     kept = reported(replace(likelihood, settings=near), found, parts, effects, [found.q])
     assert not np.array_equal(kept.fit.p, told.fit.p)
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_values_on_which_both_differ_are_between_them(seed: int) -> None:
+    likelihood, parts, found = joint_of(seed, 0.12)
+    effects = (BANK["coulomb_friction"],)
+    between = reported(likelihood, found, parts, effects, [found.q]).fit
+    likely, needed = (
+        sized(likelihood, found, parts, effects, [found.q]).fit,
+        torque_fit(likelihood, found, parts.fitted),
+    )
+    for name, true in TRUE.items():
+        place = AXIS.index(name)
+        ends = sorted((likely.p[place], needed.p[place]))
+        assert ends[0] < between.p[place] < ends[1]
+        assert between.interval(place)[0] < true < between.interval(place)[1]
+    assert not np.array_equal(between.z, likely.z)
+    alone = reported(likelihood, found, parts, (), [found.q]).fit
+    assert np.array_equal(alone.p, sized(likelihood, found, parts, (), [found.q]).fit.p)
+
+
+def test_far_ends_widen_the_interval(joint) -> None:
+    likelihood, parts, found = joint
+    places = [entry.place for entry in found.free]
+    small = replace(found, covariance=np.diag((1e-4 * found.p[places]) ** 2))
+    p = found.p.copy()
+    p[places[0]] *= 1.1
+    between = _between(likelihood, small, replace(small, p=p), parts)
+    assert between.p[places[0]] == pytest.approx(1.05 * found.p[places[0]], rel=1e-6)
+    assert between.standard_error(places[0]) == pytest.approx(0.05 * found.p[places[0]], rel=0.01)
+    assert between.standard_error(places[1]) == pytest.approx(small.standard_error(places[1]))
+    near = _between(likelihood, small, replace(small, p=found.p * (1.0 + 1e-5)), parts)
+    assert near.standard_error(places[0]) == pytest.approx(small.standard_error(places[0]))
+    surer = replace(small, covariance=100.0 * small.covariance)
+    assert abs(_between(likelihood, small, replace(surer, p=p), parts).p[places[0]] / found.p[places[0]] - 1.05) < 0.01
 
 
 def test_the_torque_of_the_held_out_part_settles_what_free_runs_cannot() -> None:

@@ -68,6 +68,23 @@ def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | N
     return replace(found, p=p, z=z, covariance=covariance, colour=colour_of(z, part))
 
 
+def explained(likelihood: RecordLikelihood, found: Fit, part: slice) -> float:
+    """Return the share of the measured torque's variance that a model explains.
+
+    Args:
+        likelihood: of the record; its plant has an inverse model.
+        found: the model.
+        part: the samples.
+
+    Returns:
+        The share; negative where it explains less than a constant torque.
+    """
+    assert likelihood.plant.inverse is not None
+    position, speed, acceleration, given = motion(likelihood, part)
+    left = given - likelihood.plant.inverse(position, speed, acceleration, found.p)
+    return 1.0 - float(left @ left) / float(np.sum((given - given.mean()) ** 2))
+
+
 def motion(likelihood: RecordLikelihood, part: slice) -> tuple[Array, Array, Array, Array]:
     """Return position, speed, acceleration and measured torque of a part, all behind one filter.
 
