@@ -29,6 +29,9 @@ class BoxSearchSettings(Settings, frozen=True):
     leaves: Annotated[float, share("of what is gained already, what a further effect must bring: no law is exact")] = (
         0.005
     )
+    law: Annotated[
+        float, share("of what an effect at a port changes of the outputs, that its law may be off by: no further one")
+    ] = 0.01
     promise: Annotated[float, setting("least predicted gain for which an effect is fitted at all")] = 8.0
     slight: Annotated[
         float,

@@ -5,8 +5,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import BoxEffect
+from orchestrator.diagnosis.blackbox.bank import PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
@@ -14,6 +15,8 @@ from orchestrator.diagnosis.blackbox.promises import Promise
 from orchestrator.diagnosis.blackbox.screening import Screened, screened
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings
 from orchestrator.diagnosis.blackbox.steps import SearchStep, counted, labels, sought
+
+Array = NDArray[np.float64]
 
 
 @dataclass
@@ -65,7 +68,7 @@ class BoxTrials:
         s = self.settings
         fitted = fit.fitted + fit.prior - before.fitted - before.prior
         decided = fit.decided - before.decided
-        if self.score(fit) - self.score(before) <= self._least(fit, before, base):
+        if self.score(fit) - self.score(before) <= self._least(fit, before, base) or self._within_laws(fit, before):
             return False
         return decided > max(s.decided, s.decided_share * fitted) and fitted > s.penalty
 
@@ -82,6 +85,18 @@ class BoxTrials:
         if before.model.effects and share(before.level) <= self.fitter.settings.rest.solver and self.explained(before):
             return max(least, s.pays_disturbed)  # noise alone is left, and of a law that is not exact a little
         return min(least, s.pays_disturbed) if whole else least
+
+    def _within_laws(self, fit: BoxFit, before: BoxFit) -> bool:
+        """Tell whether what ``fit`` explains beyond ``before`` is no more than a law of that may be off by."""
+        at, own = len(before.model.p), 0.0
+        for effect, values in zip(before.model.effects, before.model.values, strict=True):
+            if effect.kind.where == PORT:
+                own = max(own, _size(before.J[:, :, at : at + len(values)] @ values))
+            at += len(values)
+        rows = min(len(before.y), len(fit.y))
+        left = (_size(self.fitter.problem.residual(one.y[:rows])) for one in (before, fit))
+        without, beside = left
+        return without**2 - beside**2 < (self.settings.law * own) ** 2
 
     def explained(self, fit: BoxFit) -> bool:
         """Tell whether a model leaves no more than measurement noise, and no more at the ports than a disturbance.
@@ -297,3 +312,8 @@ class BoxTrials:
                 if again is not None and effect.kind.plausible(tuple(again.model.values[-1]), effect.scene):
                     found.append(again)
         return found
+
+
+def _size(values: Array) -> float:
+    """Return the root mean square of values (rows, outputs)."""
+    return float(np.sqrt(np.mean(values * values)))
