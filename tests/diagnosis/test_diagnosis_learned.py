@@ -1,13 +1,17 @@
 """A law learned inside the predictor from what no effect explains."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.slope import Free
+from orchestrator.diagnosis.outcome import LearnedLaw, Misfit
+from orchestrator.diagnosis.passes import Pass
 from orchestrator.diagnosis.proof.clocked import cycle_of
 from orchestrator.diagnosis.proof.curves import curve, drawn, formula_of, knots_of, shortened
 from orchestrator.diagnosis.proof.learned import learned_law
@@ -241,3 +245,34 @@ def test_the_law_that_is_missing_is_learned() -> None:
     ]
     assert np.corrcoef(rest)[0, 1] > 0.95
     assert all(low <= value <= high for low, value, high in zip(law.low, law.values, law.high, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "floor_off", "unknown"),
+    [(30.0, 5.0, True, True), (30.0, 15.0, True, False), (2.0, 0.2, True, False), (30.0, 5.0, False, False)],
+)
+def test_a_rest_that_a_law_explains_is_unknown(monkeypatch, before, after, floor_off, unknown):
+    """Not one that a law halves, nor one of hardly more than noise, nor one whose predictions are noise alone."""
+    shown = Misfit("theta_m", "rad", 1.0, (("parameters", before), ("learned law", after)))
+    law = LearnedLaw("motor", "speed", "rad/s", "N.m", (), (), (), (), "", (shown,))
+    monkeypatch.setattr(diagnosing, "held_out_misfit", lambda *_: (replace(shown, stages=(("", before),)),))
+    monkeypatch.setattr(diagnosing, "learned_law", lambda *_: law)
+    monkeypatch.setattr(diagnosing, "honest", lambda *_: None)
+    final = SimpleNamespace(is_hopeless=lambda limit: False)
+    found = Pass(
+        likelihood=SimpleNamespace(settings=SETTINGS), parts=PARTS, search=SimpleNamespace(stopped=False),
+        best=SimpleNamespace(effects=()), plain=None, base=None, final=SimpleNamespace(p=None, q=0.0), left=None,
+        floor_off=floor_off, unknown=False, proof=SimpleNamespace(final=final), withdrawn=(),
+    )  # fmt: skip
+    judged, told = diagnosing._with_law(found, "rad")
+    assert (judged.unknown, told is law) == (unknown, unknown)
+
+
+def test_what_the_log_gains_is_no_merit_of_a_law() -> None:
+    stages = (("parameters", 40.0), ("log put right", 12.0), ("learned law", 2.0))
+    law = LearnedLaw(
+        "motor", "speed", "rad/s", "N.m", (), (), (), (), "", (Misfit("theta_m", "rad", 1.0, stages),),
+        "shift 2 ms (late load)",
+    )  # fmt: skip
+    assert law.shrinks == 6.0
+    assert law.words.endswith("6.0 times smaller; in the log beside it: shift 2 ms (late load)")
