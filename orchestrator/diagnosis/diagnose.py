@@ -15,6 +15,7 @@ from orchestrator.diagnosis.proof.by_record import by_record, repeats
 from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
+from orchestrator.diagnosis.proof.righted import of_the_log
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
 from orchestrator.diagnosis.search.finer import finer_of
 from orchestrator.diagnosis.search.model_space import in_metres
@@ -128,7 +129,8 @@ def _with_law(found: Pass, position: str) -> tuple[Pass, LearnedLaw | None]:
     if not found.unknown:
         misfit = held_out_misfit(likelihood, final.q, [("", final.p)], parts.held_out, "")
         near = all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit)
-        if near or not found.floor_off or any(not effect.measurement for effect in found.best.effects):
+        log = {effect.label for effect in of_the_log(likelihood.plant)}
+        if near or not found.floor_off or any(effect.label not in log for effect in found.best.effects):
             return found, None
     law = learned_law(likelihood, honest(likelihood, found.base, (), parts), parts, position)
     if found.unknown or (law is not None and law.shrinks >= settings.learned.surely):

@@ -248,20 +248,28 @@ def test_the_law_that_is_missing_is_learned() -> None:
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "floor_off", "unknown"),
-    [(30.0, 5.0, True, True), (30.0, 15.0, True, False), (2.0, 0.2, True, False), (30.0, 5.0, False, False)],
-)
-def test_a_rest_that_a_law_explains_is_unknown(monkeypatch, before, after, floor_off, unknown):
-    """Not one that a law halves, nor one of hardly more than noise, nor one whose predictions are noise alone."""
+    ("before", "after", "floor_off", "named", "unknown"),
+    [
+        (30.0, 5.0, True, "input_delay@actuator", True), (30.0, 15.0, True, "", False), (2.0, 0.2, True, "", False),
+        (30.0, 5.0, False, "", False), (30.0, 5.0, True, "coulomb_friction@motor", False),
+    ],
+)  # fmt: skip
+def test_a_rest_that_a_law_explains_is_unknown(monkeypatch, before, after, floor_off, named, unknown):
+    """Not one that a law halves, nor one of hardly more than noise, nor one whose predictions are noise alone.
+
+    A late drive may be a late log; beside any other name no law is looked for.
+    """
     shown = Misfit("theta_m", "rad", 1.0, (("parameters", before), ("learned law", after)))
     law = LearnedLaw("motor", "speed", "rad/s", "N.m", (), (), (), (), "", (shown,))
     monkeypatch.setattr(diagnosing, "held_out_misfit", lambda *_: (replace(shown, stages=(("", before),)),))
     monkeypatch.setattr(diagnosing, "learned_law", lambda *_: law)
     monkeypatch.setattr(diagnosing, "honest", lambda *_: None)
     final = SimpleNamespace(is_hopeless=lambda limit: False)
+    effects = [one for one in DRIVETRAIN.bank if one.label == named]
     found = Pass(
-        likelihood=SimpleNamespace(settings=SETTINGS), parts=PARTS, search=SimpleNamespace(stopped=False),
-        best=SimpleNamespace(effects=()), plain=None, base=None, final=SimpleNamespace(p=None, q=0.0), left=None,
+        likelihood=SimpleNamespace(settings=SETTINGS, plant=DRIVETRAIN), parts=PARTS,
+        search=SimpleNamespace(stopped=False), best=SimpleNamespace(effects=effects),
+        plain=None, base=None, final=SimpleNamespace(p=None, q=0.0), left=None,
         floor_off=floor_off, unknown=False, proof=SimpleNamespace(final=final), withdrawn=(),
     )  # fmt: skip
     judged, told = diagnosing._with_law(found, "rad")

@@ -52,7 +52,7 @@ def _shifts(likelihood: RecordLikelihood, model: Fit) -> list[Effect]:
     """Return the shifts that a model does not fit yet: torques act early or late, never both."""
     plant = likelihood.plant
     taken = {entry.place for entry in model.free}
-    seen = [one for one in _of_the_log(plant) if not one.both_encoders or likelihood.signals.channels > 1]
+    seen = [one for one in of_the_log(plant) if not one.both_encoders or likelihood.signals.channels > 1]
     timing = [one for one in seen if not one.both_encoders]
     fixed = any(place in taken for one in timing for place in one.places(plant).values())
     return [
@@ -89,15 +89,22 @@ def in_the_log(plant: Plant, before: Array, after: Array) -> str:
         The words.
     """
     said = []
-    for effect in _of_the_log(plant):
+    for effect in of_the_log(plant):
         for short, place in effect.places(plant).items():
             if after[place] != before[place]:
                 said.append(f"{short} {1e3 * after[place]:.3g} ms ({effect.name.replace('_', ' ')})")
     return ", ".join(said)
 
 
-def _of_the_log(plant: Plant) -> list[Effect]:
-    """Return the effects that say when signals were stamped; that of a late drive looks like a log that is late."""
+def of_the_log(plant: Plant) -> list[Effect]:
+    """Return the effects that say when signals were stamped; that of a late drive looks like a log that is late.
+
+    Args:
+        plant: the plant.
+
+    Returns:
+        The effects, of its bank.
+    """
     return [one for one in plant.bank if one.measurement or plant.drive.delay in one.parameters.values()]
 
 
