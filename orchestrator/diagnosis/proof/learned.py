@@ -272,8 +272,16 @@ def _begun_better(wide: RecordLikelihood, argument: Argument, fitted: Fit, parts
         z = wide.whitened(at(since), fitted.q)
         return wide.log_likelihood(z, fitted.q, parts.fitted, fitted.colour, at(since))
 
+    def begun(since: float) -> Fit:
+        p = _knotted(wide, argument, replace(fitted, p=at(since)), parts.fitted)
+        return best_settled(wide, [p], fitted.q, fitted.free, parts)
+
+    # A curve that was fitted from a wrong time on makes up for what came before, and is likeliest from there.
+    first, last = h * parts.fitted.start, h * parts.fitted.stop
+    several = [begun(float(since)) for since in np.linspace(first, last, wide.settings.learned.starts + 2)[1:-1]]
+    fitted = max(fitted, *several, key=lambda one: one.rank(parts))
     for _ in range(2):
-        times = np.linspace(h * parts.fitted.start, h * parts.fitted.stop, wide.settings.learned.refined + 2)[1:-1]
+        times = np.linspace(first, last, wide.settings.learned.refined + 2)[1:-1]
         likeliest = times[int(np.argmax(spread(likelihood_of, times.tolist())))]
         p = _knotted(wide, argument, replace(fitted, p=at(likeliest)), parts.fitted)
         fitted = annealed(wide, p, fitted.q, fitted.free, parts, ())
