@@ -21,6 +21,9 @@ from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 Array = NDArray[np.float64]
 
 KNOTS = 11
+JUMP = 0.005  # of a speed's range: within so much of zero, friction turns round
+AWAY = 3.0  # such widths from zero, where the next knots stand at least
+EDGE = 0.002  # share of the samples beyond either end
 
 
 @dataclass(frozen=True)

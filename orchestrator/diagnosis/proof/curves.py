@@ -6,11 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.learned import KNOTS
+from orchestrator.plants.learned import AWAY, EDGE, JUMP, KNOTS
 
 Array = NDArray[np.float64]
-
-JUMP = 0.005  # of a speed's range: within so much of zero, friction turns round
 
 
 def knots_of(values: Array, jump: bool = False) -> Array | None:
@@ -23,14 +21,14 @@ def knots_of(values: Array, jump: bool = False) -> Array | None:
     Returns:
         Knots, rising; None: the values have no range.
     """
-    low, high = np.quantile(values, [0.002, 0.998])
+    low, high = np.quantile(values, [EDGE, 1.0 - EDGE])
     jump = jump and low < 0.0 < high
     count = KNOTS - 2 if jump else KNOTS
-    shares = np.quantile(values, np.linspace(0.002, 0.998, count))
+    shares = np.quantile(values, np.linspace(EDGE, 1.0 - EDGE, count))
     knots = 0.5 * (shares + np.linspace(shares[0], shares[-1], count))
     if jump:
         close = JUMP * (high - low)
-        away = np.where(np.abs(knots) < 2.0 * close, np.where(knots < 0.0, -3.0, 3.0) * close, knots)
+        away = np.where(np.abs(knots) < 2.0 * close, np.where(knots < 0.0, -AWAY, AWAY) * close, knots)
         knots = np.sort([*away, -close, close])
     return knots if np.all(np.diff(knots) > 1e-9 * max(float(np.ptp(knots)), 1e-300)) else None
 

@@ -19,7 +19,8 @@ from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.fit.spread import widened
 from orchestrator.diagnosis.outcome import LearnedLaw
 from orchestrator.diagnosis.proof.clocked import cycle_of
-from orchestrator.diagnosis.proof.curves import Short, curve, drawn, formula_of, knots_of, shortened
+from orchestrator.diagnosis.proof.curves import Short, curve, drawn, formula_of, knots_of
+from orchestrator.diagnosis.proof.few_terms import of_few_terms, rows_of, short_law, with_terms
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.proof.righted import free_of, in_the_log, righted
 from orchestrator.diagnosis.search.candidate import annealed, best_settled
@@ -153,58 +154,8 @@ def _tried(wide: RecordLikelihood, start: Fit, offers: Sequence[_Offer], parts: 
         if offer.argument.later:
             fitted = _begun_better(wide, offer.argument, fitted, parts)
         fitted = righted(wide, fitted, parts)
-        tried.append(_Tried(offer.argument, effect, fitted, *_short(wide, offer.argument, effect, fitted, parts)))
+        tried.append(_Tried(offer.argument, effect, fitted, *short_law(wide, offer.argument, effect, fitted, parts)))
     return tried
-
-
-def _short(
-    wide: RecordLikelihood, argument: Argument, effect: Effect, full: Fit, parts: Parts
-) -> tuple[tuple[str, ...], Fit]:
-    """Return the terms of a formula that is worth more than all values of a law, and its fit; none: the law as it is.
-
-    Values that nothing needs are fitted to noise, and free runs drift away with them.
-    """
-    if argument.kind in (CYCLE_M, CYCLE_L):
-        return (), full
-    penalty, terms, best = wide.settings.search.penalty, tuple[str, ...](), full
-    score = full.fitted + full.validated - penalty * len(effect.parameters)
-    for short in _shortened(wide, argument, effect, full, ()):
-        p, free = _fixed(wide, effect, full, short)
-        fitted = best_settled(wide, [p], full.q, free, parts)
-        worth = fitted.fitted + fitted.validated - penalty * len(short.terms)
-        if worth > score:
-            score, terms, best = worth, short.terms, fitted
-    return terms, annealed(wide, best.p, best.q, best.free, parts, ()) if terms else full
-
-
-def _shortened(
-    wide: RecordLikelihood, argument: Argument, effect: Effect, full: Fit, terms: tuple[str, ...]
-) -> list[Short]:
-    """Return the laws of few terms that are nearest to one with all its knots."""
-    places = [wide.plant.index(name) for name in effect.parameters.values()]
-    knots = full.p[[wide.plant.index(name) for name in names()[1]]]
-    rows = _rows(full, places)
-    return shortened(knots, full.p[places], full.covariance[np.ix_(rows, rows)], _jumps(wide.plant, argument), terms)
-
-
-def _fixed(wide: RecordLikelihood, effect: Effect, full: Fit, short: Short) -> tuple[Array, tuple[Free, ...]]:
-    """Return parameters with a law of few terms, the others where they are likeliest beside it, and what is free."""
-    places = [wide.plant.index(name) for name in effect.parameters.values()]
-    rest = [row for row, entry in enumerate(full.free) if entry.place not in places]
-    rows, p = _rows(full, places), full.p.copy()
-    answer = full.covariance[np.ix_(rest, rows)] @ np.linalg.pinv(full.covariance[np.ix_(rows, rows)], hermitian=True)
-    change = answer @ (short.values - p[places])
-    for place, value in zip(places, short.values, strict=True):
-        p[place] = max(value, wide.plant.entry(place).minimum)  # no friction drives
-    free = tuple(full.free[row] for row in rest)
-    for entry, by in zip(free, change, strict=True):
-        p[entry.place] = min(max(p[entry.place] + by, entry.minimum), entry.maximum)
-    return p, free
-
-
-def _rows(full: Fit, places: Sequence[int]) -> list[int]:
-    at = {entry.place: row for row, entry in enumerate(full.free)}
-    return [at[place] for place in places]
 
 
 def _lasting(wide: RecordLikelihood, start: Fit, states: Array, parts: Parts, clocked: bool) -> list[_Offer]:
@@ -320,8 +271,8 @@ def _judged(wide: RecordLikelihood, best: _Tried, base: Fit, parts: Parts, unit:
     final = widened(wide, final, slice(max(whole.fitted.start, since), whole.fitted.stop), ())
     knots, values, errors = _shown(plant, best, final)
     if best.terms:
-        short = _shortened(wide, best.argument, best.effect, final, best.terms)[0]
-        final = annealed(wide, (fixed := _fixed(wide, best.effect, final, short))[0], final.q, fixed[1], whole, ())
+        short = of_few_terms(wide, best.argument, best.effect, final, best.terms)[0]
+        final = annealed(wide, (fixed := with_terms(wide, best.effect, final, short))[0], final.q, fixed[1], whole, ())
         knots, values, errors = _shown(plant, best, final, short)
     stages = [("parameters", _widened(base.p, wide.nominal)), *_put_right(wide, best, base, final, whole)]
     misfit = held_out_misfit(wide, final.q, [*stages, ("learned law", final.p)], parts.held_out, unit)
@@ -357,7 +308,7 @@ def _shown(plant: Plant, best: _Tried, final: Fit, short: Short | None = None) -
     places, jumps = [plant.index(name) for name in best.effect.parameters.values()], _jumps(plant, best.argument)
     at, shares = drawn(final.p[[plant.index(name) for name in names()[1]]], jumps)
     shares = shares[:, : len(places)]
-    rows = [] if short else _rows(final, places)
+    rows = [] if short else rows_of(final, places)
     covariance = short.covariance if short else final.covariance[np.ix_(rows, rows)]
     errors = np.sqrt(np.maximum(np.sum((shares @ covariance) * shares, axis=1), 0.0))
     return at, shares @ final.p[places], errors
