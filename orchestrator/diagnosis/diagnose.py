@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.together import at_one_rate, series
-from orchestrator.diagnosis.outcome import Diagnosis, Named, Workings
+from orchestrator.diagnosis.outcome import Diagnosis, LearnedLaw, Named, Workings
 from orchestrator.diagnosis.passes import Pass, Progress, honest, passes
 from orchestrator.diagnosis.proof.by_record import by_record, repeats
 from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
+from orchestrator.diagnosis.proof.righted import of_the_log
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
 from orchestrator.diagnosis.search.finer import finer_of
 from orchestrator.diagnosis.search.model_space import in_metres
@@ -70,10 +71,11 @@ def diagnose(
     lag = plant.value(nominal, plant.drive.lag)
     signals, parts = series(given, lag, settings, [one.most_noise for one in analyses])
     found = passes(model, signals, parts, nominal, settings, progress, finer_of(analyses, plant, nominal, settings))
-    likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
-    base_fit, final = found.base, found.final
     units = METRIC if in_metres(model) else {}
     position = units.get("rad", "rad")
+    found, law = _with_law(found, position)
+    likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
+    base_fit, final = found.base, found.final
     chosen = honest(likelihood, base_fit, (), parts) if unknown else final
     stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
     misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
@@ -92,7 +94,6 @@ def diagnose(
     unnamed = replace(found.proof, final=found.proof.base) if unknown else found.proof
     ends = (stages[0], stages[-1])
     named_stages = ("parameters", "final")[: 1 if unknown or not best.effects else 2]
-    learning = unknown and not search.stopped and not found.hopeless
     warnings = warnings_of(found, effects, signals.channels, len(plant.bodies))
     return Diagnosis(
         verdict=verdict,
@@ -112,8 +113,29 @@ def diagnose(
         workings=Workings(likelihood, parts, base_fit, chosen, best, tuple(search.steps)),
         records=by_record(likelihood, chosen.q, ends, parts.held_out, position),
         repeats=repeats(likelihood.signals, plant.encoders, settings.proof),
-        learned=learned_law(likelihood, chosen, parts, position) if learning else None,
+        learned=law,
     )
+
+
+def _with_law(found: Pass, position: str) -> tuple[Pass, LearnedLaw | None]:
+    """Return the pass and the law learned from what it leaves; it is unknown where such a law explains most of that.
+
+    What begins late, or comes by a clock, is no noise, even where what is known of noise cannot tell.
+    """
+    likelihood, final, parts = found.likelihood, found.final, found.parts
+    settings = likelihood.settings
+    if found.search.stopped or found.hopeless:
+        return found, None
+    if not found.unknown:
+        misfit = held_out_misfit(likelihood, final.q, [("", final.p)], parts.held_out, "")
+        near = all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit)
+        log = {effect.label for effect in of_the_log(likelihood.plant)}
+        if near or not found.floor_off or any(effect.label not in log for effect in found.best.effects):
+            return found, None
+    law = learned_law(likelihood, honest(likelihood, found.base, (), parts), parts, position)
+    if found.unknown or (law is not None and law.shrinks >= settings.learned.surely):
+        return replace(found, unknown=True), law
+    return found, None
 
 
 def evidence_of(diagnosis: Diagnosis) -> Evidence:

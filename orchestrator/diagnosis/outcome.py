@@ -116,7 +116,8 @@ class LearnedLaw:
         knots, values: (k,) the curve: straight lines between them, the last ones go on.
         low, high: (k,) its 95 % band.
         formula: a short one that runs within the band, s being the argument; empty: none does.
-        misfit: of each signal on the held-out part, of re-fitted parameters and with the law.
+        misfit: of each signal on the held-out part, of re-fitted parameters, with the log put right, with the law.
+        log: what is put right in the log beside the law, in words; empty: nothing.
     """
 
     site: str
@@ -129,18 +130,23 @@ class LearnedLaw:
     high: tuple[float, ...]
     formula: str
     misfit: tuple[Misfit, ...]
+    log: str = ""
 
     @property
     def shrinks(self) -> float:
-        """Return how many times smaller the held-out misfit is with the law, in the signal that gains least."""
-        return min(one.before / max(one.after, 1e-300) for one in self.misfit)
+        """Return how many times smaller the held-out misfit is with the law, in the signal that gains least.
+
+        What putting the log right gains, which the law was fitted beside, does not count.
+        """
+        return min(one.best_before / max(one.after, 1e-300) for one in self.misfit)
 
     @property
     def words(self) -> str:
         """Return the law in one sentence."""
         text = f"what is left follows the {self.argument} at the {self.site}: a learned law makes the held-out misfit "
         text += f"{self.shrinks:.1f} times smaller"
-        return text + (f"; it runs like {self.formula}, s in {self.argument_unit}" if self.formula else "")
+        text += f"; it runs like {self.formula}, s in {self.argument_unit}" if self.formula else ""
+        return text + (f"; in the log beside it: {self.log}" if self.log else "")
 
 
 @dataclass(frozen=True)

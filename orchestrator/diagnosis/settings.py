@@ -345,6 +345,7 @@ class LearnedSettings(Settings, frozen=True):
         int, setting("arguments that are fitted in full, most promising first; 0: none is learned", ge=0)
     ] = 2
     left: Annotated[float, share("of the deciding part's misfit that a law may leave: less is not worth a curve")] = 0.7
+    surely: Annotated[float, setting("times that a law shrinks a misfit which is no noise", gt=1)] = 3.0
     spread: Annotated[float, setting("prior deviation of its values, in torques of the drive", gt=0)] = 1.0
     formula: Annotated[float, setting("mean square in standard errors up to which a formula runs within the band")] = (
         1.5

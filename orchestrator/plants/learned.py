@@ -3,6 +3,7 @@
 It is for what no effect of the bank explains. The torque acts at the site that its signal belongs to, and may grow with
 the speed of the driven body beside. Its knots and values are parameters of the predictor alone. What comes again and
 again, whatever the machine does, follows a clock; what begins at some time follows its signal from then on.
+Over a speed it may jump where the motion turns round: that part is dry friction, which sticks, as no steep line does.
 """
 
 from dataclasses import dataclass, replace
@@ -13,12 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.plants.description import CompiledEquations, Plant
+from orchestrator.plants.effects import Effect
 from orchestrator.plants.predictor import sample_of
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 
 Array = NDArray[np.float64]
 
 KNOTS = 11
+JUMP = 0.005  # of a speed's range: within so much of zero, friction turns round
+AWAY = 3.0  # such widths from zero, where the next knots stand at least
+EDGE = 0.002  # share of the samples beyond either end
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class Argument:
 MOTOR_SPEED, LOAD_SPEED, LOAD_ANGLE, TWIST, DRIVE, CYCLE_M, CYCLE_L = range(1, 8)
 WITH_SPEED, LATER = 10, 20  # added to the code
 CLOCK = 6  # the state that counts time: that of an added resonance, which a plant with a law has not
-SINCE, PERIOD = "law.since", "law.period"
+SINCE, PERIOD, DRY = "law.since", "law.period", "law.dry"
 
 
 def arguments_of(plant: Plant) -> tuple[Argument, ...]:
@@ -111,6 +116,22 @@ def cycles_of(plant: Plant) -> tuple[Argument, ...]:
     )
 
 
+def rubbing(plant: Plant, argument: Argument) -> Effect | None:
+    """Return the dry friction of the bank that a law's own is like: over a speed, where friction builds up.
+
+    Args:
+        plant: the plant.
+        argument: of the law.
+
+    Returns:
+        The effect; None: the law has no dry friction.
+    """
+    if argument.kind not in (MOTOR_SPEED, LOAD_SPEED):
+        return None
+    alike = (one for one in plant.bank if one.label == f"coulomb_friction@{argument.site}" and one.nuisances)
+    return next((one for one in alike if set(one.nuisances.values()) <= set(plant.names)), None)
+
+
 def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Return the names of the law's parameters.
 
@@ -142,6 +163,7 @@ def with_law(plant: Plant, clocked: bool = False) -> Plant:
         *(Parameter(name, "N.m", 0.0, -BIG, BIG, "Value of the learned law") for name in values),
         Parameter(SINCE, "s", 0.0, -BIG, BIG, "Time at which the learned law, or its first cycle, begins"),
         Parameter(PERIOD, "s", 1.0, 0.0, BIG, "Period of its cycles"),
+        Parameter(DRY, "N.m", 0.0, 0.0, BIG, "Dry friction within the learned law"),
     )
     first = len(plant.names)
     extended = replace(plant, nuisances=(*plant.nuisances, *added), realised=np.asarray, _index={})
@@ -151,18 +173,9 @@ def with_law(plant: Plant, clocked: bool = False) -> Plant:
     return replace(extended, runner=cache(lambda: _runner(extended)), _index={})
 
 
-def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
+def _straight(knot_at: int, value_at: int) -> Any:
+    """Return the compiled curve: straight lines between knots, the last ones go on."""
     from numba import njit
-
-    from orchestrator.shared.numba_cache import kept
-
-    friction, rates, presliding = plant.stage()
-    motor, last = plant.bodies[0], plant.bodies[-1]
-    J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)
-    ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
-    speed_m, speed_l, angle_m, angle_l = motor.speed, last.speed, motor.angle, last.angle
-    drive = plant.drive.torque
-    knot_at, value_at, since_at, period_at = (first + 1 + n for n in (0, KNOTS, 2 * KNOTS, 2 * KNOTS + 1))
 
     @njit(error_model="numpy")
     def law(s: float, p: Any) -> float:
@@ -171,6 +184,40 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
             n += 1
         share = (s - p[knot_at + n - 1]) / (p[knot_at + n] - p[knot_at + n - 1])
         return float(p[value_at + n - 1] + share * (p[value_at + n] - p[value_at + n - 1]))
+
+    return law
+
+
+def _rubs_too(friction: Any, first: int, dry_at: int) -> Any:
+    """Return the compiled levels of dry friction, that of the law included."""
+    from numba import njit
+
+    @njit(error_model="numpy")
+    def with_dry(x: Any, p: Any) -> Any:
+        at_motor, at_load = friction(x, p)
+        kind = int(p[first]) % WITH_SPEED
+        if kind == MOTOR_SPEED:
+            at_motor += p[dry_at]
+        elif kind == LOAD_SPEED:
+            at_load += p[dry_at]
+        return at_motor, at_load
+
+    return with_dry
+
+
+def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
+    from orchestrator.shared.numba_cache import kept
+
+    friction, rates, presliding = plant.stage()
+    motor, last = plant.bodies[0], plant.bodies[-1]
+    J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)
+    ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
+    speed_m, speed_l, angle_m, angle_l = motor.speed, last.speed, motor.angle, last.angle
+    drive = plant.drive.torque
+    knot_at, value_at = first + 1, first + 1 + KNOTS
+    since_at, period_at, dry_at = (first + 1 + 2 * KNOTS + n for n in range(3))
+
+    law, with_dry = _straight(knot_at, value_at), _rubs_too(friction, first, dry_at)
 
     @kept(error_model="numpy")
     def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
@@ -193,6 +240,10 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
         else:
             s = (x[CLOCK] - p[since_at]) % p[period_at]
         torque = law(s, p)
+        if kind == MOTOR_SPEED:
+            torque += signs[0] * p[dry_at]
+        elif kind == LOAD_SPEED:
+            torque += signs[1] * p[dry_at]
         if code >= LATER:
             torque *= 1.0 if x[CLOCK] >= p[since_at] else 0.0
         elif code >= WITH_SPEED:
@@ -209,7 +260,7 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
             return (r[0], r[1] + on_motor, r[2], r[3], r[4], a, b, r[7])
         return (r[0], r[1] + on_motor, r[2], r[3] + on_load, r[4], a, b, r[7])
 
-    return CompiledEquations(friction, with_torque, presliding)
+    return CompiledEquations(with_dry, with_torque, presliding)
 
 
 def _runner(plant: Plant) -> Any:
