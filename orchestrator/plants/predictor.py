@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
 LAGGED = 4  # place of the drive's torque in the state
 FINER = 8  # times more steps of a free run in a sample in which dry friction may turn round, as in fits
+MOST_STEPS = 1000  # of a free run in a sample: with values that ask for more a model is lost, and not waited for
 WAVE = 0.05  # of a wave's period: the farthest that a Runge-Kutta step of a free run goes
 CALM = 0.02  # distances of presliding per sample below which it hardly changes
 
@@ -316,10 +317,10 @@ def coarse_steps(plant: Plant, p: Array, h: float, turn: float) -> int:
         turn: the farthest that the motor turns in it [rad].
 
     Returns:
-        At least 1.
+        At least 1, and ``MOST_STEPS`` at most.
     """
     shortest = min(waves_of(plant, p).values(), default=math.inf)
-    return max(plant.substeps(p, h), math.ceil(turn / (WAVE * shortest)))
+    return min(max(plant.substeps(p, h), math.ceil(min(turn / (WAVE * shortest), MOST_STEPS))), MOST_STEPS)
 
 
 @cache

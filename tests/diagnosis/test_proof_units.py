@@ -9,7 +9,7 @@ import pytest
 from orchestrator.diagnosis import proof
 from orchestrator.diagnosis.proof.free_run import _steps, free_run, simulate
 from orchestrator.diagnosis.proof.misfit import held_out_misfit, segments
-from orchestrator.plants.predictor import runs_coarsely, waves_of
+from orchestrator.plants.predictor import MOST_STEPS, coarse_steps, runs_coarsely, waves_of
 from tests.support.short_records import (
     AXIS,
     DRIVETRAIN,
@@ -79,6 +79,23 @@ def test_steps_of_the_predictor_follow_waves_however_short(cycles: float) -> Non
     rippleless = simulate(DRIVETRAIN, drivetrain(), START, signals, slice(0, 60))
     coarse = simulate(DRIVETRAIN, p, START, signals, slice(0, 60))
     assert np.max(np.abs(coarse - exact)) < 0.02 * np.max(np.abs(rippleless - exact))
+
+
+@pytest.mark.parametrize(
+    "lost",
+    [
+        {"J_l": 1e-12},
+        {"k": 1e18},
+        {"effects__torque_ripple__cycles_per_rev": 1e15},
+        {"effects__torque_ripple__cycles_per_rev": 1e308},
+    ],
+)
+def test_values_that_ask_for_countless_steps_are_not_waited_for(lost: dict[str, float]) -> None:
+    p = drivetrain(effects__torque_ripple__amplitude=8.0, **lost)
+    signals = replace(signals_from(np.zeros((60, 2)), torque(60), 2), y=np.arange(120.0).reshape(60, 2))
+    assert runs_coarsely(DRIVETRAIN, p)
+    assert coarse_steps(DRIVETRAIN, p, H, signals.turn) == MOST_STEPS
+    assert simulate(DRIVETRAIN, p, START, signals, slice(0, 60)).shape == (60, 2)
 
 
 def test_a_wave_without_cycles_is_none() -> None:
