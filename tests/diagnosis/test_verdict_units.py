@@ -382,10 +382,11 @@ def test_what_shows_on_the_last_part_alone_is_sought_with_the_first_held_out() -
     assert not easy.floor_off
 
 
+@pytest.mark.parametrize("others", [1.0, 0.0])
 @pytest.mark.parametrize("place", [0, 1, 2])
-def test_the_heaviest_tail_counts_wherever_it_is(monkeypatch, place: int) -> None:
-    """One row in a hundred differs: excess kurtosis (1 - 6 p q) / (p q); signs that alternate have -2."""
-    columns = np.tile(np.array([1.0, -1.0]), 50)[:, None].repeat(3, axis=1)
+def test_the_heaviest_tail_counts_wherever_it_is(monkeypatch, place: int, others: float) -> None:
+    """One row in a hundred differs: excess kurtosis (1 - 6 p q) / (p q); signs that alternate have -2, zeros none."""
+    columns = others * np.tile(np.array([1.0, -1.0]), 50)[:, None].repeat(3, axis=1)
     columns[:, place] = np.eye(1, 100, 7)[0]
     monkeypatch.setattr(verdict.remainder, "error_response", lambda likelihood, model: None)
     monkeypatch.setattr(verdict.remainder, "back_propagated", lambda response, raw: columns[:, 2:])

@@ -146,7 +146,8 @@ def tails(likelihood: RecordLikelihood, model: Fit, part: slice) -> float:
     effort = back_propagated(error_response(likelihood, model), raw[:, : likelihood.signals.channels])
     columns = np.concatenate([model.colour.white(model.z, part), effort[part]], axis=1)
     columns = columns - columns.mean(axis=0)
-    return float(np.max(np.mean(columns**4, axis=0) / np.maximum(np.mean(columns**2, axis=0), 1e-300) ** 2)) - 3
+    size = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-150)  # 1e-300 squared would be none
+    return float(np.max(np.mean((columns / size) ** 4, axis=0))) - 3.0
 
 
 def predictable(likelihood: RecordLikelihood, model: Fit, parts: Parts) -> tuple[Predictable, ...]:
