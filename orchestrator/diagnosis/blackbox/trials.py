@@ -87,15 +87,14 @@ class BoxTrials:
         return min(least, s.pays_disturbed) if whole else least
 
     def _within_laws(self, fit: BoxFit, before: BoxFit) -> bool:
-        """Tell whether what ``fit`` explains beyond ``before`` is no more than a law of that may be off by."""
+        """Tell whether what ``fit`` explains beyond ``before`` is no more than the laws of that may be off by."""
         at, own = len(before.model.p), 0.0
         for effect, values in zip(before.model.effects, before.model.values, strict=True):
             if effect.kind.where == PORT:
                 own = max(own, _size(before.J[:, :, at : at + len(values)] @ values))
             at += len(values)
         rows = min(len(before.y), len(fit.y))
-        left = (_size(self.fitter.problem.residual(one.y[:rows])) for one in (before, fit))
-        without, beside = left
+        without, beside = (_size(self.fitter.problem.residual(one.y[:rows])) for one in (before, fit))
         return without**2 - beside**2 < (self.settings.law * own) ** 2
 
     def explained(self, fit: BoxFit) -> bool:

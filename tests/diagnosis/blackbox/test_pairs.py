@@ -12,6 +12,7 @@ from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.parts import parts_of
 from orchestrator.diagnosis.blackbox.promises import Known
 from orchestrator.diagnosis.blackbox.screening import Screened
+from orchestrator.diagnosis.blackbox.trials import BoxTrials
 from orchestrator.diagnosis.blackbox.whitening import Ladder, Surrogate
 
 ROWS = 800
@@ -84,3 +85,19 @@ def test_noise_alone_promises_no_pair() -> None:
 ])  # fmt: skip
 def test_an_effort_of_the_size_of_rounding_is_no_effect(name: str, values: list[float], means: bool) -> None:
     assert BoxEffect(BANK[name], "p", SCENE).means(np.array(values), 1e-3) is means
+
+
+@pytest.mark.parametrize(
+    ("kind", "left", "within"),
+    [("coulomb_friction", 9.9, True), ("coulomb_friction", 10.1, False), ("input_gain", 9.9, False)],
+)
+def test_what_a_law_at_a_port_may_be_off_by_is_no_further_effect(kind: str, left: float, within: bool) -> None:
+    """The effect changes the output by 1000 (rms); a hundredth of that counts for nothing."""
+    effect, further = BoxEffect(BANK[kind], "p", SCENE), BoxEffect(BANK["added_inertia"], "p", SCENE)
+    values = np.full(len(effect.kind.parameters), 0.5)
+    J = np.zeros((ROWS, 1, len(values)))
+    J[:, 0, 0] = 2000.0 * np.where(np.arange(ROWS) % 2, 1.0, -1.0)
+    model = BoxModel(np.zeros(0)).extended(effect, values)
+    before = BoxFit(model, 0, np.full((ROWS, 1), left), 0.0, 0.0, 0.0, J)
+    after = BoxFit(model.extended(further, np.ones(1)), 0, np.zeros((ROWS, 1)), 0.0, 0.0, 0.0, J)
+    assert BoxTrials(fitter(np.zeros(ROWS)), ())._within_laws(after, before) is within
