@@ -13,7 +13,7 @@ its own uncertainty (Norgaard, Poulsen and Ravn, Automatica 36(11), 2000): a fla
 """
 
 import math
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -319,6 +319,13 @@ def coarse_steps(plant: Plant, p: Array, h: float, turn: float) -> int:
     Returns:
         At least 1, and ``MOST_STEPS`` at most.
     """
+    return _coarse_steps(plant, p.tobytes(), h, turn)
+
+
+@lru_cache(maxsize=256)
+def _coarse_steps(plant: Plant, values: bytes, h: float, turn: float) -> int:
+    """Return what :func:`coarse_steps` does; a model is run many times from one start after the other."""
+    p = np.frombuffer(values)
     shortest = min(waves_of(plant, p).values(), default=math.inf)
     return min(max(plant.substeps(p, h), math.ceil(min(turn / (WAVE * shortest), MOST_STEPS))), MOST_STEPS)
 

@@ -272,7 +272,8 @@ def _judged(wide: RecordLikelihood, best: _Tried, base: Fit, parts: Parts, unit:
     knots, values, errors = _shown(plant, best, final)
     if best.terms:
         short = of_few_terms(wide, best.argument, best.effect, final, best.terms)[0]
-        final = annealed(wide, (fixed := with_terms(wide, best.effect, final, short))[0], final.q, fixed[1], whole, ())
+        p, free = with_terms(wide, best.effect, final, short)
+        final = annealed(wide, p, final.q, free, whole, ())
         knots, values, errors = _shown(plant, best, final, short)
     stages = [("parameters", _widened(base.p, wide.nominal)), *_put_right(wide, best, base, final, whole)]
     misfit = held_out_misfit(wide, final.q, [*stages, ("learned law", final.p)], parts.held_out, unit)
