@@ -57,6 +57,7 @@ class BoxLikelihood:
         self.mean = problem.nominal.p
         self.lower = np.array([u.minimum for u in problem.map.uncertain])
         self.upper = np.array([u.maximum for u in problem.map.uncertain])
+        self._steep: dict[str, float] = {}  # what a value changed of the outputs at last, for one of its unit
 
     def likelihood(self, e: Array, k: int, rows: Rows) -> float:
         """Return the log-likelihood of whitened residuals (n, outputs) over ``rows``, without its constant.
@@ -125,7 +126,9 @@ class BoxLikelihood:
         return out
 
     def scales(self, model: BoxModel) -> Array:
-        """Return the step of each value for differences.
+        """Return the step of each value for differences: as given, or less where that changes the outputs by much.
+
+        A motion that is sensitive (a pendulum that turns over) is linear over small changes alone.
 
         Args:
             model: parameters, effects and their values.
@@ -133,12 +136,14 @@ class BoxLikelihood:
         Returns:
             Shape (values,).
         """
-        return np.concatenate(
+        given = np.concatenate(
             [
                 self.sd * self.settings.fit.difference,
                 *(np.array(e.scales(v)) for e, v in zip(model.effects, model.values, strict=True)),
             ]
         )
+        steep = np.array([self._steep.get(name, 0.0) for name in _names(model)])
+        return np.minimum(given, self.settings.fit.wild / np.maximum(steep, 1e-300))
 
     def jacobian(self, model: BoxModel, y: Array, only: slice | None = None) -> Array | None:
         """Return differences (rows, outputs, values) of the free run, in units of the noise; None where a run fails.
@@ -151,9 +156,22 @@ class BoxLikelihood:
         Returns:
             The differences.
         """
-        z, steps = model.vector, self.scales(model)
-        places = list(range(len(z)))[only or slice(None)]
-        models = []
+        places, names = list(range(len(model.vector)))[only or slice(None)], _names(model)
+        J = self._differences(model, y, places)
+        if J is None:
+            return None
+        steep, steps = np.sqrt(np.mean(J * J, axis=(0, 1))), self.scales(model)[places]
+        self._steep |= {names[k]: float(value) for k, value in zip(places, steep, strict=True)}
+        wild = np.flatnonzero(steep * steps > 2.0 * self.settings.fit.wild)
+        finer = self._differences(model, y, [places[at] for at in wild]) if wild.size else None
+        if finer is not None:
+            J[:, :, wild] = finer
+            self._steep |= {names[places[at]]: float(np.sqrt(np.mean(J[:, :, at] ** 2))) for at in wild}
+        return J
+
+    def _differences(self, model: BoxModel, y: Array, places: Sequence[int]) -> Array | None:
+        """Return the differences (rows, outputs, places) by some of the values; None where a run fails."""
+        z, steps, models = model.vector, self.scales(model), []
         for k in places:
             trial = z.copy()
             trial[k] += steps[k] if z[k] + steps[k] <= self._high(k) else -steps[k]
@@ -227,3 +245,9 @@ class BoxLikelihood:
         N[range(count), range(count)] += 1.0 / self.sd**2
         scale = np.sqrt(np.maximum(np.diag(N), 1e-300))
         return np.asarray(np.linalg.pinv(N / scale / scale[:, None], rcond=1e-13) / scale / scale[:, None])
+
+
+def _names(model: BoxModel) -> list[str]:
+    """Return a name of each value of a model: parameters by their places, those of effects by their labels."""
+    of_effects = [f"{e.label} {n}" for e, v in zip(model.effects, model.values, strict=True) for n in range(len(v))]
+    return [*(str(n) for n in range(len(model.p))), *of_effects]

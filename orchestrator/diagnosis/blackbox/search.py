@@ -8,7 +8,7 @@ import numpy as np
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.rest import Whole
 from orchestrator.diagnosis.blackbox.screening import Pair
-from orchestrator.diagnosis.blackbox.steps import SearchStep, labels, lost_without
+from orchestrator.diagnosis.blackbox.steps import SearchStep, labels, lost_without, made_up_for
 from orchestrator.diagnosis.blackbox.trials import BoxTrials
 
 
@@ -190,7 +190,7 @@ class BoxSearch(BoxTrials):
             for effect in fit.model.effects:
                 if lost_without(self.fitter, fit, effect) > self.settings.surely * self._least(fit, base, base):
                     continue
-                again = self.fitter.grown(fit.model.without(effect.label), fit.level)
+                again = self.fitter.grown(made_up_for(self.fitter, fit, effect), fit.level)
                 if again is None or self._carries(fit, again, base):
                     continue
                 reduced.append(self.fitter.settled(again))

@@ -109,6 +109,9 @@ class FitterSettings(Settings, frozen=True):
 
     iterations: Annotated[int, setting("Gauss-Newton iterations at most", ge=1)] = 6
     difference: Annotated[float, setting("step of a difference, in standard deviations of a parameter's prior")] = 0.1
+    wild: Annotated[
+        float, setting("change of the outputs, in units of their noise, from which a difference takes a smaller step")
+    ] = 10.0
     enough: Annotated[float, setting("gain in log-likelihood below which an iteration is the last")] = 0.05
     as_expected: Annotated[float, share("of what an iteration promised, from which its Jacobian serves once more")] = (
         0.9

@@ -76,7 +76,7 @@ def lost_without(fitter: Fitter, fit: BoxFit, effect: BoxEffect) -> float:
     Returns:
         A log-likelihood; infinity where the FMU fails without it.
     """
-    model, J = fit.model.without(effect.label), fit.J
+    model, J = made_up_for(fitter, fit, effect), fit.J
     y = fitter.problem.simulate([model], fitter.parts.seen)[0]
     if y is None:
         return np.inf
@@ -85,3 +85,38 @@ def lost_without(fitter: Fitter, fit: BoxFit, effect: BoxEffect) -> float:
     J = np.delete(J[: len(y)], range(at, at + len(effect.kind.parameters)), axis=2)
     known = Known(fitter, replace(fit, model=model, y=y, J=J), len(y))
     return fit.total - max(known.explains(level) for level in fitter.ladder.near(known.start))
+
+
+def made_up_for(fitter: Fitter, fit: BoxFit, effect: BoxEffect) -> BoxModel:
+    """Return the model without an effect, the other values where linearisation says that they make up for it best.
+
+    Re-fitted parameters may do all that an effect does (a gain, and all parameters in proportion), and still not be
+    found from where they were beside it: without both the run goes astray.
+
+    Args:
+        fitter: gives the filters and the FMU.
+        fit: of the model.
+        effect: one of it; where it is not in proportion to its values, the others stay where they are.
+
+    Returns:
+        The model.
+    """
+    model, at = fit.model.without(effect.label), len(fit.model.p)
+    if not effect.kind.linear:
+        return model
+    place = fit.model.effects.index(effect)
+    at += sum(len(values) for values in fit.model.values[:place])
+    own = np.arange(at, at + len(effect.kind.parameters))
+    J = fitter.jacobian(fit.model, fit.y)  # that of the fit was kept up from step to step, and is not exact
+    if J is None:
+        return model
+    rows = fitter.parts.looked_at[fitter.parts.looked_at < len(J)]
+    white = fitter.ladder[fit.level].whiten(J)[rows].reshape(-1, J.shape[2])
+    others = np.delete(white, own, axis=1)
+    N, g = others.T @ others, others.T @ (white[:, own] @ fit.model.vector[own])
+    count = len(model.p)
+    N[range(count), range(count)] += 1.0 / fitter.sd**2
+    g[:count] -= (model.p - fitter.mean) / fitter.sd**2
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(N), 1e-300))
+    change = scale * (np.linalg.pinv(N * scale * scale[:, None], rcond=1e-12, hermitian=True) @ (scale * g))
+    return model.moved(fitter.bounded(model.vector + change))
