@@ -15,6 +15,7 @@ from msgspec import UNSET
 
 from orchestrator.api.any_fmu import FmuDiagnosisResult, of_a_box
 from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.law import asked_law, law_found, law_told
 from orchestrator.api.live import corrected_live
 from orchestrator.api.numerics import fitting
 from orchestrator.api.records import as_record
@@ -25,6 +26,7 @@ from orchestrator.diagnosis.blackbox.settings import BoxSettings
 from orchestrator.diagnosis.diagnose import evidence_of
 from orchestrator.diagnosis.outcome import Diagnosis, Misfit, Named, step_found
 from orchestrator.diagnosis.proof.corrected import BeforeAfter, before_and_after, build_corrected, fmu_name
+from orchestrator.diagnosis.proof.exported import LawRun, build_with_law, run_with_law
 from orchestrator.diagnosis.proof.model_text import corrected_model
 from orchestrator.diagnosis.proof.other_record import STAGES, Validation, torque_errors, unharmed
 from orchestrator.diagnosis.proof.other_record import validate as validated_on
@@ -56,6 +58,7 @@ class DiagnosisResult(Result):
         arguments: what was asked for.
         model: what it was compared with.
         more: further records of the same machine, fitted together with the first.
+        with_law: the corrected FMU has the learned law, off until ``effects.learned_law.on`` is 1.
     """
 
     command: ClassVar[str] = "diagnose"
@@ -68,6 +71,7 @@ class DiagnosisResult(Result):
     arguments: Mapping[str, Any] = field(default_factory=dict)
     model: Model | None = None
     more: tuple[Record, ...] = ()
+    with_law: bool = False
 
     @property
     def verdict(self) -> str:
@@ -95,7 +99,7 @@ class DiagnosisResult(Result):
         return self.diagnosis.warnings
 
     def build(self, out: Path | str) -> Path:
-        """Build the corrected plant as an FMU and check it.
+        """Build the corrected plant as an FMU, with the learned law where that was asked for, and check it.
 
         Args:
             out: the folder; made when it does not exist.
@@ -114,17 +118,30 @@ class DiagnosisResult(Result):
         except OSError as error:
             raise OutputError(f"`out` must be a folder, but {folder} is not: {error.strerror}", "out") from None
         with fitting(f"{self.record.source}: the corrected model cannot be built"):
+            if self.with_law and self.diagnosis.learned is not None:
+                return build_with_law(self.diagnosis, self.diagnosis.learned, self.record.source, folder)
             return build_corrected(self.diagnosis, self.record.source, folder)
 
-    @cached_property
+    @property
     def runs(self) -> BeforeAfter:
-        """The held-out part, measured and co-simulated with the nominal and the corrected FMU."""
+        """The held-out part, measured and co-simulated with the nominal and the corrected FMU, a law being off."""
+        return self._simulated[0]
+
+    @property
+    def law_run(self) -> LawRun | None:
+        """The held-out part, simulated by the corrected FMU with its learned law on; None: it has none."""
+        return self._simulated[1]
+
+    @cached_property
+    def _simulated(self) -> tuple[BeforeAfter, LawRun | None]:
         with tempfile.TemporaryDirectory(prefix="diagnose-") as folder:
             return self._co_simulated(self.build(folder))
 
-    def _co_simulated(self, fmu: Path) -> BeforeAfter:
+    def _co_simulated(self, fmu: Path) -> tuple[BeforeAfter, LawRun | None]:
+        law = self.diagnosis.learned if self.with_law else None
         with fitting(f"{self.record.source}: no model can be fitted to this record"):
-            return before_and_after(self.diagnosis, fmu)
+            with_law = None if law is None else run_with_law(self.diagnosis, law, fmu)
+            return before_and_after(self.diagnosis, fmu), with_law
 
     def plot(self, path: Path | str) -> None:
         """Draw the held-out part: measured, of the nominal model and of the corrected one.
@@ -147,10 +164,13 @@ class DiagnosisResult(Result):
         """
         runs = self.runs
         names: Sequence[str] = ("theta_m", "theta_l")[: runs.measured.shape[1]]
-        header = ["time", "u"] + [f"{name}{suffix}" for name in names for suffix in ("", "_before", "_after")]
+        shown = {"": runs.measured, "_before": runs.before, "_after": runs.after}
+        if self.law_run is not None:
+            shown["_with_law"] = self.law_run.outputs
+        header = ["time", "u"] + [f"{name}{suffix}" for name in names for suffix in shown]
         columns = [runs.time, runs.u]
         for n in range(len(names)):
-            columns += [runs.measured[:, n], runs.before[:, n], runs.after[:, n]]
+            columns += [values[:, n] for values in shown.values()]
         try:
             with Path(path).open("w", newline="", encoding="utf-8") as file:
                 writer = csv.writer(file, lineterminator="\n")
@@ -173,6 +193,8 @@ class DiagnosisResult(Result):
                 yield f"  {place.words}"
         if d.learned:
             yield f"Learned law: {d.learned.words}"
+        if self.with_law:
+            yield law_told(self.diagnosis, self.law_run if "_simulated" in self.__dict__ else None)
         for warning in d.warnings:
             yield f"Note: {warning}"
         yield f"Trust: {self.trust.level.word}"
@@ -184,8 +206,10 @@ class DiagnosisResult(Result):
 
     def results(self, place: Path) -> DiagnoseFound:
         """Return what ``diagnose.json`` says; the corrected FMU is in ``place``."""
+        found = self.diagnosis.found()
         return msgspec.structs.replace(
-            self.diagnosis.found(),
+            found,
+            learned_law=law_found(found.learned_law, self.law_run, self.misfit[0].unit),
             model=str(place / self.fmu_name),
             cosimulation=DifferenceFound(self.runs.difference, "rad"),
             validation=UNSET if self.validation is None else _signals(self.validation),
@@ -206,8 +230,8 @@ class DiagnosisResult(Result):
         from orchestrator.diagnosis.figures import draw_workings
 
         fmu = self.build(folder)
-        if "runs" not in self.__dict__:  # else it would be built again
-            self.__dict__["runs"] = self._co_simulated(fmu)
+        if "_simulated" not in self.__dict__:  # else it would be built again
+            self.__dict__["_simulated"] = self._co_simulated(fmu)
         self.write_csv(folder / "diagnose.csv")
         if self.model is not None:
             (folder / "corrected.toml").write_text(corrected_model(self.model, self.diagnosis), encoding="utf-8")
@@ -223,6 +247,7 @@ def diagnose(
     validate: Record | Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
+    with_law: bool = False,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
 ) -> DiagnosisResult:
     """Of a model of ours."""
@@ -249,6 +274,7 @@ def diagnose(
     validate: Record | Path | str | None = None,
     settings: DiagnosisSettings | BoxSettings | Path | str | None = None,
     search: bool = True,
+    with_law: bool = False,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
 ) -> DiagnosisResult | FmuDiagnosisResult:
     """Find out which effects a model misses, and prove it on data that was not fitted.
@@ -261,6 +287,8 @@ def diagnose(
         validate: another record, or its path, on which the misfit is shown too.
         settings: thresholds, or the path of a TOML file with those that differ from the default.
         search: False: the model is re-fitted and judged as it stands, no effect is looked for.
+        with_law: where the verdict is "unknown" and a law is learned, the corrected FMU has it: off until its parameter
+            ``effects.learned_law.on`` is 1. Where there is none, a warning says why.
         progress: called with (fits done, expected, what was fitted); of an FMU the number expected is not known: 0.
 
     Returns:
@@ -281,6 +309,10 @@ def diagnose(
         'coulomb_friction'
     """
     if map is not None or isinstance(model, (Path, str)):
+        if with_law:
+            raise ScenarioError(
+                "`with_law` must be left out with an FMU of others, of which no law is learned", "with_law"
+            )
         return _of_a_box(record, model, map, validate, settings, search, progress)
     model = read_model(None) if model is None else model
     if isinstance(settings, BoxSettings):
@@ -305,7 +337,8 @@ def diagnose(
         evidence = evidence_of(found)
     given = {"record": measured.source, "model": model.source, "validate": None if other is None else other.source}
     seconds = time.monotonic() - begun
-    return DiagnosisResult(found, measured, validated, errors, evidence, seconds, given, model, tuple(more))
+    found, has_law = asked_law(found) if with_law else (found, False)
+    return DiagnosisResult(found, measured, validated, errors, evidence, seconds, given, model, tuple(more), has_law)
 
 
 def _of_a_box(

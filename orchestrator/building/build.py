@@ -14,10 +14,11 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import orchestrator
 from orchestrator.building.launcher import find_toolchain
-from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of
+from orchestrator.building.sources import Recipe, catalogue, fingerprint, recipe_of, with_law
 from orchestrator.errors import FmuError
 from orchestrator.fmi.ours import is_ours, record
 from pyfmu_sources.fmu_variables import with_starts
@@ -65,6 +66,7 @@ def build_variant(
     base: str = "Drivetrain",
     start_values: Mapping[str, float | str] | None = None,
     directory: Path | None = None,
+    law: Mapping[str, Any] | None = None,
 ) -> Path:
     """Build (unless it is there already) an FMU called ``name`` that is ``base`` with other start values.
 
@@ -73,12 +75,15 @@ def build_variant(
         base: the FMU that it varies.
         start_values: value by parameter name; an enumeration is given by the name of its item or its number.
         directory: where it goes (default: where the others are).
+        law: a learned one that it has besides, off until it is switched on, as
+            ``pyfmu_sources.learned_plant.law_variables`` takes it.
 
     Returns:
         The FMU's path.
 
     Raises:
-        FmuError: the name is no identifier, a parameter is unknown or out of range, or the build fails.
+        FmuError: the name is no identifier, a parameter is unknown or out of range, no law can act in the plant, or
+            the build fails.
     """
     if not IDENTIFIER.fullmatch(name) or name in catalogue():
         raise FmuError(f"`name` must be a new C identifier of at most 100 characters, but is {name!r}")
@@ -89,6 +94,7 @@ def build_variant(
         with_starts(slave.table, starts)
     except ValueError as error:
         raise FmuError(str(error)) from None
+    recipe = recipe if law is None else with_law(recipe, law)
     return _ensure(recipe, default_directory() if directory is None else directory)
 
 
@@ -162,6 +168,7 @@ def _build(recipe: Recipe, path: Path, current: str) -> None:
         "module": recipe.module,
         "class_name": recipe.class_name,
         "starts": dict(recipe.starts),
+        "law": recipe.law,
         "target": str(path.absolute()),
         "fingerprint": current,
     }

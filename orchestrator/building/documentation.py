@@ -60,7 +60,9 @@ def documentation(recipe: Recipe, description: Element, platforms: Sequence[str]
     Returns:
         Content by name in the archive.
     """
-    fragments = [f"{recipe.class_name}.html"]
+    fragments = [f"{recipe.plain}.html"]
+    if recipe.law is not None:
+        fragments.append("learned_law.html")
     if any(v.attrib["name"] == "sample_time" for v in description.iter("ScalarVariable")):
         fragments.append("sampled.html")
     paths = [DATA / name for name in fragments]

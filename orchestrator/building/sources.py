@@ -6,10 +6,11 @@ import json
 import platform
 import sysconfig
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pyfmu_sources
 from orchestrator.errors import FmuError
@@ -18,6 +19,7 @@ from orchestrator.shared.version import __version__
 SOURCES = Path(pyfmu_sources.__file__).parent
 HERE = Path(__file__).parent
 SUFFIX = "_slave"
+LAW_SUFFIX, LAW_CLASS = "_law", "WithLaw"  # of the adapter of a plant with a learned law: module and class
 # Not themselves slaves, although their names end so.
 BASES = ("plant_slave", "sampled_slave")
 DATA_FILES = tuple(sorted(path for path in (HERE / "data").glob("*") if path.is_file()))
@@ -25,12 +27,18 @@ DATA_FILES = tuple(sorted(path for path in (HERE / "data").glob("*") if path.is_
 
 @dataclass(frozen=True)
 class Recipe:
-    """What one FMU is made from: model name, adapter module and class, and start values that differ."""
+    """What one FMU is made from: model name, adapter module and class, start values that differ, a learned law."""
 
     name: str
     module: str
     class_name: str
     starts: Mapping[str, float] = field(default_factory=dict)
+    law: Mapping[str, Any] | None = None
+
+    @property
+    def plain(self) -> str:
+        """Return the class's name without what says that it has a law."""
+        return self.class_name.removesuffix(LAW_CLASS)
 
 
 @cache
@@ -65,6 +73,41 @@ def recipe_of(name: str) -> Recipe:
         return catalogue()[name]
     except KeyError:
         raise FmuError(f"`name` must be one of {', '.join(catalogue())}, but is {name!r}") from None
+
+
+def with_law(recipe: Recipe, law: Mapping[str, Any]) -> Recipe:
+    """Return the recipe of a plant with a learned law.
+
+    Args:
+        recipe: of the plant without it.
+        law: as ``pyfmu_sources.learned_plant.law_variables`` takes it.
+
+    Returns:
+        The recipe.
+
+    Raises:
+        FmuError: the plant has no adapter for one.
+    """
+    module = _law_module(recipe)
+    if not takes_law(recipe):
+        raise FmuError(f"a learned law must act in a plant that has `pyfmu_sources/{module}.py`, but there is none")
+    return replace(recipe, module=module, class_name=recipe.class_name + LAW_CLASS, law=law)
+
+
+def takes_law(recipe: Recipe) -> bool:
+    """Tell whether a plant has an adapter in which a learned law acts.
+
+    Args:
+        recipe: of the plant.
+
+    Returns:
+        True when it has.
+    """
+    return (SOURCES / f"{_law_module(recipe)}.py").exists()
+
+
+def _law_module(recipe: Recipe) -> str:
+    return recipe.module.removesuffix(SUFFIX) + LAW_SUFFIX
 
 
 @cache
@@ -127,6 +170,7 @@ def fingerprint(recipe: Recipe, launcher: str) -> str:
         "name": recipe.name,
         "class": recipe.class_name,
         "starts": {name: float(value).hex() for name, value in sorted(recipe.starts.items())},
+        "law": recipe.law,
         "versions": [__version__, version("pythonfmu"), platform.python_version()],
         "platform": sysconfig.get_platform(),
         "launcher": launcher,

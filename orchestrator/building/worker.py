@@ -24,7 +24,7 @@ ENTRY = '''"""The class that PythonFMU instantiates, with the name and the start
 
 from .{module} import {class_name} as Model
 
-Model.customise({name!r}, {build!r}, {starts!r})
+{learn}Model.customise({name!r}, {build!r}, {starts!r})
 _dictionaries = []
 
 
@@ -49,16 +49,18 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
         target: the FMU's path.
         fingerprint: by which a stale FMU is recognised.
     """
-    starts = default_starts(recipe.class_name) | dict(recipe.starts)
+    starts = default_starts(recipe.plain) | dict(recipe.starts)
     runtime = _runtime()
     sources = {path.name: path.read_bytes() for path in closure(recipe.module)}
     content = [part for name in sorted(sources) for part in (name.encode(), sources[name])]
-    options = json.dumps([recipe.name, sorted(starts.items())]).encode()
+    options = json.dumps([recipe.name, sorted(starts.items()), recipe.law]).encode()
     identity = digest([options, *runtime.values(), *content])
     package = f"pyfmu_{identity[:16]}"
+    learn = "" if recipe.law is None else f"Model.learn({recipe.law!r})\n"
     entry = ENTRY.format(
-        module=recipe.module, class_name=recipe.class_name, name=recipe.name, build=identity[:16], starts=starts
-    )
+        module=recipe.module, class_name=recipe.class_name, name=recipe.name, build=identity[:16], starts=starts,
+        learn=learn,
+    )  # fmt: skip
     sources |= {"entry.py": entry.encode(), "__init__.py": b'"""The sources of one FMU."""\n'}
     loaded = LOADED.format(package=package, name=recipe.class_name)
     with tempfile.TemporaryDirectory() as folder:
@@ -128,7 +130,7 @@ def main() -> int:
         The exit code.
     """
     request = json.load(sys.stdin)
-    recipe = Recipe(request["name"], request["module"], request["class_name"], request["starts"])
+    recipe = Recipe(request["name"], request["module"], request["class_name"], request["starts"], request["law"])
     try:
         build(recipe, Path(request["target"]), request["fingerprint"])
     except (OrchestratorError, ValueError, OSError) as error:

@@ -51,6 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--time-limit", type=float, metavar="SECONDS", help="stop the search then; the verdict is unknown"
     )
+    parser.add_argument(
+        "--with-law",
+        action="store_true",
+        help="with the verdict unknown: put the learned law into the FMU, off until effects.learned_law.on is 1",
+    )
     add_reading_arguments(parser)
 
 
@@ -86,8 +91,9 @@ def run(args: argparse.Namespace) -> int:
     with staged(args.out) as folder:
         with _shown(sum(record.size for record in records)) as progress:
             found = diagnose(
-                records, model, validate=other, settings=settings, search=not args.no_search, progress=progress
-            )
+                records, model, validate=other, settings=settings, search=not args.no_search, with_law=args.with_law,
+                progress=progress,
+            )  # fmt: skip
         found.write(folder, args.out, given)
         fmu = args.out / found.fmu_name
     print_blocks([*what_was_read(records if other is None else [*records, other]), *found.blocks()])
@@ -115,6 +121,8 @@ def _any_fmu(args: argparse.Namespace) -> int:
     for name in ("model", "time_limit"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
+    if args.with_law:
+        raise ScenarioError("`with_law` must be left out with an FMU of others, of which no law is learned", "with_law")
     note_missing_walls()
     if args.draft_map:
         text = draft_map(path, fmu)

@@ -106,6 +106,21 @@ class RecordEvidence:
 
 
 @dataclass(frozen=True)
+class FittedLaw:
+    """A learned law inside the predictor.
+
+    Attributes:
+        likelihood: of the record, with a plant that has the law.
+        p: (parameters,) of the predictor, those of the law and what was fitted beside it among them.
+        q: process noise of the filter that guesses initial states.
+    """
+
+    likelihood: RecordLikelihood
+    p: Array
+    q: float
+
+
+@dataclass(frozen=True)
 class LearnedLaw:
     """A torque that no effect explains, as a curve; never a name.
 
@@ -118,6 +133,7 @@ class LearnedLaw:
         formula: a short one that runs within the band, s being the argument; empty: none does.
         misfit: of each signal on the held-out part, of re-fitted parameters, with the log put right, with the law.
         log: what is put right in the log beside the law, in words; empty: nothing.
+        fitted: the model that it is part of.
     """
 
     site: str
@@ -131,6 +147,7 @@ class LearnedLaw:
     formula: str
     misfit: tuple[Misfit, ...]
     log: str = ""
+    fitted: FittedLaw | None = field(default=None, repr=False, compare=False)
 
     @property
     def shrinks(self) -> float:

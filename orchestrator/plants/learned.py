@@ -13,14 +13,46 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.plants.compiled import compiled
 from orchestrator.plants.description import CompiledEquations, Plant
 from orchestrator.plants.effects import Effect
 from orchestrator.plants.predictor import sample_of
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
+from pyfmu_sources.learned_law import (
+    CYCLE_L,
+    CYCLE_M,
+    DRIVE,
+    KNOTS,
+    LATER,
+    LOAD_ANGLE,
+    LOAD_SPEED,
+    MOTOR_SPEED,
+    TWIST,
+    WITH_SPEED,
+)
+
+__all__ = [
+    "CYCLE_L",
+    "CYCLE_M",
+    "DRIVE",
+    "KNOTS",
+    "LATER",
+    "LOAD_ANGLE",
+    "LOAD_SPEED",
+    "MOTOR_SPEED",
+    "TWIST",
+    "WITH_SPEED",
+    "Argument",
+    "arguments_of",
+    "cycles_of",
+    "later_arguments_of",
+    "names",
+    "rubbing",
+    "with_law",
+]
 
 Array = NDArray[np.float64]
 
-KNOTS = 11
 JUMP = 0.005  # of a speed's range: within so much of zero, friction turns round
 AWAY = 3.0  # such widths from zero, where the next knots stand at least
 EDGE = 0.002  # share of the samples beyond either end
@@ -57,9 +89,7 @@ class Argument:
         return f"{self.signal}, times the load's speed" if self.with_speed else self.signal
 
 
-MOTOR_SPEED, LOAD_SPEED, LOAD_ANGLE, TWIST, DRIVE, CYCLE_M, CYCLE_L = range(1, 8)
-WITH_SPEED, LATER = 10, 20  # added to the code
-CLOCK = 6  # the state that counts time: that of an added resonance, which a plant with a law has not
+CLOCK_STATE = 6  # the state that counts time: that of an added resonance, which a plant with a law has not
 SINCE, PERIOD, DRY = "law.since", "law.period", "law.dry"
 
 
@@ -173,21 +203,6 @@ def with_law(plant: Plant, clocked: bool = False) -> Plant:
     return replace(extended, runner=cache(lambda: _runner(extended)), _index={})
 
 
-def _straight(knot_at: int, value_at: int) -> Any:
-    """Return the compiled curve: straight lines between knots, the last ones go on."""
-    from numba import njit
-
-    @njit(error_model="numpy")
-    def law(s: float, p: Any) -> float:
-        n = 1
-        while n < KNOTS - 1 and s > p[knot_at + n]:
-            n += 1
-        share = (s - p[knot_at + n - 1]) / (p[knot_at + n] - p[knot_at + n - 1])
-        return float(p[value_at + n - 1] + share * (p[value_at + n] - p[value_at + n - 1]))
-
-    return law
-
-
 def _rubs_too(friction: Any, first: int, dry_at: int) -> Any:
     """Return the compiled levels of dry friction, that of the law included."""
     from numba import njit
@@ -217,7 +232,7 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
     knot_at, value_at = first + 1, first + 1 + KNOTS
     since_at, period_at, dry_at = (first + 1 + 2 * KNOTS + n for n in range(3))
 
-    law, with_dry = _straight(knot_at, value_at), _rubs_too(friction, first, dry_at)
+    straight, with_dry = compiled("learned_law").straight, _rubs_too(friction, first, dry_at)
 
     @kept(error_model="numpy")
     def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
@@ -238,14 +253,14 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
         elif kind == DRIVE:
             s = x[drive]
         else:
-            s = (x[CLOCK] - p[since_at]) % p[period_at]
-        torque = law(s, p)
+            s = (x[CLOCK_STATE] - p[since_at]) % p[period_at]
+        torque = straight(s, p, knot_at, value_at)
         if kind == MOTOR_SPEED:
             torque += signs[0] * p[dry_at]
         elif kind == LOAD_SPEED:
             torque += signs[1] * p[dry_at]
         if code >= LATER:
-            torque *= 1.0 if x[CLOCK] >= p[since_at] else 0.0
+            torque *= 1.0 if x[CLOCK_STATE] >= p[since_at] else 0.0
         elif code >= WITH_SPEED:
             torque *= abs(x[speed_l])
         on_motor, on_load = 0.0, 0.0

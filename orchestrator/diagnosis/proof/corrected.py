@@ -78,9 +78,22 @@ def build_corrected(diagnosis: Diagnosis, source: str, directory: Path) -> Path:
         SimulationError: the check found an error in it.
     """
     plant = diagnosis.workings.plant
-    path = build_variant(
-        fmu_name(plant.name, source), plant.name, start_values(plant, diagnosis.workings.final.p), directory
-    )
+    values = start_values(plant, diagnosis.workings.final.p)
+    return checked(build_variant(fmu_name(plant.name, source), plant.name, values, directory))
+
+
+def checked(path: Path) -> Path:
+    """Return the path of a corrected FMU that passes the check.
+
+    Args:
+        path: of the FMU.
+
+    Returns:
+        The same.
+
+    Raises:
+        SimulationError: the check found an error in it.
+    """
     report = check_fmu(path)
     if not report.ok:
         raise SimulationError(f"{path.name}: the corrected FMU does not pass `check`: {report.findings[0]}")

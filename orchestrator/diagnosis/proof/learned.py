@@ -17,7 +17,7 @@ from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.fit.spread import widened
-from orchestrator.diagnosis.outcome import LearnedLaw
+from orchestrator.diagnosis.outcome import FittedLaw, LearnedLaw
 from orchestrator.diagnosis.proof.clocked import cycle_of
 from orchestrator.diagnosis.proof.curves import Short, curve, drawn, formula_of, knots_of
 from orchestrator.diagnosis.proof.few_terms import of_few_terms, rows_of, short_law, with_terms
@@ -287,6 +287,7 @@ def _judged(wide: RecordLikelihood, best: _Tried, base: Fit, parts: Parts, unit:
         argument.site, _words(wide, argument, final.p), signal_unit, value_unit, tuple(knots.tolist()),
         tuple(values.tolist()), tuple((values - band).tolist()), tuple((values + band).tolist()),
         formula_of(knots, values, errors, wide.settings.learned.formula), misfit, in_the_log(plant, base.p, final.p),
+        FittedLaw(wide, final.p, final.q),
     )  # fmt: skip
 
 

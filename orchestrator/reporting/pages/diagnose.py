@@ -280,10 +280,18 @@ def _learned(source: ResultDocument, law: LearnedFound | None) -> list[Section]:
         "Straight lines between the knots, and on beyond the last. It is no name: nothing in the library has this law."
     )
     return [
-        Text(title, (_sentence(law.words),)),
+        Text(title, (_sentence(law.words), *_in_the_fmu(law))),
         *_picture(source, "learned_law", "Learned law", note),
         ReportTable("Knots of the learned law", columns, rows),
     ]
+
+
+def _in_the_fmu(law: LearnedFound) -> tuple[str, ...]:
+    """Return in a sentence how the corrected FMU has the law; none where it has not."""
+    if (fmu := law.exported) is None:
+        return ()
+    missed = ", ".join(f"{name} by {rms:.4g} {fmu.unit}" for name, rms in fmu.misfit.items() if rms is not None)
+    return (f"The corrected FMU has it, off until its parameter {fmu.parameter} is 1; then it misses {missed}.",)
 
 
 def _where(places: Sequence[PlaceFound]) -> list[Section]:

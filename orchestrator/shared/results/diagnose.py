@@ -92,8 +92,31 @@ class FloorFound(msgspec.Struct, frozen=True):
     floor: dict[str, float]
 
 
+class LawRunFound(msgspec.Struct, frozen=True):
+    """A free run of the corrected FMU with its law on: first row in the held-out part, and start values."""
+
+    row: int
+    starts: dict[str, float]
+
+
+class LawExportFound(msgspec.Struct, frozen=True):
+    """A learned law in the corrected FMU: the parameter that switches it, and what the FMU misses with it on.
+
+    ``misfit`` is the rms by signal in ``unit`` over the held-out part.
+    """
+
+    parameter: str
+    misfit: dict[str, float | None]
+    unit: str
+    largest_difference_from_predictor: float | None
+    runs: tuple[LawRunFound, ...] = ()
+
+
 class LearnedFound(msgspec.Struct, frozen=True):
-    """A learned law: knots and values with the 95 % band (its low and its high ends), and what it is worth."""
+    """A learned law: knots and values with the 95 % band (its low and its high ends), and what it is worth.
+
+    ``exported`` says what the corrected FMU makes of it, where it was asked for.
+    """
 
     site: str
     argument: str
@@ -106,6 +129,7 @@ class LearnedFound(msgspec.Struct, frozen=True):
     formula: str
     misfit: dict[str, MisfitFound]
     times_smaller: float | None
+    exported: LawExportFound | None = None
 
 
 class HorizonFound(msgspec.Struct, frozen=True):

@@ -1,0 +1,58 @@
+"""The learned law in the corrected FMU: whether it can be there, and what results say of it."""
+
+from dataclasses import replace
+
+import msgspec
+
+from orchestrator.diagnosis.outcome import Diagnosis
+from orchestrator.diagnosis.proof.exported import LawRun, refusal
+from orchestrator.shared.results.diagnose import LawExportFound, LawRunFound, LearnedFound
+from pyfmu_sources.learned_plant import ON
+
+
+def asked_law(diagnosis: Diagnosis) -> tuple[Diagnosis, bool]:
+    """Return a diagnosis of which the law was asked for in the FMU, and whether the FMU can have it.
+
+    Args:
+        diagnosis: of the record.
+
+    Returns:
+        The diagnosis, with a warning that says why not.
+    """
+    why = refusal(diagnosis)
+    return (replace(diagnosis, warnings=(*diagnosis.warnings, why)), False) if why else (diagnosis, True)
+
+
+def law_told(diagnosis: Diagnosis, run: LawRun | None) -> str:
+    """Return in one sentence that the FMU has the law, and what it misses with it.
+
+    Args:
+        diagnosis: of the record.
+        run: of the FMU with the law on; None: it has not been run.
+
+    Returns:
+        The sentence.
+    """
+    text = f"In the FMU: the corrected FMU has this law, off until its parameter `{ON}` is 1"
+    if run is None:
+        return text
+    unit = diagnosis.misfit[0].unit
+    missed = ", ".join(f"{name} by {rms:.4g} {unit}" for name, rms in run.misfit.items())
+    return f"{text}; with it on, held-out free runs miss {missed}"
+
+
+def law_found(law: LearnedFound | None, run: LawRun | None, unit: str) -> LearnedFound | None:
+    """Return the law as ``diagnose.json`` has it, with what the FMU makes of it.
+
+    Args:
+        law: as the diagnosis says it.
+        run: of the FMU with the law on; None: it has none.
+        unit: of the measured positions.
+
+    Returns:
+        The law; None: none was learned.
+    """
+    if law is None or run is None:
+        return law
+    runs = tuple(LawRunFound(row, starts) for row, starts in zip(run.rows, run.starts, strict=True))
+    return msgspec.structs.replace(law, exported=LawExportFound(ON, dict(run.misfit), unit, run.difference, runs))

@@ -1,0 +1,79 @@
+"""The FMU ``Drivetrain`` with a law that was learned from a record."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import ClassVar
+
+from . import drivetrain
+from .drive_request import UNASKED
+from .drivetrain import Mode, State
+from .drivetrain_parameters import P_COULOMB_L, P_COULOMB_M, P_I, P_J_L, P_J_M, PARAMETERS, Parameter
+from .drivetrain_slave import T_L, T_SHAFT, Drivetrain, Values
+from .learned_law import L_DRY, LOAD_SPEED, TWIST, Motion, kind_of
+from .learned_plant import LawValues, Pushes, WithLaw
+
+_prepare = lru_cache(maxsize=256)(drivetrain.prepare)
+DIGITS = 12  # of a piece's length: equal pieces differ by rounding
+
+
+class DrivetrainWithLaw(WithLaw, Drivetrain):
+    """Motor with lag, gear with play, elastic shaft, load, and a learned torque on one of them."""
+
+    plant_parameters: ClassVar[tuple[Parameter, ...]] = PARAMETERS
+
+    _rubbing: Values
+    _law: LawValues
+    _now: float
+    _piece: float
+
+    def _begin_with(self, p: Values) -> None:
+        """Start at the initial state with other parameters."""
+        x = self._x
+        self._p = p
+        self._x = drivetrain.consistent_start((x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7]), p)
+        self._mode = drivetrain.initial_mode(self._x, p)
+
+    def _rubbed(self, p: Values) -> Values:
+        """Return parameters with the law's dry friction added to the body's own."""
+        place = P_COULOMB_L if kind_of(self._law) == LOAD_SPEED else P_COULOMB_M
+        return (*p[:place], p[place] + self._law[L_DRY], *p[place + 1 :])
+
+    def _inertias(self) -> tuple[float, float, float]:
+        """Return the inertias of motor and load [kg.m2] and the ratio of the gear."""
+        return (self._p[P_J_M], self._p[P_J_L], self._p[P_I])
+
+    def _motion(self, x: State, u: float) -> Motion:
+        """Return what a law is a function of."""
+        return (x[1], x[3], x[2], x[0] / self._p[P_I] - x[2], x[4])
+
+    def _mode_of(self, x: State, mode: Mode, p: Values, u: float) -> Mode:
+        """Return the mode in which friction that sets in finds the plant."""
+        _, slip_m, slip_l = drivetrain.initial_mode(x, p)
+        return (mode[0], slip_m, slip_l)
+
+    def _pushed(self, x: State, mode: Mode, p: Values, u: float, against: Pushes, step: float) -> tuple[State, Mode]:
+        """Return state and mode after a piece of a step with torques held against motor and load.
+
+        A torque against the motor is a drive that gives so much less: its lag and its filter are linear.
+        """
+        less, load = against
+        table = _prepare(p, float(f"{step:.{DIGITS}g}"))
+        moved, mode = drivetrain.advance(_with_less(x, less), mode, p, u - less, self.real[T_L] + load, step, table)
+        return _with_less(moved, -less), mode
+
+    def refresh(self) -> None:
+        """Recompute the shaft torque; that of a law on the shaft is part of it."""
+        if not self._acts():
+            super().refresh()
+            return
+        less, load = self._pushes(self._x, 0.0, self._clock())
+        T_l = self.real[T_L] + load if kind_of(self._law) != TWIST else self.real[T_L]
+        torque = drivetrain.shaft_torque(_with_less(self._x, less), self._mode, self._rubbing, T_l)
+        self.real[T_SHAFT] = torque - load if kind_of(self._law) == TWIST else torque
+
+
+def _with_less(x: State, less: float) -> State:
+    """Return a state whose drive delivers so much less [N.m]."""
+    filtered = x[11] if x[11] == UNASKED else x[11] - less
+    return (x[0], x[1], x[2], x[3], x[4] - less, x[5], x[6], x[7], x[8], x[9], x[10], filtered)

@@ -1,0 +1,55 @@
+"""The FMU ``ServoAxis`` with a law that was learned from a record."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from . import servo_axis
+from .drivetrain_parameters import Parameter
+from .learned_law import L_DRY, Motion
+from .learned_plant import LawValues, Pushes, WithLaw
+from .servo_axis import State
+from .servo_axis_modes import UNDECIDED
+from .servo_axis_parameters import P_COULOMB, P_J, PARAMETERS
+from .servo_axis_slave import FIRST_START, T_L, ServoAxis, Values
+
+
+class ServoAxisWithLaw(WithLaw, ServoAxis):
+    """One inertia behind the lag of its drive, and a learned torque against it."""
+
+    plant_parameters: ClassVar[tuple[Parameter, ...]] = PARAMETERS
+
+    _rubbing: Values
+    _law: LawValues
+    _now: float
+    _piece: float
+
+    def _begin_with(self, p: Values) -> None:
+        """Start at the initial state with other parameters."""
+        real = self.real
+        self._p = p
+        self._x = servo_axis.start(real[FIRST_START], real[FIRST_START + 1], real[FIRST_START + 2], p)
+        self._mode = UNDECIDED
+
+    def _rubbed(self, p: Values) -> Values:
+        """Return parameters with the law's dry friction added to the body's own."""
+        return (*p[:P_COULOMB], p[P_COULOMB] + self._law[L_DRY], *p[P_COULOMB + 1 :])
+
+    def _inertias(self) -> tuple[float, float, float]:
+        """Return the inertia [kg.m2], as that of motor and of load, and the ratio of no gear."""
+        return (self._p[P_J], self._p[P_J], 1.0)
+
+    def _motion(self, x: State, u: float) -> Motion:
+        """Return what a law is a function of."""
+        return (x[1], x[1], x[0], 0.0, servo_axis.drive_torque(x, self._p, u))
+
+    def _mode_of(self, x: State, mode: int, p: Values, u: float) -> int:
+        """Return the mode in which friction that sets in finds the axis."""
+        return servo_axis.initial_mode(x, p, u)
+
+    def _pushed(self, x: State, mode: int, p: Values, u: float, against: Pushes, step: float) -> tuple[State, int]:
+        """Return state and mode after a piece of a step with torques held against the one body."""
+        T_l = self.real[T_L] + against[0] + against[1]
+        if mode == UNDECIDED:
+            mode = servo_axis.initial_mode(x, p, u - against[0] - against[1])
+        return servo_axis.advance(x, mode, p, u, T_l, step)
