@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.blackbox.bank import CUT
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.parts import BoxParts, Rows
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
@@ -142,8 +143,11 @@ class BoxLikelihood:
                 *(np.array(e.scales(v)) for e, v in zip(model.effects, model.values, strict=True)),
             ]
         )
+        if any(e.kind.where == CUT for e in model.effects):
+            return given  # contact comes and goes: small changes tell of the nearest one alone
         steep = np.array([self._steep.get(name, 0.0) for name in _names(model)])
-        return np.minimum(given, self.settings.fit.wild / np.maximum(steep, 1e-300))
+        least = self.settings.fit.least_step * given  # rounding rules over shorter ones
+        return np.clip(self.settings.fit.wild / np.maximum(steep, 1e-300), least, given)
 
     def jacobian(self, model: BoxModel, y: Array, only: slice | None = None) -> Array | None:
         """Return differences (rows, outputs, values) of the free run, in units of the noise; None where a run fails.
@@ -161,7 +165,7 @@ class BoxLikelihood:
         if J is None:
             return None
         steep, steps = np.sqrt(np.mean(J * J, axis=(0, 1))), self.scales(model)[places]
-        self._steep |= {names[k]: float(value) for k, value in zip(places, steep, strict=True)}
+        self._steep |= {names[k]: float(value) for k, value in zip(places, steep, strict=True) if np.isfinite(value)}
         wild = np.flatnonzero(steep * steps > 2.0 * self.settings.fit.wild)
         finer = self._differences(model, y, [places[at] for at in wild]) if wild.size else None
         if finer is not None:

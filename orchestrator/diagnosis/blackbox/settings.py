@@ -112,6 +112,7 @@ class FitterSettings(Settings, frozen=True):
     wild: Annotated[
         float, setting("change of the outputs, in units of their noise, from which a difference takes a smaller step")
     ] = 10.0
+    least_step: Annotated[float, share("of its step as given, that such a smaller one has at least")] = 1e-6
     enough: Annotated[float, setting("gain in log-likelihood below which an iteration is the last")] = 0.05
     as_expected: Annotated[float, share("of what an iteration promised, from which its Jacobian serves once more")] = (
         0.9
@@ -175,7 +176,7 @@ class RestSettings(Settings, frozen=True):
     ] = 0.015
     halved: Annotated[
         float,
-        share("of the port noise without an effect, up to which it may be left beside it: more, it is a stand-in"),
+        share("of the port noise without an effect, below which it must be beside it: else it is a stand-in"),
     ] = 0.5
     driven: Annotated[
         float, setting("standard deviations of chance from which what is left follows from the drive: no disturbance")

@@ -34,7 +34,7 @@ def stand_in(search: BoxSearch, best: BoxFit, settings: RestSettings = DEFAULT.r
         return ""
     for effect in best.model.effects:
         without = fitter.fit(best.model.without(effect.label), best.level)
-        if without is not None and left > settings.halved * share(fitter.settled(without).level):
+        if without is not None and left >= settings.halved * share(fitter.settled(without).level):
             return effect.label
     return ""
 
