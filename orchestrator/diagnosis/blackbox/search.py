@@ -188,9 +188,11 @@ class BoxSearch(BoxTrials):
         while fit.model.effects:
             reduced = []
             for effect in fit.model.effects:
-                if lost_without(self.fitter, fit, effect) > self.settings.surely * self._least(fit, base, base):
+                without = made_up_for(self.fitter, fit, effect)
+                lost = lost_without(self.fitter, fit, effect, without)
+                if lost > self.settings.surely * self._least(fit, base, base):
                     continue
-                again = self.fitter.grown(made_up_for(self.fitter, fit, effect), fit.level)
+                again = self.fitter.grown(without, fit.level)
                 if again is None or self._carries(fit, again, base):
                     continue
                 reduced.append(self.fitter.settled(again))

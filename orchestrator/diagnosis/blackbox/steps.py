@@ -65,24 +65,24 @@ def labels(fit: BoxFit) -> frozenset[str]:
     return frozenset(effect.label for effect in fit.model.effects)
 
 
-def lost_without(fitter: Fitter, fit: BoxFit, effect: BoxEffect) -> float:
+def lost_without(fitter: Fitter, fit: BoxFit, effect: BoxEffect, model: BoxModel) -> float:
     """Return what a fit loses without one of its effects, the other values following as far as linearisation says.
 
     Args:
         fitter: gives the filters and the FMU.
         fit: of a model.
         effect: one of it.
+        model: without it, the others where they start from.
 
     Returns:
         A log-likelihood; infinity where the FMU fails without it.
     """
-    model, J = made_up_for(fitter, fit, effect), fit.J
     y = fitter.problem.simulate([model], fitter.parts.seen)[0]
     if y is None:
         return np.inf
     before = fit.model.effects.index(effect)
     at = len(fit.model.p) + sum(len(values) for values in fit.model.values[:before])
-    J = np.delete(J[: len(y)], range(at, at + len(effect.kind.parameters)), axis=2)
+    J = np.delete(fit.J[: len(y)], range(at, at + len(effect.kind.parameters)), axis=2)
     known = Known(fitter, replace(fit, model=model, y=y, J=J), len(y))
     return fit.total - max(known.explains(level) for level in fitter.ladder.near(known.start))
 

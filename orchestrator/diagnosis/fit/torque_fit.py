@@ -81,7 +81,19 @@ def explained(likelihood: RecordLikelihood, found: Fit, part: slice) -> float:
     """
     assert likelihood.plant.inverse is not None
     position, speed, acceleration, given = motion(likelihood, part)
-    left = given - likelihood.plant.inverse(position, speed, acceleration, found.p)
+    return share_explained(given - likelihood.plant.inverse(position, speed, acceleration, found.p), given)
+
+
+def share_explained(left: Array, given: Array) -> float:
+    """Return the share of a torque's variance that a model explains.
+
+    Args:
+        left: (n,) what the model leaves of it.
+        given: (n,) the torque.
+
+    Returns:
+        The share; negative where it explains less than a constant torque.
+    """
     return 1.0 - float(left @ left) / float(np.sum((given - given.mean()) ** 2))
 
 

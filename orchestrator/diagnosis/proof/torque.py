@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.fit.torque_fit import motion, torque_fit
+from orchestrator.diagnosis.fit.torque_fit import motion, share_explained, torque_fit
 from orchestrator.shared.inference.long_run import long_run_covariance
 
 Array = NDArray[np.float64]
@@ -69,6 +69,6 @@ def torque_proof(likelihood: RecordLikelihood, base: Fit, final: Fit, parts: Par
     mean, chance = change.mean(), np.sqrt(long_run_covariance((change - change.mean())[:, None])[0, 0]) / change.size
     return TorqueProof(
         removed=max(1.0 - float(left @ left) / float(without @ without), 0.0),
-        explained=1.0 - float(left @ left) / float(np.sum((given - given.mean()) ** 2)),
+        explained=share_explained(left, given),
         sure=bool(mean < -likelihood.settings.proof.horizons.sure * chance),
     )

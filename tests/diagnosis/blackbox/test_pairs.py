@@ -1,5 +1,6 @@
 """Two effects that pay together only; efforts too small to name."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ from orchestrator.diagnosis.blackbox.parts import parts_of
 from orchestrator.diagnosis.blackbox.promises import Known
 from orchestrator.diagnosis.blackbox.screening import Screened
 from orchestrator.diagnosis.blackbox.trials import BoxTrials
+from orchestrator.diagnosis.blackbox.verdict import stand_in
 from orchestrator.diagnosis.blackbox.whitening import Ladder, Surrogate
 
 ROWS = 800
@@ -85,6 +87,20 @@ def test_noise_alone_promises_no_pair() -> None:
 ])  # fmt: skip
 def test_an_effort_of_the_size_of_rounding_is_no_effect(name: str, values: list[float], means: bool) -> None:
     assert BoxEffect(BANK[name], "p", SCENE).means(np.array(values), 1e-3) is means
+
+
+@pytest.mark.parametrize(("without", "named"), [(0.02, "spring@p"), (0.028, "")])
+def test_an_effect_must_more_than_halve_a_disturbance(without: float, named: str) -> None:
+    shares = {0: 0.01, 1: without}
+    best = BoxFit(BoxModel(np.zeros(0)).extended(BoxEffect(BANK["spring"], "p", SCENE), np.ones(1)), 0,
+                  np.zeros((ROWS, 1)), 0.0, 0.0, 0.0, np.zeros((ROWS, 1, 1)))  # fmt: skip
+    bare = plain(fitter(np.zeros(ROWS)))
+    own = SimpleNamespace(
+        ladder=SimpleNamespace(share=shares.__getitem__),
+        fit=lambda model, level: bare,
+        settled=lambda fit: replace(fit, level=1),
+    )
+    assert stand_in(SimpleNamespace(fitter=own, settings=SimpleNamespace(quiet=3e-4)), best) == named
 
 
 @pytest.mark.parametrize(
