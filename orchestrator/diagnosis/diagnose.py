@@ -73,10 +73,9 @@ def diagnose(
     found = passes(model, signals, parts, nominal, settings, progress, finer_of(analyses, plant, nominal, settings))
     units = METRIC if in_metres(model) else {}
     position = units.get("rad", "rad")
-    found, law = _with_law(found, position)
+    found, chosen, law = _with_law(found, position)
     likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
     base_fit, final = found.base, found.final
-    chosen = honest(likelihood, base_fit, (), parts) if unknown else final
     stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
     misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
     everything = _named(found, final if unknown else chosen, units)
@@ -117,25 +116,25 @@ def diagnose(
     )
 
 
-def _with_law(found: Pass, position: str) -> tuple[Pass, LearnedLaw | None]:
-    """Return the pass and the law learned from what it leaves; it is unknown where such a law explains most of that.
+def _with_law(found: Pass, position: str) -> tuple[Pass, Fit, LearnedLaw | None]:
+    """Return the pass, the model that is told and the law of the rest; it is unknown where a law explains most of that.
 
     What begins late, or comes by a clock, is no noise, even where what is known of noise cannot tell.
     """
     likelihood, final, parts = found.likelihood, found.final, found.parts
     settings = likelihood.settings
-    if found.search.stopped or found.hopeless:
-        return found, None
+    learns = not (found.search.stopped or found.hopeless)
     if not found.unknown:
-        misfit = held_out_misfit(likelihood, final.q, [("", final.p)], parts.held_out, "")
+        misfit = held_out_misfit(likelihood, final.q, [("", final.p)], parts.held_out, "") if learns else ()
         near = all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit)
         log = {effect.label for effect in of_the_log(likelihood.plant)}
         if near or not found.floor_off or any(effect.label not in log for effect in found.best.effects):
-            return found, None
-    law = learned_law(likelihood, honest(likelihood, found.base, (), parts), parts, position)
+            return found, final, None
+    plain = honest(likelihood, found.base, (), parts)
+    law = learned_law(likelihood, plain, parts, position) if learns else None
     if found.unknown or (law is not None and law.shrinks >= settings.learned.surely):
-        return replace(found, unknown=True), law
-    return found, None
+        return replace(found, unknown=True), plain, law
+    return found, final, None
 
 
 def evidence_of(diagnosis: Diagnosis) -> Evidence:

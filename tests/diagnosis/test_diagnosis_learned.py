@@ -272,7 +272,7 @@ def test_a_rest_that_a_law_explains_is_unknown(monkeypatch, before, after, floor
         plain=None, base=None, final=SimpleNamespace(p=None, q=0.0), left=None,
         floor_off=floor_off, unknown=False, proof=SimpleNamespace(final=final), withdrawn=(),
     )  # fmt: skip
-    judged, told = diagnosing._with_law(found, "rad")
+    judged, _, told = diagnosing._with_law(found, "rad")
     assert (judged.unknown, told is law) == (unknown, unknown)
 
 
