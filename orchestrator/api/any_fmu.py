@@ -12,10 +12,10 @@ import numpy as np
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.blackbox.deliver import Delivered, deliver
-from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
 from orchestrator.diagnosis.blackbox.diagnose import diagnose as diagnosing
 from orchestrator.diagnosis.blackbox.draft import drafted
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, validated
+from orchestrator.diagnosis.blackbox.judged import BoxOutcome
 from orchestrator.diagnosis.blackbox.mapping import read_map
 from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.reading import columns_of, read_data

@@ -14,7 +14,7 @@ import pyfmu_sources
 from orchestrator.building.archive import write_archive
 from orchestrator.diagnosis.blackbox.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.binding import owned
-from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
+from orchestrator.diagnosis.blackbox.judged import BoxOutcome
 from orchestrator.diagnosis.blackbox.problem import series_of
 from orchestrator.errors import FmuError, OrchestratorError
 from orchestrator.master.signals import Samples

@@ -1,81 +1,31 @@
 """Diagnosis of any FMU: probe, fit, search, proof on held-out data, verdict."""
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.estimates import (
-    FoundEffect,
-    OutputMisfit,
-    ValueEstimate,
-    errors_of,
-    estimates_of,
-    misfits,
-)
+from orchestrator.diagnosis.blackbox.bank import INPUT, PORT
 from orchestrator.diagnosis.blackbox.fitting import Fitter
+from orchestrator.diagnosis.blackbox.guiding import guided
+from orchestrator.diagnosis.blackbox.judged import BoxOutcome, judged
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.model import BoxModel, Data
+from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.parts import BoxParts, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
-from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
 from orchestrator.diagnosis.blackbox.sites import effects_of
 from orchestrator.diagnosis.blackbox.steps import labels
 from orchestrator.diagnosis.blackbox.subject import Subject
-from orchestrator.diagnosis.blackbox.verdict import recovered, settled_names
+from orchestrator.diagnosis.blackbox.verdict import settled_names
 from orchestrator.diagnosis.blackbox.whitening import Ladder
-from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows, on_finer_steps
+from orchestrator.diagnosis.blackbox.whole import on_all_rows
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class BoxOutcome:
-    """What a record says of an FMU.
-
-    Attributes:
-        verdict: "none", "parameters", "effects" or "unknown".
-        effects: what is missing, in the order found; with "unknown": empty.
-        suspects: with "unknown": what came nearest.
-        parameters: re-fitted values.
-        misfit: of each output.
-        model: the corrected model.
-        rest: what it leaves.
-        probe: what the FMU was found to be.
-        where: sentences: output, interval of time and how far what is left exceeds noise.
-        warnings: sentences.
-        problem: ready to simulate further models; closed by ``close``.
-        refitted: the model without effects, its parameters re-fitted.
-        stages: runs of the nominal, re-fitted and corrected model, (n, outputs) each.
-    """
-
-    verdict: str
-    effects: tuple[FoundEffect, ...]
-    suspects: tuple[str, ...]
-    parameters: tuple[ValueEstimate, ...]
-    misfit: tuple[OutputMisfit, ...]
-    model: BoxModel
-    rest: Rest
-    probe: Probe
-    where: tuple[str, ...]
-    warnings: tuple[str, ...]
-    refitted: BoxModel
-    problem: BoxProblem = field(repr=False)
-    stages: tuple[Array, Array, Array] = field(repr=False)
-    search: BoxSearch | None = field(repr=False, default=None)
-    seconds: float = 0.0
-    runs: int = 0
-
-    @property
-    def late(self) -> bool:
-        """Whether the search was cut short."""
-        return self.search is not None and self.search.late
 
 
 Progress = Callable[[str], None]
@@ -215,7 +165,26 @@ def _diagnosed(
             if fewer is not None:
                 search, base, best = other, found, fewer if other.explained(fewer) else other.run(fewer, found)
     best, families = settled_names(search, best)
-    return _judged(problem, probe, search, base, best, families, begun, settings.rest)
+    free = judged(problem, probe, search, base, best, families, begun, settings.rest)
+    return free if free.verdict != "unknown" or search.late else _guided(free, progress, begun, settings)
+
+
+def _guided(free: BoxOutcome, progress: Progress, begun: float, settings: BoxSettings) -> BoxOutcome:
+    """Return what guided runs say of a record, where that is more than ``free`` ones do."""
+    problem = free.problem
+    led = guided(problem)
+    if led is None:
+        return free
+    progress("guided runs")
+    effects = [e for e in effects_of(led, led.must_read(led.nominal)) if e.kind.where in (INPUT, PORT)]
+    fitter = fitters(led, parts_of(led.n), settings)[1]
+    search = BoxSearch(fitter, effects, settings.search, progress, until=begun + problem.map.options.budget)
+    base = search.base()
+    if base is None:
+        return free
+    best, families = settled_names(search, search.run(base))
+    found = judged(problem, free.probe, search, search.plain or base, best, families, begun, settings.rest)
+    return free if found.verdict == "unknown" else found
 
 
 def _with_fewer(search: BoxSearch, best: BoxFit, other: BoxSearch, base: BoxFit) -> BoxFit | None:
@@ -264,106 +233,3 @@ def _interleaved(
     found = turns.run(start, plain)
     explains = bool(found.model.effects) and turns.explained(found)
     return (turns, turns.plain or plain, found) if explains else (search, base, best)
-
-
-def _judged(
-    problem: BoxProblem,
-    probe: Probe,
-    search: BoxSearch,
-    base: BoxFit,
-    best: BoxFit,
-    families: tuple[tuple[str, ...], ...],
-    begun: float,
-    settings: RestSettings,
-) -> BoxOutcome:
-    fitter, parts = search.fitter, search.fitter.parts
-    seen = parts.looked_at
-    on_all = on_all_rows(search, best, settings)
-    rest = doubted(search, on_all, settings)
-    on_all = on_finer_steps(search, on_all) if rest.nothing_missing else on_all
-    last = on_all.last
-    parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen))
-    nothing = _of_no_size(last, values, search.settings.least_errors) if rest.nothing_missing else None
-    if nothing is not None:
-        fewer = fitter.fit(best.model.without(best.model.effects[nothing].label), best.level)
-        if fewer is not None:
-            others = families[:nothing] + families[nothing + 1 :]
-            return _judged(problem, probe, search, base, fitter.settled(fewer), others, begun, settings)
-    whole = problem.simulate([problem.nominal, base.model])
-    if whole[0] is None:
-        raise problem.does_not_run()
-    stages = (np.asarray(whole[0]), np.asarray(whole[0] if whole[1] is None else whole[1]), last.y)
-    fine = rest.nothing_missing
-    share = recovered(base, best, len(problem.outputs), len(seen))
-    nominal = BoxFit(problem.nominal, last.level, stages[0], 0.0, 0.0, 0.0, last.J)
-    if best.model.effects:
-        verdict = "effects" if fine else "unknown"
-    else:
-        as_given = rest_of(fitter, nominal, slice(0, problem.n), settings).explained
-        verdict = ("none" if as_given else "parameters") if fine else "unknown"
-    named: tuple[FoundEffect, ...] = ()
-    if verdict == "effects":
-        named = tuple(
-            FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
-        )
-    suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
-    if suspects:
-        suspects += tuple(dict.fromkeys(label for family in families for label in family))
-    model = last.model if verdict != "unknown" else base.model
-    where = _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else ()
-    return BoxOutcome(
-        verdict, named, suspects, parameters, misfits(problem, stages, parts.held_out), model, rest, probe,
-        where, _warned(probe, search, verdict, best, share),
-        base.model, problem, stages, search,
-        time.monotonic() - begun, problem.runner.runs,
-    )  # fmt: skip
-
-
-def _of_no_size(last: BoxFit, values: Sequence[Sequence[ValueEstimate]], least: float) -> int | None:
-    """Return the place of an effect whose sizes may all be zero, given all rows; None where there is none.
-
-    It made up for the steps of the search, or for the rows that were left out.
-    """
-    for k, (effect, found) in enumerate(zip(last.model.effects, values, strict=True)):
-        sizes = found[: max(effect.amplitudes, 1)]
-        if effect.kind.finer is None and all(abs(e.value) < least * e.standard_error for e in sizes):
-            return k
-    return None
-
-
-def _warned(probe: Probe, search: BoxSearch, verdict: str, best: BoxFit, share: float) -> tuple[str, ...]:
-    """Return sentences for the user; ``share``: of what is missing, how much the effects explain."""
-    problem = search.fitter.problem
-    warnings = list(probe.notes)
-    if search.late:
-        warnings.append(
-            f"the search was cut short after {problem.map.options.budget:g} s (`budget` of the map): a run takes about "
-            f"{probe.step_cost * problem.n * problem.m:.2g} s; shorten the record or lower `substeps`"
-        )
-    if verdict == "unknown" and best.model.effects:
-        warnings.append(
-            f"the nearest effects explain {100.0 * share:.0f} % of what is missing, and more than noise is left"
-        )
-    if search.fitter.ladder.spread > 0.0:
-        warnings.append(
-            "the state that the FMU starts from is not the record's: the start is left out of the comparison"
-        )
-    return tuple(warnings)
-
-
-def _where_of(problem: BoxProblem, rest: Rest, least: float) -> tuple[str, ...]:
-    """Return where and when what is left exceeds noise, worst first."""
-    found = []
-    bounds = np.linspace(0, problem.n - 1, len(rest.blocks) + 1).astype(int)
-    for b, block in enumerate(rest.blocks):
-        for k, power in enumerate(block):
-            if power > least:
-                a, z = problem.data.time[bounds[b]], problem.data.time[bounds[b + 1]]
-                found.append(
-                    (
-                        float(power),
-                        f"{problem.outputs[k]} from {a:.4g} to {z:.4g} s: {power:.2g} times the expected power",
-                    )
-                )
-    found.sort(reverse=True)
-    return tuple(text for _, text in found[:5]) or tuple(rest.reasons[:3])

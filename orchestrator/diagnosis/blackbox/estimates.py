@@ -13,6 +13,7 @@ from orchestrator.diagnosis.blackbox.model import BoxModel, Data
 from orchestrator.diagnosis.blackbox.parts import Rows
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.errors import FmuError
+from orchestrator.shared.inference.long_run import long_run_covariance
 from orchestrator.shared.inference.normal import NORMAL_95, interval_95
 
 Array = NDArray[np.float64]
@@ -82,7 +83,7 @@ def misfits(problem: BoxProblem, stages: Sequence[Array], rows: Rows) -> tuple[O
     )
 
 
-def errors_of(fitter: Fitter, fit: BoxFit, rows: Rows) -> Array:
+def errors_of(fitter: Fitter, fit: BoxFit, rows: Rows, noisy: bool = True) -> Array:
     """Return the standard errors of all values.
 
     What acts in steps (a quantum) has a likelihood with many teeth, of which derivatives see one: its interval holds
@@ -92,11 +93,18 @@ def errors_of(fitter: Fitter, fit: BoxFit, rows: Rows) -> Array:
         fitter: gives the filters and the FMU.
         fit: whose Jacobian is known over ``rows``.
         rows: samples that were fitted.
+        noisy: what is left is the noise that it was taken for; else they hold what else it is, too.
 
     Returns:
         Shape (values,).
     """
-    errors = np.sqrt(np.maximum(np.diag(fitter.covariance(fit, rows)), 0.0))
+    covariance = fitter.covariance(fit, rows)
+    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    if not noisy:
+        # The scores' own long-run covariance (White, Econometrica 50(1), 1982).
+        scores = np.einsum("no,nov->nv", fitter.whitened(fit.y, fit.level), fitter.ladder[fit.level].whiten(fit.J))
+        sandwich = covariance @ long_run_covariance(scores[rows]) @ covariance
+        errors = np.maximum(errors, np.sqrt(np.maximum(np.diag(sandwich), 0.0)))
     at = len(fit.model.p)
     for effect, values in zip(fit.model.effects, fit.model.values, strict=True):
         if effect.kind.finer is not None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.diagnosis.blackbox.diagnose import BoxOutcome
+from orchestrator.diagnosis.blackbox.judged import BoxOutcome
 from orchestrator.diagnosis.blackbox.model import Data
 
 

@@ -77,6 +77,16 @@ def _act(k, sent, read, into, outof, ports, sign, q, most, last, built, step, le
 
 
 @kept()
+def _guide(j, read, outof, guides, pulls, led, off, pull):  # type: ignore[no-untyped-def]
+    """Find the efforts that lead to the record, at sample ``j``, from how far the FMU is off it."""
+    for g in range(len(guides)):
+        behind = led[j, g] - read[outof[guides[g, 1]]]
+        before = off[g] if j > 0 else behind
+        pull[g] = pulls[g, 0] * behind + pulls[g, 1] * (behind - before)
+        off[g] = behind
+
+
+@kept()
 def _step(calls, counts, where, time, step):  # type: ignore[no-untyped-def]
     """Set, step and read all FMUs; return ``(status, call, member)``."""
     for n in range(len(calls)):
@@ -99,7 +109,7 @@ def _step(calls, counts, where, time, step):  # type: ignore[no-untyped-def]
 @kept()
 def run_loop(  # type: ignore[no-untyped-def]
     calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, sign, q, most,
-    lead, out,
+    lead, guides, pulls, led, every, out,
 ):  # fmt: skip
     """Run one record; return ``(status, call, step, member)``, status at most 1 when all went well.
 
@@ -121,10 +131,15 @@ def run_loop(  # type: ignore[no-untyped-def]
         q: (effects, 4) parameters.
         most: (effects,) effort at a port from which the run is given up: its loop is unstable.
         lead: steps by which the fed-back signal is extrapolated.
+        guides: (guides, 2) input, variable read that is led along the record.
+        pulls: (guides, 2) effort for being off, and for a change of that since the sample before.
+        led: (samples, guides) the record.
+        every: steps in a sample.
         out: (rows, variables read), row 0 the initial values.
     """
     start, step, per_row = grid[0], grid[1], int(grid[2])
     last, built = np.zeros((len(ports), 2)), np.zeros(len(ports))
+    off, pull = np.zeros(len(guides)), np.zeros(len(guides))
     fed, handed = np.zeros((len(wires), 2)), np.zeros(len(wires))
     for n in range(len(calls)):
         status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
@@ -135,6 +150,10 @@ def run_loop(  # type: ignore[no-untyped-def]
     for k in range(len(table)):
         for i in range(len(into)):
             sent[into[i]] = table[k, i]
+        if len(guides) > 0 and k % every == 0:
+            _guide(k // every, read, outof, guides, pulls, led, off, pull)
+        for g in range(len(guides)):
+            sent[into[guides[g, 0]]] += pull[g]
         _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, handed, lead)
         if not _act(k, sent, read, into, outof, ports, sign, q, most, last, built, step, lead):
             return np.int32(2), AWAY, k, 0

@@ -14,7 +14,7 @@ from orchestrator.diagnosis.blackbox.passed import at_input, at_output
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
-from orchestrator.diagnosis.blackbox.wire import Feedback
+from orchestrator.diagnosis.blackbox.wire import Feedback, Guide
 from orchestrator.errors import SlaveError
 from pyfmu_sources.port_laws import COMPLIANCE
 
@@ -56,6 +56,11 @@ class BoxProblem:
     def h(self) -> float:
         """Return the sample time [s]."""
         return self.data.step
+
+    @property
+    def guide(self) -> Guide | None:
+        """Return what leads runs along the record; None: they are free."""
+        return None
 
     @property
     def nominal(self) -> BoxModel:
@@ -126,7 +131,8 @@ class BoxProblem:
         keys = [(tuple(p.starts.items()), id(p.table), repr(p.effects)) for p in plans]
         places = {key: k for k, key in reversed(list(enumerate(keys)))}
         order = list(places)
-        found = self.runner.run([plans[places[key]] for key in order], float(self.data.time[0]), self.h / self.m, 1)
+        wanted, start = [plans[places[key]] for key in order], float(self.data.time[0])
+        found = self.runner.run(wanted, start, self.h / self.m, 1, guide=self.guide)
         by_key = dict(zip(order, found, strict=True))
         return [by_key[key] for key in keys]
 

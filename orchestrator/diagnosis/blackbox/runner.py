@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, ProcessSettings
 from orchestrator.diagnosis.blackbox.subject import Subject
-from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Job, Load, Through, Wire
+from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Guide, Job, Load, Through, Wire
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
@@ -35,14 +35,16 @@ class Plan:
         starts: value by name of parameters and start values.
         table: (steps, inputs) input values, each held over a step.
         effects: in the loop around the FMU.
+        pulls: efforts that lead it along a record, for being off and for a change of that; empty: it runs freely.
     """
 
     starts: dict[str, float]
     table: Array
     effects: tuple[Feedback, ...] = ()
+    pulls: tuple[tuple[float, float], ...] = ()
 
 
-Grid = tuple[float, float, int, float, bool]
+Grid = tuple[float, float, int, float, bool, Guide | None]
 
 
 class Runner:
@@ -118,6 +120,7 @@ class Runner:
         per_row: int,
         lead: float = 0.5,
         together: bool = False,
+        guide: Guide | None = None,
     ) -> list[Array | None]:
         """Return what each run gave, (rows, reads); None where it failed (``reason`` says why).
 
@@ -128,6 +131,7 @@ class Runner:
             per_row: steps for each row that is returned.
             lead: steps by which fed-back signals are extrapolated.
             together: one after the other in one process.
+            guide: leads them along a record.
 
         Returns:
             A run per plan.
@@ -146,7 +150,7 @@ class Runner:
         if together or len(plans) * self.step_cost * len(plans[0].table) < own.small:
             size = len(plans)  # the latter: not worth a second child
         waiting = deque(list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size))
-        grid = (start, step, per_row, lead, self.fresh)
+        grid = (start, step, per_row, lead, self.fresh, guide)
 
         def work() -> None:
             while True:
@@ -300,9 +304,9 @@ def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid, through: list[Th
             places[id(plan.table)] = len(tables)
             tables.append(np.ascontiguousarray(plan.table))
         starts = {name: float(value) for name, value in plan.starts.items()}
-        jobs.append(Job(starts, places[id(plan.table)], list(plan.effects)))
-    start, step, per_row, lead, fresh = grid
-    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through, fresh)
+        jobs.append(Job(starts, places[id(plan.table)], list(plan.effects), [list(p) for p in plan.pulls]))
+    start, step, per_row, lead, fresh, guide = grid
+    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through, fresh, guide)
 
 
 def _worded(error: ChildError, allowed: float) -> str:
@@ -328,6 +332,6 @@ def _compile_loop() -> None:
     run_loop.compile(
         (whole[:, ::1], whole[:, ::1], whole[:, ::1], real[::1], real[::1], whole[::1], whole[::1], real[:, ::1],
          real[::1], whole[:, ::1], real[:, ::1], whole[:, ::1], real[::1], whole[:, ::1], real[::1], real[:, ::1],
-         real[::1], real, real[:, ::1])
+         real[::1], real, whole[:, ::1], real[:, ::1], real[:, ::1], whole, real[:, ::1])
     )  # fmt: skip
     _compiled.append(True)

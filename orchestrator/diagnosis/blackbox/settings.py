@@ -200,6 +200,20 @@ class RestSettings(Settings, frozen=True):
     copies: Annotated[int, setting("copies of what is left, of random phases, that show what chance gives", ge=19)] = 39
     by_chance: Annotated[float, share("of them that may do as well: noise is never just as it is taken to be")] = 0.05
     stands_out: Annotated[float, setting("times the expected power from which a stretch of time is pointed at")] = 1.3
+    shown: Annotated[
+        float,
+        share(
+            "of the squared misfit on data not fitted that effects must remove to be named although more than noise "
+            "is left"
+        ),
+    ] = 0.9
+    follows: Annotated[float, share("of an output's variance there that the model must then explain")] = 0.9
+    least_shown: Annotated[
+        float, share("of that misfit which effects beside a disturbance must remove: less, and it is their like")
+    ] = 0.5
+    implausible: Annotated[
+        float, setting("stated uncertainties from which a re-fitted value speaks against them", gt=0)
+    ] = 3.0
     worse: Annotated[
         float, setting("times the misfit without effects from which effects do harm on data not fitted", ge=1)
     ] = 1.1
@@ -272,6 +286,16 @@ class PortNoiseSettings(Settings, frozen=True):
     reach: Annotated[int, setting("samples over which efforts may have led to the start of the record", ge=1)] = 400
 
 
+class GuideSettings(Settings, frozen=True):
+    """How a guided run is led along the record."""
+
+    speed: Annotated[float, share("of a radian a sample: how fast a guided run follows")] = 0.2
+    slower: Annotated[float, setting("how many times slower it is led where that does not hold", gt=1.0)] = 3.0
+    massive: Annotated[
+        float, setting("times its first sample that the second of an answer must be, of a mass: a store has 1")
+    ] = 1.5
+
+
 class ProcessSettings(Settings, frozen=True):
     """How long the FMU's process is waited for, and what it may take."""
 
@@ -319,6 +343,7 @@ class BoxSettings(Settings, frozen=True):
     probe: Annotated[ProbeSettings, note("the probes of the FMU")] = ProbeSettings()
     place: Annotated[PlaceSettings, note("the effects that places offer")] = PlaceSettings()
     noise: Annotated[PortNoiseSettings, note("noise at the ports")] = PortNoiseSettings()
+    guide: Annotated[GuideSettings, note("guided runs")] = GuideSettings()
     process: Annotated[ProcessSettings, note("the FMU's processes")] = ProcessSettings()
     read: Annotated[ReadSettings, note("the record")] = ReadSettings()
     calibration: Annotated[CalibrationSettings, note("parameters alone")] = CalibrationSettings()

@@ -14,6 +14,7 @@ EXPLAINED_BY = {
     "parameters": "re-fitted parameters explain the record",
     "effects": "effects attached around the FMU explain the record",
 }
+PARTLY = "effects attached around the FMU explain most of what free runs miss, and something is left"
 HELD_OUT = "held-out data"
 SECOND = "the second record"
 
@@ -30,6 +31,8 @@ def statement(verdict: str, rest: Rest) -> str:
     """
     if verdict == "unknown":
         return UNEXPLAINED
+    if not rest.nothing_missing:
+        return PARTLY
     left = f"but for {disturbance(rest)}" if rest.disturbed else "to its noise"
     return f"{EXPLAINED_BY[verdict]} {left}"
 
@@ -124,6 +127,8 @@ def _not_shown(
     for effect in effects:
         if effect.family:
             yield f"the record does not tell {effect.effect.label} from {', '.join(effect.family)}"
+    if effects and not rest.nothing_missing:
+        yield f"more than a disturbance is left: {rest.reasons[0]}; the effects stand by what they do to unseen data"
     if rest.disturbed:
         yield f"more than measurement noise is left: {disturbance(rest)}, in which a small effect may hide"
     for misfit, which in ((held_out, HELD_OUT), (second, SECOND)):

@@ -19,16 +19,42 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Surrogate:
-    """``x+ = A x + B w``, ``y = C x``, outputs in units of their noise; ``order`` 0: none could be found."""
+    """``x+ = A x + B w``, ``y = C x``, outputs in units of their noise; ``order`` 0: none could be found.
+
+    Attributes:
+        A, B, C: the system, with the efforts that lead it along a record where there are any.
+        near: (ports, outputs) of these, for being off; None: there are none.
+        faster: (ports, outputs) for a change of that from the sample before.
+    """
 
     A: Array
     B: Array
     C: Array
+    near: Array | None = None
+    faster: Array | None = None
 
     @property
     def order(self) -> int:
         """Return the number of states."""
         return len(self.A)
+
+    def noisy(self) -> tuple[Array, Array, Array, Array]:
+        """Return the system from efforts at its ports and measurement noise to the residual, which has the latter too.
+
+        Noise leads a guided run astray: it acts on the FMU as any other difference to the record does. Its sample
+        before is a state.
+
+        Returns:
+            A, B, C, and the column of each output's noise.
+        """
+        if self.near is None or self.faster is None:
+            return self.A, self.B, self.C, np.zeros((self.order, len(self.C)))
+        outputs = len(self.C)
+        none = np.zeros((outputs, outputs))
+        A = np.block([[self.A, self.B @ self.faster], [np.zeros((outputs, self.order)), none]])
+        B = np.vstack([self.B, np.zeros((outputs, self.B.shape[1]))])
+        E = np.vstack([-self.B @ (self.near + self.faster), np.eye(outputs)])
+        return A, B, np.hstack([self.C, none]), E
 
     def response(self, pushes: Array, place: int) -> Array:
         """Return the outputs under efforts at one of its inputs, from rest.
@@ -176,25 +202,27 @@ def level(
         The filter.
     """
     outputs = surrogate.C.shape[0]
-    if (q == 0.0 and spread == 0.0) or surrogate.order == 0:
+    if (q == 0.0 and spread == 0.0 and surrogate.near is None) or surrogate.order == 0:
         R = np.repeat(np.eye(outputs)[None], n, axis=0)
         return NoiseLevel(0.0, 0.0, np.zeros((0, 0)), np.zeros((outputs, 0)), np.zeros((n, 0, outputs)), R, np.zeros(n))
-    order, ports = surrogate.B.shape
+    A, B, C, E = surrogate.noisy()
+    order, ports = B.shape
     sd = q * drive
+    begun = np.zeros((order, order))
+    begun[: surrogate.order, : surrogate.order] = _start(surrogate, spread, reach)
     if colour == 0.0:
-        A, C = surrogate.A, surrogate.C
-        Q = (surrogate.B * sd**2) @ surrogate.B.T
-        start = _start(surrogate, spread, reach)
+        Q, start = (B * sd**2) @ B.T, begun
     else:
-        A = np.block([[surrogate.A, surrogate.B], [np.zeros((ports, order)), colour * np.eye(ports)]])
-        C = np.hstack([surrogate.C, np.zeros((outputs, ports))])
+        A = np.block([[A, B], [np.zeros((ports, order)), colour * np.eye(ports)]])
+        C = np.hstack([C, np.zeros((outputs, ports))])
+        E = np.vstack([E, np.zeros((ports, outputs))])
         Q = np.zeros_like(A)
         Q[order:, order:] = np.diag((1.0 - colour**2) * sd**2)
         start = np.zeros_like(A)
-        start[:order, :order] = _start(surrogate, spread, reach)
+        start[:order, :order] = begun
         start[order:, order:] = np.diag(sd**2)
-    A, C, Q, start = (np.ascontiguousarray(a) for a in (A, C, Q, start))
-    K, R, half_log = _gains(A, C, Q, start, n)
+    A, C, Q, E, start = (np.ascontiguousarray(a) for a in (A, C, Q + E @ E.T, E, start))
+    K, R, half_log = _gains(A, C, Q, E, start, n)
     return NoiseLevel(q, colour, A, C, K, R, half_log)
 
 
@@ -279,8 +307,11 @@ class Ladder:
 
 
 @kept()
-def _gains(A, C, Q, P, n):  # type: ignore[no-untyped-def]
-    """Return predictor gains, inverse roots, half log determinants of every sample; each output's noise is 1."""
+def _gains(A, C, Q, E, P, n):  # type: ignore[no-untyped-def]
+    """Return predictor gains, inverse roots, half log determinants of every sample; each output's noise is 1.
+
+    ``E``: what that noise does to the states.
+    """
     states, outputs = A.shape[0], C.shape[0]
     K = np.zeros((n, states, outputs))
     R = np.zeros((n, outputs, outputs))
@@ -296,7 +327,7 @@ def _gains(A, C, Q, P, n):  # type: ignore[no-untyped-def]
         L = np.linalg.cholesky(S)
         inverse = np.linalg.inv(L)
         IT = np.ascontiguousarray(inverse.T)
-        gain = A @ (P @ (CT @ (IT @ inverse)))
+        gain = (A @ (P @ CT) + E) @ (IT @ inverse)
         K[k], R[k] = gain, inverse
         half_log[k] = np.sum(np.log(np.diag(L)))
         after = A @ P @ AT - gain @ S @ np.ascontiguousarray(gain.T) + Q

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.blackbox.diagnose import _of_no_size
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate
+from orchestrator.diagnosis.blackbox.judged import _of_no_size
 from orchestrator.diagnosis.blackbox.rest import Rest
 from orchestrator.diagnosis.blackbox.settings import RestSettings
 from orchestrator.diagnosis.blackbox.trust import SECOND, UNEXPLAINED, doubts, harm, statement

@@ -1,0 +1,214 @@
+"""What a search comes to: verdict, effects with their sizes, parameters, misfit on data that no fit has seen."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.bank import PARAMETER
+from orchestrator.diagnosis.blackbox.estimates import (
+    FoundEffect,
+    OutputMisfit,
+    ValueEstimate,
+    errors_of,
+    estimates_of,
+    misfits,
+)
+from orchestrator.diagnosis.blackbox.held_out import HeldOut, held_out
+from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.model import BoxModel
+from orchestrator.diagnosis.blackbox.probing import Probe
+from orchestrator.diagnosis.blackbox.problem import BoxProblem
+from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
+from orchestrator.diagnosis.blackbox.search import BoxSearch
+from orchestrator.diagnosis.blackbox.settings import RestSettings
+from orchestrator.diagnosis.blackbox.verdict import recovered
+from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows, on_finer_steps
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BoxOutcome:
+    """What a record says of an FMU.
+
+    Attributes:
+        verdict: "none", "parameters", "effects" or "unknown".
+        effects: what is missing, in the order found; with "unknown": empty.
+        suspects: with "unknown": what came nearest.
+        parameters: re-fitted values.
+        misfit: of each output.
+        model: the corrected model.
+        rest: what it leaves.
+        held_out: what the effects do to free runs over data that no fit has seen.
+        probe: what the FMU was found to be.
+        where: sentences: output, interval of time and how far what is left exceeds noise.
+        warnings: sentences.
+        problem: ready to simulate further models; closed by ``close``.
+        refitted: the model without effects, its parameters re-fitted.
+        stages: runs of the nominal, re-fitted and corrected model, (n, outputs) each.
+    """
+
+    verdict: str
+    effects: tuple[FoundEffect, ...]
+    suspects: tuple[str, ...]
+    parameters: tuple[ValueEstimate, ...]
+    misfit: tuple[OutputMisfit, ...]
+    model: BoxModel
+    rest: Rest
+    held_out: HeldOut
+    probe: Probe
+    where: tuple[str, ...]
+    warnings: tuple[str, ...]
+    refitted: BoxModel
+    problem: BoxProblem = field(repr=False)
+    stages: tuple[Array, Array, Array] = field(repr=False)
+    search: BoxSearch | None = field(repr=False, default=None)
+    seconds: float = 0.0
+    runs: int = 0
+
+    @property
+    def late(self) -> bool:
+        """Whether the search was cut short."""
+        return self.search is not None and self.search.late
+
+
+def judged(
+    problem: BoxProblem,
+    probe: Probe,
+    search: BoxSearch,
+    base: BoxFit,
+    best: BoxFit,
+    families: tuple[tuple[str, ...], ...],
+    begun: float,
+    settings: RestSettings,
+) -> BoxOutcome:
+    """Return what a search comes to.
+
+    Args:
+        problem: whose runs are free; those of the search may have been guided.
+        probe: what the FMU was found to be.
+        search: that was carried out.
+        base: fit of the re-fitted parameters alone.
+        best: fit of the best model.
+        families: labels that the record does not tell from each of its effects.
+        begun: when the diagnosis began, monotonic [s].
+        settings: when something is missing.
+
+    Returns:
+        The outcome.
+    """
+    fitter, seen = search.fitter, search.fitter.parts.looked_at
+    on_all = on_all_rows(search, best, settings)
+    rest = doubted(search, on_all, settings)
+    on_all = on_finer_steps(search, on_all) if rest.nothing_missing else on_all
+    problem.m = fitter.problem.m
+    last = on_all.last
+    parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen, rest.nothing_missing))
+    nothing = _of_no_size(last, values, search.settings.least_errors) if rest.nothing_missing else None
+    if nothing is not None:
+        fewer = fitter.fit(best.model.without(best.model.effects[nothing].label), best.level)
+        if fewer is not None:
+            others = families[:nothing] + families[nothing + 1 :]
+            return judged(problem, probe, search, base, fitter.settled(fewer), others, begun, settings)
+    stages = _stages(problem, base, last)
+    on_held_out = held_out(problem, stages, fitter.parts.held_out, settings)
+    verdict, rest = _verdict(search, last, rest, on_held_out, settings)
+    named = tuple(
+        FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
+    )
+    suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
+    if suspects:
+        suspects += tuple(dict.fromkeys(label for family in families for label in family))
+    share = recovered(base, best, len(problem.outputs), len(seen))
+    return BoxOutcome(
+        verdict, named if verdict == "effects" else (), suspects, parameters,
+        misfits(problem, stages, fitter.parts.held_out), base.model if verdict == "unknown" else last.model,
+        rest, on_held_out, probe,
+        _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else (),
+        _warned(probe, search, verdict, best, share), base.model, problem, stages, search,
+        time.monotonic() - begun, problem.runner.runs,
+    )  # fmt: skip
+
+
+def _stages(problem: BoxProblem, base: BoxFit, last: BoxFit) -> tuple[Array, Array, Array]:
+    """Return free runs of the nominal, the re-fitted and the corrected model; what fails is as the one before."""
+    runs = problem.simulate([problem.nominal, base.model, last.model])
+    if runs[0] is None:
+        raise problem.does_not_run()
+    refitted = runs[0] if runs[1] is None else runs[1]
+    return runs[0], refitted, refitted if runs[2] is None else runs[2]
+
+
+def _verdict(
+    search: BoxSearch, last: BoxFit, rest: Rest, shown: HeldOut, settings: RestSettings,
+) -> tuple[str, Rest]:  # fmt: skip
+    """Return the verdict, and what is left in its light."""
+    fitter, effects = search.fitter, last.model.effects
+    if effects and rest.disturbed and shown.removed < settings.least_shown:
+        why = f"the effects remove {100.0 * max(shown.removed, 0.0):.0f} % of the misfit on data not fitted"
+        return "unknown", replace(rest, disturbed=False, reasons=(why,))
+    if effects and rest.nothing_missing:
+        return "effects", rest
+    if effects:
+        off = np.abs(last.model.p - fitter.mean) / fitter.sd
+        plausible = bool(np.all(off < settings.implausible)) and all(e.kind.where != PARAMETER for e in effects)
+        return ("effects" if plausible and shown.shows(settings) else "unknown"), rest
+    if not rest.nothing_missing:
+        return "unknown", rest
+    given = fitter.problem.nominal
+    nominal = BoxFit(given, last.level, fitter.problem.must_simulate(given), 0.0, 0.0, 0.0, last.J)
+    as_given = rest_of(fitter, nominal, slice(0, fitter.problem.n), settings).explained
+    return ("none" if as_given else "parameters"), rest
+
+
+def _of_no_size(last: BoxFit, values: Sequence[Sequence[ValueEstimate]], least: float) -> int | None:
+    """Return the place of an effect whose sizes may all be zero, given all rows; None where there is none.
+
+    It made up for the steps of the search, or for the rows that were left out.
+    """
+    for k, (effect, found) in enumerate(zip(last.model.effects, values, strict=True)):
+        sizes = found[: max(effect.amplitudes, 1)]
+        if effect.kind.finer is None and all(abs(e.value) < least * e.standard_error for e in sizes):
+            return k
+    return None
+
+
+def _warned(probe: Probe, search: BoxSearch, verdict: str, best: BoxFit, share: float) -> tuple[str, ...]:
+    """Return sentences for the user; ``share``: of what is missing, how much the effects explain."""
+    problem = search.fitter.problem
+    warnings = list(probe.notes)
+    if search.late:
+        warnings.append(
+            f"the search was cut short after {problem.map.options.budget:g} s (`budget` of the map): a run takes about "
+            f"{probe.step_cost * problem.n * problem.m:.2g} s; shorten the record or lower `substeps`"
+        )
+    if verdict == "unknown" and best.model.effects:
+        warnings.append(
+            f"the nearest effects explain {100.0 * share:.0f} % of what is missing, and more than noise is left"
+        )
+    if search.fitter.ladder.spread > 0.0:
+        warnings.append(
+            "the state that the FMU starts from is not the record's: the start is left out of the comparison"
+        )
+    return tuple(warnings)
+
+
+def _where_of(problem: BoxProblem, rest: Rest, least: float) -> tuple[str, ...]:
+    """Return where and when what is left exceeds noise, worst first."""
+    found = []
+    bounds = np.linspace(0, problem.n - 1, len(rest.blocks) + 1).astype(int)
+    for b, block in enumerate(rest.blocks):
+        for k, power in enumerate(block):
+            if power > least:
+                a, z = problem.data.time[bounds[b]], problem.data.time[bounds[b + 1]]
+                found.append(
+                    (
+                        float(power),
+                        f"{problem.outputs[k]} from {a:.4g} to {z:.4g} s: {power:.2g} times the expected power",
+                    )
+                )
+    found.sort(reverse=True)
+    return tuple(text for _, text in found[:5]) or tuple(rest.reasons[:3])
