@@ -18,6 +18,7 @@ from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit,
 from orchestrator.diagnosis.blackbox.judged import BoxOutcome
 from orchestrator.diagnosis.blackbox.mapping import read_map
 from orchestrator.diagnosis.blackbox.model import Data
+from orchestrator.diagnosis.blackbox.rate import decimated, factor_of
 from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.steps import counted
@@ -238,7 +239,9 @@ def of_a_box(
     subject = subject_of(Path(fmu))
     given = read_map(Path(map), subject)
     data = read_data(Path(record), given, used.read)
-    second = None if validate is None else read_data(Path(validate), given, used.read)
+    factor = factor_of(data, used.rate)
+    data = decimated(data, factor, used.rate)
+    second = None if validate is None else decimated(read_data(Path(validate), given, used.read), factor, used.rate)
     outcome = diagnosing(subject, given, data, used, progress)
     try:
         models = (outcome.problem.nominal, outcome.refitted, outcome.model)

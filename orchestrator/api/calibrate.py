@@ -11,6 +11,7 @@ from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.blackbox.calibrate import BoxCalibration
 from orchestrator.diagnosis.blackbox.calibrate import calibrate as calibrating
 from orchestrator.diagnosis.blackbox.mapping import read_map
+from orchestrator.diagnosis.blackbox.rate import decimated, factor_of
 from orchestrator.diagnosis.blackbox.reading import read_data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.subject import subject_of
@@ -114,5 +115,6 @@ def calibrate(
     subject = subject_of(Path(fmu))
     given = read_map(Path(map), subject)
     data = read_data(Path(record), given, used.read)
+    data = decimated(data, factor_of(data, used.rate), used.rate)
     found = calibrating(subject, given, data, progress, used)
     return CalibrationResult(found, {"record": str(record), "fmu": str(fmu), "map": str(map)}, used)

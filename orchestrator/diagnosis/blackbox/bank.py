@@ -167,6 +167,12 @@ def _once_a_turn(values: Values, scene: Surroundings) -> bool:
     return scene.angular and abs(values[2] - 1.0) < scene.once
 
 
+def _repeats(values: Values, scene: Surroundings) -> bool:
+    """Tell whether a ripple comes back within the motion, more than once a turn: else it is a spring, or gravity."""
+    slow = bool(scene.cycles) and abs(values[2]) < 0.5 * scene.cycles[0]
+    return not slow and not _once_a_turn(values, scene)
+
+
 def _positive(values: Values, scene: Surroundings) -> bool:
     del scene
     return values[0] > 0.0
@@ -227,7 +233,7 @@ _FEEDBACK = (
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 / s.span),
          lambda s: tuple((0.01 * s.size, 0.01 * s.size, n) for n in s.cycles[:: max(len(s.cycles) // 24, 1)]),
          law=laws.RIPPLE, scan=lambda s: s.cycles, amplitudes=2,
-         plausible=lambda v, s: not _once_a_turn(v, s)),
+         plausible=_repeats),
     Kind("hysteresis", PORT, ("level", "distance"), ("effort", "flow"),
          lambda s: (0.01 * s.size, 0.02 * s.span),
          lambda s: tuple((0.05 * s.size, f * s.span) for f in (0.08, 0.25, 0.8)),

@@ -59,7 +59,7 @@ def prepared(
     problem.map = reduced(given, probe)
     problem.sign = probe.sign
     y = problem.must_simulate(problem.nominal)
-    rough = [noise_of(given, data.outputs, r) for r in (data.outputs, data.outputs - y)]
+    rough = [noise_of(given, data, r) for r in (data.outputs, data.outputs - y)]
     problem.noise = np.sqrt(np.minimum(*rough) ** 2 + probe.solver_error**2)
     return problem, probe
 
@@ -170,7 +170,7 @@ def _diagnosed(
 
 
 def _guided(free: BoxOutcome, progress: Progress, begun: float, settings: BoxSettings) -> BoxOutcome:
-    """Return what guided runs say of a record, where that is more than ``free`` ones do."""
+    """Return what guided runs name, where free ones name nothing."""
     problem = free.problem
     led = guided(problem)
     if led is None:
@@ -184,7 +184,8 @@ def _guided(free: BoxOutcome, progress: Progress, begun: float, settings: BoxSet
         return free
     best, families = settled_names(search, search.run(base))
     found = judged(problem, free.probe, search, search.plain or base, best, families, begun, settings.rest)
-    return free if found.verdict == "unknown" else found
+    # A run that is led has little left to explain: it says what is missing, never that nothing is.
+    return found if found.verdict == "effects" else free
 
 
 def _with_fewer(search: BoxSearch, best: BoxFit, other: BoxSearch, base: BoxFit) -> BoxFit | None:

@@ -180,6 +180,10 @@ def _warned(probe: Probe, search: BoxSearch, verdict: str, best: BoxFit, share: 
     """Return sentences for the user; ``share``: of what is missing, how much the effects explain."""
     problem = search.fitter.problem
     warnings = list(probe.notes)
+    data = problem.data
+    if data.factor > 1:
+        rate = f"{1.0 / data.step:.4g} Hz"
+        warnings.append(f"analysed at {rate}, one row for {data.factor}: nothing faster shows in the outputs")
     if search.late:
         warnings.append(
             f"the search was cut short after {problem.map.options.budget:g} s (`budget` of the map): a run takes about "

@@ -20,6 +20,8 @@ class Data:
         outputs: (n, outputs).
         source: file name, for messages.
         signals: (n, signals), off their references.
+        factor: rows of the file for one of these.
+        noise_share: share of the measurement noise of the file's rows that these have.
     """
 
     time: Array
@@ -27,6 +29,8 @@ class Data:
     outputs: Array
     source: str
     signals: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    factor: int = 1
+    noise_share: float = 1.0
 
     @property
     def step(self) -> float:

@@ -84,7 +84,7 @@ def opened(
     inputs, reads = _names_of(given, subject)
     runner = Runner(subject, inputs, reads, given.tunable, given.options.tolerance, True, workers, settings.process)
     try:
-        rough = noise_of(given, data.outputs, data.outputs)
+        rough = noise_of(given, data, data.outputs)
         runner.through = _passing(runner, given, data, settings)
         problem = BoxProblem(
             data, given, runner, _affordable(runner, given, data, progress, settings), rough, settings=settings
@@ -130,12 +130,12 @@ def _passing(runner: Runner, given: Map, data: Data, settings: BoxSettings) -> l
     return found
 
 
-def noise_of(given: Map, outputs: Array, residual: Array) -> Array:
+def noise_of(given: Map, data: Data, residual: Array) -> Array:
     """Return the noise of each output: as given, else from third differences of what no model should follow.
 
     Args:
         given: the map.
-        outputs: (n, outputs) measured.
+        data: the record.
         residual: (n, outputs) measured minus simulated.
 
     Returns:
@@ -144,12 +144,12 @@ def noise_of(given: Map, outputs: Array, residual: Array) -> Array:
     found = []
     for k, entry in enumerate(given.outputs.values()):
         if entry.noise is not None:
-            found.append(entry.noise * abs(entry.factor))
+            found.append(entry.noise * abs(entry.factor) * data.noise_share)
             continue
         # Its mean without the largest hundredth: a median is no measure of what comes in whole counts.
         rough = np.sort(np.abs(np.diff(residual[:, k], 3)))[: int(0.99 * (len(residual) - 3))]
         estimate = float(np.mean(rough)) / TRIMMED / np.sqrt(20.0)
-        found.append(max(estimate, 1e-9 * float(np.max(np.abs(outputs[:, k]))), 1e-300))
+        found.append(max(estimate, 1e-9 * float(np.max(np.abs(data.outputs[:, k]))), 1e-300))
     return np.array(found)
 
 

@@ -325,6 +325,18 @@ class ReadSettings(Settings, frozen=True):
     uneven: Annotated[float, share("of a sample by which a time may be off")] = 0.01
 
 
+class BoxRateSettings(Settings, frozen=True):
+    """The rate at which a long record is analysed."""
+
+    rows: Annotated[int, setting("rows that a record keeps in any case: runs of as many take no time", ge=200)] = 2000
+    per_band: Annotated[float, setting("rate over the frequency below which nearly all motion lies", gt=2)] = 16.0
+    shows: Annotated[float, setting("power over that of the noise from which motion shows", ge=1)] = 4.0
+    most_above: Annotated[float, share("of the squared speed that may lie above the band")] = 0.01
+    pane: Annotated[int, setting("samples of a spectrum's pane at most", ge=64)] = 1024
+    cut_off: Annotated[float, share("of half the lower rate at which the filter before it cuts off")] = 0.8
+    rounding: Annotated[float, share("of a rate that time stamps may be off by")] = 0.02
+
+
 class CalibrationSettings(Settings, frozen=True):
     """What is said of parameters that are fitted alone."""
 
@@ -346,6 +358,7 @@ class BoxSettings(Settings, frozen=True):
     guide: Annotated[GuideSettings, note("guided runs")] = GuideSettings()
     process: Annotated[ProcessSettings, note("the FMU's processes")] = ProcessSettings()
     read: Annotated[ReadSettings, note("the record")] = ReadSettings()
+    rate: Annotated[BoxRateSettings, note("the rate at which it is analysed")] = BoxRateSettings()
     calibration: Annotated[CalibrationSettings, note("parameters alone")] = CalibrationSettings()
 
 

@@ -128,7 +128,8 @@ def _not_shown(
         if effect.family:
             yield f"the record does not tell {effect.effect.label} from {', '.join(effect.family)}"
     if effects and not rest.nothing_missing:
-        yield f"more than a disturbance is left: {rest.reasons[0]}; the effects stand by what they do to unseen data"
+        left = rest.reasons[0] if rest.reasons else disturbance(rest)
+        yield f"more than noise is left: {left}; the effects stand by what they do to data not fitted"
     if rest.disturbed:
         yield f"more than measurement noise is left: {disturbance(rest)}, in which a small effect may hide"
     for misfit, which in ((held_out, HELD_OUT), (second, SECOND)):

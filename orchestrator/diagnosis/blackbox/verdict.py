@@ -1,5 +1,7 @@
 """What a search means: explained or not, by what, how surely, and where the rest is."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,11 +9,16 @@ from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
+from orchestrator.diagnosis.blackbox.promises import Promise
+from orchestrator.diagnosis.blackbox.screening import screened
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
 from orchestrator.diagnosis.blackbox.steps import labels
 
 Array = NDArray[np.float64]
+
+AS_PROMISED = 2
+"""Starts of a rival, in all: where its own fit ended, and the best promise in the place of what it rivals."""
 
 
 def stand_in(search: BoxSearch, best: BoxFit, settings: RestSettings = DEFAULT.rest) -> str:
@@ -147,12 +154,33 @@ def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, Box
             elif beside:
                 rivals.append(fit)
     rivals.sort(key=search.score, reverse=True)
-    for fit in [r for r in rivals if r.model.effects[-1].label not in near][: search.settings.rivals]:
-        model = best.model.without(effect.label).extended(fit.model.effects[-1], fit.model.values[-1])
-        again = search.fitter.fit(model, best.level)
-        if again is not None:
-            near.setdefault(fit.model.effects[-1].label, search.fitter.settled(again))
+    others: dict[str, tuple[BoxEffect, list[Array]]] = {}
+    for fit in [r for r in rivals if r.model.effects[-1].label not in near]:
+        other, values = fit.model.effects[-1], fit.model.values[-1]
+        if other.label not in others and len(others) < search.settings.rivals:
+            others[other.label] = other, [values]
+    without = best.model.without(effect.label)
+    if search.fitter.ladder.share(best.level) > search.settings.quiet:
+        # Beside noise at the ports a fit may have ended elsewhere: what would do the same is a start, too.
+        for promise in _promised(search, without, best, [other for other, _ in others.values()]):
+            if len(others[promise.effect.label][1]) < AS_PROMISED:
+                others[promise.effect.label][1].append(promise.values)
+    for other, starts in others.values():
+        fits = [search.fitter.fit(without.extended(other, other.bounded(values)), best.level) for values in starts]
+        found = [search.fitter.settled(fit) for fit in fits if fit is not None]
+        if found:
+            near.setdefault(other.label, max(found, key=search.score))
     return near
+
+
+def _promised(search: BoxSearch, without: BoxModel, best: BoxFit, others: Sequence[BoxEffect]) -> Sequence[Promise]:
+    """Return what effects promise beside the values of the best model, one of its effects taken out."""
+    fitter = search.fitter
+    y = fitter.problem.simulate([without], fitter.parts.seen)[0] if others else None
+    J = None if y is None else fitter.jacobian(without, y)
+    if y is None or J is None:
+        return []
+    return screened(fitter, others, BoxFit(without, best.level, y, 0.0, 0.0, fitter.prior(without), J)).promises
 
 
 def recovered(base: BoxFit, best: BoxFit, outputs: int, rows: int) -> float:

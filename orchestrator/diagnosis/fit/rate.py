@@ -16,6 +16,7 @@ from orchestrator.diagnosis.fit.signals import encoder_noise, noise_level
 from orchestrator.diagnosis.settings import DiagnosisSettings, RateSettings
 from orchestrator.plants.description import Plant
 from orchestrator.records.record import Record
+from orchestrator.shared.inference.decimation import averaged, content_band, sampled
 from orchestrator.shared.inference.noise import rms
 from orchestrator.shared.results.diagnose import AnalysisFound
 
@@ -129,27 +130,11 @@ def band(record: Record, settings: RateSettings, window: int) -> float:
     Returns:
         The frequency; 0.0 where nothing moves.
     """
-    from scipy.signal import welch
-
-    highest = 0.0
-    for angle in (record.theta_m, record.theta_l):
-        if angle is None:
-            continue
-        rate = 1.0 / record.step
-        frequency, power = welch(np.diff(angle), rate, nperseg=min(settings.pane, angle.size // 4))
-        slope = np.abs(1.0 - np.exp(-2j * np.pi * frequency / rate)) ** 2
-        power = power[1:] / slope[1:]
-        floor = max(2.0 * noise_level(angle, window) ** 2 / rate, float(np.median(power[-len(power) // 8 :])))
-        speed = np.where(power > settings.shows * floor, power - floor, 0.0) * frequency[1:] ** 2
-        share = np.cumsum(speed) / max(float(np.sum(speed)), 1e-300)
-        beyond = np.maximum.accumulate(power[::-1])[::-1]  # largest power at a frequency or above it
-        twice = beyond[np.minimum(2 * np.arange(power.size) + 1, power.size - 1)]
-        drowned = np.flatnonzero(
-            power[: power.size // 2] < twice[: power.size // 2]
-        )  # noise is no smaller an octave above
-        last = int(drowned[0]) if drowned.size else power.size - 1
-        highest = max(highest, float(frequency[1:][min(int(np.searchsorted(share, 1.0 - settings.most_above)), last)]))
-    return highest
+    return max(
+        content_band(angle, record.step, noise_level(angle, window), settings.shows, settings.most_above, settings.pane)
+        for angle in (record.theta_m, record.theta_l)
+        if angle is not None
+    )
 
 
 def decimated(record: Record, factor: int, settings: RateSettings) -> Record:
@@ -165,35 +150,11 @@ def decimated(record: Record, factor: int, settings: RateSettings) -> Record:
     """
     if factor <= 1:
         return record
-    from scipy.signal import fftconvolve, firwin
-
-    half = 4 * factor
-    kernel = firwin(2 * half + 1, settings.cut_off / factor)
-    size = (record.size - 1) // factor
-
-    def smooth(values: Array, kernel: Array = kernel) -> Array:
-        mirrored = np.concatenate(
-            [2 * values[0] - values[half:0:-1], values, 2 * values[-1] - values[-2 : -half - 2 : -1]]
-        )
-        return np.asarray(fftconvolve(mirrored, kernel, "valid"))[: size * factor]
-
-    def angle(values: Array | None) -> Array | None:
-        return None if values is None else smooth(values)[::factor]
-
-    torque = smooth(record.u, _made_up_for(kernel, factor)).reshape(size, factor).mean(axis=1)
-    motor = angle(record.theta_m)
+    rows = (record.size - 1) // factor * factor
+    motor, load = (
+        None if angle is None else sampled(angle, factor, settings.cut_off)
+        for angle in (record.theta_m, record.theta_l)
+    )
     assert motor is not None
-    return replace(record, time=record.time[: size * factor : factor], u=torque, theta_m=motor,
-                   theta_l=angle(record.theta_l), further={})  # fmt: skip
-
-
-def _made_up_for(kernel: Array, factor: int) -> Array:
-    """Return a filter's kernel with the gain that a torque loses where it is averaged over ``factor`` rows and held.
-
-    Both take a sinc of the frequency from it, beside that of the hold over a row which the machine has seen.
-    """
-    gain, size = np.fft.fft(np.fft.ifftshift(kernel)), kernel.size
-    frequency = np.abs(np.fft.fftfreq(size))
-    lost = (np.sinc(factor * frequency) / np.sinc(frequency)) ** 2
-    inside = frequency < 0.5 / factor
-    return np.fft.fftshift(np.fft.ifft(np.where(inside, gain / np.where(inside, lost, 1.0), 0.0)).real)
+    return replace(record, time=record.time[:rows:factor], u=averaged(record.u, factor, settings.cut_off),
+                   theta_m=motor, theta_l=load, further={})  # fmt: skip
