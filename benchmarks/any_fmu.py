@@ -50,7 +50,7 @@ def cases(args: argparse.Namespace, plants: list[Plant]) -> Iterator[tuple[str, 
                 hidden = (*plant.unknown, *((INSIDE,) if plant.inside else ()))
                 names = (hidden[turn % len(hidden)],)
             closed = bool(plant.loop) and (rng.random() < 0.4 or plant.number == 11)
-            disturbance = 0.01 if kind == "clean" and (k // len(plants)) % 2 else 0.0
+            disturbance = 0.01 if kind == "clean" and (k // len(plants)) % 2 else args.disturbance
             yield kind, Maker(plant, rng, args.rows, closed, disturbance).case(names, LEAST, MOST)
 
 
@@ -220,6 +220,7 @@ def main() -> None:
         parser.add_argument(f"--{name}", type=int, default=count)
     parser.add_argument("--foreign", type=Path, metavar="DIR", help="FMUs of others, by the names of their plants")
     parser.add_argument("--records", type=Path, metavar="DIR", help="judge the records of a folder")
+    parser.add_argument("--disturbance", type=float, default=0.0, help="coloured noise at the port, over the drive")
     parser.add_argument("--plants", type=int, nargs="*", default=[], help="numbers of the plants that take part")
     parser.add_argument("--write", type=Path, metavar="DIR", help="write the examples of the documentation, and stop")
     args = parser.parse_args()

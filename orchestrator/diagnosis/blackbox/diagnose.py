@@ -177,7 +177,7 @@ def _guided(free: BoxOutcome, progress: Progress, begun: float, settings: BoxSet
         return free
     progress("guided runs")
     effects = [e for e in effects_of(led, led.must_read(led.nominal)) if e.kind.where in (INPUT, PORT)]
-    fitter = fitters(led, parts_of(led.n), settings)[1]
+    fitter = fitters(led, parts_of(led.n, led.caught), settings)[1]
     search = BoxSearch(fitter, effects, settings.search, progress, until=begun + problem.map.options.budget)
     base = search.base()
     if base is None:

@@ -54,6 +54,11 @@ class GuidedProblem(BoxProblem):
     _answers: dict[tuple[float, ...], Array] = field(init=False, default_factory=dict, repr=False)
 
     @property
+    def caught(self) -> int:
+        """Return the row from which on a run has caught up with the record, wherever it started."""
+        return int(np.ceil(self.settings.guide.caught / self.speed))
+
+    @property
     def guide(self) -> Guide | None:
         """Return what leads runs along the record."""
         outputs = [pull.output for pull in self.pulls]

@@ -18,8 +18,8 @@ class HeldOut:
     """What effects do to free runs over the held-out part, on the output where they do the least.
 
     Attributes:
-        removed: share of the squared misfit, beyond noise, of the re-fitted model that they remove; 1.0 where that
-            leaves no more than noise.
+        removed: share of the squared misfit, beyond noise, of the re-fitted model that they remove; 1.0 where they
+            leave no more than noise, or there was no more.
         removed_of_nominal: the same of the model as it was given.
         r_squared: share of the output's variance that the corrected model explains.
     """
@@ -57,7 +57,7 @@ def held_out(problem: BoxProblem, stages: Sequence[Array], rows: Rows, settings:
     spread = np.var(problem.data.outputs[rows] / problem.noise, axis=0)
 
     def removed(before: Array) -> float:
-        told = before > settings.notable_misfit**2
+        told = np.minimum(before, corrected) > settings.notable_misfit**2
         left = np.maximum(corrected[told] - 1.0, 0.0) / (before[told] - 1.0)
         return 1.0 - float(np.max(left, initial=0.0))
 

@@ -147,9 +147,9 @@ def _verdict(
 ) -> tuple[str, Rest]:  # fmt: skip
     """Return the verdict, and what is left in its light."""
     fitter, effects = search.fitter, last.model.effects
-    if effects and rest.disturbed and shown.removed < settings.least_shown:
+    if effects and rest.nothing_missing and shown.removed < settings.least_shown:
         why = f"the effects remove {100.0 * max(shown.removed, 0.0):.0f} % of the misfit on data not fitted"
-        return "unknown", replace(rest, disturbed=False, reasons=(why,))
+        return "unknown", replace(rest, explained=False, disturbed=False, reasons=(why,))
     if effects and rest.nothing_missing:
         return "effects", rest
     if effects:

@@ -33,16 +33,17 @@ class BoxParts:
         return int(self.fitted.stop if isinstance(self.fitted, slice) else self.fitted[-1] + 1)
 
 
-def parts_of(n: int) -> BoxParts:
+def parts_of(n: int, first: int = 0) -> BoxParts:
     """Return half, a quarter and a quarter.
 
     Args:
         n: samples of the record.
+        first: row from which on the first half is fitted.
 
     Returns:
         The fitted, the deciding and the held-out part.
     """
-    return BoxParts(slice(0, n // 2), slice(n // 2, 3 * n // 4), slice(3 * n // 4, n))
+    return BoxParts(slice(min(first, n // 8), n // 2), slice(n // 2, 3 * n // 4), slice(3 * n // 4, n))
 
 
 def interleaved(n: int, pieces: int, whole: bool = False) -> BoxParts:

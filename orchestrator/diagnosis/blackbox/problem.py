@@ -78,7 +78,7 @@ class BoxProblem:
         return tuple(self.map.outputs)
 
     def simulate(self, models: Sequence[BoxModel], rows: int | None = None) -> list[Array | None]:
-        """Return outputs (rows, outputs) of each model; None where the FMU failed.
+        """Return outputs (rows, outputs) of each model; None where the FMU failed, or ran away.
 
         Args:
             models: parameters, effects and their values, each.
@@ -88,7 +88,9 @@ class BoxProblem:
             The outputs, in their own units.
         """
         found = self._runs([self._plan(model, rows) for model in models])
-        return [None if y is None else self._measured(y, model) for y, model in zip(found, models, strict=True)]
+        runs = [None if y is None else self._measured(y, model) for y, model in zip(found, models, strict=True)]
+        most = self.settings.process.absurd * np.max(np.abs(self.data.outputs), axis=0)
+        return [None if y is None or np.any(np.abs(y) > most) else y for y in runs]
 
     def read(self, models: Sequence[BoxModel], rows: int | None = None) -> list[Array | None]:
         """Return all that is read (rows, reads) of each model, before effects at outputs.

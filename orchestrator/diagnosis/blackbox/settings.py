@@ -209,7 +209,10 @@ class RestSettings(Settings, frozen=True):
     ] = 0.9
     follows: Annotated[float, share("of an output's variance there that the model must then explain")] = 0.9
     least_shown: Annotated[
-        float, share("of that misfit which effects beside a disturbance must remove: less, and it is their like")
+        float,
+        share(
+            "of that misfit which any effects must remove, where they leave more than noise: less, and it is their like"
+        ),
     ] = 0.5
     implausible: Annotated[
         float, setting("stated uncertainties from which a re-fitted value speaks against them", gt=0)
@@ -290,6 +293,9 @@ class GuideSettings(Settings, frozen=True):
     """How a guided run is led along the record."""
 
     speed: Annotated[float, share("of a radian a sample: how fast a guided run follows")] = 0.2
+    caught: Annotated[
+        float, setting("time constants after which it has caught up with the record: no row before is fitted", ge=0)
+    ] = 5.0
     slower: Annotated[float, setting("how many times slower it is led where that does not hold", gt=1.0)] = 3.0
     massive: Annotated[
         float, setting("times its first sample that the second of an answer must be, of a mass: a store has 1")
@@ -313,6 +319,7 @@ class ProcessSettings(Settings, frozen=True):
     small: Annotated[float, setting("seconds of work below which a second process is not asked")] = 0.01
     total: Annotated[float, setting("seconds that a process may live", gt=0.0)] = 86_400.0
     memory: Annotated[int, setting("MiB that a process may use", ge=1)] = 4096
+    absurd: Annotated[float, setting("times an output's largest value, beyond which a run has failed", gt=1)] = 1e9
     runaway: Annotated[
         float, setting("effort of an effect over the drive's, beyond which a run is given up: it is unstable", gt=1)
     ] = 1e4

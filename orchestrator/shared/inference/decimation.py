@@ -19,7 +19,7 @@ def content_band(values: Array, step: float, noise: float, shows: float, most_ab
         step: sample time [s].
         noise: standard deviation of its measurement.
         shows: power over that of the noise from which motion shows.
-        most_above: share of the squared speed that may lie above the band.
+        most_above: share of the squared speed that may lie above the band, and below where noise is looked for.
         pane: samples of a spectrum's pane at most.
 
     Returns:
@@ -36,8 +36,9 @@ def content_band(values: Array, step: float, noise: float, shows: float, most_ab
     share = np.cumsum(speed) / max(float(np.sum(speed)), 1e-300)
     beyond = np.maximum.accumulate(power[::-1])[::-1]  # largest power at a frequency or above it
     twice = beyond[np.minimum(2 * np.arange(power.size) + 1, power.size - 1)]
-    # Noise is no smaller an octave above.
-    drowned = np.flatnonzero(power[: power.size // 2] < twice[: power.size // 2])
+    # Noise is no smaller an octave above; it begins no lower than the motion does.
+    first = min(int(np.searchsorted(share, most_above)), power.size // 2)
+    drowned = first + np.flatnonzero(power[first : power.size // 2] < twice[first : power.size // 2])
     last = int(drowned[0]) if drowned.size else power.size - 1
     return float(frequency[1:][min(int(np.searchsorted(share, 1.0 - most_above)), last)])
 

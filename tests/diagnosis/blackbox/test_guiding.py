@@ -1,8 +1,8 @@
 """Guided runs: they say what free runs say of linear FMUs, and stay with the record where those go astray."""
 
-import dataclasses
 from types import SimpleNamespace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -16,7 +16,7 @@ from orchestrator.diagnosis.blackbox.parts import parts_of
 from orchestrator.diagnosis.blackbox.reading import read_data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
 from orchestrator.diagnosis.blackbox.subject import subject_of
-from tests.support.box_fmu import DOMAINS, MOTOR, record, write_fmu, write_map, write_record
+from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 
 needs_compiler = pytest.mark.skipif(not have_compiler(), reason="no C compiler")
@@ -82,29 +82,33 @@ def test_a_store_is_led_by_its_level_alone(opened):
 @needs_compiler
 def test_without_a_measured_position_there_is_no_guide(opened):
     problem, _ = opened(SPRING)
-    problem.map = type(problem.map)(**{f: getattr(problem.map, f) for f in problem.map.__struct_fields__} | {"ports": {}})
+    problem.map = msgspec.structs.replace(problem.map, ports={})
     assert guided(problem) is None
 
 
 @needs_compiler
 def test_friction_beside_a_large_disturbance_is_named_by_what_it_does_to_unseen_data(tmp_path):
-    domain = dataclasses.replace(MOTOR, further=())
-    del domain
-    case = record(SPRING, ("coulomb_friction",), np.random.default_rng(3), 900, disturbance=0.06)
+    case = record(SPRING, ("coulomb_friction",), np.random.default_rng(4), 900, disturbance=0.06)
     found = diagnose(
         write_record(tmp_path / "record.csv", case),
         write_fmu(tmp_path / "a.fmu", SPRING),
         write_map(tmp_path / "map.toml", SPRING),
     )
+    (tmp_path / "out").mkdir()
+    found.write_files(tmp_path / "out")
     found.close()
-    assert found.verdict in ("effects", "unknown")
+    assert found.verdict == "effects"
+    assert [f.name for f in found.effects] == ["coulomb_friction"]
+    low, high = found.effects[0].estimates[0].interval
+    assert low < case.sizes[0] < high
+    assert found.trust.level.word == "amber"
+    assert any("data not fitted" in str(reason) for reason in found.trust.reasons)
+    assert found.delivered[0].difference < 0.1
 
 
 def _held_out(before, after, nominal=None):
     y = 100.0 * np.sin(np.arange(200.0))[:, None]
-    problem = SimpleNamespace(
-        residual=lambda run: run - y, data=SimpleNamespace(outputs=y), noise=np.ones(1)
-    )
+    problem = SimpleNamespace(residual=lambda run: run - y, data=SimpleNamespace(outputs=y), noise=np.ones(1))
     runs = [y + np.where(np.arange(200)[:, None] % 2, 1.0, -1.0) * off for off in (nominal or before, before, after)]
     return held_out(problem, runs, slice(0, 200), DEFAULT.rest)
 
@@ -114,6 +118,8 @@ def test_effects_show_where_they_remove_nine_tenths_of_the_squared_misfit():
     assert not _held_out(20.0, 8.0).shows(DEFAULT.rest)
     assert not _held_out(20.0, 5.0, nominal=8.0).shows(DEFAULT.rest)  # the model as it was given is as good
     assert _held_out(1.0, 1.0).removed == 1.0  # nothing was missing there
+    assert _held_out(1.3, 1.1).removed == 1.0  # nor is it with the effects
+    assert _held_out(4.4, 4.0).removed < DEFAULT.rest.least_shown
 
 
 def test_effects_that_do_not_follow_the_motion_do_not_show():
