@@ -27,8 +27,11 @@ def fit(total: float, *names: str) -> BoxFit:
     return BoxFit(model, 0, NONE, total, 0.0, 0.0, NONE)
 
 
-def search(totals: dict[str, float], *steps: SearchStep) -> SimpleNamespace:
-    """Return a search whose fits of further models have the totals given, by all effects or by their last one."""
+def search(totals: dict[str, float], *steps: SearchStep, share: float = 0.0) -> SimpleNamespace:
+    """Return a search whose fits of further models have the totals given, by all effects or by their last one.
+
+    ``share``: noise at the ports beside all of them.
+    """
 
     def fitted(model: BoxModel, level: int) -> BoxFit:
         names = [e.kind.name for e in model.effects]
@@ -37,6 +40,7 @@ def search(totals: dict[str, float], *steps: SearchStep) -> SimpleNamespace:
     fitter = SimpleNamespace(
         fit=fitted,
         settled=lambda found: found,
+        ladder=SimpleNamespace(share=lambda level: share),
     )
     return SimpleNamespace(
         fitter=fitter, steps=steps, earlier=(), settings=DEFAULT.search, score=lambda found: found.total,
@@ -100,3 +104,24 @@ def test_one_effect_that_does_better_than_two_is_named_alone() -> None:
     )
     assert [effect.kind.name for effect in found.model.effects] == ["spring"]
     assert families == ((),)
+
+
+def test_beside_noise_a_rival_starts_from_what_it_promises_too(monkeypatch) -> None:
+    best = fit(-10.0, "input_offset")
+    step = SearchStep(fit(-900.0), (fit(-800.0, "input_offset"), fit(-700.0, "coulomb_friction")), True)
+    promise = SimpleNamespace(effect=at("coulomb_friction"), values=np.array([0.04, 0.01]))
+    monkeypatch.setattr("orchestrator.diagnosis.blackbox.verdict._promised", lambda *given: [promise])
+
+    def told(share: float) -> tuple[tuple[str, ...], ...]:
+        found = search({}, share=share)
+        found.earlier = (step,)
+
+        def fitted(model: BoxModel, level: int) -> BoxFit:
+            led = model.values[-1][0] == 0.04  # from where its own fit ended it comes nowhere
+            return BoxFit(model, 0, NONE, -11.0 if led else -300.0, 0.0, 0.0, NONE)
+
+        found.fitter.fit = fitted
+        return settled_names(found, best)[1]
+
+    assert told(0.02) == (("coulomb_friction@p",),)
+    assert told(0.0) == ((),)
