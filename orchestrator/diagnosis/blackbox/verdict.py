@@ -154,13 +154,15 @@ def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, Box
             elif beside:
                 rivals.append(fit)
     rivals.sort(key=search.score, reverse=True)
+    noisy = search.fitter.ladder.share(best.level) > search.settings.quiet
+    most = search.settings.rivals * (AS_PROMISED if noisy else 1)  # where fits ended says less of who rivals
     others: dict[str, tuple[BoxEffect, list[Array]]] = {}
     for fit in [r for r in rivals if r.model.effects[-1].label not in near]:
         other, values = fit.model.effects[-1], fit.model.values[-1]
-        if other.label not in others and len(others) < search.settings.rivals:
+        if other.label not in others and len(others) < most:
             others[other.label] = other, [values]
     without = best.model.without(effect.label)
-    if search.fitter.ladder.share(best.level) > search.settings.quiet:
+    if noisy:
         # Beside noise at the ports a fit may have ended elsewhere: what would do the same is a start, too.
         for promise in _promised(search, without, best, [other for other, _ in others.values()]):
             if len(others[promise.effect.label][1]) < AS_PROMISED:
