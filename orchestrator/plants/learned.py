@@ -207,9 +207,7 @@ def _rubs_too(friction: Any, first: int, dry_at: int) -> Any:
     """Return the compiled levels of dry friction, that of the law included."""
     from numba import njit
 
-    from orchestrator.shared.numba_cache import UNCOUNTED
-
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy")
     def with_dry(x: Any, p: Any) -> Any:
         at_motor, at_load = friction(x, p)
         kind = int(p[first]) % WITH_SPEED
@@ -223,7 +221,7 @@ def _rubs_too(friction: Any, first: int, dry_at: int) -> Any:
 
 
 def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
-    from orchestrator.shared.numba_cache import UNCOUNTED, kept
+    from orchestrator.shared.numba_cache import kept
 
     friction, rates, presliding = plant.stage()
     motor, last = plant.bodies[0], plant.bodies[-1]
@@ -236,7 +234,7 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
 
     straight, with_dry = compiled("learned_law").straight, _rubs_too(friction, first, dry_at)
 
-    @kept(error_model="numpy", **UNCOUNTED)
+    @kept(error_model="numpy")
     def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
         r = rates(x, signs, p, u)
         code = int(p[first])

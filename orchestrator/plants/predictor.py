@@ -141,6 +141,8 @@ class Sample(NamedTuple):
 def sample_of(plant: Plant) -> Sample:
     """Return the compiled equations of one sample.
 
+    References are counted in them: equations of a plant that say nothing else inherit that, and may make arrays.
+
     Args:
         plant: whose equations they are.
 
@@ -150,7 +152,7 @@ def sample_of(plant: Plant) -> Sample:
     friction, stage, (at_m, at_l) = plant.stage()
     at_lag = plant.index(plant.drive.lag)
 
-    @njit(error_model="numpy", forceinline=True, **UNCOUNTED)
+    @njit(error_model="numpy", forceinline=True)
     def advanced(x: Any, signs: Any, p: Any, torque: float, step: float) -> Any:
         begin, middle, end, left = _delivered(x[LAGGED], torque, p[at_lag], step)
         k1 = stage(_with_torque(x, begin), signs, p, torque)
@@ -160,17 +162,17 @@ def sample_of(plant: Plant) -> Sample:
         new = _along(_along(_along(_along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
         return _with_torque(new, left)
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy")
     def rest_of(p: Any) -> Any:
         at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
         sliding = friction((0.0, 1e6, 0.0, 1e6, 0.0, 0.0, 0.0, 0.0), p)
         return (max(at_rest[0], sliding[0]), max(at_rest[1], sliding[1]))
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy")
     def reach_of(p: Any) -> Any:
         return (math.exp(p[at_m]), math.exp(p[at_l]))
 
-    @njit(error_model="numpy", forceinline=True, **UNCOUNTED)
+    @njit(error_model="numpy", forceinline=True)
     def sample(x: Any, memory: Any, p: Any, rest: Any, reach: Any, torques: Any, first: float, h: float,
                substeps: Any) -> Any:  # fmt: skip
         """Return the state and what friction remembers (bristles, directions) one sample on."""
