@@ -15,16 +15,20 @@ import sys
 from functools import cache
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numba
 
 import pyfmu_sources
 from orchestrator.shared.cache import cache_directory
-from orchestrator.shared.numba_cache import kept
+from orchestrator.shared.numba_cache import UNCOUNTED, kept
 from orchestrator.shared.output import write_text
 
 INLINED = ("rates", "elastic_torque", "motor_torque", "load_torque")
 """Functions whose call costs more than their body: every stage of every step makes it."""
+
+LISTING = ("attachment", "backlash_estimator", "dead_time", "linear_mode", "riccati")
+"""Modules whose functions make lists: references to those are counted, there and in modules that call them."""
 
 _PACKAGE = pyfmu_sources.__name__
 _SOURCES = Path(pyfmu_sources.__file__).parent
@@ -55,16 +59,22 @@ def compiled(name: str) -> ModuleType:
     spec.loader.exec_module(copy)
     copy.__name__ = full_name
     sys.modules[full_name] = copy
+    options = _options(name)
     for attribute, value in list(vars(copy).items()):
         if not inspect.isfunction(value):
             continue
         home = value.__module__.rpartition(".")[2]
         if home == name:
             value.__module__ = full_name
-            setattr(copy, attribute, kept(forceinline=attribute in INLINED)(value))
+            setattr(copy, attribute, kept(forceinline=attribute in INLINED, **options)(value))
         elif value.__module__.startswith(_PACKAGE + "."):
             setattr(copy, attribute, getattr(compiled(home), attribute))
     return copy
+
+
+def _options(name: str) -> dict[str, Any]:
+    """Return the further options with which numba compiles a module's functions."""
+    return {} if _closure(name) & set(LISTING) else UNCOUNTED
 
 
 @cache
@@ -72,6 +82,7 @@ def _copied_source(name: str) -> Path:
     """Return the copy of a source in a folder named by a hash of it and of all that it imports."""
     digest = hashlib.sha256(numba.__version__.encode())
     for module in sorted(_closure(name)):
+        digest.update(repr(_options(module)).encode())
         digest.update((_SOURCES / f"{module}.py").read_bytes())
     folder = cache_directory("numba") / digest.hexdigest()[:20]
     folder.mkdir(exist_ok=True)

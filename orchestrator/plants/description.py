@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -147,7 +148,7 @@ class Plant:
         """Number the parameters."""
         self._index.update({name: n for n, name in enumerate(self.names)})
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Return the parameters' names in table order, then those of the predictor alone."""
         return tuple(entry.name for entry in (*self.table, *self.nuisances))

@@ -21,7 +21,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
-from orchestrator.shared.numba_cache import kept
+from orchestrator.shared.numba_cache import UNCOUNTED, kept
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ WAVE = 0.05  # of a wave's period: the farthest that a Runge-Kutta step of a fre
 CALM = 0.02  # distances of presliding per sample below which it hardly changes
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **UNCOUNTED)
 def _turned(bristle: float, speed: float, level: float, rest: float, distance: float, h: float) -> Any:
     """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre)."""
     if level <= 1e-9 * rest or rest == 0.0:
@@ -44,14 +44,14 @@ def _turned(bristle: float, speed: float, level: float, rest: float, distance: f
     return new, 0.5 * (bristle + new) / reach
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **UNCOUNTED)
 def _near_rest(speed: float, acceleration: float, distance: float, h: float) -> Any:
     """Whether dry friction may turn round within ``h``, so far that steps must be short."""
     way, change = abs(speed) * h, 1.5 * h * h * abs(acceleration)
     return way < change + NEAR * distance and way + change > CALM * distance
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **UNCOUNTED)
 def _along(x: Any, rate: Any, h: float) -> Any:
     """Return the state after a straight step; the last entry is the memory of the shaft's hysteresis here."""
     return (
@@ -66,7 +66,7 @@ def _along(x: Any, rate: Any, h: float) -> Any:
     )
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **UNCOUNTED)
 def _delivered(before: float, asked: float, lag: float, h: float) -> Any:
     """Return the drive's torque at the beginning, in the middle and at the end of a step as it acts, and as it is left.
 
@@ -88,13 +88,13 @@ def _delivered(before: float, asked: float, lag: float, h: float) -> Any:
     )  # fmt: skip
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **UNCOUNTED)
 def _with_torque(x: Any, torque: float) -> Any:
     """Return the state with another torque of the drive."""
     return (x[0], x[1], x[2], x[3], torque, x[5], x[6], x[7])
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **UNCOUNTED)
 def _corrected(x: Any, g: Array, a: float, b: float) -> Any:
     """Return the state corrected by the innovations ``a`` (motor) and ``b`` (load)."""
     return (
@@ -141,6 +141,8 @@ class Sample(NamedTuple):
 def sample_of(plant: Plant) -> Sample:
     """Return the compiled equations of one sample.
 
+    References are counted in them: equations of a plant that say nothing else inherit that, and may make arrays.
+
     Args:
         plant: whose equations they are.
 
@@ -150,7 +152,7 @@ def sample_of(plant: Plant) -> Sample:
     friction, stage, (at_m, at_l) = plant.stage()
     at_lag = plant.index(plant.drive.lag)
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def advanced(x: Any, signs: Any, p: Any, torque: float, step: float) -> Any:
         begin, middle, end, left = _delivered(x[LAGGED], torque, p[at_lag], step)
         k1 = stage(_with_torque(x, begin), signs, p, torque)
@@ -170,7 +172,7 @@ def sample_of(plant: Plant) -> Sample:
     def reach_of(p: Any) -> Any:
         return (math.exp(p[at_m]), math.exp(p[at_l]))
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", forceinline=True)
     def sample(x: Any, memory: Any, p: Any, rest: Any, reach: Any, torques: Any, first: float, h: float,
                substeps: Any) -> Any:  # fmt: skip
         """Return the state and what friction remembers (bristles, directions) one sample on."""

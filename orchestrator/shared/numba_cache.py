@@ -24,6 +24,12 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from orchestrator.shared.cache import cache_directory
 from orchestrator.shared.code_digest import digest_of
 
+UNCOUNTED: dict[str, Any] = {"_nrt": False}
+"""Option of functions that make neither arrays nor lists: references to what they are given are not counted.
+
+Counted at each call of each small function, they take several times as long as the equations of a plant.
+"""
+
 _DIGEST = hashlib.sha256().digest_size
 FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6), "big"))
 
@@ -46,7 +52,7 @@ def kept(**options: Any) -> Callable[[Any], Any]:
         with contextlib.suppress(RuntimeError, OSError):
             if function.__closure__ is None:
                 dispatcher._cache = _Cache(function)
-            elif digest := digest_of(function):
+            elif digest := digest_of(dispatcher):  # its options count
                 dispatcher._cache = _ClosureCache(function, digest)
         return dispatcher
 

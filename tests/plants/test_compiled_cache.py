@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.plants import compiled as module
+from orchestrator.shared.numba_cache import UNCOUNTED
 
 
 @pytest.mark.parametrize("damage", [b"", b"raise SystemExit\n", b"\xff\xfe"])
@@ -16,3 +17,11 @@ def test_a_damaged_source_is_not_imported(tmp_path: Path, monkeypatch: pytest.Mo
     path.write_bytes(damage)
     assert copied("drivetrain") == path
     assert path.read_bytes() == intact
+
+
+def test_references_are_counted_where_a_module_makes_lists_or_calls_one_that_does() -> None:
+    listing = {path.stem for path in module._SOURCES.glob("*.py") if "list[" in path.read_text(encoding="utf-8")}
+    adapters = {name for name in listing if name.endswith(("_slave", "_base", "_state"))}
+    assert set(module.LISTING) == listing - adapters
+    assert module._options("equations") == UNCOUNTED
+    assert module._options("linear_mode") == module._options("drivetrain") == {}

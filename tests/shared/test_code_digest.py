@@ -45,6 +45,15 @@ def test_whatever_changes_the_machine_code_changes_the_digest(change: dict[str, 
     assert made(**change) != made()
 
 
+def test_options_of_the_function_itself_change_its_digest() -> None:
+    def twice(x: float) -> float:
+        return 2.0 * x
+
+    digests = {digest_of(njit(**options)(twice)) for options in ({}, {"fastmath": True}, {"error_model": "numpy"})}
+    assert len(digests) == 3
+    assert None not in digests
+
+
 def test_arrays_count_by_their_content() -> None:
     assert made(table=np.array([1.0, 2.0])) == made(table=np.array([1.0, 2.0]))
     assert made(table=np.array([1.0, 2.0])) != made(table=np.array([1.0, 2.1]))

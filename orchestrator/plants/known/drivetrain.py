@@ -41,7 +41,7 @@ def _stage() -> CompiledEquations:
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
-    from orchestrator.shared.numba_cache import kept
+    from orchestrator.shared.numba_cache import UNCOUNTED, kept
 
     source = compiled("equations")
     rates, twist, contact_of, elastic = source.rates, source.twist, source.contact_of, source.elastic_torque
@@ -52,12 +52,12 @@ def _stage() -> CompiledEquations:
     damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
     loaded, lag_at = (dt.P_LOADED_M, dt.P_LOADED_L), dt.P_TAU
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", **UNCOUNTED)
     def whole(x: Any, u: float) -> Any:
         # The predictor bends its own bristles, gets a filtered request, and its last state is the shaft's memory.
         return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], 0.0, 0.0, 0.0, x[7], u)
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", **UNCOUNTED)
     def friction(x: Any, p: Any) -> Any:
         full, shaft = whole(x, 0.0), 0.0
         if p[loaded[0]] + p[loaded[1]] > 0.0:
@@ -65,7 +65,7 @@ def _stage() -> CompiledEquations:
             shaft = elastic(full, contact, p)
         return friction_m(full, shaft * twist_slope(full, p), p), friction_l(full, shaft, p)
 
-    @kept(error_model="numpy")
+    @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         full = whole(x, u)
         angle = twist(full, p)

@@ -33,17 +33,17 @@ def stage() -> CompiledEquations:
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
-    from orchestrator.shared.numba_cache import kept
+    from orchestrator.shared.numba_cache import UNCOUNTED, kept
 
     source = compiled("servo_axis")
     rates, level = source.rates, source.friction
     end = ap.COUNT
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", **UNCOUNTED)
     def friction(x: Any, p: Any) -> Any:
         return level((x[0], x[1], x[4], 0.0, 0.0), p), 0.0
 
-    @kept(error_model="numpy")
+    @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)

@@ -17,6 +17,7 @@ from orchestrator.shared.numba_cache import kept
 Array = NDArray[np.float64]
 
 ORDERS = (0, 1, 2, 3, 4, 6, 8, 12)  # that are compared
+STRETCH = 512  # samples that are whitened at a time
 SAMPLES_PER_LAG = 20  # at least, and per channel, so that the autoregression does not learn the record by heart
 
 
@@ -113,10 +114,10 @@ def colour_of(z: Array, part: slice, most: int = ORDERS[-1]) -> Colour:
         return _nothing(m)
     orders = [p for p in ORDERS if p <= most and p * m * SAMPLES_PER_LAG <= n]
     moments = np.array([e[k:].T @ e[: n - k] / n for k in range(orders[-1] + 1)])  # E e_t e_(t-k)'
-    found, cost = None, np.inf
+    matrix, found, cost = _block_toeplitz(moments), None, np.inf
     for p in orders:
         try:
-            lags, covariance = _yule_walker(moments, p)
+            lags, covariance = _yule_walker(moments, matrix, p)
             sign, logdet = np.linalg.slogdet(covariance)
         except np.linalg.LinAlgError:
             continue
@@ -134,25 +135,34 @@ def colour_of(z: Array, part: slice, most: int = ORDERS[-1]) -> Colour:
 
 @kept(nogil=True)
 def _whitened(given: Array, lags: Array, root: Array, first: int) -> Array:
-    """Return the scaled residuals of (n, channels, k) innovations from sample ``first`` on."""
+    """Return the scaled residuals of (n, channels, k) innovations from sample ``first`` on.
+
+    Innermost loops go along time, over stretches that stay in the processor's cache.
+    """
     n, m, k = given.shape
     out = np.empty((n - first, m, k))
-    row = np.empty((m, k))
-    for t in range(first, n):
-        for c in range(m):
-            for j in range(k):
-                row[c, j] = given[t, c, j]
-            for lag in range(min(lags.shape[0], t)):
-                for i in range(m):
-                    weight = lags[lag, c, i]
-                    for j in range(k):
-                        row[c, j] -= weight * given[t - lag - 1, i, j]
-        for c in range(m):
-            for j in range(k):
-                out[t - first, c, j] = 0.0
-            for i in range(m):
-                for j in range(k):
-                    out[t - first, c, j] += root[c, i] * row[i, j]
+    turned, rows = np.empty((m, n)), np.empty((m, STRETCH))
+    for j in range(k):
+        for i in range(m):
+            turned[i] = given[:, i, j]
+        for begin in range(first, n, STRETCH):
+            size = min(STRETCH, n - begin)
+            for c in range(m):
+                row = rows[c, :size]
+                row[:] = turned[c, begin : begin + size]
+                for lag in range(lags.shape[0]):
+                    known = max(begin, lag + 1)  # before it there is nothing to look back at
+                    late = row[known - begin :]
+                    for i in range(m):
+                        weight, before = lags[lag, c, i], turned[i, known - lag - 1 : begin + size - lag - 1]
+                        for t in range(late.size):
+                            late[t] -= weight * before[t]
+            for c in range(m):
+                for t in range(size):
+                    total = 0.0
+                    for i in range(m):
+                        total += root[c, i] * rows[i, t]
+                    out[begin - first + t, c, j] = total
     return out
 
 
@@ -160,14 +170,31 @@ def _nothing(channels: int) -> Colour:
     return Colour(np.zeros((0, channels, channels)), np.full((channels, channels), np.nan))
 
 
-def _yule_walker(moments: Array, p: int) -> tuple[Array, Array]:
-    """Return lags (p, m, m) and the covariance of the residuals for autocovariances ``moments`` (lags, m, m)."""
+def _block_toeplitz(moments: Array) -> Array:
+    """Return Yule and Walker's matrix (order m, order m) of the largest order; those of smaller ones are its corners.
+
+    Args:
+        moments: (order + 1, m, m) autocovariances.
+    """
+    order, m = len(moments) - 1, moments.shape[1]
+    if order == 0:
+        return np.zeros((0, 0))
+    signed = np.concatenate([moments[order - 1 : 0 : -1].transpose(0, 2, 1), moments[:order]])  # of lags -order + 1 on
+    rows = np.arange(order)
+    blocks = signed[rows[None, :] - rows[:, None] + order - 1]
+    return blocks.transpose(0, 2, 1, 3).reshape(order * m, order * m)
+
+
+def _yule_walker(moments: Array, matrix: Array, p: int) -> tuple[Array, Array]:
+    """Return lags (p, m, m) and the covariance of the residuals for autocovariances ``moments`` (lags, m, m).
+
+    ``matrix`` is :func:`_block_toeplitz` of them.
+    """
     m = moments.shape[1]
     if p == 0:
         return np.zeros((0, m, m)), moments[0]
-    blocks = [[moments[j - i] if j >= i else moments[i - j].T for j in range(p)] for i in range(p)]
     right = np.concatenate(list(moments[1 : p + 1]), axis=1)
-    solution = np.linalg.solve(np.block(blocks).T, right.T).T
+    solution = np.linalg.solve(matrix[: p * m, : p * m].T, right.T).T
     lags = np.array([solution[:, i * m : (i + 1) * m] for i in range(p)])
     covariance = moments[0] - sum(lags[k] @ moments[k + 1].T for k in range(p))
     return lags, 0.5 * (covariance + covariance.T)
