@@ -154,25 +154,36 @@ def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, Box
             elif beside:
                 rivals.append(fit)
     rivals.sort(key=search.score, reverse=True)
+    return _anew(search, best, effect, near, rivals)
+
+
+def _anew(
+    search: BoxSearch, best: BoxFit, effect: BoxEffect, near: dict[str, BoxFit], rivals: Sequence[BoxFit]
+) -> dict[str, BoxFit]:
+    """Return fits of the best model with rivals in the place of ``effect``, beside those that are known.
+
+    Beside noise at the ports a fit may have ended elsewhere: what would do the same is a start then, of known ones, too.
+    """
     noisy = search.fitter.ladder.share(best.level) > search.settings.quiet
-    most = search.settings.rivals * (AS_PROMISED if noisy else 1)  # where fits ended says less of who rivals
-    others: dict[str, tuple[BoxEffect, list[Array]]] = {}
-    for fit in [r for r in rivals if r.model.effects[-1].label not in near]:
-        other, values = fit.model.effects[-1], fit.model.values[-1]
-        if other.label not in others and len(others) < most:
-            others[other.label] = other, [values]
-    without = best.model.without(effect.label)
     if noisy:
-        # Beside noise at the ports a fit may have ended elsewhere: what would do the same is a start, too.
-        for promise in _promised(search, without, best, [other for other, _ in others.values()]):
-            if len(others[promise.effect.label][1]) < AS_PROMISED:
-                others[promise.effect.label][1].append(promise.values)
+        rivals = sorted((*rivals, *near.values()), key=search.score, reverse=True)
+    others: dict[str, tuple[BoxEffect, list[Array]]] = {}
+    for fit in rivals:
+        other = next(e for e in reversed(fit.model.effects) if e.label not in labels(best) - {effect.label})
+        known = noisy or other.label not in near
+        if known and other.label not in others and len(others) < search.settings.rivals * (AS_PROMISED if noisy else 1):
+            others[other.label] = other, [fit.model.values[fit.model.effects.index(other)]]
+    without, found = best.model.without(effect.label), dict(near)
+    for promise in _promised(search, without, best, [other for other, _ in others.values()]) if noisy else ():
+        if len(others[promise.effect.label][1]) < AS_PROMISED:
+            others[promise.effect.label][1].append(promise.values)
     for other, starts in others.values():
         fits = [search.fitter.fit(without.extended(other, other.bounded(values)), best.level) for values in starts]
-        found = [search.fitter.settled(fit) for fit in fits if fit is not None]
-        if found:
-            near.setdefault(other.label, max(found, key=search.score))
-    return near
+        again = [search.fitter.settled(fit) for fit in fits if fit is not None]
+        again += [near[other.label]] if other.label in near else []
+        if again:
+            found[other.label] = max(again, key=search.score)
+    return found
 
 
 def _promised(search: BoxSearch, without: BoxModel, best: BoxFit, others: Sequence[BoxEffect]) -> Sequence[Promise]:
