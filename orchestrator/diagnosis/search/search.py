@@ -12,6 +12,7 @@ from functools import partial
 
 from orchestrator.diagnosis.proof.horizons import horizons
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
+from orchestrator.diagnosis.search.confirmed import is_confirmed
 from orchestrator.diagnosis.search.finer import Finer, is_timed
 from orchestrator.diagnosis.search.fits import Fits, Guesses, TimeUpError
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
@@ -203,7 +204,11 @@ class Search(Fits):
         Returns:
             True when it does.
         """
-        return self.pays(candidate, current, base) and candidate.holds_over(current)
+        if not self.pays(candidate, current, base):
+            return False
+        if candidate.holds_over(current):
+            return True
+        return is_noise(self.likelihood, candidate.fit, self.parts) and self.confirms(candidate, current)
 
     def pays(self, candidate: Candidate, current: Candidate, base: Candidate) -> bool:
         """Tell whether a candidate gains enough over the model before it; the less so the surer noise alone is left.
@@ -218,7 +223,22 @@ class Search(Fits):
         """
         if candidate.pays_over(current, base):
             return True
-        return candidate.pays_over(current, base, noise=True) and is_noise(self.likelihood, candidate.fit, self.parts)
+        if not candidate.pays_over(current, base, noise=True, confirmed=True):
+            return False
+        left_noise = is_noise(self.likelihood, candidate.fit, self.parts)
+        return left_noise and (candidate.pays_over(current, base, noise=True) or self.confirms(candidate, current))
+
+    def confirms(self, candidate: Candidate, current: Candidate) -> bool:
+        """Tell whether the deciding part, asked by itself, has as much of a candidate's last effect.
+
+        Args:
+            candidate: a fitted model.
+            current: the model before.
+
+        Returns:
+            True when it has.
+        """
+        return is_confirmed(self.likelihood, candidate.fit, current.fit, self.parts)
 
     def shows(self, candidate: Candidate, current: Candidate) -> bool:
         """Tell whether a candidate that gains less predicts so much better that it may be named for that.
