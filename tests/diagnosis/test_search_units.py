@@ -136,6 +136,19 @@ def test_which_effects_may_be_added() -> None:
     assert "gravity_load@load" not in labels(replace(search, model=metric).eligible(BASE))
 
 
+def test_torques_act_early_or_late_never_both() -> None:
+    """A mean of two requests beside a dead time is no finding: the two differ within a sample, and only there."""
+    likelihood, _ = drivetrain_likelihood(40)
+    search = Search(likelihood, default_model(), PARTS, most=4)
+    bank = {effect.label: effect for effect in likelihood.plant.bank}
+    timed = {"early_torque@log", "input_delay@actuator"}
+    assert timed < labels(search.eligible(BASE))
+    for label in timed:
+        assert not timed & labels(search.eligible(candidate(0, 0, bank[label])))
+        assert {"late_load@log", "drive_filter@actuator"} < labels(search.eligible(candidate(0, 0, bank[label])))
+    assert timed < labels(search.eligible(candidate(0, 0, LATE_LOAD)))
+
+
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 @pytest.mark.parametrize(("back", "alone"), [(0.5, True), (2.0, False)])
 def test_a_motor_that_hardly_turns_back_turns_one_way(sign: float, back: float, alone: bool) -> None:
