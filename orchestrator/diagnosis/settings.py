@@ -141,7 +141,7 @@ class SearchSettings(Settings, frozen=True):
         float, setting("and its gain per parameter where it is fitted: chance reaches it once in 100")
     ] = 3.5
     shown: Annotated[float, share("share of the squared long-run error that such an effect must remove")] = 0.5
-    least_errors: Annotated[float, setting("standard errors by which a named size must differ from zero")] = 2.0
+    least_errors: Annotated[float, setting("standard errors between a named size and zero; parts agree within")] = 2.0
     one_way: Annotated[float, share("share of the travel that a machine may go back and still go one way")] = 1e-3
     most_friction: Annotated[float, setting("dry friction over the largest torque: with more nothing moves")] = 1.0
     most_torque: Annotated[float, setting("other torques over the largest that was asked for")] = 5.0

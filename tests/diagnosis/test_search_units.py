@@ -14,6 +14,7 @@ from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Guess
 from orchestrator.diagnosis.search.search import Search
 from orchestrator.plants.effects import Effect
+from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD
 from orchestrator.records.columns import Column
 from orchestrator.records.model_file import default_model
 from orchestrator.shared.stopwatch import Stopwatch
@@ -133,6 +134,19 @@ def test_which_effects_may_be_added() -> None:
     assert not in_metres(search.model)
     assert not in_metres(replace(search.model, columns={"theta_m": Column("x", "deg")}))
     assert "gravity_load@load" not in labels(replace(search, model=metric).eligible(BASE))
+
+
+def test_torques_act_early_or_late_never_both() -> None:
+    """A mean of two requests beside a dead time is no finding: the two differ within a sample, and only there."""
+    likelihood, _ = drivetrain_likelihood(40)
+    search = Search(likelihood, default_model(), PARTS, most=4)
+    bank = {effect.label: effect for effect in likelihood.plant.bank}
+    timed = {"early_torque@log", "input_delay@actuator"}
+    assert timed < labels(search.eligible(BASE))
+    for label in timed:
+        assert not timed & labels(search.eligible(candidate(0, 0, bank[label])))
+        assert {"late_load@log", "drive_filter@actuator"} < labels(search.eligible(candidate(0, 0, bank[label])))
+    assert timed < labels(search.eligible(candidate(0, 0, LATE_LOAD)))
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
@@ -298,6 +312,33 @@ def test_an_effect_is_judged_against_the_best_fit_without_it(friction) -> None:
     assert search.against_its_like(refused, base) is refused
     assert search.known(best.effects)
     assert not search.known((FRICTION, STRIBECK))
+
+
+def test_a_law_leaves_nothing_of_what_a_shift_of_the_log_gains() -> None:
+    """Beside a shift that gains 1750 a resonance that gains 14 is no rest of it; beside friction it may be one."""
+    likelihood, p = drivetrain_likelihood(40)
+    bank = {effect.label: effect for effect in likelihood.plant.bank}
+    friction, resonance = bank["coulomb_friction@motor"], bank["extra_resonance@load"]
+    assert LATE_LOAD.leaves == 0.0 < EARLY_TORQUE.leaves
+
+    def of(gain: float, *effects) -> Candidate:
+        found = Fit(p, 1e-5, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.67 * gain, 0.33 * gain)
+        return Candidate(effects, found, SEARCH)
+
+    base, shift = of(0.0), of(1750.0, LATE_LOAD)
+    search = Search(likelihood, default_model(), Parts(slice(10, 20), slice(20, 30), slice(30, 40)), most=4)
+    assert search.before_laws(base, base) is base
+    assert search.before_laws(shift, base) is shift
+    assert of(1781.0, LATE_LOAD, resonance).pays_over(shift, search.before_laws(shift, base))
+    early = of(1750.0, EARLY_TORQUE)
+    assert search.before_laws(early, base) is base
+    assert not of(1781.0, EARLY_TORQUE, resonance).pays_over(early, base)
+    both = of(2000.0, LATE_LOAD, friction)
+    assert search.before_laws(both, base) is base  # the shift alone was not met
+    search.steps = [ForwardStep(base, (shift, of(1000.0, friction)), True)]
+    assert search.before_laws(both, base) is shift
+    assert of(2040.0, LATE_LOAD, friction, resonance).pays_over(both, shift)  # 4 % of 250
+    assert not of(2040.0, LATE_LOAD, friction, resonance).pays_over(both, base)
 
 
 def test_a_law_that_contains_another_is_tried_where_that_pays(friction) -> None:

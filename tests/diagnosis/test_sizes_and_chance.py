@@ -8,6 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
+from orchestrator.diagnosis.fit.runs import Run, in_parts
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.fit.slope import Free
@@ -373,6 +374,24 @@ def test_a_shifted_log_is_put_right() -> None:
     assert np.array_equal(found.y[:, 0], signals.y[:, 0])
     assert found.u[196:200].tolist() == [1.0, 1.5, 3.0, 3.0]
     assert found.u.sum() == pytest.approx(signals.u.sum() + 2.25 * 2.0)
+
+
+@pytest.mark.parametrize("late", [2.6, -2.6])
+@pytest.mark.parametrize("records", [1, 2])
+def test_a_load_that_is_read_beyond_the_ends_of_its_record_goes_on(late: float, records: int) -> None:
+    """Held where it was, it stands still in its last rows: innovations of hundreds of deviations, and no noise left."""
+    t = np.arange(400)
+    load, h = np.sin(0.02 * (t - late)), 0.005
+    y, u = np.column_stack([np.sin(0.02 * t), load]), np.ones(400)
+    noise = np.full(2, 1e-4)
+    rows, order = in_parts([400] * records, [(200, 300)] * records)
+    runs = tuple(Run(own, noise, "") for own in rows) if records > 1 else ()
+    signals = Signals(np.tile(y, (records, 1))[order], np.tile(u, records)[order], h, 2, noise, 1.0, runs)
+    p = PLANT.extended([entry.default for entry in PLANT.table])
+    p[PLANT.index(SHIFT.name)] = late * h
+    found = signals.aligned(PLANT, p).y[:, 1]
+    for own in rows:
+        assert found[own] == pytest.approx(np.sin(0.02 * t), abs=1e-4)
 
 
 def test_one_gain_is_likelier_than_many_values_off_by_one_factor() -> None:

@@ -105,14 +105,24 @@ class Signals:
     def _earlier_load(self, samples: float) -> Array:
         """Return the angles (n, 2), the load's read ``samples`` later.
 
-        Whole samples are moved; the rest follows a smoothed motion, so that the noise of a sample stays as it is.
+        Whole samples are moved; the rest follows a smoothed motion, so that the noise of a sample stays as it is. What
+        is read beyond the record's ends goes on as the motion does there.
         """
         if samples == 0.0:
             return self.y
         whole = round(samples)
-        rest, (one, two) = samples - whole, self._motion
-        load = self.y[:, 1] + rest * one + 0.5 * rest**2 * two
-        load = self._each(load, lambda y: y[np.clip(np.arange(y.size) + whole, 0, y.size - 1)])
+
+        def inside(size: int) -> NDArray[np.int64]:
+            return np.clip(np.arange(size) + whole, 0, size - 1)
+
+        def beyond(own: Array) -> Array:
+            return (np.arange(own.size) + whole - inside(own.size)).astype(float)
+
+        rest = samples - whole + self._each(self.u, beyond)
+        angle, one, two = (
+            self._each(values, lambda own: own[inside(own.size)]) for values in (self.y[:, 1], *self._motion)
+        )
+        load = angle + rest * one + 0.5 * rest**2 * two
         return np.ascontiguousarray(np.column_stack([self.y[:, 0], load]))
 
 

@@ -14,6 +14,7 @@ from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.search.candidate import Candidate, annealed, best_settled
+from orchestrator.diagnosis.search.model_space import is_of_torques_time
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Screen
 from orchestrator.plants.description import Plant
@@ -53,7 +54,7 @@ def _shifts(likelihood: RecordLikelihood, model: Fit) -> list[Effect]:
     plant = likelihood.plant
     taken = {entry.place for entry in model.free}
     seen = [one for one in of_the_log(plant) if not one.both_encoders or likelihood.signals.channels > 1]
-    timing = [one for one in seen if not one.both_encoders]
+    timing = [one for one in seen if is_of_torques_time(plant, one)]
     fixed = any(place in taken for one in timing for place in one.places(plant).values())
     return [
         one for one in seen
@@ -105,7 +106,7 @@ def of_the_log(plant: Plant) -> list[Effect]:
     Returns:
         The effects, of its bank.
     """
-    return [one for one in plant.bank if one.measurement or plant.drive.delay in one.parameters.values()]
+    return [one for one in plant.bank if one.measurement or is_of_torques_time(plant, one)]
 
 
 def free_of(likelihood: RecordLikelihood, effect: Effect, scene: Scene) -> Sequence[Free]:

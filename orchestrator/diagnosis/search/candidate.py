@@ -88,7 +88,9 @@ class Candidate:
         """
         return self.score - other.score
 
-    def pays_over(self, other: "Candidate", base: "Candidate", noise: bool = False) -> bool:
+    def pays_over(
+        self, other: "Candidate", base: "Candidate", noise: bool = False, confirmed: bool = False
+    ) -> bool:  # fmt: skip
         """Tell whether this model, which has more effects than ``other``, earns them on both parts.
 
         The gain must also be more than what the laws of the effects before may leave of what those have gained over
@@ -99,6 +101,7 @@ class Candidate:
             other: the model before.
             base: the model without effects.
             noise: what this model leaves is known to be noise, of whatever colour.
+            confirmed: both parts are known to ask for as much of the last effect; what they gain together counts then.
 
         Returns:
             True when it does.
@@ -110,7 +113,8 @@ class Candidate:
         pays = settings.pays if noise or self.fit.q <= settings.noise_alone else settings.pays_above_noise
         least_decided = settings.least_decided_of_noise if noise else settings.least_decided
         least = max(pays, left * (other.fit.fitted + other.fit.validated - base.fit.fitted - base.fit.validated))
-        return self.gain_over(other) > least and fitted > more and decided > least_decided
+        on_both = confirmed or (fitted > more and decided > least_decided)
+        return self.gain_over(other) > least and on_both
 
     def nearly_pays_over(self, other: "Candidate") -> bool:
         """Tell whether this model earns its parameters on either part, so that predictions may decide.

@@ -56,11 +56,13 @@ class ModelSpace:
         present = {effect.label for effect in current.effects}
         replaced = {effect.needs for effect in current.effects}
         one_way = self.one_way
+        timed = any(is_of_torques_time(self.plant, effect) for effect in current.effects)
         for effect in self.plant.bank:
             if effect.needs or (effect.angular and in_metres(self.model)):
                 continue
             blind = effect.both_encoders and self.likelihood.signals.channels < 2
             alike = one_way and effect.name in ALIKE_ONE_WAY
+            alike = alike or (timed and is_of_torques_time(self.plant, effect))  # early or late, never both
             if effect.label not in present | replaced and not blind and not alike:
                 yield effect
 
@@ -151,6 +153,20 @@ class ModelSpace:
             The candidate.
         """
         return Candidate(effects, fitted, self.settings)
+
+
+def is_of_torques_time(plant: Plant, effect: Effect) -> bool:
+    """Tell whether an effect says by how much torques act before their stamps, or after them.
+
+    Args:
+        plant: the plant.
+        effect: of its bank.
+
+    Returns:
+        True when it does.
+    """
+    stamped = effect.measurement and not effect.both_encoders
+    return stamped or plant.drive.delay in effect.parameters.values()
 
 
 def in_metres(model: Model) -> bool:

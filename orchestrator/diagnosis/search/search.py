@@ -12,6 +12,7 @@ from functools import partial
 
 from orchestrator.diagnosis.proof.horizons import horizons
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
+from orchestrator.diagnosis.search.confirmed import is_confirmed
 from orchestrator.diagnosis.search.finer import Finer, is_timed
 from orchestrator.diagnosis.search.fits import Fits, Guesses, TimeUpError
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
@@ -137,6 +138,7 @@ class Search(Fits):
         Returns:
             What was tried and what was accepted.
         """
+        base = self.before_laws(current, base)
         scene, guesses = self.screen(current)
         begun = self.each(lambda pair: self.begin(current, *pair, scene), guesses)
         least = self.settings.followed * max((one.gain_over(current) for one in begun), default=0.0)
@@ -151,6 +153,23 @@ class Search(Fits):
         shown = next((c for c in found if self.shows(c, current)), None)
         first = [] if shown is None else [shown]
         return ForwardStep(current, (*first, *(c for c in found if c is not shown)), bool(first))
+
+    def before_laws(self, current: Candidate, base: Candidate) -> Candidate:
+        """Return the model that what ``current`` has gained is counted from, where exact effects have gained of it.
+
+        What a shift of the log gains is no law's, and leaves nothing for other effects to gain.
+
+        Args:
+            current: the model to build on.
+            base: the model without effects.
+
+        Returns:
+            The best model met that has the exact effects of ``current`` alone; ``base`` where there is none.
+        """
+        exact = [effect for effect in current.effects if effect.leaves == 0.0]
+        if len(exact) == len(current.effects):
+            return current
+        return max([base, *self.known(exact)], key=lambda candidate: candidate.score) if exact else base
 
     def against_its_like(self, step: ForwardStep, base: Candidate) -> ForwardStep:
         """Return an accepted step judged against the model before it, fitted again from where its effect has led.
@@ -171,7 +190,7 @@ class Search(Fits):
         again = self.reduced(first, scene_of(self.likelihood, first.fit), first.effects[-1])
         if again.gain_over(before) < self.likelihood.settings.fit.enough:
             return step
-        own = base if before.effects else again
+        own = self.before_laws(again, base)
         return ForwardStep(again, step.candidates, self.earns(first, again, own) or self.shows(first, again))
 
     def earns(self, candidate: Candidate, current: Candidate, base: Candidate) -> bool:
@@ -185,7 +204,11 @@ class Search(Fits):
         Returns:
             True when it does.
         """
-        return self.pays(candidate, current, base) and candidate.holds_over(current)
+        if not self.pays(candidate, current, base):
+            return False
+        if candidate.holds_over(current):
+            return True
+        return is_noise(self.likelihood, candidate.fit, self.parts) and self.confirms(candidate, current)
 
     def pays(self, candidate: Candidate, current: Candidate, base: Candidate) -> bool:
         """Tell whether a candidate gains enough over the model before it; the less so the surer noise alone is left.
@@ -200,7 +223,22 @@ class Search(Fits):
         """
         if candidate.pays_over(current, base):
             return True
-        return candidate.pays_over(current, base, noise=True) and is_noise(self.likelihood, candidate.fit, self.parts)
+        if not candidate.pays_over(current, base, noise=True, confirmed=True):
+            return False
+        left_noise = is_noise(self.likelihood, candidate.fit, self.parts)
+        return left_noise and (candidate.pays_over(current, base, noise=True) or self.confirms(candidate, current))
+
+    def confirms(self, candidate: Candidate, current: Candidate) -> bool:
+        """Tell whether the deciding part, asked by itself, has as much of a candidate's last effect.
+
+        Args:
+            candidate: a fitted model.
+            current: the model before.
+
+        Returns:
+            True when it has.
+        """
+        return is_confirmed(self.likelihood, candidate.fit, current.fit, self.parts)
 
     def shows(self, candidate: Candidate, current: Candidate) -> bool:
         """Tell whether a candidate that gains less predicts so much better that it may be named for that.
@@ -396,7 +434,7 @@ class Search(Fits):
         Returns:
             The candidate that is left.
         """
-        scene = scene_of(self.likelihood, current.fit)
+        scene, base = scene_of(self.likelihood, current.fit), self.before_laws(current, base)
         while len(current.effects) > 1:
             reduced = self.each(partial(self.reduced, current, scene), current.effects[:-1])
             best = max(reduced, key=lambda candidate: candidate.score)
