@@ -162,7 +162,7 @@ def _anew(
 ) -> dict[str, BoxFit]:
     """Return fits of the best model with rivals in the place of ``effect``, beside those that are known.
 
-    Beside noise at the ports a fit may have ended elsewhere: what would do the same is a start then, of known ones, too.
+    Beside noise at the ports a fit may have ended elsewhere: what would do the same is a start then, too.
     """
     noisy = search.fitter.ladder.share(best.level) > search.settings.quiet
     if noisy:
