@@ -24,6 +24,7 @@ from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import RestSettings
+from orchestrator.diagnosis.blackbox.sites import alike_one_way
 from orchestrator.diagnosis.blackbox.verdict import recovered
 from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows, on_finer_steps
 
@@ -113,6 +114,11 @@ def judged(
         if fewer is not None:
             others = families[:nothing] + families[nothing + 1 :]
             return judged(problem, probe, search, base, fitter.settled(fewer), others, begun, settings)
+    one_way = alike_one_way(problem)
+    families = tuple(
+        tuple(dict.fromkeys((*family, *one_way.get(effect.label, ()))))
+        for effect, family in zip(best.model.effects, families, strict=True)
+    )
     stages = _stages(problem, base, last)
     on_held_out = held_out(problem, stages, fitter.parts.held_out, settings)
     verdict, rest = _verdict(search, last, rest, on_held_out, settings)

@@ -257,6 +257,9 @@ class PlaceSettings(Settings, frozen=True):
     starts_off: Annotated[float, share("of its rms by which an input starts away from zero to be tried from both")] = (
         1e-3
     )
+    one_way: Annotated[
+        float, share("of a port's travel that it may go back, and still turns one way: friction is a load then")
+    ] = 0.01
     least_phase: Annotated[float, setting("radians of a ripple within the motion, from which it is no spring")] = 4.0
     most_cycles: Annotated[int, setting("wavenumbers that are looked through", ge=1)] = 500
     once: Annotated[float, share("of a turn by which a ripple must differ from gravity, which comes once a turn")] = (

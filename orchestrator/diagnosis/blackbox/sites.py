@@ -15,6 +15,9 @@ from orchestrator.diagnosis.blackbox.bank import (
 from orchestrator.diagnosis.blackbox.followed import Motion, measured_motions
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
 
+EFFORTS = ("N.m", "N")
+"""Units of efforts that dry friction has."""
+
 Array = NDArray[np.float64]
 
 ANGLES = ("rad", "deg", "")
@@ -77,7 +80,43 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
         )
         kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
         found += [BoxEffect(kind, name, scene) for kind in kinds]
+    alike = alike_one_way(problem)
+    left_out = {label for labels in alike.values() for label in labels}
+    found = [effect for effect in found if effect.label not in left_out]
     return [*found, *_of_parameters(problem), *_of_cuts(problem, nominal)]
+
+
+def alike_one_way(problem: BoxProblem) -> dict[str, tuple[str, ...]]:
+    """Return the effects that do what dry friction does, by its label, at ports that turn one way in all of the record.
+
+    Every machine has friction: it stands for all of them.
+
+    Args:
+        problem: the FMU and the record.
+
+    Returns:
+        Labels of a constant effort, of what grows with speed in one direction, and of an input that drives one way too
+        and loses as much.
+    """
+    found = {}
+    for name, port in problem.map.ports.items():
+        unit = problem.units.get(port.input)
+        if unit not in EFFORTS or port.position not in problem.outputs:
+            continue
+        x = problem.data.outputs[:, problem.outputs.index(port.position)]
+        back = min(float(np.max(np.maximum.accumulate(s * x) - s * x)) for s in (1.0, -1.0))
+        if back > problem.settings.place.one_way * float(np.ptp(x)):
+            continue
+        driven = [
+            given
+            for given, u in zip(problem.inputs, problem.data.inputs.T, strict=True)
+            if problem.units.get(given) == unit and (np.all(u >= 0.0) or np.all(u <= 0.0))
+        ]
+        here = [f"{kind}@{name}" for kind in ("load", "directional_friction")]
+        found[f"coulomb_friction@{name}"] = (
+            *here, *(f"{kind}@{given}" for given in driven for kind in ("input_offset", "input_dead_zone"))
+        )  # fmt: skip
+    return found
 
 
 def _of_parameters(problem: BoxProblem) -> list[BoxEffect]:
