@@ -314,31 +314,17 @@ def test_an_effect_is_judged_against_the_best_fit_without_it(friction) -> None:
     assert not search.known((FRICTION, STRIBECK))
 
 
-def test_a_law_leaves_nothing_of_what_a_shift_of_the_log_gains() -> None:
-    """Beside a shift that gains 1750 a resonance that gains 14 is no rest of it; beside friction it may be one."""
-    likelihood, p = drivetrain_likelihood(40)
-    bank = {effect.label: effect for effect in likelihood.plant.bank}
+def test_a_shift_between_the_encoders_leaves_nothing_for_others_to_gain() -> None:
+    """Beside a shift that gains 1750 a resonance that gains 16 is no rest of it; beside a law it may be one."""
+    bank = {effect.label: effect for effect in drivetrain_likelihood(40)[0].plant.bank}
     friction, resonance = bank["coulomb_friction@motor"], bank["extra_resonance@load"]
-    assert LATE_LOAD.leaves == 0.0 < EARLY_TORQUE.leaves
 
-    def of(gain: float, *effects) -> Candidate:
-        found = Fit(p, 1e-5, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.67 * gain, 0.33 * gain)
-        return Candidate(effects, found, SEARCH)
+    def of(gain: float, *effects: Effect) -> Candidate:
+        return candidate(0.67 * gain, 0.33 * gain, *effects)
 
-    base, shift = of(0.0), of(1750.0, LATE_LOAD)
-    search = Search(likelihood, default_model(), Parts(slice(10, 20), slice(20, 30), slice(30, 40)), most=4)
-    assert search.before_laws(base, base) is base
-    assert search.before_laws(shift, base) is shift
-    assert of(1781.0, LATE_LOAD, resonance).pays_over(shift, search.before_laws(shift, base))
-    early = of(1750.0, EARLY_TORQUE)
-    assert search.before_laws(early, base) is base
-    assert not of(1781.0, EARLY_TORQUE, resonance).pays_over(early, base)
-    both = of(2000.0, LATE_LOAD, friction)
-    assert search.before_laws(both, base) is base  # the shift alone was not met
-    search.steps = [ForwardStep(base, (shift, of(1000.0, friction)), True)]
-    assert search.before_laws(both, base) is shift
-    assert of(2040.0, LATE_LOAD, friction, resonance).pays_over(both, shift)  # 4 % of 250
-    assert not of(2040.0, LATE_LOAD, friction, resonance).pays_over(both, base)
+    for first, pays in ((LATE_LOAD, True), (EARLY_TORQUE, False), (friction, False)):
+        assert of(1781.0, first, resonance).pays_over(of(1750.0, first), BASE) is pays
+    assert not of(2040.0, LATE_LOAD, friction, resonance).pays_over(of(2000.0, LATE_LOAD, friction), BASE)
 
 
 def test_a_law_that_contains_another_is_tried_where_that_pays(friction) -> None:

@@ -138,7 +138,6 @@ class Search(Fits):
         Returns:
             What was tried and what was accepted.
         """
-        base = self.before_laws(current, base)
         scene, guesses = self.screen(current)
         begun = self.each(lambda pair: self.begin(current, *pair, scene), guesses)
         least = self.settings.followed * max((one.gain_over(current) for one in begun), default=0.0)
@@ -153,23 +152,6 @@ class Search(Fits):
         shown = next((c for c in found if self.shows(c, current)), None)
         first = [] if shown is None else [shown]
         return ForwardStep(current, (*first, *(c for c in found if c is not shown)), bool(first))
-
-    def before_laws(self, current: Candidate, base: Candidate) -> Candidate:
-        """Return the model that what ``current`` has gained is counted from, where exact effects have gained of it.
-
-        What a shift of the log gains is no law's, and leaves nothing for other effects to gain.
-
-        Args:
-            current: the model to build on.
-            base: the model without effects.
-
-        Returns:
-            The best model met that has the exact effects of ``current`` alone; ``base`` where there is none.
-        """
-        exact = [effect for effect in current.effects if effect.leaves == 0.0]
-        if len(exact) == len(current.effects):
-            return current
-        return max([base, *self.known(exact)], key=lambda candidate: candidate.score) if exact else base
 
     def against_its_like(self, step: ForwardStep, base: Candidate) -> ForwardStep:
         """Return an accepted step judged against the model before it, fitted again from where its effect has led.
@@ -190,7 +172,7 @@ class Search(Fits):
         again = self.reduced(first, scene_of(self.likelihood, first.fit), first.effects[-1])
         if again.gain_over(before) < self.likelihood.settings.fit.enough:
             return step
-        own = self.before_laws(again, base)
+        own = base if before.effects else again
         return ForwardStep(again, step.candidates, self.earns(first, again, own) or self.shows(first, again))
 
     def earns(self, candidate: Candidate, current: Candidate, base: Candidate) -> bool:
@@ -434,7 +416,7 @@ class Search(Fits):
         Returns:
             The candidate that is left.
         """
-        scene, base = scene_of(self.likelihood, current.fit), self.before_laws(current, base)
+        scene = scene_of(self.likelihood, current.fit)
         while len(current.effects) > 1:
             reduced = self.each(partial(self.reduced, current, scene), current.effects[:-1])
             best = max(reduced, key=lambda candidate: candidate.score)
