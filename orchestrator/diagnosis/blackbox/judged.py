@@ -1,7 +1,7 @@
 """What a search comes to: verdict, effects with their sizes, parameters, misfit on data that no fit has seen."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from orchestrator.diagnosis.blackbox.estimates import (
     estimates_of,
     misfits,
 )
+from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.held_out import HeldOut, held_out
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
@@ -114,6 +115,10 @@ def judged(
         if fewer is not None:
             others = families[:nothing] + families[nothing + 1 :]
             return judged(problem, probe, search, base, fitter.settled(fewer), others, begun, settings)
+    if not rest.nothing_missing and len(best.model.effects) > 1:
+        for k, fewer in _with_one_less(problem, fitter, base, best, settings):
+            others = families[:k] + families[k + 1 :]
+            return judged(problem, probe, search, base, fewer, others, begun, settings)
     one_way = alike_one_way(problem)
     families = tuple(
         tuple(dict.fromkeys((*family, *one_way.get(effect.label, ()))))
@@ -137,6 +142,22 @@ def judged(
         _warned(probe, search, verdict, best, share), base.model, problem, stages, search,
         time.monotonic() - begun, problem.runner.runs,
     )  # fmt: skip
+
+
+def _with_one_less(
+    problem: BoxProblem, fitter: Fitter, base: BoxFit, best: BoxFit, settings: RestSettings
+) -> Iterator[tuple[int, BoxFit]]:
+    """Yield fits that stand by what they do to unseen data without one of their effects, and its place, latest first.
+
+    Where more than noise is left, what pays may follow what no law explains: nothing is named that is not needed.
+    """
+    for k in reversed(range(len(best.model.effects))):
+        fewer = fitter.fit(best.model.without(best.model.effects[k].label), best.level)
+        if fewer is None:
+            continue
+        stages = _stages(problem, base, fewer)
+        if held_out(problem, stages, fitter.parts.held_out, settings).shows(settings):
+            yield k, fewer
 
 
 def _stages(problem: BoxProblem, base: BoxFit, last: BoxFit) -> tuple[Array, Array, Array]:
