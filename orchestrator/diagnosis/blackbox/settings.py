@@ -69,6 +69,12 @@ class BoxSearchSettings(Settings, frozen=True):
             ge=0,
         ),
     ] = 3
+    rivals_beside_noise: Annotated[
+        int, setting("the same beside noise at the ports, where a fit's end says less of who rivals", ge=0)
+    ] = 6
+    rival_starts: Annotated[
+        int, setting("starts of each then: where its own fit ended, and what it promises in that place", ge=1)
+    ] = 2
     noise_margin: Annotated[
         float, setting("standard deviations of pure noise's log-likelihood within which a record is explained")
     ] = 4.0

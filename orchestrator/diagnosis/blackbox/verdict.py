@@ -17,9 +17,6 @@ from orchestrator.diagnosis.blackbox.steps import labels
 
 Array = NDArray[np.float64]
 
-AS_PROMISED = 2
-"""Starts of a rival, in all: where its own fit ended, and the best promise in the place of what it rivals."""
-
 
 def stand_in(search: BoxSearch, best: BoxFit, settings: RestSettings = DEFAULT.rest) -> str:
     """Return the first effect without which little more noise is needed at the ports; empty where there is none.
@@ -165,17 +162,18 @@ def _anew(
     Beside noise at the ports a fit may have ended elsewhere: what would do the same is a start then, too.
     """
     noisy = search.fitter.ladder.share(best.level) > search.settings.quiet
+    most = search.settings.rivals_beside_noise if noisy else search.settings.rivals
     if noisy:
         rivals = sorted((*rivals, *near.values()), key=search.score, reverse=True)
     others: dict[str, tuple[BoxEffect, list[Array]]] = {}
     for fit in rivals:
         other = next(e for e in reversed(fit.model.effects) if e.label not in labels(best) - {effect.label})
         known = noisy or other.label not in near
-        if known and other.label not in others and len(others) < search.settings.rivals * (AS_PROMISED if noisy else 1):
+        if known and other.label not in others and len(others) < most:
             others[other.label] = other, [fit.model.values[fit.model.effects.index(other)]]
     without, found = best.model.without(effect.label), dict(near)
     for promise in _promised(search, without, best, [other for other, _ in others.values()]) if noisy else ():
-        if len(others[promise.effect.label][1]) < AS_PROMISED:
+        if len(others[promise.effect.label][1]) < search.settings.rival_starts:
             others[promise.effect.label][1].append(promise.values)
     for other, starts in others.values():
         fits = [search.fitter.fit(without.extended(other, other.bounded(values)), best.level) for values in starts]
