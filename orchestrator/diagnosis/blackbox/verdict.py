@@ -13,9 +13,12 @@ from orchestrator.diagnosis.blackbox.promises import Promise
 from orchestrator.diagnosis.blackbox.screening import screened
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, RestSettings
+from orchestrator.diagnosis.blackbox.sites import EFFORTS
 from orchestrator.diagnosis.blackbox.steps import labels
 
 Array = NDArray[np.float64]
+LIKE_FRICTION = ("input_dead_zone", "input_offset", "load")
+"""Effects that take a constant effort away as dry friction does, while the motion does not turn."""
 
 
 def stand_in(search: BoxSearch, best: BoxFit, settings: RestSettings = DEFAULT.rest) -> str:
@@ -113,7 +116,26 @@ def settled_names(search: BoxSearch, best: BoxFit) -> tuple[BoxFit, tuple[tuple[
             if other and best.total - search.fitter.settled(fit).total < own.family:
                 others = (*others, last.label)
         found.append(others)
+    for k, near in enumerate(beside):
+        usual = _friction_for(search, best, k, near)
+        if usual is not None:
+            label = usual.model.effects[-1].label
+            own_family = (best.model.effects[k].label, *(one for one in found[k] if one != label))
+            return usual, (*found[:k], *found[k + 1 :], own_family)
     return best, tuple(found)
+
+
+def _friction_for(search: BoxSearch, best: BoxFit, k: int, near: dict[str, BoxFit]) -> BoxFit | None:
+    """Return the fit with dry friction in the place of what the record does not tell from it: every machine has it."""
+    if best.model.effects[k].kind.name not in LIKE_FRICTION:
+        return None
+    for fit in near.values():
+        last = fit.model.effects[-1]
+        if last.kind.name == "coulomb_friction" and best.total - fit.total < search.settings.family:
+            problem = search.fitter.problem
+            unit = problem.units.get(problem.map.ports[last.place].input)
+            return fit if not unit or unit in EFFORTS else None
+    return None
 
 
 def _alone(search: BoxSearch, best: BoxFit) -> BoxFit:

@@ -112,7 +112,7 @@ def test_beside_noise_a_rival_starts_from_what_it_promises_too(monkeypatch) -> N
     promise = SimpleNamespace(effect=at("coulomb_friction"), values=np.array([0.04, 0.01]))
     monkeypatch.setattr("orchestrator.diagnosis.blackbox.verdict._promised", lambda *given: [promise])
 
-    def told(share: float) -> tuple[tuple[str, ...], ...]:
+    def told(share: float, unit: str = "N.m") -> tuple[tuple[str, ...], ...]:
         found = search({}, share=share)
         found.earlier = (step,)
 
@@ -121,7 +121,10 @@ def test_beside_noise_a_rival_starts_from_what_it_promises_too(monkeypatch) -> N
             return BoxFit(model, 0, NONE, -11.0 if led else -300.0, 0.0, 0.0, NONE)
 
         found.fitter.fit = fitted
+        ports = {"p": SimpleNamespace(input="u")}
+        found.fitter.problem = SimpleNamespace(units={"u": unit}, map=SimpleNamespace(ports=ports))
         return settled_names(found, best)[1]
 
-    assert told(0.02) == (("coulomb_friction@p",),)
     assert told(0.0) == ((),)
+    assert told(0.02, unit="W") == (("coulomb_friction@p",),)  # heat has no friction
+    assert told(0.02) == (("input_offset@p",),)  # every machine has: it stands for the offset
