@@ -5,7 +5,9 @@
 It is built with PythonFMU into each corrected system.
 """
 
+from collections.abc import Mapping
 from math import exp
+from xml.etree.ElementTree import Element
 
 from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
 
@@ -50,6 +52,20 @@ class AttachedEffect(Fmi2Slave):
         self._steps, self._built, self._x, self._v, self._held = 0, 0.0, 0.0, 0.0, 0.0
         self._past: list[float] = []
         self._fed = (0.0, 0.0)
+
+    def to_xml(self, model_options: Mapping[str, str] | None = None) -> Element:
+        """Return the model description: what arrives is computed over a step and follows no input at once.
+
+        Args:
+            model_options: of PythonFMU.
+
+        Returns:
+            Its root.
+        """
+        root = super().to_xml({} if model_options is None else model_options)
+        for unknown in root.iterfind("ModelStructure/Outputs/Unknown"):
+            unknown.set("dependencies", "")
+        return root
 
     def exit_initialization_mode(self) -> None:
         """Start anew."""

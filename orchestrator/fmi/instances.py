@@ -20,13 +20,14 @@ class FmuFactory:
         return FmuSlave(name, self.path, self.description)
 
 
-def fmu_instance(name: str, path: Path, start: Start | None = None) -> Instance:
+def fmu_instance(name: str, path: Path, start: Start | None = None, solver_tolerance: float | None = None) -> Instance:
     """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
 
     Args:
         name: of the instance.
         path: the FMU's file or the folder of an unpacked one.
         start: values by variable name.
+        solver_tolerance: relative tolerance for the FMU's own solver; None: its default.
 
     Returns:
         The instance, whose slave is made when a session needs it.
@@ -35,4 +36,4 @@ def fmu_instance(name: str, path: Path, start: Start | None = None) -> Instance:
         FmuError: see ``read_description``.
     """
     description = read_description(path)
-    return Instance(name, description.model, FmuFactory(path, description), start or {})
+    return Instance(name, description.model, FmuFactory(path, description), start or {}, solver_tolerance)

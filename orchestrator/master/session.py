@@ -172,13 +172,14 @@ class Session:
         return values
 
     def _initialise(self, wiring: Wiring, values: Mapping[str, Mapping[str, Value]], table: Array) -> None:
+        tolerances = {instance.name: instance.solver_tolerance for instance in self.system.instances}
         for stage in wiring.stages:
             slave, name = stage.slave, stage.block.name
             if name in self._used:
                 slave.reset()
             if values[name]:
                 slave.set(values[name])
-            slave.begin(self.start, self.stop, None)
+            slave.begin(self.start, self.stop, tolerances[name])
         initialise(wiring, self._cut, table, INITIAL_TOLERANCE, INITIAL_PASSES)
         for stage in wiring.stages:
             stage.slave.start()

@@ -32,12 +32,14 @@ class Instance:
         model: its interface.
         create: makes the slave, given the instance's name.
         start: parameters and start values by variable name.
+        solver_tolerance: relative tolerance for the slave's own solver; None: its default.
     """
 
     name: str
     model: ModelInterface
     create: Callable[[str], Slave]
     start: Start = field(default_factory=dict)
+    solver_tolerance: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,6 +65,7 @@ class _Quantity(_Strict, frozen=True, kw_only=True):
 class _Instance(_Strict, frozen=True, kw_only=True):
     fmu: str
     parameters: dict[str, Any] = {}
+    solver_tolerance: float | None = None
 
 
 class _Connection(_Strict, frozen=True, kw_only=True):
@@ -254,8 +255,9 @@ class _Reader:
                 parameter = self._parameter(value, f"{path}.parameters.{key}")
                 if parameter is not None:
                     start[key] = parameter
+            self._bounded(instance, "solver_tolerance", path, lambda x: 0.0 < x < 1.0, "above 0 and below 1")
             try:
-                found.append(fmu_instance(name, self._fmu(instance.fmu), start))
+                found.append(fmu_instance(name, self._fmu(instance.fmu), start, instance.solver_tolerance))
             except FmuError as error:
                 raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
         return tuple(found)

@@ -9,6 +9,7 @@ import pytest
 from orchestrator.building.build import ensure_built
 from orchestrator.cli import main
 from orchestrator.errors import ConnectionMismatchError, FmuError, InputError, ScenarioError, SimulationError
+from orchestrator.fmi.slave import FmuSlave
 from orchestrator.scenarios.scenario import load_scenario, simulate
 
 GOOD = """
@@ -86,9 +87,33 @@ def test_units_of_parameters_are_converted(tmp_path: Path) -> None:
     assert value == pytest.approx(np.pi / 180.0, rel=1e-15)
 
 
+def test_fmus_are_told_how_exactly_to_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: dict[str, float | None] = {}
+    begin = FmuSlave.begin
+
+    def noted(slave: FmuSlave, start: float, stop: float | None, tolerance: float | None) -> None:
+        told[slave.name] = tolerance
+        begin(slave, start, stop, tolerance)
+
+    monkeypatch.setattr(FmuSlave, "begin", noted)
+    line = 'fmu = "Drivetrain"\n'
+    own = write(tmp_path, GOOD.replace(line, line + "solver_tolerance = 1e-8\n"))
+    with load_scenario(own).session() as session:
+        session.run()
+    assert told == {"plant": 1e-8}
+    with load_scenario(write(tmp_path, GOOD)).session() as session:
+        session.run()
+    assert told == {"plant": None}
+
+
 @pytest.mark.parametrize(
     ("change", "error", "expected"),
     [
+        (
+            ('fmu = "Drivetrain"', 'fmu = "Drivetrain"\nsolver_tolerance = 1'),
+            ScenarioError,
+            "$.instances.plant.solver_tolerance: must be above 0 and below 1, but is 1",
+        ),
         (("stop = 0.05", "stop = 0.05\nstep = 1"), ScenarioError, "unknown field `step`"),
         (("step = 1e-3", "step = 0"), ScenarioError, "$.stop: `step` must be finite and positive"),
         (("step = 1e-3", "step = 1e-3\nalgorithm = 'euler'"), ScenarioError, "$.master.algorithm: must be one of"),

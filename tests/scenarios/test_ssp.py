@@ -50,6 +50,17 @@ def test_what_is_written_reads_back_as_the_same_run(scenario, package) -> None:
         np.testing.assert_array_equal(found[name], expected[name])
 
 
+@pytest.mark.parametrize("stated", [None, 1e-8])
+def test_how_exactly_fmus_solve_is_kept(scenario, tmp_path, stated) -> None:
+    instances = tuple(replace(i, solver_tolerance=stated) for i in scenario.system.instances)
+    write_ssp(tmp_path / "s.ssp", replace(scenario, system=replace(scenario.system, instances=instances)))
+    with zipfile.ZipFile(tmp_path / "s.ssp") as archive:
+        text = archive.read("SystemStructure.ssd").decode()
+    assert f'relativeTolerance="{stated or 1e-4}"' in text  # OMSimulator hands 0 to FMUs where it is left out
+    with opened_ssp(tmp_path / "s.ssp") as again:
+        assert {i.solver_tolerance for i in again.system.instances} == {stated}
+
+
 def test_fmpy_runs_it_to_the_same_bits(package) -> None:
     values = ParameterSet(name="all")
     with zipfile.ZipFile(package) as archive:

@@ -20,7 +20,7 @@ from orchestrator.errors import FmuError, OrchestratorError
 from orchestrator.master.signals import Samples
 from orchestrator.scenarios.isolated import Safety
 from orchestrator.scenarios.scenario import simulate
-from orchestrator.scenarios.ssp.common import OSP, SPACES, STRUCTURE, require_valid, tag
+from orchestrator.scenarios.ssp.common import SPACES, STRUCTURE, add_experiment, add_master, require_valid, tag
 from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.shared.results.any_fmu import DeliveredFound, PartFound
 from pyfmu_sources.attachment import SERIES
@@ -259,7 +259,7 @@ def _followed(parts: tuple[Part, ...]) -> list[str]:
 
 def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], attachment: str) -> bytes:
     problem, members = outcome.problem, outcome.problem.runner.subject.members
-    spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp")}
+    spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp", "oms")}
     root = etree.Element(tag("ssd", "SystemStructureDescription"), nsmap=spaces, version="1.0", name="corrected")
     root.set("generationTool", "backlash-cosim")
     root.set("generationDateAndTime", DATE)
@@ -297,13 +297,9 @@ def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], attachment: str) ->
         )
         given |= dict(zip(("endElement", "endConnector"), end, strict=True)) if end[0] else {"endConnector": end[1]}
         etree.SubElement(wires, tag("ssd", "Connection"), given)
-    times = {"startTime": repr(float(problem.data.time[0])), "stopTime": repr(float(problem.data.time[-1]))}
-    experiment = etree.SubElement(root, tag("ssd", "DefaultExperiment"), times)
-    annotations = etree.SubElement(experiment, tag("ssd", "Annotations"))
-    algorithm = etree.SubElement(
-        etree.SubElement(annotations, tag("ssc", "Annotation"), type=OSP), tag("osp", "Algorithm")
-    )
-    etree.SubElement(algorithm, tag("osp", "FixedStepAlgorithm"), baseStepSize=repr(problem.h / problem.m))
+    options, data = problem.map.options, problem.data
+    add_master(system, problem.h / problem.m, options.tolerance)
+    add_experiment(root, float(data.time[0]), float(data.time[-1]), problem.h / problem.m)
     require_valid(root, "ssd", STRUCTURE)
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 

@@ -24,12 +24,14 @@ from orchestrator.diagnosis.blackbox.probing import Probe
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
-from orchestrator.diagnosis.blackbox.settings import RestSettings
+from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings, RestSettings
 from orchestrator.diagnosis.blackbox.sites import alike_one_way
 from orchestrator.diagnosis.blackbox.verdict import recovered
 from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows, on_finer_steps
 
 Array = NDArray[np.float64]
+SETTINGS_OF_A_CHANNEL = ("output_gain", "output_offset")
+"""Effects that take up the mean or the size of whatever is missing: alone they are told only where no more is left."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def judged(
     problem.m = fitter.problem.m
     last = on_all.last
     parameters, values = estimates_of(problem, last.model, errors_of(fitter, last, seen, rest.nothing_missing))
-    nothing = _of_no_size(last, values, search.settings.least_errors) if rest.nothing_missing else None
+    nothing = _of_no_size(last, values, search.settings) if rest.nothing_missing else None
     if nothing is not None:
         fewer = fitter.fit(best.model.without(best.model.effects[nothing].label), best.level)
         if fewer is not None:
@@ -126,7 +128,7 @@ def judged(
     )
     stages = _stages(problem, base, last)
     on_held_out = held_out(problem, stages, fitter.parts.held_out, settings)
-    verdict, rest = _verdict(search, last, rest, on_held_out, settings)
+    verdict, rest = _verdict(search, last, values, rest, on_held_out, settings)
     named = tuple(
         FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
     )
@@ -170,7 +172,8 @@ def _stages(problem: BoxProblem, base: BoxFit, last: BoxFit) -> tuple[Array, Arr
 
 
 def _verdict(
-    search: BoxSearch, last: BoxFit, rest: Rest, shown: HeldOut, settings: RestSettings,
+    search: BoxSearch, last: BoxFit, values: Sequence[Sequence[ValueEstimate]], rest: Rest, shown: HeldOut,
+    settings: RestSettings,
 ) -> tuple[str, Rest]:  # fmt: skip
     """Return the verdict, and what is left in its light."""
     fitter, effects = search.fitter, last.model.effects
@@ -182,7 +185,9 @@ def _verdict(
     if effects:
         off = np.abs(last.model.p - fitter.mean) / fitter.sd
         plausible = bool(np.all(off < settings.implausible)) and all(e.kind.where != PARAMETER for e in effects)
-        return ("effects" if plausible and shown.shows(settings) else "unknown"), rest
+        told = _of_no_size(last, values, search.settings) is None
+        told = told and any(e.kind.name not in SETTINGS_OF_A_CHANNEL for e in effects)
+        return ("effects" if plausible and told and shown.shows(settings) else "unknown"), rest
     if not rest.nothing_missing:
         return "unknown", rest
     given = fitter.problem.nominal
@@ -191,14 +196,19 @@ def _verdict(
     return ("none" if as_given else "parameters"), rest
 
 
-def _of_no_size(last: BoxFit, values: Sequence[Sequence[ValueEstimate]], least: float) -> int | None:
+def _of_no_size(
+    last: BoxFit, values: Sequence[Sequence[ValueEstimate]], settings: BoxSearchSettings
+) -> int | None:  # fmt: skip
     """Return the place of an effect whose sizes may all be zero, given all rows; None where there is none.
 
-    It made up for the steps of the search, or for the rows that were left out.
+    It made up for the steps of the search, or for the rows that were left out. So does a ripple that need not repeat.
     """
     for k, (effect, found) in enumerate(zip(last.model.effects, values, strict=True)):
         sizes = found[: max(effect.amplitudes, 1)]
-        if effect.kind.finer is None and all(abs(e.value) < least * e.standard_error for e in sizes):
+        if effect.kind.finer is None and all(abs(e.value) < settings.least_errors * e.standard_error for e in sizes):
+            return k
+        wavenumber = found[-1]
+        if effect.kind.name == "ripple" and wavenumber.value < settings.least_sharp * wavenumber.standard_error:
             return k
     return None
 

@@ -44,11 +44,11 @@ def delayed(fine: Array, step: float, delay: float, before: float) -> Array:
     """
     if delay <= 0.0:
         return fine
-    time = step * np.arange(len(fine) + 1)
-    integral = np.concatenate([[0.0], np.cumsum(fine) * step])
-    late = time - delay
-    found = np.where(late < 0.0, before * late, np.interp(late, time, integral))
-    return np.asarray(np.diff(found) / step)
+    n, parts = len(fine), min(delay / step, len(fine) + 1.0)
+    whole = int(parts)
+    share = parts - whole
+    past = np.concatenate([np.full(whole + 1, before), fine])
+    return np.asarray((1.0 - share) * past[1 : n + 1] + share * past[:n])
 
 
 @kept()

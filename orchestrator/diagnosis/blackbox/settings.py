@@ -19,6 +19,9 @@ class BoxSearchSettings(Settings, frozen=True):
     least_errors: Annotated[
         float, setting("standard errors by which a size must differ from zero once all rows are fitted, in fine steps")
     ] = 2.0
+    least_sharp: Annotated[
+        float, setting("standard errors by which a ripple's wavenumber must differ from zero: a smooth curve has none")
+    ] = 10.0
     quiet: Annotated[float, share("port noise, of the drive, up to which that does not apply")] = 3e-4
     decided: Annotated[float, setting("least gain on the deciding part alone")] = 5.0
     decided_share: Annotated[float, share("and its least share of the gain on the fitted part")] = 0.06

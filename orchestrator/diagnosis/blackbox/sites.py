@@ -18,6 +18,14 @@ from orchestrator.diagnosis.blackbox.problem import BoxProblem
 EFFORTS = ("N.m", "N")
 """Units of efforts that dry friction has."""
 
+FLOWS = ("W", "kW", "m3/s", "m3/h", "l/s", "l/min", "kg/s")
+"""Units of inputs that are flows of heat or matter: what they change has no direction of motion, and no cycles."""
+
+OF_MOTION = (
+    "coulomb_friction", "stribeck_friction", "directional_friction", "gravity", "ripple", "hysteresis", "added_inertia"
+)  # fmt: skip
+"""Laws that mean something only against a motion, or a current."""
+
 Array = NDArray[np.float64]
 
 ANGLES = ("rad", "deg", "")
@@ -78,11 +86,13 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
             once=own.once,
             long=own.long,
         )
+        left_out = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
         kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
+        kinds = [k for k in kinds if k.name not in left_out]
         found += [BoxEffect(kind, name, scene) for kind in kinds]
     alike = alike_one_way(problem)
-    left_out = {label for labels in alike.values() for label in labels}
-    found = [effect for effect in found if effect.label not in left_out]
+    stood_for = {label for labels in alike.values() for label in labels}
+    found = [effect for effect in found if effect.label not in stood_for]
     return [*found, *_of_parameters(problem), *_of_cuts(problem, nominal)]
 
 

@@ -27,6 +27,9 @@ OSP = "com.opensimulationplatform"
 OMS = "org.openmodelica"
 """Type of the annotation without which OMSimulator does not know that a system is co-simulated."""
 
+OMS_TOLERANCE = 1e-4
+"""Relative tolerance that OMSimulator hands to FMUs where a file states none; stated, it counts as not stated."""
+
 STRUCTURE = "SystemStructure.ssd"
 EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 MAXIMUM_XML = 64 * 2**20
@@ -101,3 +104,58 @@ def require_valid(root: etree._Element, kind: str, origin: str) -> None:
     if not rules.validate(root):
         first = rules.error_log[0]
         raise ScenarioError(f"{origin}: must follow {SCHEMAS[kind]}, but does not: line {first.line}: {first.message}")
+
+
+def add_master(system: etree._Element, step: float, solver_tolerance: float | None) -> None:
+    """Say of a system that it is co-simulated, how it steps, and how exactly its FMUs solve, as OMSimulator reads it.
+
+    Args:
+        system: the outermost system; the annotation becomes its last child.
+        step: communication step [s].
+        solver_tolerance: relative, for the FMUs' own solvers; None: their defaults.
+    """
+    annotations = etree.SubElement(system, tag("ssd", "Annotations"))
+    annotation = etree.SubElement(annotations, tag("ssc", "Annotation"), type=OMS)
+    information = etree.SubElement(
+        etree.SubElement(annotation, tag("oms", "Annotations")), tag("oms", "SimulationInformation")
+    )
+    given = {"description": "oms-ma", "stepSize": repr(step), "absoluteTolerance": f"{OMS_TOLERANCE:g}"}
+    given["relativeTolerance"] = f"{OMS_TOLERANCE if solver_tolerance is None else solver_tolerance:.12g}"
+    etree.SubElement(information, tag("oms", "FixedStepMaster"), given)
+
+
+def add_experiment(root: etree._Element, start: float, stop: float, step: float) -> None:
+    """Say when a system runs, and its communication step where libcosim reads it.
+
+    Args:
+        root: of the structure; the experiment becomes its last child.
+        start: [s].
+        stop: [s].
+        step: communication step [s].
+    """
+    times = {"startTime": repr(start), "stopTime": repr(stop)}
+    experiment = etree.SubElement(root, tag("ssd", "DefaultExperiment"), times)
+    annotations = etree.SubElement(experiment, tag("ssd", "Annotations"))
+    annotation = etree.SubElement(annotations, tag("ssc", "Annotation"), type=OSP)
+    algorithm = etree.SubElement(annotation, tag("osp", "Algorithm"))
+    etree.SubElement(algorithm, tag("osp", "FixedStepAlgorithm"), {"baseStepSize": repr(step)})
+
+
+def solver_tolerance(system: etree._Element) -> float | None:
+    """Return the relative tolerance for the FMUs' own solvers that a system states where OMSimulator looks for it.
+
+    Args:
+        system: the outermost system.
+
+    Returns:
+        The tolerance; None where there is none, or OMSimulator's default.
+    """
+    for annotation in system.findall(f"{tag('ssd', 'Annotations')}/{tag('ssc', 'Annotation')}"):
+        for found in annotation.findall(f".//{tag('oms', 'SimulationInformation')}/*[@relativeTolerance]"):
+            try:
+                value = float(str(found.get("relativeTolerance")))
+            except ValueError:
+                continue
+            if annotation.get("type") == OMS and 0.0 < value < 1.0 and value != OMS_TOLERANCE:
+                return value
+    return None

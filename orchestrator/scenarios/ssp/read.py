@@ -17,7 +17,7 @@ from orchestrator.master.protocol import NUMERIC, Unit, Value
 from orchestrator.master.signals import Scaled, Signal
 from orchestrator.master.system import Connection, Instance, SignalSource, System
 from orchestrator.scenarios.scenario import Scenario
-from orchestrator.scenarios.ssp.common import OSP, SPACES, STRUCTURE, parse, tag
+from orchestrator.scenarios.ssp.common import OSP, SPACES, STRUCTURE, parse, solver_tolerance, tag
 from orchestrator.scenarios.ssp.parameters import Given, bound_values, own_value, read_units
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.scratch import Scratch
@@ -85,7 +85,7 @@ def _scenario(
     assert system is not None
     _walk(system, "", structure)
     raise_problems(structure.problems, f"{path}: {STRUCTURE}")
-    instances = _instances(structure, path)
+    instances = _instances(structure, path, solver_tolerance(system))
     connections, sources = _connections(structure, inputs)
     made = System(tuple(instances), tuple(connections), tuple(sources))
     raise_problems(structure.problems + made.problems(), f"{path}: {STRUCTURE}")
@@ -193,7 +193,7 @@ def _connection(element: etree._Element, path: str, place: str, structure: _Stru
     structure.drivers[target] = (source, factor, offset)
 
 
-def _instances(structure: _Structure, path: Path) -> list[Instance]:
+def _instances(structure: _Structure, path: Path, tolerance: float | None) -> list[Instance]:
     instances = []
     for name, file in structure.components.items():
         try:
@@ -210,7 +210,7 @@ def _instances(structure: _Structure, path: Path) -> list[Instance]:
             if node[0] == name and node[1] not in description.model.variables:
                 text = f"must be a variable of {description.model.name}, but {node[1]!r} is none"
                 structure.problems.append(Problem(f"$.{name}.Connectors", text, mismatch=True))
-        instances.append(Instance(name, description.model, FmuFactory(file, description), start))
+        instances.append(Instance(name, description.model, FmuFactory(file, description), start, tolerance))
     for owner, variable in structure.given:
         if owner not in structure.components:
             text = f"must name a component's parameter, but {variable!r} of {owner or 'the system'} is none"

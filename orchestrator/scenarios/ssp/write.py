@@ -12,7 +12,15 @@ from orchestrator.master.protocol import Unit, Value, Variable
 from orchestrator.master.signals import Constant
 from orchestrator.master.system import Connection, Instance, System, split
 from orchestrator.scenarios.scenario import Scenario
-from orchestrator.scenarios.ssp.common import EXPONENTS, OMS, OSP, SPACES, STRUCTURE, require_valid, tag
+from orchestrator.scenarios.ssp.common import (
+    EXPONENTS,
+    SPACES,
+    STRUCTURE,
+    add_experiment,
+    add_master,
+    require_valid,
+    tag,
+)
 
 DATE = "2026-01-01T00:00:00Z"
 """Date in the files' metadata: fixed, so that the same system gives the same bytes."""
@@ -93,9 +101,10 @@ def _structure(scenario: Scenario) -> bytes:
         connections = etree.SubElement(system, tag("ssd", "Connections"))
     for k, connection in enumerate(scenario.system.connections):
         _connection(connections, connection, k)
-    _master(system, scenario)
+    stated = [i.solver_tolerance for i in scenario.system.instances if i.solver_tolerance is not None]
+    add_master(system, scenario.algorithm.step, min(stated, default=None))
     _units(root, scenario.system.instances)
-    _experiment(root, scenario)
+    add_experiment(root, scenario.start, scenario.stop, scenario.algorithm.step)
     return _bytes(root, "ssd", STRUCTURE)
 
 
@@ -175,27 +184,6 @@ def _unit(parent: etree._Element, unit: Unit) -> None:
         base.set("factor", repr(unit.factor))
     if unit.offset != 0.0:
         base.set("offset", repr(unit.offset))
-
-
-def _master(system: etree._Element, scenario: Scenario) -> None:
-    annotations = etree.SubElement(system, tag("ssd", "Annotations"))
-    annotation = etree.SubElement(annotations, tag("ssc", "Annotation"), type=OMS)
-    information = etree.SubElement(
-        etree.SubElement(annotation, tag("oms", "Annotations")), tag("oms", "SimulationInformation")
-    )
-    step = {"description": "oms-ma", "stepSize": repr(scenario.algorithm.step)}
-    tolerances = {"absoluteTolerance": "0.0001", "relativeTolerance": "0.0001"}
-    etree.SubElement(information, tag("oms", "FixedStepMaster"), step | tolerances)
-
-
-def _experiment(root: etree._Element, scenario: Scenario) -> None:
-    times = {"startTime": repr(scenario.start), "stopTime": repr(scenario.stop)}
-    experiment = etree.SubElement(root, tag("ssd", "DefaultExperiment"), times)
-    annotations = etree.SubElement(experiment, tag("ssd", "Annotations"))
-    annotation = etree.SubElement(annotations, tag("ssc", "Annotation"), type=OSP)
-    algorithm = etree.SubElement(annotation, tag("osp", "Algorithm"))
-    step = {"baseStepSize": repr(scenario.algorithm.step)}
-    etree.SubElement(algorithm, tag("osp", "FixedStepAlgorithm"), step)
 
 
 def _values(instance: Instance, values: Mapping[str, Value]) -> bytes:

@@ -12,6 +12,7 @@ from orchestrator.api.any_fmu import draft_map
 from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
+from orchestrator.diagnosis.blackbox.bank import PORT
 from orchestrator.diagnosis.blackbox.diagnose import prepared
 from orchestrator.diagnosis.blackbox.mapping import read_map
 from orchestrator.diagnosis.blackbox.reading import read_data
@@ -19,6 +20,7 @@ from orchestrator.diagnosis.blackbox.settings import BoxSettings, FitterSettings
 from orchestrator.diagnosis.blackbox.sites import effects_of
 from orchestrator.diagnosis.blackbox.subject import subject_of
 from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.shared.results import read
 from orchestrator.shared.results.any_fmu import BoxCalibrationFound, BoxDiagnosisFound
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
@@ -102,7 +104,9 @@ def test_the_command_delivers_a_system_that_reproduces_the_fit(made, tmp_path):
     results = json.loads((out / "diagnose.json").read_text())["results"]
     assert [e["name"] for e in results["effects"]] == ["quadratic_drag"]
     assert set(results) == set(BoxDiagnosisFound.__struct_fields__)
-    assert results["delivery"][0]["difference_over_noise"] < 0.1
+    assert results["delivery"][0]["difference_over_noise"] == 0.0
+    with opened_ssp(out / "corrected.ssp") as corrected:
+        assert corrected.system.execution_order() == ("quadratic_drag_1", "plant")  # as in the fit
     assert {p.name for p in out.iterdir()} >= {"corrected.ssp", "report.html", "diagnose.csv", "diagnose_signals.png"}
 
 
@@ -204,6 +208,21 @@ def test_a_run_whose_fed_back_effort_runs_away_is_given_up_before_the_fmu_meets_
         assert problem.runner.lost == 0
     finally:
         problem.runner.close()
+
+
+@pytest.mark.parametrize(("domain", "moves"), [(SPRING, True), (CIRCUIT, True), (TANKS, False)])
+def test_where_the_input_is_a_flow_no_law_of_motion_is_tried(made, domain, moves):
+    _, record_path, fmu, map_path = made(domain, rows=300)
+    subject = subject_of(fmu)
+    given = read_map(map_path, subject)
+    problem, _ = prepared(subject, given, read_data(record_path, given), workers=1)
+    try:
+        at_port = {e.kind.name for e in effects_of(problem, problem.must_read(problem.nominal)) if e.kind.where == PORT}
+    finally:
+        problem.runner.close()
+    assert {"load", "spring", "quadratic_drag"} <= at_port
+    assert ({"coulomb_friction", "ripple", "hysteresis"} <= at_port) == moves
+    assert bool(at_port & {"coulomb_friction", "ripple", "hysteresis"}) == moves
 
 
 def test_a_run_that_hangs_is_given_up_soon_and_others_go_on(made):

@@ -78,4 +78,5 @@ def compare(signal, kind, value, at_rest):
         found.append(effect.result)
     scene = Surroundings(STEP, 1.0, 1.0, signal)
     fitted = at_input(BoxEffect(BANK[f"input_{kind}"], "u", scene, at_rest), signal, STEP, value)
-    assert found == pytest.approx(fitted, abs=1e-9)
+    # A variable-step solver makes another path of another last bit: what is delivered must feed it the same one.
+    assert found == (pytest.approx(fitted, abs=1e-12) if kind in ("lag", "rate_limit") else fitted.tolist())

@@ -6,13 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate
-from orchestrator.diagnosis.blackbox.judged import _of_no_size
+from orchestrator.diagnosis.blackbox.held_out import HeldOut
+from orchestrator.diagnosis.blackbox.judged import _of_no_size, _verdict
 from orchestrator.diagnosis.blackbox.rest import Rest
-from orchestrator.diagnosis.blackbox.settings import RestSettings
+from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings, RestSettings
 from orchestrator.diagnosis.blackbox.trust import SECOND, UNEXPLAINED, doubts, harm, statement
 from orchestrator.shared.trust import Level
 
+SEARCH = BoxSearchSettings()
 NOISE = Rest(True, False, 0.0, (), np.ones((8, 1)))
 DISTURBED = replace(NOISE, explained=False, disturbed=True, share=1e-4)
 LEFT = replace(NOISE, explained=False, reasons=("output 1: comes in bursts",))
@@ -78,9 +81,36 @@ def test_thresholds_are_those_of_the_settings():
     [([(3.0, 0.1), (1.0, 0.6)], 1), ([(3.0, 0.1), (-1.3, 0.6)], None), ([(0.1, 0.2), (0.1, 0.2)], 0), ([], None)],
 )
 def test_an_effect_whose_size_may_be_zero_is_found(sizes, expected):
-    effects = [SimpleNamespace(kind=SimpleNamespace(finer=None), amplitudes=1) for _ in sizes]
+    effects = [SimpleNamespace(kind=SimpleNamespace(finer=None, name="load"), amplitudes=1) for _ in sizes]
     values = [(ValueEstimate("size", value, error, (0.0, 0.0), "N"),) for value, error in sizes]
-    assert _of_no_size(SimpleNamespace(model=SimpleNamespace(effects=effects)), values, 2.0) == expected
+    assert _of_no_size(SimpleNamespace(model=SimpleNamespace(effects=effects)), values, SEARCH) == expected
+
+
+@pytest.mark.parametrize(("error", "expected"), [(0.011, 0), (0.001, None)])
+def test_a_ripple_whose_wavenumber_is_hardly_known_need_not_repeat(error, expected):
+    ripple = SimpleNamespace(kind=SimpleNamespace(finer=None, name="ripple"), amplitudes=2)
+    sizes = ((-6.4, 0.3), (-0.4, 0.3), (0.045, error))
+    values = [tuple(ValueEstimate("size", value, of, (0.0, 0.0), "N") for value, of in sizes)]
+    assert _of_no_size(SimpleNamespace(model=SimpleNamespace(effects=(ripple,))), values, SEARCH) == expected
+
+
+SHOWN = HeldOut(0.99, 0.999, 0.99)
+
+
+@pytest.mark.parametrize(("labels", "error", "expected"), [
+    (("coulomb_friction@p",), 0.01, "effects"),
+    (("coulomb_friction@p",), 0.8, "unknown"),
+    (("output_offset@y",), 0.01, "unknown"),
+    (("output_gain@y", "output_offset@y"), 0.01, "unknown"),
+    (("coulomb_friction@p", "output_offset@y"), 0.01, "effects"),
+    (("coulomb_friction@p", "parameter_drift@k"), 0.01, "unknown"),
+])  # fmt: skip
+def test_where_more_than_noise_is_left_effects_are_named_that_cannot_follow_anything(labels, error, expected):
+    effects = [BoxEffect(BANK[name.partition("@")[0]], name, None) for name in labels]
+    search = SimpleNamespace(fitter=SimpleNamespace(mean=np.ones(1), sd=np.ones(1)), settings=SEARCH)
+    last = SimpleNamespace(model=SimpleNamespace(effects=effects, p=np.ones(1)))
+    values = [(ValueEstimate("size", 1.0, error, (0.0, 0.0), "N"),) * 2 for _ in labels]
+    assert _verdict(search, last, values, LEFT, SHOWN, RestSettings())[0] == expected
 
 
 def test_without_effects_nothing_can_do_harm():
