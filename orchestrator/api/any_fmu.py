@@ -240,8 +240,8 @@ def of_a_box(
     given = read_map(Path(map), subject)
     data = read_data(Path(record), given, used.read)
     factor = factor_of(data, used.rate)
-    data = decimated(data, factor, used.rate)
-    second = None if validate is None else decimated(read_data(Path(validate), given, used.read), factor, used.rate)
+    data = decimated(data, factor)
+    second = None if validate is None else decimated(read_data(Path(validate), given, used.read), factor)
     outcome = diagnosing(subject, given, data, used, progress)
     try:
         models = (outcome.problem.nominal, outcome.refitted, outcome.model)

@@ -115,6 +115,6 @@ def calibrate(
     subject = subject_of(Path(fmu))
     given = read_map(Path(map), subject)
     data = read_data(Path(record), given, used.read)
-    data = decimated(data, factor_of(data, used.rate), used.rate)
+    data = decimated(data, factor_of(data, used.rate))
     found = calibrating(subject, given, data, progress, used)
     return CalibrationResult(found, {"record": str(record), "fmu": str(fmu), "map": str(map)}, used)

@@ -21,7 +21,7 @@ class Data:
         source: file name, for messages.
         signals: (n, signals), off their references.
         factor: rows of the file for one of these.
-        noise_share: share of the measurement noise of the file's rows that these have.
+        held: (n * factor, inputs) inputs in all rows of the file, where there are more; ``inputs`` are their means.
     """
 
     time: Array
@@ -30,7 +30,12 @@ class Data:
     source: str
     signals: Array = field(default_factory=lambda: np.zeros((0, 0)))
     factor: int = 1
-    noise_share: float = 1.0
+    held: Array | None = None
+
+    @property
+    def driven(self) -> Array:
+        """Return the inputs as the file has them, (rows of the file, inputs)."""
+        return self.inputs if self.held is None else self.held
 
     @property
     def step(self) -> float:

@@ -105,7 +105,9 @@ def _passing(runner: Runner, given: Map, data: Data, settings: BoxSettings) -> l
     connected = runner.subject.connections
     if not connected:
         return []
-    problem = BoxProblem(data, given, runner, given.options.substeps, np.ones(len(given.outputs)))
+    problem = BoxProblem(
+        data, given, runner, steps_of(given.options.substeps, data.factor), np.ones(len(given.outputs))
+    )
     own = settings.probe
     plan = problem.starts(problem.nominal)
     plain = series_of(problem, 2)[:1]
@@ -144,7 +146,7 @@ def noise_of(given: Map, data: Data, residual: Array) -> Array:
     found = []
     for k, entry in enumerate(given.outputs.values()):
         if entry.noise is not None:
-            found.append(entry.noise * abs(entry.factor) * data.noise_share)
+            found.append(entry.noise * abs(entry.factor))
             continue
         # Its mean without the largest hundredth: a median is no measure of what comes in whole counts.
         rough = np.sort(np.abs(np.diff(residual[:, k], 3)))[: int(0.99 * (len(residual) - 3))]
@@ -179,6 +181,19 @@ def _affordable(runner: Runner, given: Map, data: Data, progress: Progress, sett
     return m
 
 
+def steps_of(substeps: int, factor: int) -> int:
+    """Return how many communication steps a sample has, so many at least, and a whole number for each row of the file.
+
+    Args:
+        substeps: as the map says.
+        factor: rows of the file for one sample.
+
+    Returns:
+        The number.
+    """
+    return factor * -(-substeps // factor)
+
+
 def _steps_in_a_sample(runner: Runner, given: Map, data: Data, stuck: float) -> int:
     """Return how many communication steps a sample has: as the map says, but none in which the FMU stands still.
 
@@ -188,7 +203,7 @@ def _steps_in_a_sample(runner: Runner, given: Map, data: Data, stuck: float) -> 
         SlaveError: it does not run.
     """
     rows = min(len(data.time), 200)
-    m = given.options.substeps
+    m = steps_of(given.options.substeps, data.factor)
     while m > 1:
         problem = BoxProblem(data, given, runner, m, np.ones(len(given.outputs)))
         plan = Plan(problem.starts(problem.nominal), series_of(problem, rows))
@@ -248,10 +263,11 @@ def _pushed(problem: BoxProblem) -> Probe:
     base = problem.must_read(problem.nominal)
     size = np.maximum(np.max(np.abs(base), axis=0), 1e-300)
     notes = ["reset is not followed: a new instance is made for every run"] if fresh else []
-    if problem.m < problem.map.options.substeps:
+    wanted = steps_of(problem.map.options.substeps, problem.data.factor)
+    if problem.m < wanted:
         notes.append(
             f"the FMU has a fixed step of its own, or is slow: {problem.m} communication steps in a sample instead of "
-            f"{problem.map.options.substeps}"
+            f"{wanted}"
         )
     sign, blind = {}, []
     plain = series_of(problem, problem.n)

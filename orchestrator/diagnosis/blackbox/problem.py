@@ -357,7 +357,7 @@ class BoxProblem:
         Returns:
             Shape (places,).
         """
-        sizes = np.sqrt(np.mean(self.data.inputs**2, axis=0))
+        sizes = np.sqrt(np.mean(self.data.driven**2, axis=0))
         largest = float(sizes.max()) or 1.0
         found = []
         for place in places:
@@ -384,5 +384,6 @@ def series_of(problem: BoxProblem, rows: int) -> Array:
     table = np.zeros(((rows - 1) * problem.m, len(problem.runner.inputs)))
     for k, entry in enumerate(problem.map.inputs.values()):
         order = 1 if entry.hold == "linear" else 0
-        table[:, k] = series.finely(problem.data.inputs[:rows, k], problem.m, order)
+        u = problem.data.driven[: (rows - 1) * problem.data.factor + 1, k]
+        table[:, k] = series.divided(u, problem.data.factor, problem.m, order)
     return table

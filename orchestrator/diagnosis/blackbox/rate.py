@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxRateSettings
-from orchestrator.shared.inference.decimation import averaged, content_band, noise_left, sampled
+from orchestrator.shared.inference.decimation import content_band
 from orchestrator.shared.inference.noise import residual_noise
+
+Array = NDArray[np.float64]
 
 
 def factor_of(data: Data, settings: BoxRateSettings = DEFAULT.rate) -> int:
@@ -31,24 +34,25 @@ def factor_of(data: Data, settings: BoxRateSettings = DEFAULT.rate) -> int:
     return max(1, min(n // settings.rows, int(rate / max(settings.per_band * fastest, rate / n))))
 
 
-def decimated(data: Data, factor: int, settings: BoxRateSettings = DEFAULT.rate) -> Data:
-    """Return a record at a rate lower by a whole ``factor``.
+def decimated(data: Data, factor: int) -> Data:
+    """Return a record of which one row in ``factor`` is looked at.
+
+    The FMU is driven as before, row by row of the file: what limits or delays an input acts on each of them.
 
     Args:
         data: the record.
         factor: rows for one that is kept.
-        settings: the thresholds.
 
     Returns:
-        The record: outputs behind a linear-phase filter, inputs and signals behind it and averaged over the new rows.
+        The record: every ``factor``-th sample of the outputs, means of inputs and signals until the next, all inputs.
     """
     if factor == 1:
         return data
-    rows, cut = (len(data.time) - 1) // factor * factor, settings.cut_off
-    inputs, outputs, signals = (
-        np.column_stack([down(column, factor, cut) for column in columns.T]) if columns.size else columns[:rows:factor]
-        for down, columns in ((averaged, data.inputs), (sampled, data.outputs), (averaged, data.signals))
-    )
-    share = data.noise_share * noise_left(factor, cut)
-    return replace(data, time=data.time[:rows:factor], inputs=inputs, outputs=outputs, signals=signals,
-                   factor=data.factor * factor, noise_share=share)  # fmt: skip
+    rows = (len(data.time) - 1) // factor * factor
+
+    def mean(columns: Array) -> Array:
+        return np.asarray(columns[:rows].reshape(-1, factor, columns.shape[1]).mean(axis=1))
+
+    signals = mean(data.signals) if data.signals.size else data.signals
+    return replace(data, time=data.time[:rows:factor], inputs=mean(data.inputs), outputs=data.outputs[:rows:factor],
+                   signals=signals, factor=factor, held=data.inputs[:rows])  # fmt: skip

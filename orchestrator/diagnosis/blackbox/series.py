@@ -30,6 +30,26 @@ def finely(u: Array, m: int, order: int = 0) -> Array:
     return np.asarray(lines.ravel())
 
 
+def divided(u: Array, factor: int, m: int, order: int = 0) -> Array:
+    """Return the means over ``m`` parts of each sample of a signal of which a sample has ``factor`` rows.
+
+    Args:
+        u: (samples * factor + 1,) the rows; the last one counts for straight lines alone.
+        factor: rows in a sample.
+        m: parts of a sample.
+        order: 0: held; 1: straight lines.
+
+    Returns:
+        Shape (samples * m,).
+    """
+    if m % factor == 0:
+        return finely(u, m // factor, order)
+    rows = finely(u, 1, order)
+    integral = np.concatenate([[0.0], np.cumsum(rows)])
+    ends = np.arange(len(rows) // factor * m + 1) * (factor / m)
+    return np.asarray(np.diff(np.interp(ends, np.arange(len(integral)), integral)) * (m / factor))
+
+
 def delayed(fine: Array, step: float, delay: float, before: float) -> Array:
     """Return means over the same parts of a signal that comes ``delay`` [s] later; ``before``: its value until then.
 

@@ -347,12 +347,11 @@ class ReadSettings(Settings, frozen=True):
 class BoxRateSettings(Settings, frozen=True):
     """The rate at which a long record is analysed."""
 
-    rows: Annotated[int, setting("rows that a record keeps in any case: runs of as many take no time", ge=200)] = 2000
+    rows: Annotated[int, setting("rows of a record that are looked at in any case", ge=200)] = 4000
     per_band: Annotated[float, setting("rate over the frequency below which nearly all motion lies", gt=2)] = 16.0
     shows: Annotated[float, setting("power over that of the noise from which motion shows", ge=1)] = 4.0
     most_above: Annotated[float, share("of the squared speed that may lie above the band")] = 0.01
     pane: Annotated[int, setting("samples of a spectrum's pane at most", ge=64)] = 1024
-    cut_off: Annotated[float, share("of half the lower rate at which the filter before it cuts off")] = 0.8
     rounding: Annotated[float, share("of a rate that time stamps may be off by")] = 0.02
 
 

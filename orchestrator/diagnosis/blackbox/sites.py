@@ -45,10 +45,10 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
     h, runner, own = problem.h, problem.runner, problem.settings.place
     motions = measured_motions(problem)
     for k, name in enumerate(problem.inputs):
-        u = problem.data.inputs[:, k]
+        u = problem.data.driven[:, k]
         if float(np.ptp(u)) == 0.0:
             continue
-        scene = Surroundings(h, _rms(u), float(np.max(np.abs(u))), u)
+        scene = Surroundings(h / problem.data.factor, _rms(u), float(np.max(np.abs(u))), u)
         found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
         if abs(u[0]) > own.starts_off * scene.size:
             found += [BoxEffect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
@@ -119,7 +119,7 @@ def alike_one_way(problem: BoxProblem) -> dict[str, tuple[str, ...]]:
             continue
         driven = [
             given
-            for given, u in zip(problem.inputs, problem.data.inputs.T, strict=True)
+            for given, u in zip(problem.inputs, problem.data.driven.T, strict=True)
             if problem.units.get(given) == unit and (np.all(u >= 0.0) or np.all(u <= 0.0))
         ]
         here = [f"{kind}@{name}" for kind in ("load", "directional_friction")]

@@ -72,19 +72,6 @@ def averaged(values: Array, factor: int, cut_off: float) -> Array:
     return np.asarray(smooth.reshape(-1, factor).mean(axis=1))
 
 
-def noise_left(factor: int, cut_off: float) -> float:
-    """Return the share of the standard deviation of white noise that the filter leaves.
-
-    Args:
-        factor: rows for one that is kept.
-        cut_off: of the filter, as a share of half the lower rate.
-
-    Returns:
-        The share.
-    """
-    return float(np.sqrt(np.sum(_kernel(factor, cut_off) ** 2)))
-
-
 @functools.lru_cache
 def _kernel(factor: int, cut_off: float) -> Array:
     from scipy.signal import firwin

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from orchestrator.api.diagnose import diagnose
 from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.rate import decimated, factor_of
-from orchestrator.diagnosis.blackbox.settings import DEFAULT
+from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxRateSettings, BoxSettings
+from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
+from tests.support.c_fmu import have_compiler
 
 NOISE = 1e-3
 
@@ -20,7 +23,7 @@ def _data(rows, frequency, step=1e-3):
 
 @pytest.mark.parametrize(
     ("rows", "frequency", "factor"),
-    [(3_900, 1.0, 1), (20_000, 1.0, 10), (20_000, 10.0, 6), (20_000, 60.0, 1)],
+    [(7_900, 1.0, 1), (40_000, 1.0, 10), (40_000, 10.0, 6), (40_000, 60.0, 1)],
     ids=["short", "slow", "faster", "fast"],
 )
 def test_a_long_record_keeps_the_rate_that_its_outputs_ask_for(rows, frequency, factor):
@@ -28,19 +31,32 @@ def test_a_long_record_keeps_the_rate_that_its_outputs_ask_for(rows, frequency, 
     assert found == 1 if factor == 1 else abs(found - factor) <= 1
 
 
-def test_motion_impulse_and_noise_of_fewer_rows():
+def test_fewer_rows_are_looked_at_and_all_inputs_act():
     data = _data(20_000, 1.0)
     less = decimated(data, 10)
     assert less.factor == 10
     assert less.step == pytest.approx(1e-2)
-    smooth = np.sin(2 * np.pi * less.time)
-    left = (less.outputs[:, 0] - smooth)[20:-20]
-    assert np.std(left) == pytest.approx(NOISE * less.noise_share, rel=0.1)
-    assert less.noise_share < 0.4
-    inner = slice(200, 1800)
+    np.testing.assert_array_equal(less.outputs, data.outputs[:19_990:10])
+    np.testing.assert_array_equal(less.driven, data.inputs[:19_990])
     held = np.cumsum(data.inputs[:-1, 0])[9::10] * data.step
-    assert np.cumsum(less.inputs[:, 0])[inner] * less.step == pytest.approx(held[: len(less.time)][inner], abs=2e-3)
-    assert less.signals[inner, 0] == pytest.approx(less.time[inner] + 4.5e-3, abs=1e-6)
+    assert np.cumsum(less.inputs[:, 0]) * less.step == pytest.approx(held, abs=1e-12)
+    assert less.signals[:, 0] == pytest.approx(less.time + 4.5e-3, abs=1e-9)
+
+
+@pytest.mark.skipif(not have_compiler(), reason="no C compiler")
+def test_a_saturation_between_the_rows_that_are_looked_at_is_found_to_its_size(tmp_path):
+    domain, rng = DOMAINS[0], np.random.default_rng(8)
+    case = record(domain, ("input_saturation",), rng, 1300)
+    fmu, map_path = write_fmu(tmp_path / "Spring.fmu", domain), write_map(tmp_path / "map.toml", domain)
+    settings = BoxSettings(rate=BoxRateSettings(rows=400, per_band=2.1, most_above=0.3))
+    found = diagnose(write_record(tmp_path / "r.csv", case), fmu, map_path, settings=settings)
+    found.close()
+    assert found.outcome.problem.data.factor == 3
+    assert found.outcome.problem.m == 6  # at least four in a sample, a whole number a row of the file
+    (effect,) = found.effects
+    assert effect.effect.kind.name == "input_saturation"
+    assert effect.estimates[0].value == pytest.approx(case.sizes[0], rel=0.01)
+    assert found.outcome.misfit[0].corrected < 1.1
 
 
 def test_all_rows_of_a_short_record_stay():

@@ -17,6 +17,17 @@ def signal():
     return np.repeat(rng.standard_normal(60), 5)
 
 
+def test_rows_are_divided_into_more_parts_than_rows_or_fewer(signal):
+    rows = np.append(signal, 9.0)
+    assert series.divided(rows, 3, 6) == pytest.approx(np.repeat(signal, 2), abs=0.0)
+    assert series.divided(rows, 3, 1) == pytest.approx(signal.reshape(-1, 3).mean(axis=1))
+    halves = series.divided(rows, 3, 2)
+    assert halves[0] == pytest.approx((signal[0] + 0.5 * signal[1]) / 1.5)
+    assert halves.mean() == pytest.approx(signal.mean())
+    lines = series.divided(np.arange(7.0), 3, 3, order=1)
+    assert lines == pytest.approx(np.arange(6.0) + 0.5)
+
+
 def test_a_delay_of_whole_steps_shifts(signal):
     late = series.delayed(signal, STEP, 7 * STEP, 0.5)
     assert late[:7] == pytest.approx(0.5)
