@@ -69,6 +69,7 @@ class Kind:
         amplitudes: in how many of the values, the first ones, the response is linear, where it is not in all.
         needs: the simpler effect that it contains.
         grows: that one's values, scene -> values to try in its place.
+        becomes: values, scene -> that one's values to try where its law is no other.
         departs: values, scene -> share by which its law differs from that one's within the motion of the record.
         plausible: values -> False where the fit has left what the effect means.
         angular: only for angles.
@@ -91,6 +92,7 @@ class Kind:
     amplitudes: int = 0
     needs: str = ""
     grows: Callable[[Values, Surroundings], tuple[Values, ...]] = lambda values, scene: ()
+    becomes: Callable[[Values, Surroundings], tuple[Values, ...]] = lambda values, scene: ()
     departs: Callable[[Values, Surroundings], float] = lambda values, scene: 0.0
     plausible: Callable[[Values, Surroundings], bool] = lambda values, scene: True
     angular: bool = False
@@ -183,10 +185,15 @@ def _from_coulomb(values: Values, s: Surroundings) -> tuple[Values, ...]:
     return tuple((0.9 * level, 1.5 * level, share * s.speed, distance) for share in (0.05, 0.3))
 
 
+def _to_coulomb(values: Values, s: Surroundings) -> tuple[Values, ...]:
+    sliding, _, _, distance = values
+    return ((sliding, distance), (sliding, 0.2 * s.speed * s.h))
+
+
 def _falls(values: Values, s: Surroundings) -> float:
     """Return the share of Stribeck's friction by which it falls from rest to the typical speed."""
     sliding, breakaway, speed = values[:3]
-    return float((1.0 - sliding / breakaway) * (1.0 - np.exp(-((s.speed / speed) ** 2))))
+    return float((1.0 - sliding / breakaway) * (1.0 - np.exp(-(min(s.speed / speed, 100.0) ** 2))))
 
 
 _SERIES = (
@@ -218,7 +225,7 @@ _FEEDBACK = (
          ("effort", "effort", "flow/s", "flow"),
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 * s.speed, 0.2 * s.speed * s.h), lambda s: (),
          law=laws.STRIBECK, lower=(0.0, 0.0, 1e-300, 1e-300), needs="coulomb_friction",
-         grows=_from_coulomb, departs=_falls, plausible=lambda v, s: v[1] > 1.03 * v[0] > 0.0),
+         grows=_from_coulomb, becomes=_to_coulomb, departs=_falls, plausible=lambda v, s: v[1] > 1.03 * v[0] > 0.0),
     Kind("quadratic_drag", PORT, ("coefficient",), ("effort.s2/flow2",), lambda s: (0.01 * s.size / s.speed**2,),
          lambda s: ((0.01 * s.size / s.speed**2,),), True, laws.QUADRATIC, plausible=_positive),
     Kind("viscous_drag", PORT, ("coefficient",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),

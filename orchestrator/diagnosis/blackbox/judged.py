@@ -107,6 +107,7 @@ def judged(
     fitter, seen = search.fitter, search.fitter.parts.looked_at
     on_all = on_all_rows(search, best, settings)
     rest = doubted(search, on_all, settings)
+    refuted = on_all.rest.disturbed and not rest.disturbed
     on_all = on_finer_steps(search, on_all) if rest.nothing_missing else on_all
     problem.m = fitter.problem.m
     last = on_all.last
@@ -117,7 +118,7 @@ def judged(
         if fewer is not None:
             others = families[:nothing] + families[nothing + 1 :]
             return judged(problem, probe, search, base, fitter.settled(fewer), others, begun, settings)
-    if not rest.nothing_missing and len(best.model.effects) > 1:
+    if not rest.nothing_missing and not refuted and len(best.model.effects) > 1:
         for k, fewer in _with_one_less(problem, fitter, base, best, settings):
             others = families[:k] + families[k + 1 :]
             return judged(problem, probe, search, base, fewer, others, begun, settings)
@@ -129,6 +130,7 @@ def judged(
     stages = _stages(problem, base, last)
     on_held_out = held_out(problem, stages, fitter.parts.held_out, settings)
     verdict, rest = _verdict(search, last, values, rest, on_held_out, settings)
+    verdict = "unknown" if refuted else verdict  # what stands in for something else does well on unseen data too
     named = tuple(
         FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
     )

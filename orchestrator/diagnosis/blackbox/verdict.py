@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import BoxEffect
+from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
@@ -99,7 +99,7 @@ def settled_names(search: BoxSearch, best: BoxFit) -> tuple[BoxFit, tuple[tuple[
     Returns:
         The model, and the labels for each of its effects in their order.
     """
-    best = _alone(search, best)
+    best = _come_down(search, _alone(search, best))
     for _ in range(1 + len(best.model.effects)):
         beside = [_beside(search, best, effect) for effect in best.model.effects]
         better = [fit for near in beside for fit in near.values() if search.score(fit) > search.score(best)]
@@ -154,6 +154,23 @@ def _alone(search: BoxSearch, best: BoxFit) -> BoxFit:
             tried[effect.label] = search.fitter.fit(BoxModel(best.model.p).extended(effect, values), best.level)
     found = [search.fitter.settled(fit) for fit in tried.values() if fit is not None]
     return max([best, *found], key=search.score)
+
+
+def _come_down(search: BoxSearch, best: BoxFit) -> BoxFit:
+    """Return the fit with the simpler effect where the law of one that contains it has become no other."""
+    own = search.settings
+    for effect, values in zip(best.model.effects, best.model.values, strict=True):
+        if not effect.kind.needs or effect.kind.departs(tuple(values), effect.scene) > own.departs:
+            continue
+        simple = BoxEffect(BANK[effect.kind.needs], effect.place, effect.scene)
+        others = best.model.without(effect.label)
+        starts = effect.kind.becomes(tuple(values), effect.scene)
+        tried = [search.fitter.fit(others.extended(simple, np.array(start)), best.level) for start in starts]
+        found = [search.fitter.settled(fit) for fit in tried if fit is not None]
+        nearest = max(found, key=search.score, default=best)
+        if search.score(nearest) > search.score(best) - own.family:
+            best = nearest
+    return best
 
 
 def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, BoxFit]:

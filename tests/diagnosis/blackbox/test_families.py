@@ -79,6 +79,19 @@ def test_what_contains_an_effect_is_of_its_family_where_its_law_is_another(total
     assert settled_names(found, best)[1] == ((() if told else ("stribeck_friction@p",)),)
 
 
+@pytest.mark.parametrize(("values", "total", "name"), [
+    ((0.036, 0.023, 1e-300, 1e-300), -14.0, "coulomb_friction"),  # no other law, and as likely
+    ((0.036, 0.037, 1.0, 0.001), -14.0, "coulomb_friction"),
+    ((0.036, 0.023, 1e-300, 1e-300), -17.0, "stribeck_friction"),  # its start or its end makes a difference
+    ((0.036, 0.060, 1.0, 0.001), -9.0, "stribeck_friction"),
+])  # fmt: skip
+def test_a_law_that_has_become_the_one_that_it_contains_goes_by_its_name(values, total, name) -> None:
+    model = BoxModel(np.zeros(0)).extended(at("stribeck_friction"), np.array(values))
+    best = BoxFit(model, 0, NONE, -10.0, 0.0, 0.0, NONE)
+    found, _ = settled_names(search({"coulomb_friction": total}), best)
+    assert [effect.kind.name for effect in found.model.effects] == [name]
+
+
 def test_what_stood_beside_an_effect_in_an_earlier_search_is_fitted_anew() -> None:
     best = fit(-10.0, "input_delay")
     step = SearchStep(fit(-900.0), (fit(-800.0, "input_delay"), fit(-11.0, "input_lag"), fit(-801.0, "load")), True)
