@@ -165,11 +165,13 @@ def _come_down(search: BoxSearch, best: BoxFit) -> BoxFit:
         simple = BoxEffect(BANK[effect.kind.needs], effect.place, effect.scene)
         others = best.model.without(effect.label)
         starts = effect.kind.becomes(tuple(values), effect.scene)
-        tried = [search.fitter.fit(others.extended(simple, np.array(start)), best.level) for start in starts]
-        found = [search.fitter.settled(fit) for fit in tried if fit is not None]
-        nearest = max(found, key=search.score, default=best)
-        if search.score(nearest) > search.score(best) - own.family:
-            best = nearest
+        models = [others.extended(simple, np.array(start)) for start in starts]
+        for iterations in (0, None):  # as it is, or fitted anew
+            tried = [search.fitter.fit(model, best.level, iterations=iterations) for model in models]
+            nearest = max((fit for fit in tried if fit is not None), key=search.score, default=best)
+            if search.score(nearest) > search.score(best) - own.family:
+                best = nearest
+                break
     return best
 
 

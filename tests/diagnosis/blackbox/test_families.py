@@ -33,7 +33,7 @@ def search(totals: dict[str, float], *steps: SearchStep, share: float = 0.0) -> 
     ``share``: noise at the ports beside all of them.
     """
 
-    def fitted(model: BoxModel, level: int) -> BoxFit:
+    def fitted(model: BoxModel, level: int, iterations: int | None = None) -> BoxFit:
         names = [e.kind.name for e in model.effects]
         return fit(totals.get("+".join(names), totals[names[-1]]), *names)
 
