@@ -129,8 +129,7 @@ def judged(
     )
     stages = _stages(problem, base, last)
     on_held_out = held_out(problem, stages, fitter.parts.held_out, settings)
-    verdict, rest = _verdict(search, last, values, rest, on_held_out, settings)
-    verdict = "unknown" if refuted else verdict  # what stands in for something else does well on unseen data too
+    verdict, rest = _verdict(search, last, values, rest, refuted, on_held_out, settings)
     named = tuple(
         FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
     )
@@ -174,8 +173,8 @@ def _stages(problem: BoxProblem, base: BoxFit, last: BoxFit) -> tuple[Array, Arr
 
 
 def _verdict(
-    search: BoxSearch, last: BoxFit, values: Sequence[Sequence[ValueEstimate]], rest: Rest, shown: HeldOut,
-    settings: RestSettings,
+    search: BoxSearch, last: BoxFit, values: Sequence[Sequence[ValueEstimate]], rest: Rest, refuted: bool,
+    shown: HeldOut, settings: RestSettings,
 ) -> tuple[str, Rest]:  # fmt: skip
     """Return the verdict, and what is left in its light."""
     fitter, effects = search.fitter, last.model.effects
@@ -188,7 +187,8 @@ def _verdict(
         off = np.abs(last.model.p - fitter.mean) / fitter.sd
         plausible = bool(np.all(off < settings.implausible)) and all(e.kind.where != PARAMETER for e in effects)
         told = _of_no_size(last, values, search.settings) is None
-        told = told and any(e.kind.name not in SETTINGS_OF_A_CHANNEL for e in effects)
+        # What stands in for something else beside a disturbance does well on unseen data too.
+        told = told and not refuted and any(e.kind.name not in SETTINGS_OF_A_CHANNEL for e in effects)
         return ("effects" if plausible and told and shown.shows(settings) else "unknown"), rest
     if not rest.nothing_missing:
         return "unknown", rest

@@ -97,20 +97,21 @@ def test_a_ripple_whose_wavenumber_is_hardly_known_need_not_repeat(error, expect
 SHOWN = HeldOut(0.99, 0.999, 0.99)
 
 
-@pytest.mark.parametrize(("labels", "error", "expected"), [
-    (("coulomb_friction@p",), 0.01, "effects"),
-    (("coulomb_friction@p",), 0.8, "unknown"),
-    (("output_offset@y",), 0.01, "unknown"),
-    (("output_gain@y", "output_offset@y"), 0.01, "unknown"),
-    (("coulomb_friction@p", "output_offset@y"), 0.01, "effects"),
-    (("coulomb_friction@p", "parameter_drift@k"), 0.01, "unknown"),
+@pytest.mark.parametrize(("labels", "error", "refuted", "expected"), [
+    (("coulomb_friction@p",), 0.01, False, "effects"),
+    (("coulomb_friction@p",), 0.8, False, "unknown"),
+    (("coulomb_friction@p",), 0.01, True, "unknown"),
+    (("output_offset@y",), 0.01, False, "unknown"),
+    (("output_gain@y", "output_offset@y"), 0.01, False, "unknown"),
+    (("coulomb_friction@p", "output_offset@y"), 0.01, False, "effects"),
+    (("coulomb_friction@p", "parameter_drift@k"), 0.01, False, "unknown"),
 ])  # fmt: skip
-def test_where_more_than_noise_is_left_effects_are_named_that_cannot_follow_anything(labels, error, expected):
+def test_where_more_than_noise_is_left_effects_are_named_that_cannot_follow_anything(labels, error, refuted, expected):
     effects = [BoxEffect(BANK[name.partition("@")[0]], name, None) for name in labels]
     search = SimpleNamespace(fitter=SimpleNamespace(mean=np.ones(1), sd=np.ones(1)), settings=SEARCH)
     last = SimpleNamespace(model=SimpleNamespace(effects=effects, p=np.ones(1)))
     values = [(ValueEstimate("size", 1.0, error, (0.0, 0.0), "N"),) * 2 for _ in labels]
-    assert _verdict(search, last, values, LEFT, SHOWN, RestSettings())[0] == expected
+    assert _verdict(search, last, values, LEFT, refuted, SHOWN, RestSettings())[0] == expected
 
 
 def test_without_effects_nothing_can_do_harm():
