@@ -14,7 +14,7 @@ from orchestrator.cli import main
 from orchestrator.errors import ConnectionMismatchError, FmuError, InputError, ScenarioError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel, Jacobi
-from orchestrator.master.signals import Constant, Sine
+from orchestrator.master.signals import Constant, Sine, Step
 from orchestrator.master.system import SignalSource, System
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.scenario import paired_scenario
@@ -184,6 +184,34 @@ def test_outer_inputs_reach_through_with_their_transformation(fmus, tmp_path: Pa
     with opened_ssp(pack(tmp_path, fmus), {"torque": Constant(4.0)}, step=1e-3) as found:
         result = simulate(replace(found, record=("drive/plant.u",)))
     assert result.values[0, -1] == 13.0
+
+
+CONTROLLER = """<ssd:System name="root">
+ <ssd:Connectors><ssd:Connector name="angle" kind="input"><ssc:Real/></ssd:Connector></ssd:Connectors>
+ <ssd:Elements>
+  <ssd:Component name="controller" source="resources/LqrController.fmu">
+   <ssd:Connectors>
+    <ssd:Connector name="theta_l_hat" kind="input"><ssc:Real/></ssd:Connector>
+    <ssd:Connector name="u" kind="output"><ssc:Real/></ssd:Connector>
+   </ssd:Connectors>
+  </ssd:Component>
+ </ssd:Elements>
+ <ssd:Connections>
+  <ssd:Connection startConnector="angle" endElement="controller" endConnector="theta_l_hat"/>
+ </ssd:Connections>
+</ssd:System>
+<ssd:DefaultExperiment startTime="0" stopTime="0.01"/>
+</ssd:SystemStructureDescription>
+"""
+
+
+def test_what_is_fed_in_at_a_communication_point_holds_from_there_on(fmus, tmp_path: Path) -> None:
+    path = pack(tmp_path, fmus, CONTROLLER, **{"resources/LqrController.fmu": fmus["LqrController"].read_bytes()})
+    with opened_ssp(path, {"angle": Step(0.003, 1.0)}, step=1e-3) as found:
+        assert found.system.fed_through("controller.theta_l_hat")  # a sampled-data block would be given what comes next
+        torque = simulate(found)["controller.u"]
+    assert not np.any(torque[:4])
+    assert torque[4] != 0.0
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ class BoxSearchSettings(Settings, frozen=True):
     ] = 30.0
     least_errors: Annotated[
         float, setting("standard errors by which a size must differ from zero once all rows are fitted, in fine steps")
-    ] = 2.0
+    ] = 4.0
     least_sharp: Annotated[
         float, setting("standard errors by which a ripple's wavenumber must differ from zero: a smooth curve has none")
     ] = 10.0

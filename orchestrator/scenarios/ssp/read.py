@@ -230,7 +230,8 @@ def _connections(structure: _Structure, inputs: Mapping[str, Signal]) -> tuple[l
         if node[0] in structure.components:
             connections.append(Connection(".".join(node), name, factor, offset))
         elif node[0] == "" and node[1] in inputs:
-            sources.append(SignalSource(name, Scaled(inputs[node[1]], factor, offset)))
+            # As other tools do: what is set at a communication point holds over the step from there.
+            sources.append(SignalSource(name, Scaled(inputs[node[1]], factor, offset), at="start"))
     for name in inputs:
         if structure.kinds.get(("", name)) != "input":
             structure.problems.append(Problem("$.System.Connectors", f"must have an input {name!r}, but has none"))

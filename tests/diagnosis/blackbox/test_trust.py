@@ -78,7 +78,7 @@ def test_thresholds_are_those_of_the_settings():
 
 @pytest.mark.parametrize(
     ("sizes", "expected"),
-    [([(3.0, 0.1), (1.0, 0.6)], 1), ([(3.0, 0.1), (-1.3, 0.6)], None), ([(0.1, 0.2), (0.1, 0.2)], 0), ([], None)],
+    [([(3.0, 0.1), (1.0, 0.3)], 1), ([(3.0, 0.1), (-1.3, 0.3)], None), ([(0.1, 0.2), (0.1, 0.2)], 0), ([], None)],
 )
 def test_an_effect_whose_size_may_be_zero_is_found(sizes, expected):
     effects = [SimpleNamespace(kind=SimpleNamespace(finer=None, name="load"), amplitudes=1) for _ in sizes]
