@@ -107,7 +107,7 @@ class Tally:
     counts: dict[str, dict[str, int]] = field(default_factory=dict)
     trusts: dict[str, dict[str, int]] = field(default_factory=dict)
     told: dict[str, dict[str, int]] = field(default_factory=dict)
-    misfits: list[float] = field(default_factory=list)
+    misfits: dict[str, list[float]] = field(default_factory=dict)
     errors: list[float] = field(default_factory=list)
     z: list[float] = field(default_factory=list)
     z_sizes: list[float] = field(default_factory=list)
@@ -124,9 +124,9 @@ class Tally:
             of_told[verdict] = of_told.get(verdict, 0) + 1
         of_level = self.trusts.setdefault(found.trust.level.word, {})
         of_level[verdict] = of_level.get(verdict, 0) + 1
+        self.misfits.setdefault(kind, []).append(max(m.corrected for m in found.outcome.misfit))
         if verdict != "right" or kind == "unknown":
             return
-        self.misfits.append(max(m.corrected for m in found.outcome.misfit))
         for f in found.effects:
             e, size = f.estimates[0], dict(zip(names, sizes, strict=True))[f.effect.kind.name]
             if f.effect.kind.name == "ripple":  # sine and cosine of an amplitude
@@ -142,8 +142,8 @@ class Tally:
         for kind, counts in (*self.counts.items(), *self.told.items(), *self.trusts.items()):
             listed = ", ".join(f"{k} {n}" for k, n in sorted(counts.items()))
             print(f"{kind}: {sum(counts.values())} records; {listed}")
-        if self.misfits:
-            print(f"misfit over noise: median {np.median(self.misfits):.3f}, 90 % {np.quantile(self.misfits, 0.9):.3f}")
+        for kind, misfits in self.misfits.items():
+            print(f"misfit over noise, {kind}: median {np.median(misfits):.3f}, 90 % {np.quantile(misfits, 0.9):.3f}")
         if self.errors:
             shown = (100 * np.quantile(self.errors, q) for q in (0.5, 0.9))
             print("error of the size: median {:.3f} %, 90 % {:.3f} %".format(*shown))

@@ -18,6 +18,7 @@ from orchestrator.diagnosis.blackbox.estimates import (
 )
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.held_out import HeldOut, held_out
+from orchestrator.diagnosis.blackbox.lawful import dependence_of
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.probing import Probe
@@ -189,7 +190,10 @@ def _verdict(
         told = _of_no_size(last, values, search.settings) is None
         # What stands in for something else beside a disturbance does well on unseen data too.
         told = told and not refuted and any(e.kind.name not in SETTINGS_OF_A_CHANNEL for e in effects)
-        return ("effects" if plausible and told and shown.shows(settings) else "unknown"), rest
+        if not (plausible and told and shown.shows(settings)):
+            return "unknown", rest
+        law = dependence_of(fitter, last, settings)
+        return ("effects", rest) if law is None else ("unknown", replace(rest, reasons=(law.statement,)))
     if not rest.nothing_missing:
         return "unknown", rest
     given = fitter.problem.nominal

@@ -6,10 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from orchestrator.diagnosis.blackbox import judged as outcome
 from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate
 from orchestrator.diagnosis.blackbox.held_out import HeldOut
-from orchestrator.diagnosis.blackbox.judged import _of_no_size, _verdict
+from orchestrator.diagnosis.blackbox.lawful import Dependence
 from orchestrator.diagnosis.blackbox.rest import Rest
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings, RestSettings
 from orchestrator.diagnosis.blackbox.trust import SECOND, UNEXPLAINED, doubts, harm, statement
@@ -83,7 +84,7 @@ def test_thresholds_are_those_of_the_settings():
 def test_an_effect_whose_size_may_be_zero_is_found(sizes, expected):
     effects = [SimpleNamespace(kind=SimpleNamespace(finer=None, name="load"), amplitudes=1) for _ in sizes]
     values = [(ValueEstimate("size", value, error, (0.0, 0.0), "N"),) for value, error in sizes]
-    assert _of_no_size(SimpleNamespace(model=SimpleNamespace(effects=effects)), values, SEARCH) == expected
+    assert outcome._of_no_size(SimpleNamespace(model=SimpleNamespace(effects=effects)), values, SEARCH) == expected
 
 
 @pytest.mark.parametrize(("error", "expected"), [(0.011, 0), (0.001, None)])
@@ -91,10 +92,19 @@ def test_a_ripple_whose_wavenumber_is_hardly_known_need_not_repeat(error, expect
     ripple = SimpleNamespace(kind=SimpleNamespace(finer=None, name="ripple"), amplitudes=2)
     sizes = ((-6.4, 0.3), (-0.4, 0.3), (0.045, error))
     values = [tuple(ValueEstimate("size", value, of, (0.0, 0.0), "N") for value, of in sizes)]
-    assert _of_no_size(SimpleNamespace(model=SimpleNamespace(effects=(ripple,))), values, SEARCH) == expected
+    assert outcome._of_no_size(SimpleNamespace(model=SimpleNamespace(effects=(ripple,))), values, SEARCH) == expected
 
 
 SHOWN = HeldOut(0.99, 0.999, 0.99)
+
+
+def _told(monkeypatch, labels, error, refuted, law=None):
+    effects = [BoxEffect(BANK[name.partition("@")[0]], name, None) for name in labels]
+    search = SimpleNamespace(fitter=SimpleNamespace(mean=np.ones(1), sd=np.ones(1)), settings=SEARCH)
+    last = SimpleNamespace(model=SimpleNamespace(effects=effects, p=np.ones(1)))
+    values = [(ValueEstimate("size", 1.0, error, (0.0, 0.0), "N"),) * 2 for _ in labels]
+    monkeypatch.setattr(outcome, "dependence_of", lambda *_: law)
+    return outcome._verdict(search, last, values, LEFT, refuted, SHOWN, RestSettings())
 
 
 @pytest.mark.parametrize(("labels", "error", "refuted", "expected"), [
@@ -106,12 +116,17 @@ SHOWN = HeldOut(0.99, 0.999, 0.99)
     (("coulomb_friction@p", "output_offset@y"), 0.01, False, "effects"),
     (("coulomb_friction@p", "parameter_drift@k"), 0.01, False, "unknown"),
 ])  # fmt: skip
-def test_where_more_than_noise_is_left_effects_are_named_that_cannot_follow_anything(labels, error, refuted, expected):
-    effects = [BoxEffect(BANK[name.partition("@")[0]], name, None) for name in labels]
-    search = SimpleNamespace(fitter=SimpleNamespace(mean=np.ones(1), sd=np.ones(1)), settings=SEARCH)
-    last = SimpleNamespace(model=SimpleNamespace(effects=effects, p=np.ones(1)))
-    values = [(ValueEstimate("size", 1.0, error, (0.0, 0.0), "N"),) * 2 for _ in labels]
-    assert _verdict(search, last, values, LEFT, refuted, SHOWN, RestSettings())[0] == expected
+def test_where_more_than_noise_is_left_effects_are_named_that_cannot_follow_anything(
+    labels, error, refuted, expected, monkeypatch
+):
+    assert _told(monkeypatch, labels, error, refuted)[0] == expected
+
+
+def test_no_effect_is_named_beside_what_follows_a_law(monkeypatch):
+    law = Dependence(231.0, 0.3, "what is left follows the position and the speed at `p`")
+    verdict, rest = _told(monkeypatch, ("coulomb_friction@p",), 0.01, False, law)
+    assert verdict == "unknown"
+    assert rest.reasons == (law.statement,)
 
 
 def test_without_effects_nothing_can_do_harm():
