@@ -222,7 +222,7 @@ class RestSettings(Settings, frozen=True):
         share(
             "of that misfit which any effects must remove, where they leave more than noise: less, and it is their like"
         ),
-    ] = 0.5
+    ] = 0.65
     implausible: Annotated[
         float, setting("stated uncertainties from which a re-fitted value speaks against them", gt=0)
     ] = 3.0
