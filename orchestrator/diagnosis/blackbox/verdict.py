@@ -179,9 +179,11 @@ def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, Box
     """Return fits of the best model with another effect in the place of ``effect``, by the other's label."""
     kept = labels(best) - {effect.label}
     near: dict[str, BoxFit] = {}
+    close: dict[str, None] = {}
     rivals: list[BoxFit] = []
     for step in (*search.earlier, *search.steps):
-        beside = any(fit.model.effects[-1].label == effect.label for fit in step.tried)
+        own = max((fit.total for fit in step.tried if fit.model.effects[-1].label == effect.label), default=-np.inf)
+        beside = own > -np.inf
         for fit in step.tried:
             other = fit.model.effects[-1]
             if other.label in labels(best) or other.kind.needs == effect.kind.name:  # what contains it is no other
@@ -189,10 +191,14 @@ def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, Box
             if labels(fit) == kept | {other.label} and step in search.steps:
                 known = near.get(other.label)
                 near[other.label] = fit if known is None or fit.total > known.total else known
+                if abs(own - fit.total) < search.settings.family:
+                    close[other.label] = None
             elif beside:
                 rivals.append(fit)
     rivals.sort(key=search.score, reverse=True)
-    return _anew(search, best, effect, near, rivals)
+    # The best has been fitted further since its step; what did as well there is fitted anew beside it.
+    behind = [near.pop(label) for label in close if best.total - near[label].total > search.settings.family]
+    return _anew(search, best, effect, near, [*behind, *rivals])
 
 
 def _anew(
@@ -206,18 +212,21 @@ def _anew(
     most = search.settings.rivals_beside_noise if noisy else search.settings.rivals
     if noisy:
         rivals = sorted((*rivals, *near.values()), key=search.score, reverse=True)
-    others: dict[str, tuple[BoxEffect, list[Array]]] = {}
+    others: dict[str, tuple[BoxEffect, list[Array], tuple[int, ...]]] = {}
     for fit in rivals:
         other = next(e for e in reversed(fit.model.effects) if e.label not in labels(best) - {effect.label})
         known = noisy or other.label not in near
         if known and other.label not in others and len(others) < most:
-            others[other.label] = other, [fit.model.values[fit.model.effects.index(other)]]
+            # From less noise than its own a fit may end where it began.
+            levels = tuple(dict.fromkeys((best.level, fit.level)))
+            others[other.label] = other, [fit.model.values[fit.model.effects.index(other)]], levels
     without, found = best.model.without(effect.label), dict(near)
-    for promise in _promised(search, without, best, [other for other, _ in others.values()]) if noisy else ():
+    for promise in _promised(search, without, best, [other for other, *_ in others.values()]) if noisy else ():
         if len(others[promise.effect.label][1]) < search.settings.rival_starts:
             others[promise.effect.label][1].append(promise.values)
-    for other, starts in others.values():
-        fits = [search.fitter.fit(without.extended(other, other.bounded(values)), best.level) for values in starts]
+    for other, starts, levels in others.values():
+        models = [without.extended(other, other.bounded(values)) for values in starts]
+        fits = [search.fitter.fit(model, level) for model in models for level in levels]
         again = [search.fitter.settled(fit) for fit in fits if fit is not None]
         again += [near[other.label]] if other.label in near else []
         if again:
