@@ -30,7 +30,7 @@ from .drivetrain_parameters import (
     P_WAVY_PHASE_M,
 )
 from .effects import bristle_rate, dependent_friction
-from .equations import Mode, Parameters, State, elastic_torque, friction_l, friction_m, is_rigid, twist_slope
+from .equations import Mode, Parameters, State, elastic_torque, friction_l, friction_m, is_rigid, lever_arm
 
 # A bristle has settled when it is this near to its reach.
 SETTLED = 1e-6
@@ -131,7 +131,7 @@ def carried_m(x: State, contact: int, p: Parameters) -> float:
     Returns:
         The torque.
     """
-    return 0.0 if is_rigid(p) or p[P_LOADED_M] == 0.0 else elastic_torque(x, contact, p) * twist_slope(x, p)
+    return 0.0 if is_rigid(p) or p[P_LOADED_M] == 0.0 else elastic_torque(x, contact, p) * lever_arm(x, p)
 
 
 def carried_l(x: State, contact: int, p: Parameters) -> float:

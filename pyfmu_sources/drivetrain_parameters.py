@@ -145,6 +145,8 @@ SHAFT = (
     Parameter("effects.shaft_hysteresis.torque", "N.m", 0.0, 0.0, BIG, "Hysteresis of the shaft (Bouc-Wen): torque"),
     Parameter("effects.shaft_hysteresis.twist", "rad", 1e-3, TINY, BIG, "Twist over which it turns round"),
     Parameter("effects.impact_damping.depth", "rad", 0.0, 0.0, BIG, "Depth over which damping of teeth sets in"),
+    Parameter("effects.gear_eccentricity.lever_arm", "1", 1.0, 0.0, 1.0, "Share of its change that the lever takes"),
+    Parameter("effects.hardening_stiffness.sharpness", "1", 0.0, 0.0, BIG, "Fifth power, over cubic squared by k"),
 )
 
 PARAMETERS = (*_FIRST, *friction_details("motor"), *friction_details("load"), *DRIVE, *BODY, *SHAFT)
@@ -229,6 +231,8 @@ COUNT = len(PARAMETERS)
     P_HYSTERESIS,
     P_HYSTERESIS_TWIST,
     P_ONSET,
+    P_ECC_LEVER,
+    P_SHARPNESS,
 ) = range(COUNT)
 
 

@@ -26,11 +26,11 @@ from .equations import (
     elastic_torque,
     gear,
     is_rigid,
+    lever_arm,
     load_inertia,
     load_torque,
     motor_torque,
     rigid_acceleration,
-    twist_slope,
 )
 
 NEVER = 1e300
@@ -75,7 +75,7 @@ def push_on_motor(x: State, contact: int, p: Parameters) -> float:
     """
     if is_rigid(p):
         return motor_torque(x, 0.0, 0.0, p)
-    return motor_torque(x, 0.0, 0.0, p) - elastic_torque(x, contact, p) * twist_slope(x, p)
+    return motor_torque(x, 0.0, 0.0, p) - elastic_torque(x, contact, p) * lever_arm(x, p)
 
 
 def push_on_load(x: State, contact: int, p: Parameters, T_l: float) -> float:

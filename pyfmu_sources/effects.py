@@ -340,14 +340,22 @@ def twist_error_curvature(theta_m: float, amplitude: float, cycles_per_rev: floa
     return -amplitude * cycles_per_rev * cycles_per_rev * sine(cycles_per_rev * theta_m + phase)
 
 
-def hardening_torque(twist: float, cubic: float) -> float:
-    """Return what a cubic stiffness [N.m/rad3] adds to the torque of a shaft twisted by ``twist`` [rad].
+def hardening_torque(twist: float, cubic: float, stiffness: float, sharpness: float) -> float:
+    """Return what a hardening stiffness adds to the torque of a shaft twisted by ``twist`` [rad].
+
+    ``cubic * twist**3 + sharpness * cubic**2 / stiffness * twist**5``: the odd series of a stiffness that grows, to its
+    third term. A cubic spring has a sharpness of 0, one that grows as the tangent does, up to a rigid end, 1.2.
 
     Args:
         twist: [rad].
         cubic: [N.m/rad3].
+        stiffness: of small twists [N.m/rad]; without one there is no fifth power.
+        sharpness: [1].
 
     Returns:
         The torque.
     """
-    return cubic * twist * twist * twist
+    third = cubic * twist * twist * twist
+    if sharpness == 0.0 or stiffness <= 0.0:
+        return third
+    return third * (1.0 + sharpness * cubic * twist * twist / stiffness)

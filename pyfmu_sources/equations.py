@@ -36,6 +36,7 @@ from .drivetrain_parameters import (
     P_DIRECTION_M,
     P_DRAG,
     P_ECC,
+    P_ECC_LEVER,
     P_ECC_N,
     P_ECC_PHASE,
     P_FILTER,
@@ -69,6 +70,7 @@ from .drivetrain_parameters import (
     P_RIPPLE_3_PHASE,
     P_RIPPLE_N,
     P_RIPPLE_PHASE,
+    P_SHARPNESS,
     P_SPRING,
     P_SPRING_ANGLE,
     P_SPRING_CUBIC,
@@ -206,6 +208,22 @@ def twist_slope(x: State, p: Parameters) -> float:
     return 1.0 / p[P_I] + twist_error_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
+def lever_arm(x: State, p: Parameters) -> float:
+    """Return the torque on the motor over that of the elastic shaft [N.m/(N.m)], which is 1/i for an ideal gear.
+
+    The arm of teeth that conserve energy is :func:`twist_slope`. That of a gear whose teeth only stand off their
+    places, or of an encoder that sits off its axis, keeps its length.
+
+    Args:
+        x: state, see the head of the module.
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The ratio.
+    """
+    return 1.0 / p[P_I] + p[P_ECC_LEVER] * twist_error_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
+
+
 def twist_rate(x: State, p: Parameters) -> float:
     """Return the time derivative of the twist [rad/s].
 
@@ -257,7 +275,8 @@ def elastic_torque(x: State, contact: int, p: Parameters) -> float:
         stiffness *= 1.0 + periodic(x[0], p[P_K_WAVE], p[P_K_WAVE_N], p[P_K_WAVE_PHASE])
     if p[P_ONSET] != 0.0 and int(p[P_MODEL]) in GRADUAL:
         damping *= set_in(wound, p[P_ONSET])
-    torque = stiffness * wound + damping * twist_rate(x, p) + hardening_torque(wound, p[P_CUBIC])
+    torque = stiffness * wound + damping * twist_rate(x, p)
+    torque += hardening_torque(wound, p[P_CUBIC], shaft_stiffness(p), p[P_SHARPNESS])
     if p[P_HYSTERESIS] != 0.0:
         torque += p[P_HYSTERESIS] * x[10]
     return torque
@@ -443,7 +462,8 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
     wound_rate = 0.0
     if contact == 0 and x[7] != 0.0:
         stiffness = shaft_stiffness(p)
-        wound_rate = -(stiffness * x[7] + hardening_torque(x[7], p[P_CUBIC])) / shaft_damping(p)
+        torque = stiffness * x[7] + hardening_torque(x[7], p[P_CUBIC], stiffness, p[P_SHARPNESS])
+        wound_rate = -torque / shaft_damping(p)
     follower = 0.0
     if p[P_RES_J] > 0.0:
         pull = resonance_torque(x[2] - x[5], x[3] - x[6], p[P_RES_J], p[P_RES_W], p[P_RES_ZETA])
@@ -458,7 +478,7 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
         accelerated_m, accelerated_l = rigid_rates(x, contact, sign_m, sign_l, p, T_l)
     else:
         shaft = elastic_torque(x, contact, p)
-        transmitted = shaft * twist_slope(x, p)
+        transmitted = shaft * lever_arm(x, p)
         accelerated_m = (motor_torque(x, transmitted, sign_m, p) - transmitted) / p[P_J_M]
         accelerated_l = (load_torque(x, shaft, sign_l, p, T_l) + shaft) / load_inertia(x, p)
         if p[P_HYSTERESIS] != 0.0 and contact != 0:

@@ -6,6 +6,7 @@ plant's table, and one row here; ``docs/diagnosis.md`` walks through an example.
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +145,19 @@ def _periodic(
     )  # fmt: skip
 
 
+def _eccentricity() -> Effect:
+    """Return the row of an eccentric gear, whose lever arm follows its ratio, or an encoder's, whose arm does not."""
+    wave = _periodic("gear_eccentricity", "shaft", lambda s: 0.003 * s.twist, tolerance=8e-3, leaves=0.04)
+    return replace(
+        wave,
+        parameters=wave.parameters | group(wave.name, "lever_arm"),
+        starts=lambda s: wave.starts(s) | {"lever_arm": (0.5,)},
+        scales=lambda s: wave.scales(s) | {"lever_arm": 0.3},
+        priors=lambda s: {"lever_arm": (0.5, 0.5)},
+        shape=("lever_arm",),
+    )
+
+
 def _torque(scene: Scene) -> float:
     return 0.01 * scene.torque
 
@@ -192,13 +206,13 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: 0.003 * float(np.max(np.abs(s.u))), lambda s: {"limit": _limits(s)},
     ),
     Effect(
-        "hardening_stiffness", "shaft", group("hardening_stiffness", "cubic"), "cubic",
-        lambda s: 0.02 * s.stiffness / s.twist**2, amplitudes=("cubic",), family="weak shaft at small torque",
-        leaves=0.03,
+        "hardening_stiffness", "shaft", group("hardening_stiffness", "cubic", "sharpness"), "cubic",
+        lambda s: 0.02 * s.stiffness / s.twist**2, lambda s: {"sharpness": (0.6,)}, amplitudes=("cubic",),
+        scales=lambda s: {"sharpness": 0.3}, priors=lambda s: {"sharpness": (0.6, 0.6)}, shape=("sharpness",),
+        family="weak shaft at small torque", leaves=0.03,
     ),
     _periodic("torque_ripple", "motor", _torque),
-    # Where the tooth force acts on an eccentric gear, and so its lever arm, differs between models.
-    _periodic("gear_eccentricity", "shaft", lambda s: 0.003 * s.twist, tolerance=8e-3, leaves=0.04),
+    _eccentricity(),
     Effect(
         "load_torque", "load", group("load_torque", "torque"), "torque", _load_torque, amplitudes=("torque",),
     ),

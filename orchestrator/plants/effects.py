@@ -92,6 +92,7 @@ class Effect:
         bounds: scene -> short name -> (least, largest), narrower than the table's.
         nuisances: parameters of the predictor alone that are fitted with the effect, and not reported as its own.
         priors: scene -> short name -> (mean, standard deviation).
+        shape: parameters by which laws of this kind differ; each has a prior, which speaks where a record does not.
         angular: True if it makes sense for an angle only, not for a position in metres.
         both_encoders: True if it can be seen only with an encoder on either side.
         leaves: share of what the effect gains that its law, not being exact, may leave for other effects to gain.
@@ -124,6 +125,7 @@ class Effect:
     angular: bool = False
     nuisances: dict[str, str] = field(default_factory=dict)
     priors: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
+    shape: tuple[str, ...] = ()
     leaves: float = 0.01
     least_noise: float = 0.0
     taken_from: dict[str, str] = field(default_factory=dict)

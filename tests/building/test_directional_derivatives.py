@@ -21,9 +21,11 @@ SHAFT = {
     "alpha": 0.01,
     "theta_m_start": 0.08,
     "effects.hardening_stiffness.cubic": 2e4,
+    "effects.hardening_stiffness.sharpness": 0.7,
     "effects.varying_stiffness.amplitude": 0.1,
     "effects.shaft_hysteresis.torque": 2.0,
     "effects.gear_eccentricity.amplitude": 1e-3,
+    "effects.gear_eccentricity.lever_arm": 0.3,
     "effects.impact_damping.depth": 1e-3,
 }
 FRICTION = {

@@ -173,6 +173,29 @@ def test_a_parted_shaft_unwinds_with_its_hardening() -> None:
     assert eq.rates(x, 1, 0.0, 0.0, p, 0.0, 0.0)[7] == 0.0
 
 
+@pytest.mark.parametrize("model", [dt.DEAD_ZONE, dt.ELASTIC_IMPACT])
+def test_a_sharp_hardening_adds_the_fifth_power(model: int) -> None:
+    x = at(theta_m=I * 0.02, omega_m=0.0, theta_l=0.0, omega_l=0.0)
+    plain, sharp = (
+        eq.elastic_torque(x, 1, p_of(model, hardening_stiffness__cubic=1e6, hardening_stiffness__sharpness=q))
+        for q in (0.0, 1.2)
+    )
+    k = K if model == dt.DEAD_ZONE else p_of()[dt.P_CONTACT_K]
+    wound = 0.02 - ALPHA
+    assert sharp - plain == pytest.approx(1.2 * 1e12 / k * wound**5)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+def test_the_lever_arm_of_an_eccentric_gear_takes_its_share(share: float) -> None:
+    x = at(theta_m=0.7, omega_m=0.0, omega_l=0.0)
+    wave = {"gear_eccentricity__amplitude": 0.02, "gear_eccentricity__cycles_per_rev": 3.0}
+    p = p_of(dt.NONE, gear_eccentricity__lever_arm=share, **wave)
+    shaft = eq.elastic_torque(x, 1, p)
+    moved = eq.rates(x, 1, 0.0, 0.0, p, 0.0, 0.0)
+    arm = 1.0 / I + share * 0.06 * math.cos(2.1)
+    assert J_M * moved[1] == pytest.approx(eq.motor_torque(x, 0.0, 0.0, p) - arm * shaft)
+
+
 def test_a_gear_whose_ratio_is_infinite_is_cut_off() -> None:
     x = at(theta_m=0.0)
     assert eq.gear(x, p_of(gear_eccentricity__amplitude=-1.0 / I)) == 1e12

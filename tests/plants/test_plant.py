@@ -121,6 +121,7 @@ def test_conservative_effects_keep_the_energy():
             "effects.gravity_load.amplitude": 30.0,
             "effects.gravity_load.phase": 0.4,
             "effects.hardening_stiffness.cubic": 1e6,
+            "effects.hardening_stiffness.sharpness": 1.2,
             "effects.extra_resonance.inertia": 0.8,
             "effects.extra_resonance.damping_ratio": 0.0,
             "effects.torque_ripple.amplitude": 5.0,
@@ -136,6 +137,7 @@ def test_conservative_effects_keep_the_energy():
     theta_m, omega_m, theta_l, omega_l, _, theta_r, omega_r = states[:, :7].T
     twist = theta_m / 3.984 - theta_l + 1e-3 * np.sin(2.0 * theta_m + 0.9)
     energy = 0.2 * omega_m**2 + 2.8 * omega_l**2 + 0.4 * omega_r**2 + 1650.0 * twist**2 + 0.25e6 * twist**4
+    energy += 1.2e12 / 3300.0 / 6.0 * twist**6
     energy += -30.0 * np.cos(theta_l + 0.4) + 5.0 / 7.0 * np.cos(7.0 * theta_m - 0.6)
     energy += 0.4 * 60.0**2 * (theta_l - theta_r) ** 2
     assert np.abs(energy - energy[0]).max() < 1e-8

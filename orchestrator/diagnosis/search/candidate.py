@@ -172,7 +172,7 @@ def simplest_first(found: Sequence[Candidate], within: float) -> list[Candidate]
 
 
 def parameter_count(candidate: Candidate) -> int:
-    """Return the number of parameters of a candidate's effects.
+    """Return the number of parameters of a candidate's effects; those of a law's shape pay by their prior.
 
     Args:
         candidate: with its effects.
@@ -180,7 +180,7 @@ def parameter_count(candidate: Candidate) -> int:
     Returns:
         The number.
     """
-    return sum(len(effect.parameters) for effect in candidate.effects)
+    return sum(len(effect.parameters) - len(effect.shape) for effect in candidate.effects)
 
 
 @dataclass(frozen=True)

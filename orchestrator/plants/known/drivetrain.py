@@ -45,8 +45,8 @@ def _stage() -> CompiledEquations:
 
     source = compiled("equations")
     rates, twist, contact_of, elastic = source.rates, source.twist, source.contact_of, source.elastic_torque
-    twist_rate, twist_slope, friction_m, friction_l = (
-        source.twist_rate, source.twist_slope, source.friction_m, source.friction_l,
+    twist_rate, lever_arm, friction_m, friction_l = (
+        source.twist_rate, source.lever_arm, source.friction_m, source.friction_l,
     )  # fmt: skip
     alpha_at, end, set_in_at = dt.P_ALPHA, dt.COUNT, dt.P_ONSET
     damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
@@ -63,7 +63,7 @@ def _stage() -> CompiledEquations:
         if p[loaded[0]] + p[loaded[1]] > 0.0:
             contact = contact_of(twist(full, p), p[alpha_at]) if p[alpha_at] > 0.0 else 1
             shaft = elastic(full, contact, p)
-        return friction_m(full, shaft * twist_slope(full, p), p), friction_l(full, shaft, p)
+        return friction_m(full, shaft * lever_arm(full, p), p), friction_l(full, shaft, p)
 
     @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
@@ -75,7 +75,7 @@ def _stage() -> CompiledEquations:
         if p[alpha_at] > 0.0 and contact != 0 and p[set_in_at] == 0.0:
             depth = abs(angle) - p[alpha_at]
             lacking = p[damping_at] * twist_rate(full, p) * math.exp(-depth / math.exp(p[onset_at]))
-            motor, load = lacking * twist_slope(full, p) / p[motor_at], lacking / p[load_at]
+            motor, load = lacking * lever_arm(full, p) / p[motor_at], lacking / p[load_at]
         lag = (u - x[4]) / p[lag_at]
         return (r[0], r[1] + motor, r[2], r[3] - load, lag, r[5], r[6], r[10])
 
