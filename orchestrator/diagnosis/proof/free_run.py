@@ -177,7 +177,9 @@ def _closest(
         lambda gain, after: gain == 0.0 or gain < settings.enough * after,
     )  # fmt: skip
     straight = bool(foretold) and abs(foretold[0] - 1.0) < settings.straight
-    return FreeRun(out, start, np.sqrt(np.mean((out - measured) ** 2, axis=0)), straight)
+    with np.errstate(over="ignore"):  # a run that runs away is infinitely far off
+        error = np.sqrt(np.mean((out - measured) ** 2, axis=0))
+    return FreeRun(out, start, error, straight)
 
 
 def start_answers(

@@ -41,6 +41,12 @@ def gain_of(model: Model, p: Array, settings: VerdictSettings) -> Gain | None:
     Returns:
         The gain, or None.
     """
+    gain = _likeliest(model, p, settings)
+    return gain if gain is not None and gain.score > settings.sure_gain else None
+
+
+def _likeliest(model: Model, p: Array, settings: VerdictSettings) -> Gain | None:
+    """Return the gain by which re-fitted values lie nearest to those of the model file, None where they are too few."""
     ratios, weights = [], []
     for u in model.uncertain:
         value = model.plant.value(p, u.name)
@@ -53,7 +59,7 @@ def gain_of(model: Model, p: Array, settings: VerdictSettings) -> Gain | None:
     total = float(np.sum(w)) + 1.0 / settings.likely_gain**2
     mean = float(np.sum(w * r)) / total
     score = 0.5 * total * mean**2
-    return Gain(math.exp(-mean), math.exp(-mean) / math.sqrt(total), score) if score > settings.sure_gain else None
+    return Gain(math.exp(-mean), math.exp(-mean) / math.sqrt(total), score)
 
 
 def as_nuisance(gain: Gain) -> Named:
@@ -71,7 +77,7 @@ def as_nuisance(gain: Gain) -> Named:
 
 
 def far_off(model: Model, p: Array, settings: VerdictSettings) -> list[str]:
-    """Return the names of parameters that lie far outside what the model file allows, the drive's gain apart.
+    """Return the names of parameters that lie far outside what the model file allows, with any gain of the drive.
 
     Args:
         model: nominal values, and how far each may be off.
@@ -81,11 +87,12 @@ def far_off(model: Model, p: Array, settings: VerdictSettings) -> list[str]:
     Returns:
         The names.
     """
-    gain = gain_of(model, p, settings)
+    gain = _likeliest(model, p, settings)
     found = []
     for u in model.uncertain:
-        factor = gain.value if gain is not None and _carries(model, u.name) else 1.0
-        if _uncertainties(model, u, factor * model.plant.value(p, u.name)) > settings.far_off:
+        factors = (1.0, gain.value) if gain is not None and _carries(model, u.name) else (1.0,)
+        off = min(_uncertainties(model, u, factor * model.plant.value(p, u.name)) for factor in factors)
+        if off > settings.far_off:
             found.append(u.name)
     return found
 
