@@ -148,11 +148,11 @@ class SearchSettings(Settings, frozen=True):
     least_limit: Annotated[float, share("of the largest torque: a drive that is limited to less delivers none")] = 0.02
     most_delay: Annotated[float, setting("longest dead time [s]: beyond, the signals do not belong together")] = 0.25
     delay_share: Annotated[float, share("or of the record's length, where that is less")] = 0.1
-    shortlist: Annotated[
-        int, setting("candidates fitted in full: the right one was among them in development", ge=1)
-    ] = 6
+    shortlist: Annotated[int, setting("candidates fitted in full: the right one was among them so far", ge=1)] = 6
     worth: Annotated[float, share("least share of the best promise that a candidate must promise to be fitted")] = 0.03
     followed: Annotated[float, share("of the best gain, from which other levels are tried: winners had half")] = 0.2
+    kept: Annotated[float, share("of a promise that a fit must keep, not to be tried from more noise too")] = 0.2
+    above: Annotated[int, setting("levels of process noise from above which that is done", ge=1)] = 4
     least_promise: Annotated[float, setting("least promised gain for a fit: below, noise promises as much")] = 3.0
     penalty: Annotated[float, setting("log-likelihood that each further parameter must earn")] = 5.0
     pays: Annotated[float, setting("least gain of an effect where what is left is noise, of whatever colour")] = 10.0

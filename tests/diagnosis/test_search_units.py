@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
+from orchestrator.diagnosis.search import fits
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, ladder, parameter_count
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor
 from orchestrator.diagnosis.search.model_space import in_metres
@@ -325,6 +326,45 @@ def test_a_shift_between_the_encoders_leaves_nothing_for_others_to_gain() -> Non
     for first, pays in ((LATE_LOAD, True), (EARLY_TORQUE, False), (friction, False)):
         assert of(1781.0, first, resonance).pays_over(of(1750.0, first), BASE) is pays
     assert not of(2040.0, LATE_LOAD, friction, resonance).pays_over(of(2000.0, LATE_LOAD, friction), BASE)
+
+
+@pytest.mark.parametrize("first", [LATE_LOAD, FRICTION])
+def test_gains_are_counted_from_a_log_that_is_put_right(friction, monkeypatch, first) -> None:
+    search, found, grounds = replace(friction[0], steps=[]), candidate(1000.0, 500.0, first), []
+
+    def step(current: Candidate, ground: Candidate) -> ForwardStep:
+        grounds.append(ground)
+        return ForwardStep(current, () if current.effects else (found,), not current.effects)
+
+    for name, stub in {
+        "base": lambda: BASE, "hidden_gap": lambda base: None, "step": step, "against_its_like": lambda step, _: step,
+        "prune": lambda current, _: current, "beside_hidden": lambda current: current,
+    }.items():  # fmt: skip
+        monkeypatch.setattr(search, name, stub)
+    assert search.run() == (BASE, found)
+    assert grounds == [BASE, found if first is LATE_LOAD else BASE]
+
+
+@pytest.mark.parametrize(("promise", "kept", "again"), [(50.0, 9.0, True), (50.0, 11.0, False), (9.0, -5.0, False)])
+def test_a_fit_that_keeps_little_of_its_promise_is_tried_from_more_noise(
+    friction, monkeypatch, promise, kept, again
+) -> None:
+    search, _, base, _, _ = friction
+    levels, tried = search.likelihood.settings.levels, []
+    settled_fit = replace(base.fit, fitted=base.fit.fitted + kept)
+    annealed_fit = replace(base.fit, fitted=base.fit.fitted + 40.0)
+
+    def annealed(likelihood, start, q, *_):
+        tried.append(q)
+        return annealed_fit
+
+    monkeypatch.setattr(fits, "best_settled", lambda *_: settled_fit)
+    monkeypatch.setattr(fits, "annealed", annealed)
+    guesses = (Guess({"torque": 0.5, "presliding": -6.0}, promise),)
+    current = replace(base, fit=replace(base.fit, q=levels[5]))
+    found = search.begin(current, FRICTION, guesses, scene_of(search.likelihood, base.fit))
+    assert found.fit is (annealed_fit if again else settled_fit)
+    assert tried == ([levels[1]] if again else [])
 
 
 def test_a_law_that_contains_another_is_tried_where_that_pays(friction) -> None:

@@ -58,7 +58,7 @@ class Fits(ModelSpace):
         Args:
             candidate: a fitted model.
             current: the model to build on.
-            base: the model without effects.
+            base: the model without a law that may leave a rest.
 
         Returns:
             The better of both.
@@ -103,6 +103,9 @@ class Fits(ModelSpace):
     def begin(self, current: Candidate, effect: Effect, guesses: Guesses, scene: Scene) -> Candidate:
         """Return ``current`` with one more effect: the best of the fits from the guesses, at its level of noise.
 
+        Where that keeps little of what the screen promised, it is fitted from more noise down as well: the colour of
+        what ``current`` leaves may stand for the effect itself, and holds a fit with it where it is.
+
         Args:
             current: the model to build on.
             effect: of the bank.
@@ -117,7 +120,15 @@ class Fits(ModelSpace):
             return self.hidden
         free = self.free(effects, scene)
         starts = [effect.put(self.plant, current.fit.p, guess.values, self.refitted) for guess in guesses]
-        return self.candidate(effects, best_settled(self.likelihood, starts, current.fit.q, free, self.parts))
+        found = best_settled(self.likelihood, starts, current.fit.q, free, self.parts)
+        own = self.settings
+        promise = max(guess.gain for guess in guesses)
+        if promise > own.pays and found.fitted - current.fit.fitted < own.kept * promise:
+            levels = self.likelihood.settings.levels
+            above = levels[max(sum(level > current.fit.q for level in levels) - own.above, 0)]
+            again = annealed(self.likelihood, starts[0], above, free, self.parts, effects)
+            found = max(found, again, key=lambda fit: fit.rank(self.parts))
+        return self.candidate(effects, found)
 
     def follow(self, begun: Candidate, current: Candidate, least: float) -> Candidate:
         """Return a candidate fitted down the ladder of process noise; as it is where it has gained too little for that.

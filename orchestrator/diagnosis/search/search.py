@@ -48,16 +48,18 @@ class Search(Fits):
             Both.
         """
         base = self.base()
-        current = base
+        current = ground = base
         try:
             self.hidden = self.hidden_gap(base)
             while len(current.effects) < self.most and len(self.steps) < self.settings.most_steps:
-                step = self.against_its_like(self.step(current, base), base)
+                step = self.against_its_like(self.step(current, ground), ground)
                 self.steps.append(step)
                 base = base if step.before.effects else step.before
+                ground = ground if ground.effects else base
                 if not step.accepted and step.before is current:
                     break
-                current = self.prune(step.candidates[0], base) if step.accepted else step.before
+                current = self.prune(step.candidates[0], ground) if step.accepted else step.before
+                ground = current if _is_ground(current) else ground
         except TimeUpError:
             self.stopped = True
         return base, self.beside_hidden(current)
@@ -133,7 +135,7 @@ class Search(Fits):
 
         Args:
             current: the model to build on.
-            base: the model without effects.
+            base: the model without a law that may leave a rest.
 
         Returns:
             What was tried and what was accepted.
@@ -160,7 +162,7 @@ class Search(Fits):
 
         Args:
             step: as it was taken.
-            base: the model without effects.
+            base: the model without a law that may leave a rest.
 
         Returns:
             The step; on top of the better fit, and accepted if its effect earns its place over that one too.
@@ -181,7 +183,7 @@ class Search(Fits):
         Args:
             candidate: a fitted model.
             current: the model before.
-            base: the model without effects.
+            base: the model without a law that may leave a rest.
 
         Returns:
             True when it does.
@@ -198,7 +200,7 @@ class Search(Fits):
         Args:
             candidate: a fitted model.
             current: the model before.
-            base: the model without effects.
+            base: the model without a law that may leave a rest.
 
         Returns:
             True when it does.
@@ -391,7 +393,7 @@ class Search(Fits):
         Args:
             found: fitted candidates.
             current: the model to build on.
-            base: the model without effects.
+            base: the model without a law that may leave a rest.
             scene: sizes of the record's signals.
 
         Returns:
@@ -411,7 +413,7 @@ class Search(Fits):
 
         Args:
             current: the model to build on.
-            base: the model without effects.
+            base: the model without a law that may leave a rest.
 
         Returns:
             The candidate that is left.
@@ -428,3 +430,8 @@ class Search(Fits):
             if simpler is not None:
                 current = max(current, self.simplified(current, scene, effect, simpler), key=lambda one: one.score)
         return current
+
+
+def _is_ground(candidate: Candidate) -> bool:
+    """Tell whether a model has no law that may leave a rest: what a log's shift has gained is none of an effect's."""
+    return all(effect.leaves == 0.0 for effect in candidate.effects)

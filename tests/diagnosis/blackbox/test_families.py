@@ -58,6 +58,13 @@ def test_an_earlier_effect_has_a_family_too() -> None:
     assert families == (("input_lag@p",), ())
 
 
+@pytest.mark.parametrize(("lag", "told"), [(-52.0, False), (-70.0, True)])
+def test_what_did_as_well_in_its_step_is_fitted_anew_beside_an_effect_that_has_been_fitted_further(lag, told) -> None:
+    step = SearchStep(fit(-90.0), (fit(-50.0, "input_delay"), fit(lag, "input_lag")), True)
+    families = settled_names(search({"input_lag": -12.0}, step), fit(-10.0, "input_delay"))[1]
+    assert families == (() if told else ("input_lag@p",),)
+
+
 def test_what_contains_an_effect_is_none_of_its_family() -> None:
     best = fit(-10.0, "coulomb_friction")
     step = SearchStep(fit(-90.0), (best, fit(-9.0, "stribeck_friction"), fit(-13.0, "viscous_drag")), True)
@@ -113,7 +120,8 @@ def test_what_does_better_in_the_place_of_an_effect_stays_there() -> None:
 def test_one_effect_that_does_better_than_two_is_named_alone() -> None:
     first = SearchStep(fit(-90.0), (fit(-50.0, "hardening_spring"), fit(-52.0, "spring"), fit(-80.0, "load")), True)
     found, families = settled_names(
-        search({"spring": -9.0, "load": -70.0}, first), fit(-10.0, "hardening_spring", "input_offset")
+        search({"spring": -9.0, "hardening_spring": -50.0, "load": -70.0}, first),
+        fit(-10.0, "hardening_spring", "input_offset"),
     )
     assert [effect.kind.name for effect in found.model.effects] == ["spring"]
     assert families == ((),)
