@@ -146,7 +146,7 @@ SHAFT = (
     Parameter("effects.shaft_hysteresis.twist", "rad", 1e-3, TINY, BIG, "Twist over which it turns round"),
     Parameter("effects.impact_damping.depth", "rad", 0.0, 0.0, BIG, "Depth over which damping of teeth sets in"),
     Parameter("effects.gear_eccentricity.lever_arm", "1", 1.0, 0.0, 1.0, "Share of its change that the lever takes"),
-    Parameter("effects.hardening_stiffness.sharpness", "1", 0.0, 0.0, BIG, "Fifth power, over cubic squared by k"),
+    Parameter("effects.hardening_stiffness.sharpness", "1", 0.0, 0.0, 100.0, "Fifth power, over cubic squared by k"),
 )
 
 PARAMETERS = (*_FIRST, *friction_details("motor"), *friction_details("load"), *DRIVE, *BODY, *SHAFT)

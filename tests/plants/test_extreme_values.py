@@ -18,7 +18,9 @@ EXTREMES = (
     {"tau": 1e-6},
     {"J_m": 1e-9, "effects.coulomb_friction.motor.torque": 1e12},
     {"c": 1e12, "effects.hardening_stiffness.cubic": 1e12},
+    {"effects.hardening_stiffness.cubic": 1e12, "effects.hardening_stiffness.sharpness": 100.0},
     {"effects.gear_eccentricity.amplitude": 1e12},
+    {"effects.gear_eccentricity.amplitude": 1e12, "effects.gear_eccentricity.lever_arm": 0.0},
 )
 AXIS = (
     {"J": 1e-9},
