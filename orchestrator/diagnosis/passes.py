@@ -212,7 +212,9 @@ def _proven(
         noise = torque_noise(likelihood, final.fit, whole.fitted, sized_base.fit.p)
         torque = torque_proof(likelihood, plain, final.fit, whole)
         out, harm = weak or best.effects[-1], after.harm_over(before, noise)
-        if harm == after.labels[-1:] and torque.decides(verdict.proven, verdict.good):
+        if harm == after.labels[-1:] and (
+            torque.decides(verdict.proven, verdict.good) or stands_as_log(best.effects, before, after)
+        ):
             harm = ()  # one run, which adds up every disturbance
         fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
         if weak is None and not harm and fewer.effects:
@@ -229,6 +231,20 @@ def _proven(
         best = fewer
     final = replace(sized_base, fit=honest(likelihood, sized_base.fit, (), whole))
     return _Proven(base, plain, sized_base, final, Proof(before, before), tuple(notes))
+
+
+def stands_as_log(effects: Sequence[Effect], before: Horizons, after: Horizons) -> bool:
+    """Tell whether a log that is put right stands, whatever one run over all of a part says: many are surely better.
+
+    Args:
+        effects: of the model.
+        before: what the model without them predicts.
+        after: what it predicts with them.
+
+    Returns:
+        True where no effect of the machine is among them, and predictions over short horizons are better beyond chance.
+    """
+    return all(effect.measurement for effect in effects) and bool(after.surely_better_than(before))
 
 
 def honest(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect], parts: Parts) -> Fit:

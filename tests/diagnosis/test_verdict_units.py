@@ -395,3 +395,18 @@ def test_the_heaviest_tail_counts_wherever_it_is(monkeypatch, place: int, others
     fitted = SimpleNamespace(p=None, q=0.0, z=columns[:, :2], colour=white)
     found = verdict.remainder.tails(likelihood, fitted, slice(0, 100))
     assert found == pytest.approx((1.0 - 6.0 * 0.01 * 0.99) / (0.01 * 0.99))
+
+
+@pytest.mark.parametrize(
+    ("names", "better", "stands"),
+    [
+        (("late_load@log",), ("50 ms",), True),
+        (("late_load@log", "early_torque@log"), ("50 ms",), True),
+        (("late_load@log",), (), False),
+        (("late_load@log", "coulomb_friction@motor"), ("50 ms",), False),
+    ],
+)
+def test_one_run_says_nothing_against_a_log_that_is_put_right(names, better, stands) -> None:
+    bank = {effect.label: effect for effect in DRIVETRAIN.bank}
+    after = SimpleNamespace(surely_better_than=lambda before: better)
+    assert rules.stands_as_log([bank[name] for name in names], SimpleNamespace(), after) is stands
