@@ -130,10 +130,9 @@ def judged(
     )
     stages = _stages(problem, base, last)
     on_held_out = held_out(problem, stages, fitter.parts.held_out, settings)
-    verdict, rest = _verdict(search, last, values, rest, refuted, on_held_out, settings)
-    named = tuple(
-        FoundEffect(e, values[k], best.total - base.total, families[k]) for k, e in enumerate(last.model.effects)
-    )
+    gained = best.total - base.total
+    verdict, rest = _verdict(search, last, values, rest, refuted, on_held_out, gained, settings)
+    named = tuple(FoundEffect(e, values[k], gained, families[k]) for k, e in enumerate(last.model.effects))
     suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
     if suspects:
         suspects += tuple(dict.fromkeys(label for family in families for label in family))
@@ -175,9 +174,13 @@ def _stages(problem: BoxProblem, base: BoxFit, last: BoxFit) -> tuple[Array, Arr
 
 def _verdict(
     search: BoxSearch, last: BoxFit, values: Sequence[Sequence[ValueEstimate]], rest: Rest, refuted: bool,
-    shown: HeldOut, settings: RestSettings,
+    shown: HeldOut, gained: float, settings: RestSettings,
 ) -> tuple[str, Rest]:  # fmt: skip
-    """Return the verdict, and what is left in its light."""
+    """Return the verdict, and what is left in its light.
+
+    No law of friction is exact; but where what is left follows a law that explains more than the effects have gained
+    in log-likelihood, something else is at work.
+    """
     fitter, effects = search.fitter, last.model.effects
     if effects and rest.nothing_missing and shown.removed < settings.least_shown:
         why = f"the effects remove {100.0 * max(shown.removed, 0.0):.0f} % of the misfit on data not fitted"
@@ -193,7 +196,9 @@ def _verdict(
         if not (plausible and told and shown.shows(settings)):
             return "unknown", rest
         law = dependence_of(fitter, last, settings)
-        return ("effects", rest) if law is None else ("unknown", replace(rest, reasons=(law.statement,)))
+        if law is None or law.gain - max(law.by_chance, 0.0) <= gained:
+            return "effects", rest
+        return "unknown", replace(rest, reasons=(law.statement,))
     if not rest.nothing_missing:
         return "unknown", rest
     given = fitter.problem.nominal

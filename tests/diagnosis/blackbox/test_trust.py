@@ -104,7 +104,7 @@ def _told(monkeypatch, labels, error, refuted, law=None):
     last = SimpleNamespace(model=SimpleNamespace(effects=effects, p=np.ones(1)))
     values = [(ValueEstimate("size", 1.0, error, (0.0, 0.0), "N"),) * 2 for _ in labels]
     monkeypatch.setattr(outcome, "dependence_of", lambda *_: law)
-    return outcome._verdict(search, last, values, LEFT, refuted, SHOWN, RestSettings())
+    return outcome._verdict(search, last, values, LEFT, refuted, SHOWN, 56.0, RestSettings())
 
 
 @pytest.mark.parametrize(("labels", "error", "refuted", "expected"), [
@@ -122,11 +122,14 @@ def test_where_more_than_noise_is_left_effects_are_named_that_cannot_follow_anyt
     assert _told(monkeypatch, labels, error, refuted)[0] == expected
 
 
-def test_no_effect_is_named_beside_what_follows_a_law(monkeypatch):
-    law = Dependence(231.0, 0.3, "what is left follows the position and the speed at `p`")
+@pytest.mark.parametrize(("gain", "by_chance", "expected"), [
+    (231.0, 0.3, "unknown"), (231.0, 180.0, "effects"), (55.0, -3.0, "effects"), (57.0, -3.0, "unknown"),
+])  # fmt: skip
+def test_no_effect_is_named_beside_a_law_that_explains_more(monkeypatch, gain, by_chance, expected):
+    law = Dependence(gain, by_chance, "what is left follows the position and the speed at `p`")
     verdict, rest = _told(monkeypatch, ("coulomb_friction@p",), 0.01, False, law)
-    assert verdict == "unknown"
-    assert rest.reasons == (law.statement,)
+    assert verdict == expected
+    assert (rest.reasons == (law.statement,)) is (expected == "unknown")
 
 
 def test_without_effects_nothing_can_do_harm():
