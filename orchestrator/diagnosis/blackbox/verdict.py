@@ -217,8 +217,8 @@ def _anew(
         other = next(e for e in reversed(fit.model.effects) if e.label not in labels(best) - {effect.label})
         known = noisy or other.label not in near
         if known and other.label not in others and len(others) < most:
-            # From less noise than its own a fit may end where it began.
-            levels = tuple(dict.fromkeys((best.level, fit.level)))
+            # With next to no noise a fit may end where it began: it starts from its own level, too.
+            levels = (best.level,) if noisy else tuple(dict.fromkeys((best.level, fit.level)))
             others[other.label] = other, [fit.model.values[fit.model.effects.index(other)]], levels
     without, found = best.model.without(effect.label), dict(near)
     for promise in _promised(search, without, best, [other for other, *_ in others.values()]) if noisy else ():
