@@ -212,21 +212,18 @@ def _anew(
     most = search.settings.rivals_beside_noise if noisy else search.settings.rivals
     if noisy:
         rivals = sorted((*rivals, *near.values()), key=search.score, reverse=True)
-    others: dict[str, tuple[BoxEffect, list[Array], tuple[int, ...]]] = {}
+    others: dict[str, tuple[BoxEffect, list[Array]]] = {}
     for fit in rivals:
         other = next(e for e in reversed(fit.model.effects) if e.label not in labels(best) - {effect.label})
         known = noisy or other.label not in near
         if known and other.label not in others and len(others) < most:
-            # With next to no noise a fit may end where it began: it starts from its own level, too.
-            levels = (best.level,) if noisy else tuple(dict.fromkeys((best.level, fit.level)))
-            others[other.label] = other, [fit.model.values[fit.model.effects.index(other)]], levels
+            others[other.label] = other, [fit.model.values[fit.model.effects.index(other)]]
     without, found = best.model.without(effect.label), dict(near)
-    for promise in _promised(search, without, best, [other for other, *_ in others.values()]) if noisy else ():
+    for promise in _promised(search, without, best, [other for other, _ in others.values()]) if noisy else ():
         if len(others[promise.effect.label][1]) < search.settings.rival_starts:
             others[promise.effect.label][1].append(promise.values)
-    for other, starts, levels in others.values():
-        models = [without.extended(other, other.bounded(values)) for values in starts]
-        fits = [search.fitter.fit(model, level) for model in models for level in levels]
+    for other, starts in others.values():
+        fits = [search.fitter.fit(without.extended(other, other.bounded(values)), best.level) for values in starts]
         again = [search.fitter.settled(fit) for fit in fits if fit is not None]
         again += [near[other.label]] if other.label in near else []
         if again:
