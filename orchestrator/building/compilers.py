@@ -25,7 +25,7 @@ FLAGS = ("-std=c99", "-ffp-contract=off", "-fvisibility=hidden", "-g0", "-Wall",
 # zig is clang with checks switched on; its vectors of two numbers stall where structures are read right after.
 ZIG_FLAGS = ("-O2", "-fno-sanitize=undefined", "-fno-slp-vectorize")
 # On Windows half a library is the compiler's own C library: what is translated is kept small there, and copied less.
-ZIG_WINDOWS_FLAGS = ("-Os", "-mllvm", "-inline-threshold=20", *ZIG_FLAGS[1:])
+ZIG_WINDOWS_FLAGS = ("-Os", "-mllvm", "-inline-threshold=0", *ZIG_FLAGS[1:])
 # A module without a main function, for a browser.
 WEB_FLAGS = ("-std=gnu99", *ZIG_FLAGS, "-target", "wasm32-wasi", "-mexec-model=reactor", "-s")
 
