@@ -53,17 +53,23 @@ def group(effect: str, *names: str) -> dict[str, str]:
     return {name.rpartition(".")[2]: f"effects.{effect}.{name}" for name in names}
 
 
-def _friction(site: str) -> tuple[Effect, Effect]:
-    at_load = site == "load"
+def _speed(scene: Scene, site: str) -> float:
+    return scene.speed_l if site == "load" else scene.speed_m
 
+
+def _build_up(scene: Scene, site: str) -> tuple[float, float]:
+    return float(np.log(0.04 * scene.h * _speed(scene, site))), 2.0
+
+
+def _friction(site: str) -> tuple[Effect, Effect]:
     def unit(scene: Scene) -> float:
-        return 0.01 * scene.torque * (scene.ratio if at_load else 1.0)
+        return 0.01 * scene.torque * (scene.ratio if site == "load" else 1.0)
 
     def rms(scene: Scene) -> float:
-        return scene.speed_l if at_load else scene.speed_m
+        return _speed(scene, site)
 
     def build_up(scene: Scene) -> tuple[float, float]:
-        return float(np.log(0.04 * scene.h * rms(scene))), 2.0
+        return _build_up(scene, site)
 
     def start(scene: Scene) -> Start:
         return {"presliding": (build_up(scene)[0],)}
@@ -114,6 +120,13 @@ def _limits(scene: Scene) -> tuple[float, ...]:
 
 def _delays(scene: Scene) -> tuple[float, ...]:
     return tuple(scene.h * f for f in (0.04, 0.12, 0.3, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0))
+
+
+def _rates(scene: Scene) -> tuple[float, ...]:
+    asked = np.abs(np.diff(scene.u)) / scene.h
+    changes = asked[asked > 0.0]
+    shares = (0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.995)
+    return tuple(float(v) for v in np.quantile(changes, shares)) if changes.size else ()
 
 
 def _frequencies(scene: Scene) -> tuple[float, ...]:
@@ -187,6 +200,39 @@ def directional_friction(site: str) -> Effect:
     )  # fmt: skip
 
 
+def _end_stop(side: str) -> Effect:
+    """Return the row of the end stop on one side: where it stands, how stiff it is and what it dissipates."""
+
+    def travel(scene: Scene) -> float:
+        return max(scene.highest - scene.lowest, 1e-12)
+
+    def angles(scene: Scene) -> tuple[float, ...]:
+        end, inwards = (scene.highest, -travel(scene)) if side == "upper" else (scene.lowest, travel(scene))
+        return tuple(end + f * inwards for f in (0.0005, 0.002, 0.006, 0.02, 0.06, 0.15))
+
+    def stiffness(scene: Scene) -> tuple[float, ...]:
+        return tuple(f * scene.torque * scene.ratio / travel(scene) for f in (3.0, 30.0, 300.0))
+
+    names = {"angle": side, "stiffness": "stiffness", "dissipation": "dissipation"}
+    return Effect(
+        f"{side}_end_stop", "load", {short: f"effects.end_stop.{name}" for short, name in names.items()},
+        "angle", lambda s: 1e-4 * travel(s),
+        lambda s: {"angle": angles(s), "stiffness": stiffness(s), "dissipation": (0.1,)},
+        scales=lambda s: {"stiffness": 0.1 * stiffness(s)[1], "dissipation": 0.1}, tries=3,
+        tolerance={"effects.end_stop.stiffness": 0.01}, leaves=0.06, against="angle",
+    )  # fmt: skip
+
+
+def _load_dependent(site: str) -> Effect:
+    return Effect(
+        "load_dependent_friction", site, group("load_dependent_friction", f"{site}.coefficient"), "coefficient",
+        lambda scene: 0.01, lambda scene: {"presliding": (_build_up(scene, site)[0],)}, amplitudes=("coefficient",),
+        scales=lambda scene: {"presliding": 0.2}, family=f"dry friction of the {site}",
+        nuisances={"presliding": f"presliding.{site}"}, priors=lambda scene: {"presliding": _build_up(scene, site)},
+        tolerance={f"effects.load_dependent_friction.{site}.coefficient": 0.01}, leaves=0.25, against="speed",
+    )  # fmt: skip
+
+
 DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "backlash", "shaft", {"alpha": "alpha"}, "alpha", lambda s: 0.003 * s.twist,
@@ -197,6 +243,10 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     ),
     *_friction("motor"),
     *_friction("load"),
+    _load_dependent("motor"),
+    _load_dependent("load"),
+    _end_stop("lower"),
+    _end_stop("upper"),
     Effect(
         "input_delay", "actuator", group("input_delay", "delay"), "delay", lambda s: 0.02 * s.h,
         lambda s: {"delay": _delays(s)}, family="late drive",
@@ -204,6 +254,10 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "torque_saturation", "actuator", group("torque_saturation", "limit"), "limit",
         lambda s: 0.003 * float(np.max(np.abs(s.u))), lambda s: {"limit": _limits(s)},
+    ),
+    Effect(
+        "rate_limit", "actuator", group("rate_limit", "rate"), "rate",
+        lambda s: 0.003 * float(np.max(np.abs(np.diff(s.u)))) / s.h, lambda s: {"rate": _rates(s)}, family="late drive",
     ),
     Effect(
         "hardening_stiffness", "shaft", group("hardening_stiffness", "cubic", "sharpness"), "cubic",

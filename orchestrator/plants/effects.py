@@ -52,6 +52,7 @@ class Scene:
         stiffness: of the shaft [N.m/rad].
         ratio: gear ratio.
         turns: travel of the motor in revolutions.
+        lowest, highest: angles [rad] between which the load moves.
         cycles: name of a periodic effect -> cycles per revolution at the peaks of its frequency scan.
     """
 
@@ -65,6 +66,8 @@ class Scene:
     stiffness: float
     ratio: float
     turns: float
+    lowest: float
+    highest: float
     cycles: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
 

@@ -19,6 +19,8 @@ TORQUE_NOISE = False  # set by the benchmark: half of the cases have a coloured 
 SHIFTS = False  # the same: half have signals that are late by up to two samples
 GAIN = False  # the same: half have a drive whose torque is up to 10 % off
 RATE = 200.0  # samples per second
+REACHED = ("sat", "slew", "stop")  # sizes of what acts only where it is reached
+LIMITS = {"saturation", "rate_limit", "end_stops"}  # a loop that is closed need not reach them
 EXCITATIONS = ("multisine", "multisine", "levels", "closed_loop")
 
 # Kind -> (effects of the independent plant at the largest size, name of the size, labels that are right).
@@ -46,6 +48,12 @@ SINGLE: dict[str, tuple[dict[str, float], str, tuple[str, ...]]] = {
     "spring": ({"ks": 30.0}, "ks", ("spring_load@load",)),
     "varying_inertia": ({"jvar": 0.2}, "jvar", ("varying_inertia@load",)),
     "shaft_hysteresis": ({"bw": 60.0, "bw_x": 0.01}, "bw", ("shaft_hysteresis@shaft",)),
+    "rate_limit": ({"slew": 0.9}, "slew", ("rate_limit@actuator",)),
+    "end_stops": ({"stop": 0.3, "stop_k": 2e4}, "stop", ("upper_end_stop@load", "lower_end_stop@load")),
+    "load_dependent_motor": (
+        {"mu_m": 0.05}, "mu_m", ("load_dependent_friction@motor",)),
+    "load_dependent_load": (
+        {"mu_l": 0.05}, "mu_l", ("load_dependent_friction@load",)),
     "offset": ({"off_m": 0.05}, "off_m", ("sensor_offset@motor", "sensor_offset@load")),
 }  # fmt: skip
 
@@ -88,7 +96,7 @@ def single_case(kind: str, seed: int, duration: float = 30.0) -> Case:
     rng = np.random.default_rng([seed, 2])
     effects, size, right = SINGLE[kind]
     effects = _varied(effects, rng)
-    excitation = str(rng.choice(EXCITATIONS[:3] if kind == "saturation" else EXCITATIONS))
+    excitation = str(rng.choice(EXCITATIONS[:3] if kind in LIMITS else EXCITATIONS))
     chosen, ratio = draw_size(effects, size, seed, excitation, rng, duration)
     return _case(kind, seed, chosen, (right,), excitation, duration, ratio)
 
@@ -96,7 +104,7 @@ def single_case(kind: str, seed: int, duration: float = 30.0) -> Case:
 def double_case(kinds: tuple[str, str], seed: int, duration: float = 30.0) -> Case:
     """Return a record with two effects, each drawn from ten times the noise to half of the largest size."""
     rng = np.random.default_rng([seed, 3])
-    excitation = str(rng.choice(EXCITATIONS[:3] if "saturation" in kinds else EXCITATIONS))
+    excitation = str(rng.choice(EXCITATIONS[:3] if LIMITS & set(kinds) else EXCITATIONS))
     both: dict[str, float] = {}
     for kind in kinds:
         effects, size, _ = SINGLE[kind]
@@ -168,9 +176,9 @@ def draw_size(
         return times_noise(plain, _raw(scaled(effects, size, share), seed, excitation, duration))
 
     share = 1.0
-    for _ in range(2 if size not in ("sat", "slew") else 0):
+    for _ in range(2 if size not in REACHED else 0):
         share = min(max(share * least / max(change(share), 1e-3), 1e-4), 1.0)
-    if size in ("sat", "slew"):
+    if size in REACHED:
         inside, outside = 1.0, 0.0
         for _ in range(6):
             middle = 0.5 * (inside + outside)
@@ -191,6 +199,8 @@ def scaled(effects: dict[str, float], size: str, share: float) -> dict[str, floa
     elif size == "slew":
         # The request of the records changes by up to 9000 N.m/s.
         changed["slew"] = 9000.0 * (1.0 - effects["slew"] * share)
+    elif size == "stop":
+        changed["stop"] = effects["stop"] / share  # the farther out, the less it is reached
     elif size == "hard":
         changed["hard"] = effects["hard"] / np.sqrt(share)
     else:

@@ -123,7 +123,8 @@ class ModelSpace:
         for effect in effects:
             unit, scales = effect.unit_of_size(scene), effect.scales(scene)
             for short, place in effect.places(self.plant).items():
-                if place not in taken:
+                if place not in taken:  # effects may share one: the stiffness of two end stops
+                    taken.add(place)
                     entry = self.plant.entry(place)
                     low, high = effect.bounds(scene).get(short, (entry.minimum, entry.maximum))
                     prior = effect.priors(scene).get(short)

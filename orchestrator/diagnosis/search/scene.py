@@ -24,11 +24,12 @@ def scene_of(likelihood: RecordLikelihood, model: Fit) -> Scene:
     first, last = plant.bodies[0], plant.bodies[-1]
     turns = float(np.ptp(x[:, first.angle])) / (2.0 * np.pi)
     speeds = rms(x[:, first.speed]), rms(x[:, last.speed])
+    reach = float(np.min(x[:, last.angle])), float(np.max(x[:, last.angle]))
     if plant.shaft is None:
         inertia = plant.value(p, first.inertia)
-        return Scene(signals.h, signals.torque, signals.u, *speeds, 1.0, inertia, 1.0, 1.0, turns)
+        return Scene(signals.h, signals.torque, signals.u, *speeds, 1.0, inertia, 1.0, 1.0, turns, *reach)
     twist = float(np.quantile(np.abs(plant.twist(p, x)), likelihood.settings.search.twist_quantile))
     inertia, stiffness = (plant.value(likelihood.nominal, name) for name in (last.inertia, plant.shaft.stiffness))
     return Scene(
-        signals.h, signals.torque, signals.u, *speeds, twist, inertia, stiffness, plant.ratio(p), turns
+        signals.h, signals.torque, signals.u, *speeds, twist, inertia, stiffness, plant.ratio(p), turns, *reach
     )  # fmt: skip

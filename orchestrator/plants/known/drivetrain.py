@@ -121,8 +121,8 @@ def realised(p: Array) -> Array:
         The parameters, in the order of the FMU's table.
     """
     own = np.array(p[: dt.COUNT], dtype=float)
-    motor = own[dt.P_COULOMB_M] + own[dt.P_STRIBECK_M] + own[dt.P_BREAKAWAY_M]
-    load = own[dt.P_COULOMB_L] + own[dt.P_STRIBECK_L] + own[dt.P_BREAKAWAY_L]
+    motor = own[dt.P_COULOMB_M] + own[dt.P_STRIBECK_M] + own[dt.P_BREAKAWAY_M] + own[dt.P_LOADED_M]
+    load = own[dt.P_COULOMB_L] + own[dt.P_STRIBECK_L] + own[dt.P_BREAKAWAY_L] + own[dt.P_LOADED_L]
     gap = own[dt.P_ALPHA] if int(own[dt.P_MODEL]) in GRADUAL else 0.0
     places = (dt.P_PRESLIDING_M, dt.P_PRESLIDING_L, dt.P_ONSET)
     for place, on, fitted in zip(places, (motor, load, gap), p[dt.COUNT : dt.COUNT + len(places)], strict=True):

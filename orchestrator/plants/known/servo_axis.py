@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 # friction leaves; the FMU has them.
 _SHARED = ("coulomb_friction@motor", "stribeck_friction@motor", "input_delay@actuator", "torque_saturation@actuator",
            "torque_ripple@motor", "load_torque@load", "gravity_load@load", "quadratic_drag@load",
-           "drive_filter@actuator", "directional_friction@motor")  # fmt: skip
+           "drive_filter@actuator", "directional_friction@motor", "rate_limit@actuator", "lower_end_stop@load",
+           "upper_end_stop@load")  # fmt: skip
 
 SERVO_AXIS_BANK = tuple(effect for effect in DRIVETRAIN_BANK if effect.label in _SHARED)
 
