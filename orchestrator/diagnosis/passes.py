@@ -225,7 +225,10 @@ def _proven(
         final = as_allowed(likelihood, search.model, final, whole)
         final = replace(final, fit=honest(likelihood, final.fit, best.effects, whole))
         after = horizons(likelihood, final.fit.p, plain.q, whole.held_out)
-        weak = next((e for e in reversed(best.effects) if _is_weak(search, e, final.fit, after, plain.q, whole)), None)
+        odd = search.odd(best.effects, final.fit.p, scene_of(likelihood, best.fit))
+        weak = odd or next(
+            (e for e in reversed(best.effects) if _is_weak(search, e, final.fit, after, plain.q, whole)), None
+        )
         noise = torque_noise(likelihood, final.fit, whole.fitted, sized_base.fit.p)
         torque = torque_proof(likelihood, plain, final.fit, whole)
         out, harm = weak or best.effects[-1], after.harm_over(before, noise)
@@ -238,6 +241,7 @@ def _proven(
             harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
         harm = harm or _larger_misfit(likelihood, bases, final.fit, whole)
         why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
+        why = "it has come to a size that no machine has" if odd else why
         if weak is None and not harm:
             small = _minor(search, parts, plain, best, efficient, final.fit, after)
             if small is None:

@@ -510,3 +510,16 @@ def test_a_torque_that_counts_as_given_is_not_changed_on_its_way(friction) -> No
         "early_torque@log",
     }
     assert "coulomb_friction@motor" in tried
+
+
+def test_an_effect_that_a_later_one_has_fitted_away_is_seen(friction) -> None:
+    search, _, base, _, _ = friction
+    limit, gravity = (next(e for e in AXIS.bank if e.name == name) for name in ("torque_saturation", "gravity_load"))
+    scene = scene_of(search.likelihood, base.fit)
+    largest = float(np.max(np.abs(scene.u)))
+    for share, odd in ((0.5, None), (0.005, limit)):
+        p = base.fit.p.copy()
+        p[limit.places(AXIS)["limit"]] = share * largest
+        assert search.odd((limit, gravity), p, scene) is odd
+        found = [replace(base, effects=(limit, gravity), fit=replace(base.fit, p=p))]
+        assert search.possible(found, scene) == ([] if odd else found)
