@@ -14,9 +14,7 @@ from orchestrator.shared.settings import Settings, note, setting, share
 class AdmissionSettings(Settings, frozen=True):
     """What record and model must have before they are compared."""
 
-    least_travel: Annotated[float, setting("travel in noise deviations; a long record of pure noise spans eight")] = (
-        20.0
-    )
+    least_travel: Annotated[float, setting("travel in noise deviations; a long record of noise spans eight")] = 20.0
     most_substeps: Annotated[int, setting("integration steps in a sample; more: the model is far too fast", ge=1)] = 100
 
 
@@ -148,6 +146,7 @@ class SearchSettings(Settings, frozen=True):
     least_limit: Annotated[float, share("of the largest torque: a drive that is limited to less delivers none")] = 0.02
     most_delay: Annotated[float, setting("longest dead time [s]: beyond, the signals do not belong together")] = 0.25
     delay_share: Annotated[float, share("or of the record's length, where that is less")] = 0.1
+    most_lag: Annotated[float, setting("slowest drive [s]: a slower one lets next to nothing of `u` through")] = 1.0
     shortlist: Annotated[int, setting("candidates fitted in full: the right one was among them so far", ge=1)] = 6
     worth: Annotated[float, share("least share of the best promise that a candidate must promise to be fitted")] = 0.03
     followed: Annotated[float, share("of the best gain, from which other levels are tried: winners had half")] = 0.2

@@ -11,6 +11,7 @@ from orchestrator.diagnosis.search import fits
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, ladder, parameter_count
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor
 from orchestrator.diagnosis.search.model_space import in_metres
+from orchestrator.diagnosis.search.plausible import implausible
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Guess
 from orchestrator.diagnosis.search.search import Search
@@ -486,3 +487,39 @@ def test_a_size_that_no_machine_has_is_refused_and_said_once() -> None:
     assert "1e+04 N.m is more than the drive's largest torque" in search.refused[FRICTION.label]
     assert search.possible([larger], scene) == []
     assert "1e+04" in search.refused[FRICTION.label]
+
+
+@pytest.mark.parametrize(("lag", "refused"), [(0.9, False), (90.0, True)])
+def test_a_drive_that_is_slower_than_any_is_refused(friction, lag, refused) -> None:
+    search, _, base, _, _ = friction
+    slow = next(effect for effect in AXIS.bank if effect.name == "drive_filter")
+    p = base.fit.p.copy()
+    p[slow.places(AXIS)["time_constant"]] = lag
+    why = implausible(AXIS, slow, p, scene_of(search.likelihood, base.fit), SETTINGS.search)
+    assert ("too slow for a drive" in why) is refused
+
+
+def test_a_torque_that_counts_as_given_is_not_changed_on_its_way(friction) -> None:
+    search, _, base, _, _ = friction
+    tried = {effect.label for effect in replace(search, as_given=True).eligible(base)}
+    left_out = {effect.label for effect in search.eligible(base)} - tried
+    assert left_out == {
+        "input_delay@actuator",
+        "torque_saturation@actuator",
+        "drive_filter@actuator",
+        "early_torque@log",
+    }
+    assert "coulomb_friction@motor" in tried
+
+
+def test_an_effect_that_a_later_one_has_fitted_away_is_seen(friction) -> None:
+    search, _, base, _, _ = friction
+    limit, gravity = (next(e for e in AXIS.bank if e.name == name) for name in ("torque_saturation", "gravity_load"))
+    scene = scene_of(search.likelihood, base.fit)
+    largest = float(np.max(np.abs(scene.u)))
+    for share, odd in ((0.5, None), (0.005, limit)):
+        p = base.fit.p.copy()
+        p[limit.places(AXIS)["limit"]] = share * largest
+        assert search.odd((limit, gravity), p, scene) is odd
+        found = [replace(base, effects=(limit, gravity), fit=replace(base.fit, p=p))]
+        assert search.possible(found, scene) == ([] if odd else found)

@@ -228,6 +228,18 @@ def test_pulses_are_outweighed_by_skill_at_every_horizon_only() -> None:
     assert is_unknown(left, True, settled, False, False, SETTINGS.verdict)
 
 
+def test_the_torque_settles_what_free_runs_that_are_lost_cannot() -> None:
+    lost = replace(horizons([0.1, 1.0, 5.0, 9.0]), plain=np.full((4, 1), 0.1), r_squared=np.array([-50.0]))
+    left = Remainder(100.0, 0.1, 1.0, ())
+    proof = Proof(horizons([0.1, 1.0, 5.0, 9.0]), lost, TorqueProof(0.9, 0.97, sure=True))
+    assert lost.is_hopeless(SETTINGS.verdict.hopeless)
+    assert not is_unknown(left, True, proof, True, False, SETTINGS.verdict)
+    assert is_unknown(left, True, proof, False, False, SETTINGS.verdict)
+    assert is_unknown(
+        left, True, replace(proof, torque=TorqueProof(0.9, 0.85, sure=True)), True, False, SETTINGS.verdict
+    )
+
+
 def test_skill_counts_from_the_horizon_that_is_asked_for() -> None:
     before, after = horizons([1.0, 1.0, 1.0, 1.0]), horizons([0.1, 1.0, 1.0, 0.9])
     assert after.skill_over(before, first=0) > 0.9  # the first sample, which a wave shows in

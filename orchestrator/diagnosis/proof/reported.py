@@ -11,7 +11,9 @@ from orchestrator.diagnosis.fit.sizes import Sized, sized
 from orchestrator.diagnosis.fit.torque_fit import explained, torque_fit
 from orchestrator.diagnosis.proof.horizons import Horizons, horizons
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
+from orchestrator.diagnosis.verdict.gain import far_off
 from orchestrator.plants.effects import Effect
+from orchestrator.records.model_file import Model
 from orchestrator.shared.inference.colour import colour_of
 
 
@@ -48,6 +50,30 @@ def reported(
     if not effects or not _as_good(likelihood, needed, before, after, parts):
         return likely
     return Sized(_between(likelihood, likely.fit, needed, parts))
+
+
+def as_allowed(likelihood: RecordLikelihood, model: Model, told: Sized, parts: Parts) -> Sized:
+    """Return sizes that the model file allows: the torque's, where those of the likelihood lie far outside.
+
+    What a controller answers makes an inertia larger in predictions, and not in the torque. Where the torque's values
+    explain what was measured, and are such as the data sheet says, it tells which of both holds.
+
+    Args:
+        likelihood: of the record.
+        model: nominal values, and how far each may be off.
+        told: the sizes of a model with effects.
+        parts: parts of the record.
+
+    Returns:
+        The sizes, changed or not.
+    """
+    verdict = likelihood.settings.verdict
+    if not far_off(model, told.fit.p, verdict):
+        return told
+    needed = torque_fit(likelihood, told.fit, parts.fitted)
+    if needed is None or far_off(model, needed.p, verdict):
+        return told
+    return Sized(needed) if explained(likelihood, needed, parts.fitted) > verdict.good else told
 
 
 def _as_good(likelihood: RecordLikelihood, needed: Fit, before: Horizons, after: Horizons, parts: Parts) -> bool:

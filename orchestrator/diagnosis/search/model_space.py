@@ -1,7 +1,7 @@
 """The models that a search chooses from: which effects may be added, and which parameters each model fits."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,11 +28,13 @@ class ModelSpace:
 
     Attributes:
         likelihood, model, parts: what is searched.
+        as_given: the torque counts as it stands in the record: what may change it on its way is not looked for.
     """
 
     likelihood: RecordLikelihood
     model: Model
     parts: Parts
+    as_given: bool = field(default=False, kw_only=True)
 
     @property
     def plant(self) -> Plant:
@@ -59,6 +61,8 @@ class ModelSpace:
         timed = any(is_of_torques_time(self.plant, effect) for effect in current.effects)
         for effect in self.plant.bank:
             if effect.needs or (effect.angular and in_metres(self.model)):
+                continue
+            if self.as_given and changes_the_torque(effect):
                 continue
             blind = effect.both_encoders and self.likelihood.signals.channels < 2
             alike = one_way and effect.name in ALIKE_ONE_WAY
@@ -181,3 +185,15 @@ def in_metres(model: Model) -> bool:
     """
     column = model.columns.get("theta_m")
     return column is not None and column.unit in ("m", "mm")
+
+
+def changes_the_torque(effect: Effect) -> bool:
+    """Tell whether an effect changes the torque of the record on its way to the machine.
+
+    Args:
+        effect: of a bank.
+
+    Returns:
+        True when it does.
+    """
+    return effect.site in ("actuator", "log")

@@ -41,4 +41,6 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
             return f"{what} is more than the whole travel, {travel:.3g} rad"
         elif short == "delay" and value > min(settings.most_delay, settings.delay_share * scene.h * scene.u.size):
             return f"{what} is too long for a dead time: `u` and the angles may not belong together"
+        elif effect.site == "actuator" and short == "time_constant" and value > settings.most_lag:
+            return f"{what} is too slow for a drive: next to nothing of `u` would get through"
     return ""

@@ -14,7 +14,7 @@ from orchestrator.diagnosis.proof.horizons import horizons
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
 from orchestrator.diagnosis.search.confirmed import is_confirmed
 from orchestrator.diagnosis.search.finer import Finer, is_timed
-from orchestrator.diagnosis.search.fits import Fits, Guesses, TimeUpError
+from orchestrator.diagnosis.search.fits import Array, Fits, Guesses, TimeUpError
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
 from orchestrator.diagnosis.search.periodic import with_cycles
 from orchestrator.diagnosis.search.plausible import implausible
@@ -237,7 +237,9 @@ class Search(Fits):
         return candidate.nearly_pays_over(current) and self.predicts(candidate, current)
 
     def possible(self, found: Sequence[Candidate], scene: Scene) -> list[Candidate]:
-        """Return the candidates whose last effect has a size that a machine may have; note the others.
+        """Return the candidates whose effects have sizes that a machine may have; note the others.
+
+        An effect may be fitted away to such a size by one that comes after it.
 
         Args:
             found: fitted candidates.
@@ -248,12 +250,25 @@ class Search(Fits):
         """
         kept = []
         for candidate in found:
-            why = implausible(self.plant, candidate.effects[-1], candidate.fit.p, scene, self.settings)
-            if not why:
+            odd = self.odd(candidate.effects, candidate.fit.p, scene)
+            if odd is None:
                 kept.append(candidate)
-            elif candidate.effects[-1].label not in self.refused:
-                self.refused[candidate.effects[-1].label] = why
+            elif odd.label not in self.refused:
+                self.refused[odd.label] = implausible(self.plant, odd, candidate.fit.p, scene, self.settings)
         return kept
+
+    def odd(self, effects: Sequence[Effect], p: Array, scene: Scene) -> Effect | None:
+        """Return the last effect whose size no machine has.
+
+        Args:
+            effects: of a model.
+            p: its parameters.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The effect; None: there is none.
+        """
+        return next((e for e in reversed(effects) if implausible(self.plant, e, p, scene, self.settings)), None)
 
     def on_time(self, found: Sequence[Candidate], current: Candidate, scene: Scene) -> list[Candidate]:
         """Return the candidates whose last effect, where it is one of the drive's timing, shows at the measured rate.
@@ -420,9 +435,9 @@ class Search(Fits):
         """
         scene = scene_of(self.likelihood, current.fit)
         while len(current.effects) > 1:
-            reduced = self.each(partial(self.reduced, current, scene), current.effects[:-1])
-            best = max(reduced, key=lambda candidate: candidate.score)
-            if self.pays(current, best, base):
+            reduced = self.possible(self.each(partial(self.reduced, current, scene), current.effects[:-1]), scene)
+            best = max(reduced, key=lambda candidate: candidate.score, default=None)
+            if best is None or self.pays(current, best, base):
                 break
             current = best
         for effect in current.effects:

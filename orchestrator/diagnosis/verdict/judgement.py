@@ -51,14 +51,16 @@ def is_unknown(
     Returns:
         True when one is.
     """
+    # Of an arm that is held up, free runs are lost whatever the model: the torque that its motion needs tells.
     # Rare, large torques leave short predictions as bad as they were, whatever their mean explains of long ones.
     proven = named and proof.skill > settings.proven
     proven = proven and (left.tails < settings.pulses or proof.even_skill > settings.proven)
-    if proof.final.is_hopeless(settings.hopeless) and (named or floor_off):
+    settled = named and proof.torque.decides(settings.proven, settings.good)
+    if proof.final.is_hopeless(settings.hopeless) and (named or floor_off) and not settled:
         return True
     if not floor_off:
         return left.growth > settings.grown
-    if proven or (named and proof.torque.decides(settings.proven, settings.good)):
+    if proven or settled:
         return False
     no_noise = structured(left, settings) or (far_off and not named)
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
