@@ -52,6 +52,7 @@ class Scene:
         stiffness: of the shaft [N.m/rad].
         ratio: gear ratio.
         turns: travel of the motor in revolutions.
+        middle: angle of the load in the middle of its travel [rad].
         cycles: name of a periodic effect -> cycles per revolution at the peaks of its frequency scan.
     """
 
@@ -65,6 +66,7 @@ class Scene:
     stiffness: float
     ratio: float
     turns: float
+    middle: float = 0.0
     cycles: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
 
@@ -104,6 +106,7 @@ class Effect:
         tolerance: name in the plant's table -> share of its value to which laws of this kind, of which none is exact,
             leave the parameter undefined (standard deviation; measured on records made with other laws).
         against: quantity against which its law is drawn: "speed", "angle" of the load; "": that of its site.
+        memory: it has a state of its own that no encoder shows: a stretch of a record cannot be begun in its middle.
         measurement: it is no physics of the machine but a property of its log.
     """
 
@@ -132,6 +135,7 @@ class Effect:
     tries: int = 1
     tolerance: dict[str, float] = field(default_factory=dict)
     against: str = ""
+    memory: bool = False
     measurement: bool = False
 
     @property

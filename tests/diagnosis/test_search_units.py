@@ -11,15 +11,16 @@ from orchestrator.diagnosis.search import fits
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, ladder, parameter_count
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor
 from orchestrator.diagnosis.search.model_space import in_metres
+from orchestrator.diagnosis.search.plausible import implausible
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Guess
 from orchestrator.diagnosis.search.search import Search
-from orchestrator.plants.effects import Effect
+from orchestrator.plants.effects import Effect, Scene
 from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD
 from orchestrator.records.columns import Column
 from orchestrator.records.model_file import default_model
 from orchestrator.shared.stopwatch import Stopwatch
-from tests.support.short_records import AXIS, SETTINGS, axis_likelihood, drivetrain_likelihood
+from tests.support.short_records import AXIS, DRIVETRAIN, SETTINGS, axis_likelihood, drivetrain_likelihood
 from tests.support.small_search import search_of
 
 SEARCH = SETTINGS.search
@@ -466,6 +467,16 @@ def test_what_a_model_leaves_above_the_noise_is_not_at_the_floor() -> None:
     wrong = p.copy()
     wrong[likelihood.plant.index("k")] *= 0.5
     assert not at_the_floor(likelihood, fit(likelihood, wrong, 1e-3, (), PARTS), PARTS.fitted)
+
+
+@pytest.mark.parametrize(("middle", "rest", "refused"), [(0.0, 3.0, False), (0.0, 7.0, True), (100.0, 103.0, False)])
+def test_a_spring_at_rest_beyond_the_travel_is_a_constant_torque(middle: float, rest: float, refused: bool) -> None:
+    """The load travels 2 pi, seen from an encoder whose zero may be far away."""
+    law = next(effect for effect in DRIVETRAIN.bank if effect.label == "spring_load@load")
+    scene = Scene(0.01, 1.0, np.ones(3), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, middle)
+    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    p[law.places(DRIVETRAIN)["angle"]] = rest
+    assert bool(implausible(DRIVETRAIN, law, p, scene, SEARCH)) is refused
 
 
 def test_a_size_that_no_machine_has_is_refused_and_said_once() -> None:

@@ -23,12 +23,13 @@ def scene_of(likelihood: RecordLikelihood, model: Fit) -> Scene:
     x = states[likelihood.settings.likelihood.settled :]
     first, last = plant.bodies[0], plant.bodies[-1]
     turns = float(np.ptp(x[:, first.angle])) / (2.0 * np.pi)
+    middle = 0.5 * float(np.min(x[:, last.angle]) + np.max(x[:, last.angle]))
     speeds = rms(x[:, first.speed]), rms(x[:, last.speed])
     if plant.shaft is None:
         inertia = plant.value(p, first.inertia)
-        return Scene(signals.h, signals.torque, signals.u, *speeds, 1.0, inertia, 1.0, 1.0, turns)
+        return Scene(signals.h, signals.torque, signals.u, *speeds, 1.0, inertia, 1.0, 1.0, turns, middle)
     twist = float(np.quantile(np.abs(plant.twist(p, x)), likelihood.settings.search.twist_quantile))
     inertia, stiffness = (plant.value(likelihood.nominal, name) for name in (last.inertia, plant.shaft.stiffness))
     return Scene(
-        signals.h, signals.torque, signals.u, *speeds, twist, inertia, stiffness, plant.ratio(p), turns
+        signals.h, signals.torque, signals.u, *speeds, twist, inertia, stiffness, plant.ratio(p), turns, middle
     )  # fmt: skip
