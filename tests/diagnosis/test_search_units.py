@@ -479,6 +479,22 @@ def test_a_spring_at_rest_beyond_the_travel_is_a_constant_torque(middle: float, 
     assert bool(implausible(DRIVETRAIN, law, p, scene, SEARCH)) is refused
 
 
+@pytest.mark.parametrize(("share", "rests"), [(0.97, True), (0.5, False)])
+def test_an_effect_that_the_fitted_part_does_not_reach_is_asked_of_the_other_alone(share: float, rests: bool) -> None:
+    """A limit between what the fitted part asks for at most and what the deciding part does."""
+    likelihood, p = drivetrain_likelihood()
+    likelihood.signals.u[PARTS.validated.start] = 3.0 * np.max(np.abs(likelihood.signals.u))
+    limit = next(effect for effect in DRIVETRAIN.bank if effect.label == "torque_saturation@actuator")
+    search = replace(search_of(likelihood), model=default_model())
+    asked = np.max(np.abs(likelihood.signals.u))
+    limited = limit.put(DRIVETRAIN, p, {"limit": share * asked if rests else 0.1 * asked}, ())
+    found = Candidate((limit,), fit(likelihood, limited, 1e-3, (), PARTS), SEARCH)
+    assert search.rests(found) is rests
+    before = Candidate((), fit(likelihood, p, 1e-3, (), PARTS), SEARCH)
+    shown = replace(found, fit=replace(found.fit, fitted=before.fit.fitted, validated=before.fit.validated + 40.0))
+    assert search.pays(shown, before, before) is rests
+
+
 def test_a_size_that_no_machine_has_is_refused_and_said_once() -> None:
     likelihood, p = axis_likelihood()
     search = search_of(likelihood)
