@@ -233,7 +233,7 @@ def _proven(
         torque = torque_proof(likelihood, plain, final.fit, whole)
         out, harm = weak or best.effects[-1], after.harm_over(before, noise)
         if harm == after.labels[-1:] and (
-            torque.decides(verdict.proven, verdict.good) or stands_as_log(best.effects, before, after)
+            torque.decides(verdict.proven, verdict.good) or outweighs_one_run(best.effects, before, after)
         ):
             harm = ()  # one run, which adds up every disturbance
         fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
@@ -254,8 +254,10 @@ def _proven(
     return _Proven(base, plain, sized_base, final, Proof(before, before), tuple(notes))
 
 
-def stands_as_log(effects: Sequence[Effect], before: Horizons, after: Horizons) -> bool:
-    """Tell whether a log that is put right stands, whatever one run over all of a part says: many are surely better.
+def outweighs_one_run(effects: Sequence[Effect], before: Horizons, after: Horizons) -> bool:
+    """Tell whether effects stand, whatever one run over all of a part says: many predictions are surely better.
+
+    One run adds up every torque that is in no request. Sixty predictions over half a second each begin anew.
 
     Args:
         effects: of the model.
@@ -263,9 +265,12 @@ def stands_as_log(effects: Sequence[Effect], before: Horizons, after: Horizons) 
         after: what it predicts with them.
 
     Returns:
-        True where no effect of the machine is among them, and predictions over short horizons are better beyond chance.
+        True where predictions over half a second are better beyond chance; of the log's effects alone, over any
+        horizon of many starts.
     """
-    return all(effect.measurement for effect in effects) and bool(after.surely_better_than(before))
+    better = after.surely_better_than(before)
+    of_the_log = all(effect.measurement for effect in effects)
+    return bool(better) if of_the_log else bool(set(better) & set(after.labels[after.long :]))
 
 
 def honest(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect], parts: Parts) -> Fit:

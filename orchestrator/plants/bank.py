@@ -282,7 +282,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         scales=lambda s: {"frequency": 0.5, "damping_ratio": 0.01},
         bounds=lambda s: {"frequency": _band(s), "damping_ratio": (0.0, 1.0)},
         # Below its resonance the added inertia moves with the load, so the re-fitted J_l already holds it.
-        taken_from={"inertia": "J_l"}, tries=3,
+        taken_from={"inertia": "J_l"}, tries=3, memory=True,
     ),
     Effect(
         "quadratic_drag", "load", group("quadratic_drag", "coefficient"), "coefficient",
@@ -320,5 +320,6 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: 0.01 * s.torque * s.ratio, lambda s: {"twist": tuple(f * s.twist for f in (0.1, 0.3, 1.0, 2.0))},
         amplitudes=("torque",), scales=lambda s: {"twist": 0.02 * s.twist},
         bounds=lambda s: {"twist": (0.02 * s.twist, 5.0 * s.twist)}, family="weak shaft at small torque",
+        memory=True,
     ),
 )  # fmt: skip

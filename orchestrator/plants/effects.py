@@ -70,6 +70,11 @@ class Scene:
     highest: float
     cycles: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
+    @property
+    def middle(self) -> float:
+        """Return the angle of the load in the middle of its travel [rad]."""
+        return 0.5 * (self.lowest + self.highest)
+
 
 Start = dict[str, tuple[float, ...]]
 
@@ -107,6 +112,7 @@ class Effect:
         tolerance: name in the plant's table -> share of its value to which laws of this kind, of which none is exact,
             leave the parameter undefined (standard deviation; measured on records made with other laws).
         against: quantity against which its law is drawn: "speed", "angle" of the load; "": that of its site.
+        memory: it has a state of its own that no encoder shows: a stretch of a record cannot be begun in its middle.
         measurement: it is no physics of the machine but a property of its log.
     """
 
@@ -135,6 +141,7 @@ class Effect:
     tries: int = 1
     tolerance: dict[str, float] = field(default_factory=dict)
     against: str = ""
+    memory: bool = False
     measurement: bool = False
 
     @property

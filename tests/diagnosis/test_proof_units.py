@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.diagnosis import proof
 from orchestrator.diagnosis.proof.free_run import _steps, free_run, simulate
-from orchestrator.diagnosis.proof.misfit import held_out_misfit, segments
+from orchestrator.diagnosis.proof.misfit import held_out_misfit, running, segments
 from orchestrator.plants.predictor import MOST_STEPS, coarse_steps, runs_coarsely, waves_of
 from tests.support.short_records import (
     AXIS,
@@ -204,7 +204,17 @@ def test_segments_cover_the_part() -> None:
     assert segments(slice(280, 400), signals, cut) == [slice(280, 300)]
 
 
-def test_the_misfit_is_the_rms_over_segments() -> None:
+def test_free_runs_of_a_misfit_overlap_where_few_have_room() -> None:
+    cut = msgspec.structs.replace(PROOF, segment=0.5, least_samples=40, runs=5)
+    signals = replace(drivetrain_likelihood(600)[0].signals, h=0.01)
+    starts = (100, 127, 155, 182, 210)
+    assert running(slice(100, 260), signals, cut) == [slice(n, n + 50) for n in starts]  # no row is left out
+    assert running(slice(100, 150), signals, cut) == [slice(100, 150)]
+    assert running(slice(0, 600), signals, cut) == segments(slice(0, 600), signals, cut)  # twelve stand side by side
+    assert running(slice(0, 580), signals, cut)[-1] == slice(530, 580)
+
+
+def test_the_misfit_is_the_rms_over_its_runs() -> None:
     likelihood, p = drivetrain_likelihood(160, k=3000.0)
     stages = [("nominal", likelihood.nominal), ("right", p)]
     found = held_out_misfit(likelihood.over(100), 1e-3, stages, slice(40, 160), "rad")
@@ -217,7 +227,7 @@ def test_the_misfit_is_the_rms_over_segments() -> None:
         assert misfit.before > 1.3 * noise
         assert misfit.before == misfit.stages[0][1]
     _, states = likelihood.innovations(p, 1e-3)
-    runs = segments(slice(40, 160), likelihood.signals, PROOF)
+    runs = running(slice(40, 160), likelihood.signals, PROOF)
     squares = [free_run(DRIVETRAIN, p, states[s.start], likelihood.signals, s, FREE_RUN).rms ** 2 for s in runs]
     assert found[1].after == pytest.approx(np.sqrt(np.mean(squares, axis=0))[1])
 

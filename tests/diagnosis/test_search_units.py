@@ -15,12 +15,12 @@ from orchestrator.diagnosis.search.plausible import implausible
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Guess
 from orchestrator.diagnosis.search.search import Search
-from orchestrator.plants.effects import Effect
+from orchestrator.plants.effects import Effect, Scene
 from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD
 from orchestrator.records.columns import Column
 from orchestrator.records.model_file import default_model
 from orchestrator.shared.stopwatch import Stopwatch
-from tests.support.short_records import AXIS, SETTINGS, axis_likelihood, drivetrain_likelihood
+from tests.support.short_records import AXIS, DRIVETRAIN, SETTINGS, axis_likelihood, drivetrain_likelihood
 from tests.support.small_search import search_of
 
 SEARCH = SETTINGS.search
@@ -469,6 +469,32 @@ def test_what_a_model_leaves_above_the_noise_is_not_at_the_floor() -> None:
     assert not at_the_floor(likelihood, fit(likelihood, wrong, 1e-3, (), PARTS), PARTS.fitted)
 
 
+@pytest.mark.parametrize(("middle", "rest", "refused"), [(0.0, 3.0, False), (0.0, 7.0, True), (100.0, 103.0, False)])
+def test_a_spring_at_rest_beyond_the_travel_is_a_constant_torque(middle: float, rest: float, refused: bool) -> None:
+    """The load travels 2 pi, seen from an encoder whose zero may be far away."""
+    law = next(effect for effect in DRIVETRAIN.bank if effect.label == "spring_load@load")
+    scene = Scene(0.01, 1.0, np.ones(3), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, middle - np.pi, middle + np.pi)
+    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    p[law.places(DRIVETRAIN)["angle"]] = rest
+    assert bool(implausible(DRIVETRAIN, law, p, scene, SEARCH)) is refused
+
+
+@pytest.mark.parametrize(("share", "rests"), [(0.97, True), (0.5, False)])
+def test_an_effect_that_the_fitted_part_does_not_reach_is_asked_of_the_other_alone(share: float, rests: bool) -> None:
+    """A limit between what the fitted part asks for at most and what the deciding part does."""
+    likelihood, p = drivetrain_likelihood()
+    likelihood.signals.u[PARTS.validated.start] = 3.0 * np.max(np.abs(likelihood.signals.u))
+    limit = next(effect for effect in DRIVETRAIN.bank if effect.label == "torque_saturation@actuator")
+    search = replace(search_of(likelihood), model=default_model())
+    asked = np.max(np.abs(likelihood.signals.u))
+    limited = limit.put(DRIVETRAIN, p, {"limit": share * asked if rests else 0.1 * asked}, ())
+    found = Candidate((limit,), fit(likelihood, limited, 1e-3, (), PARTS), SEARCH)
+    assert search.rests(found) is rests
+    before = Candidate((), fit(likelihood, p, 1e-3, (), PARTS), SEARCH)
+    shown = replace(found, fit=replace(found.fit, fitted=before.fit.fitted, validated=before.fit.validated + 40.0))
+    assert search.pays(shown, before, before) is rests
+
+
 def test_a_size_that_no_machine_has_is_refused_and_said_once() -> None:
     likelihood, p = axis_likelihood()
     search = search_of(likelihood)
@@ -499,6 +525,34 @@ def test_a_drive_that_is_slower_than_any_is_refused(friction, lag, refused) -> N
     assert ("too slow for a drive" in why) is refused
 
 
+@pytest.mark.parametrize(("seconds", "refused"), [(0.5, False), (5.0, True)])
+def test_a_drive_whose_torque_takes_seconds_to_rise_is_refused(friction, seconds: float, refused: bool) -> None:
+    search, _, base, _, _ = friction
+    limit = next(effect for effect in AXIS.bank if effect.name == "rate_limit")
+    scene = scene_of(search.likelihood, base.fit)
+    p = base.fit.p.copy()
+    p[limit.places(AXIS)["rate"]] = np.max(np.abs(scene.u)) / seconds
+    assert ("too slow for a drive" in implausible(AXIS, limit, p, scene, SETTINGS.search)) is refused
+
+
+def test_effects_that_share_a_parameter_fit_it_once() -> None:
+    likelihood, p = drivetrain_likelihood()
+    stops = tuple(effect for effect in DRIVETRAIN.bank if effect.name.endswith("end_stop"))
+    search = replace(search_of(likelihood), model=default_model())
+    free = search.free(stops, scene_of(likelihood, fit(likelihood, p, 1e-3, (), PARTS)))
+    places = [one.place for one in free]
+    assert len(stops) == 2
+    assert len(places) == len(set(places)) == len(search.linear()) + 4  # two angles, one stiffness, one dissipation
+
+
+def test_a_request_that_never_changes_has_no_limit_of_its_rate() -> None:
+    scene = Scene(0.01, 1.0, np.ones(5), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, 0.0, 0.0)
+    for effect in (one for one in DRIVETRAIN.bank if one.name == "rate_limit" or one.name.endswith("end_stop")):
+        starts = effect.starts(scene)
+        assert all(np.all(np.isfinite(values)) for values in starts.values())
+        assert (starts.get("rate") == ()) is (effect.name == "rate_limit")
+
+
 def test_a_torque_that_counts_as_given_is_not_changed_on_its_way(friction) -> None:
     search, _, base, _, _ = friction
     tried = {effect.label for effect in replace(search, as_given=True).eligible(base)}
@@ -506,6 +560,7 @@ def test_a_torque_that_counts_as_given_is_not_changed_on_its_way(friction) -> No
     assert left_out == {
         "input_delay@actuator",
         "torque_saturation@actuator",
+        "rate_limit@actuator",
         "drive_filter@actuator",
         "early_torque@log",
     }

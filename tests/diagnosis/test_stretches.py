@@ -131,6 +131,26 @@ def test_what_is_there_all_along_is_not_absent_for_a_colour_that_takes_it_up(see
     assert absent_at_times(likelihood, found, part, (LATE_LOAD,)) == ()
 
 
+def test_a_third_mass_that_swings_when_a_block_begins_is_not_absent_from_it() -> None:
+    law = next(effect for effect in DRIVETRAIN.bank if effect.label == "extra_resonance@load")
+    size, step, rng = 1600, 0.005, np.random.default_rng(3)
+    nominal = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    right = law.put(DRIVETRAIN, nominal, {"inertia": 0.3, "frequency": 40.0, "damping_ratio": 0.0}, ())
+    rung = np.arange(size) < 600
+    u = torque(size, 3) + 200.0 * rung * np.sin(40.0 * step * np.arange(size))
+    y = drivetrain_angles(right, u, h=step) + ENCODERS * rng.standard_normal((size, 2))
+    likelihood = RecordLikelihood(DRIVETRAIN, signals_from(y, u, 2, ENCODERS, step), nominal, size, SETTINGS)
+    part, places = slice(10, size), law.places(DRIVETRAIN)
+    free = (
+        Free(places["inertia"], 0.05, 0.0, 10.0), Free(places["frequency"], 0.5, 8.0, 250.0),
+        Free(likelihood.plant.index("J_l"), 0.05, 0.0, 100.0),
+    )  # fmt: skip
+    found = fit(likelihood, right, 1e-3, free, Parts(part, part, part))
+    assert found.p[places["inertia"]] == pytest.approx(0.3, rel=0.1)
+    assert absent_at_times(likelihood, found, part, (replace(law, memory=False),)) != ()  # begun at rest in each block
+    assert absent_at_times(likelihood, found, part, (law,)) == ()
+
+
 def test_motion_of_few_rows_a_period_is_no_noise_of_an_encoder() -> None:
     record = bench_record(20_000)
     rng = np.random.default_rng(2)

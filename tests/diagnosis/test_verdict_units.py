@@ -404,9 +404,12 @@ def test_the_heaviest_tail_counts_wherever_it_is(monkeypatch, place: int, others
         (("late_load@log", "early_torque@log"), ("50 ms",), True),
         (("late_load@log",), (), False),
         (("late_load@log", "coulomb_friction@motor"), ("50 ms",), False),
+        (("coulomb_friction@motor",), ("500 ms",), True),
+        (("coulomb_friction@motor",), (), False),
     ],
 )
-def test_one_run_says_nothing_against_a_log_that_is_put_right(names, better, stands) -> None:
+def test_one_run_says_nothing_against_what_many_show(names, better, stands) -> None:
     bank = {effect.label: effect for effect in DRIVETRAIN.bank}
-    after = SimpleNamespace(surely_better_than=lambda before: better)
-    assert rules.stands_as_log([bank[name] for name in names], SimpleNamespace(), after) is stands
+    labels = ("one sample", "50 ms", "500 ms", "2 s", "whole part")
+    after = SimpleNamespace(surely_better_than=lambda before: better, labels=labels, long=2)
+    assert rules.outweighs_one_run([bank[name] for name in names], SimpleNamespace(), after) is stands

@@ -68,6 +68,8 @@ def absent_at_times(
     Such a block is likelier with none of the effect than with all, or half, of what the whole has of it, all else
     fitted again. One in which the effect rests, an uncrossed gap say, is as likely with as without. It must be likelier
     under the colour of the whole, too: one of the block's own may take up what the effect did.
+    An effect with a memory is not looked at: a block is a record of its own, which does not tell how far such an effect
+    has swung when it begins.
 
     Args:
         likelihood: of the record.
@@ -93,7 +95,7 @@ def absent_at_times(
         same = _gains([[_in_colour(*block, whole.colour) for block in blocks] for blocks in fits])
         return max((gain for gain, too in zip(own, same, strict=True) if too > 0.0), default=0.0)
 
-    looked_at = (effect for effect in effects if plant.entry(effect.places(plant)[effect.size]).default == 0.0)
+    looked_at = (one for one in effects if not one.memory and plant.entry(one.places(plant)[one.size]).default == 0.0)
     return tuple(effect for effect in looked_at if gain_without(effect) > settings.surely_absent)
 
 

@@ -13,7 +13,7 @@ from orchestrator.diagnosis.fit.runs import stretches
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.outcome import RecordEvidence
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
-from orchestrator.diagnosis.settings import ProofSettings
+from orchestrator.diagnosis.proof.settings import ProofSettings
 from orchestrator.shared.inference.repeats import Repeats, repeat_variance
 
 Array = NDArray[np.float64]

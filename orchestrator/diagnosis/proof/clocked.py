@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.settings import CycleSettings
+from orchestrator.diagnosis.proof.settings import CycleSettings
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.runs import in_time
 from orchestrator.diagnosis.fit.signals import Signals
-from orchestrator.diagnosis.settings import FreeRunSettings
+from orchestrator.diagnosis.proof.settings import FreeRunSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.predictor import FINER, coarse_runner_of, coarse_steps, runs_coarsely
 from orchestrator.shared.cores import spread

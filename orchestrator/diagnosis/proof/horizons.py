@@ -5,6 +5,7 @@ over its horizon with the exact, event-located plant. Over two seconds, and over
 the one that lies closest. All models of a diagnosis are started by the same filter: they differ in physics alone.
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.proof.free_run import FreeRun, free_run, simulate
-from orchestrator.diagnosis.proof.misfit import segments
-from orchestrator.diagnosis.settings import HorizonSettings
+from orchestrator.diagnosis.proof.misfit import running
+from orchestrator.diagnosis.proof.settings import HorizonSettings
 from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.long_run import long_run_covariance
+from orchestrator.shared.inference.normal import of_many
 from orchestrator.shared.results.diagnose import HorizonFound
 
 Array = NDArray[np.float64]
@@ -49,7 +51,7 @@ class Horizons:
     settings: HorizonSettings
 
     def harm_over(self, other: "Horizons", chance: Chance | None = None) -> tuple[str, ...]:
-        """Return the horizons at which this model predicts worse than another, beyond chance.
+        """Return the horizons at which this model predicts worse than another, beyond what chance does to one of them.
 
         Args:
             other: of the other model, over the same part.
@@ -59,14 +61,14 @@ class Horizons:
         Returns:
             Their labels.
         """
-        settings = self.settings
+        settings, sure = self.settings, sure_of_one(self.settings)
         most = (
             np.where(np.isnan(other.errors), np.inf, other.errors) * (1.0 + settings.larger)
             + settings.of_noise * self.noise
         )
         worse = np.any(~(self.errors <= most), axis=1)
         for row, (change, scatter) in enumerate(self._changes_over(other)):
-            worse[row] &= not change <= settings.sure * scatter
+            worse[row] &= not change <= sure * scatter
         if chance is not None:
             for row, (mine, theirs) in enumerate(zip(self.runs, other.runs, strict=True), start=len(self.squares)):
                 if worse[row]:
@@ -102,8 +104,10 @@ class Horizons:
             pairs = list(zip(mine, theirs, strict=True))
             m = self.noise.size
             change = np.array([np.sum((a.rms[:m] ** 2 - b.rms[:m] ** 2) / self.noise**2) for (a, _), (b, _) in pairs])
-            if len(pairs) > 1 and np.mean(change) <= self.settings.sure * np.std(change, ddof=1) / len(pairs) ** 0.5:
-                found.append(label)
+            if len(pairs) > 1:
+                mean, error = _mean_of(change)
+                if mean <= self.settings.sure * error:
+                    found.append(label)
         return tuple(found)
 
     def _changes_over(self, other: "Horizons") -> Iterator[tuple[float, float]]:
@@ -113,8 +117,7 @@ class Horizons:
                 yield (-np.inf if np.all(np.isfinite(own)) else np.inf), 0.0
                 continue
             change = np.sum((own - before) / self.noise**2, axis=1)
-            mean = float(np.mean(change))
-            yield mean, float(np.sqrt(long_run_covariance((change - mean)[:, None])[0, 0]) / change.size)
+            yield _mean_of(change)
 
     @property
     def long(self) -> int:
@@ -191,6 +194,24 @@ class Horizons:
         return not bool(better) and not bool(np.any(self.r_squared > share))
 
 
+def sure_of_one(settings: HorizonSettings) -> float:
+    """Return the standard deviations that count at one horizon where several are asked.
+
+    Args:
+        settings: of the horizons.
+
+    Returns:
+        One of them exceeds it by chance as rarely as a single one would exceed ``sure``.
+    """
+    return of_many(settings.sure, len(settings.spans) + 3)  # beside a sample, a few seconds and the whole part
+
+
+def _mean_of(change: Array) -> tuple[float, float]:
+    """Return the mean of what neighbours in time have in common, and its standard error."""
+    mean = float(np.mean(change))
+    return mean, float(np.sqrt(long_run_covariance((change - mean)[:, None])[0, 0]) / change.size)
+
+
 def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> Horizons:
     """Return the prediction errors of a model on a part of a record.
 
@@ -221,10 +242,11 @@ def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> H
     def closest(rows: slice) -> tuple[FreeRun, slice]:
         return free_run(plant, p, states[rows.start], signals, rows, proof.free_run), rows
 
-    pieces = segments(part, signals, proof)
+    pieces = running(part, signals, proof)
+    pieces = pieces[:: math.ceil(len(pieces) / settings.most_segments)]
     runs: list[tuple[tuple[FreeRun, slice], ...]] = []
     if len(pieces) > 1:
-        runs.append(tuple(spread(closest, pieces[: settings.most_segments])))
+        runs.append(tuple(spread(closest, pieces)))
         labels.append(f"{proof.segment:g} s")
         errors.append(np.sqrt(np.mean(np.square([run.rms[:m] for run, _ in runs[0]]), axis=0)))
         plain.append(none)

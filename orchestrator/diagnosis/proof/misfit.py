@@ -1,5 +1,6 @@
 """The misfit of models on a part of a record that no fit has touched: rms of free runs against the measurement."""
 
+import math
 from collections.abc import Sequence
 from functools import partial
 
@@ -10,7 +11,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.proof.free_run import FreeRun, free_run
-from orchestrator.diagnosis.settings import ProofSettings
+from orchestrator.diagnosis.proof.settings import ProofSettings
 from orchestrator.shared.cores import spread
 
 Array = NDArray[np.float64]
@@ -37,10 +38,34 @@ def segments(part: slice, signals: Signals, settings: ProofSettings) -> list[sli
     ]
 
 
+def running(part: slice, signals: Signals, settings: ProofSettings) -> list[slice]:
+    """Return the free runs of which a misfit is the mean: of a segment's length, from the part's first row to its last.
+
+    Where few segments have room they overlap. Under torque noise a run of two seconds drifts, and what a few of them
+    make of a small effect is chance: runs from further starts see other noise, and no row is left out.
+
+    Args:
+        part: samples to cover.
+        signals: of the record, or records.
+        settings: of the proof.
+
+    Returns:
+        The runs, in order, evenly spaced within each record.
+    """
+    found, pieces, stretches = list[slice](), segments(part, signals, settings), signals.stretches(part)
+    length = pieces[0].stop - pieces[0].start
+    for rows in stretches:
+        room = rows.stop - rows.start - length
+        count = max(math.ceil((room + length) / length), math.ceil(settings.runs / len(stretches)))
+        starts = np.unique(np.linspace(rows.start, rows.start + room, min(count, room + 1)).astype(int))
+        found += [slice(start, start + length) for start in starts.tolist()]
+    return found
+
+
 def held_out_misfit(
     likelihood: RecordLikelihood, q: float, stages: Sequence[tuple[str, Array]], part: slice, unit: str
 ) -> tuple[Misfit, ...]:  # fmt: skip
-    """Return the misfit of each model over free runs that cover a part of a record, segment by segment.
+    """Return the misfit of each model: the rms of free runs over a part of a record.
 
     Args:
         likelihood: of the record.
@@ -53,7 +78,7 @@ def held_out_misfit(
         A misfit per encoder.
     """
     plant, signals, settings = likelihood.plant, likelihood.signals, likelihood.settings.proof
-    runs = segments(part, signals, settings)
+    runs = running(part, signals, settings)
     whole = likelihood.over(signals.size)
     rows = []
     for name, p in stages:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.proof.free_run import free_run
-from orchestrator.diagnosis.settings import InverseSettings
+from orchestrator.diagnosis.proof.settings import InverseSettings
 from orchestrator.plants.description import Plant
 
 Array = NDArray[np.float64]

@@ -9,10 +9,13 @@ of them it excludes.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.shared.inference.long_run import long_run_covariance
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -80,3 +83,21 @@ def is_confirmed(likelihood: RecordLikelihood, model: Fit, before: Fit, parts: P
     return all(one.value > sure * one.error for one in (fitted, decides)) and (
         abs(decides.value - fitted.value) <= sure * apart
     )
+
+
+def most_gain(likelihood: RecordLikelihood, model: Fit, without: Array, part: slice) -> float:
+    """Return the log-likelihood that a part may be expected to gain by an effect which is all there.
+
+    Args:
+        likelihood: of the record.
+        model: the fit that has the effect.
+        without: (parameters,) the same with nothing changed but that the effect is taken out.
+        part: the samples that are asked.
+
+    Returns:
+        Half the squared change of the innovations; 0: the part does not answer to the effect.
+    """
+    if not model.colour.usable:
+        return np.inf
+    own, other = (model.colour.white(likelihood.whitened(p, model.q), part) for p in (model.p, without))
+    return 0.5 * float(np.sum((own - other) ** 2))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Parts, followed
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, best_settled, ladder
+from orchestrator.diagnosis.search.confirmed import most_gain
 from orchestrator.diagnosis.search.model_space import ModelSpace
 from orchestrator.diagnosis.search.screening import Guess
 from orchestrator.plants.effects import Effect, Scene
@@ -53,7 +54,8 @@ class Fits(ModelSpace):
         """Fit a candidate to both parts when it gains much on the first and fails on the second.
 
         A law that holds where it was fitted may fail where the deciding part reaches further (a spring that hardens
-        faster than its cubic, a limit that is reached once); fitted to both, it shows what it is worth.
+        faster than its cubic, a limit that is reached once); fitted to both, it shows what it is worth. So does
+        one that rests on the first part, and gains on the second.
 
         Args:
             candidate: a fitted model.
@@ -64,7 +66,9 @@ class Fits(ModelSpace):
             The better of both.
         """
         gained = candidate.fit.fitted - current.fit.fitted
-        if gained < self.settings.rescued or candidate.pays_over(current, base):
+        shows = candidate.fit.validated - current.fit.validated > self.settings.least_decided
+        begun = gained > self.settings.rescued or (shows and self.rests(candidate))
+        if not begun or candidate.pays_over(current, base):
             return candidate
         start, stop = (f(self.parts.fitted, self.parts.validated) for f in (_first, _last))
         both = Parts(slice(start, stop), self.parts.validated, self.parts.held_out)
@@ -74,6 +78,20 @@ class Fits(ModelSpace):
         share = self.likelihood.log_likelihood(fitted.z, fitted.q, self.parts.validated, fitted.colour, fitted.p)
         retried = self.candidate(candidate.effects, replace(fitted, fitted=whole - share, validated=share))
         return max(candidate, retried, key=lambda c: c.score)
+
+    def rests(self, candidate: Candidate) -> bool:
+        """Tell whether the fitted part could not earn a candidate's last effect, were it all there: it is not reached.
+
+        Args:
+            candidate: a fitted model.
+
+        Returns:
+            True when it could not.
+        """
+        effect = candidate.effects[-1]
+        without = self.without(candidate.fit.p, effect)
+        most = most_gain(self.likelihood, candidate.fit, without, self.parts.fitted)
+        return most < self.settings.penalty * len(effect.parameters)
 
     def refine(self, source: Candidate, simpler: Effect, effect: Effect, scene: Scene) -> Candidate | None:
         """Return the best fit of ``effect`` in the place of ``simpler``, from several starts; None: not plausible.

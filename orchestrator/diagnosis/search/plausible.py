@@ -39,8 +39,14 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
                 return f"{what} is more than the drive's largest torque, {largest:.3g}: wrong units, or another machine"
         elif unit == "rad" and short in ("offset", "alpha", "amplitude") and value > travel:
             return f"{what} is more than the whole travel, {travel:.3g} rad"
+        elif unit == "rad" and short == "angle" and abs(float(p[place]) - scene.middle) > travel:
+            return (
+                f"{effect.name} ({effect.site}) would rest beyond the whole travel, {travel:.3g} rad: a constant torque"
+            )
         elif short == "delay" and value > min(settings.most_delay, settings.delay_share * scene.h * scene.u.size):
             return f"{what} is too long for a dead time: `u` and the angles may not belong together"
+        elif short == "rate" and value * settings.most_lag < float(np.max(np.abs(scene.u))):
+            return f"{what} is too slow for a drive: its largest torque would take longer than {settings.most_lag:g} s"
         elif effect.site == "actuator" and short == "time_constant" and value > settings.most_lag:
             return f"{what} is too slow for a drive: next to nothing of `u` would get through"
     return ""

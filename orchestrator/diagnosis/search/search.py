@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+from orchestrator.diagnosis.fit.fitting import Parts
 from orchestrator.diagnosis.proof.horizons import horizons
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
 from orchestrator.diagnosis.search.confirmed import is_confirmed
@@ -205,7 +206,7 @@ class Search(Fits):
         Returns:
             True when it does.
         """
-        if candidate.pays_over(current, base):
+        if candidate.pays_over(current, base, confirmed=self.rests(candidate)):
             return True
         if not candidate.pays_over(current, base, noise=True, confirmed=True):
             return False
@@ -328,6 +329,9 @@ class Search(Fits):
     def guessed(self, current: Candidate, scene: Scene, screen: Screen) -> list[tuple[Effect, Guesses]]:
         """Return the guesses of every effect that is not in ``current``, most promising first.
 
+        One that rests on the fitted part, at whatever size (a limit that is not reached there), is looked for on the
+        deciding one.
+
         Args:
             current: the model to build on.
             scene: sizes of the record's signals.
@@ -336,9 +340,15 @@ class Search(Fits):
         Returns:
             Effects with their guesses.
         """
-        pairs = self.each(
-            lambda effect: (effect, self.guesses(screen, effect, scene, current)), list(self.eligible(current))
-        )
+        elsewhere = Parts(self.parts.validated, self.parts.validated, self.parts.held_out)
+        late = Screen(self.likelihood, current.fit, elsewhere)
+
+        def of(effect: Effect) -> tuple[Effect, Guesses]:
+            found = self.guesses(screen, effect, scene, current)
+            rests = not effect.amplitudes and self.parts.apart and not any(guess.gain for guess in found)
+            return effect, self.guesses(late, effect, scene, current) if rests else found
+
+        pairs = self.each(of, list(self.eligible(current)))
         return sorted((pair for pair in pairs if pair[1]), key=lambda pair: pair[1][0].gain, reverse=True)
 
     def guesses(self, screen: Screen, effect: Effect, scene: Scene, current: Candidate) -> Guesses:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.proof.free_run import simulate, start_answers
-from orchestrator.diagnosis.proof.horizons import Runs
+from orchestrator.diagnosis.proof.horizons import Runs, sure_of_one
 from orchestrator.diagnosis.verdict.where import missing_torque
 from orchestrator.shared.inference.colour import WHITE
 
@@ -67,7 +67,7 @@ class TorqueNoise:
                     for basis, run in zip(bases, (own, other), strict=True)
                 ]
                 changes[draw] += (np.mean(errors[0] ** 2, axis=0) - np.mean(errors[1] ** 2, axis=0)) / len(mine)
-        return np.asarray(np.mean(changes, axis=0) + settings.sure * np.std(changes, axis=0))
+        return np.asarray(np.mean(changes, axis=0) + sure_of_one(settings) * np.std(changes, axis=0))
 
     def drift(self, start: Array, outputs: Array, part: slice, draw: int) -> Array:
         """Return (n, channels): what one draw of the torque noise, and of the model's values, adds to a free run.
@@ -86,15 +86,15 @@ class TorqueNoise:
         limit = plant.index(plant.drive.limit)
         u = np.clip(signals.u, -p[limit], p[limit])
         p[limit] = plant.table[limit].default  # the noise acts behind the limit
-        u[begin:end] += self._requested(self._drawn(end - begin, draw))
+        u[begin:end] += self._requested(self._drawn(part, draw))
         run = simulate(plant, p, start, replace(signals, u=u), part)[:, : signals.channels]
         return np.nan_to_num(run - outputs)
 
-    def _drawn(self, size: int, draw: int) -> Array:
-        """Return one draw (size,) of the torque noise."""
+    def _drawn(self, part: slice, draw: int) -> Array:
+        """Return one draw (n,) of the torque noise over a part: runs that overlap see the same."""
         rng = np.random.default_rng(draw)
         turned = np.roll(self.torque, rng.integers(self.torque.size))[:: rng.choice((-1, 1))]
-        return np.asarray(rng.choice((-1.0, 1.0)) * np.resize(turned, size))
+        return np.asarray(rng.choice((-1.0, 1.0)) * turned[np.arange(part.start, part.stop) % turned.size])
 
     def _values(self, draw: int) -> Array:
         """Return one draw (parameters,) of the model's values, within their covariance and bounds."""
