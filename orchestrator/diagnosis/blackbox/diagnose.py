@@ -1,12 +1,12 @@
 """Diagnosis of any FMU: probe, fit, search, proof on held-out data, verdict."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import INPUT, PORT
+from orchestrator.diagnosis.blackbox.bank import INPUT, PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.guiding import guided
 from orchestrator.diagnosis.blackbox.judged import BoxOutcome, judged
@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 
 
 Progress = Callable[[str], None]
+ALIKE_BEHIND = {"input_gain": "output_gain", "input_delay": "output_delay", "input_lag": "output_lag"}
+"""Effects that do the same before a linear FMU and behind it."""
 
 
 def prepared(
@@ -183,9 +185,27 @@ def _guided(free: BoxOutcome, progress: Progress, begun: float, settings: BoxSet
     if base is None:
         return free
     best, families = settled_names(search, search.run(base))
+    families = tuple(behind(e, family, led.outputs) for e, family in zip(best.model.effects, families, strict=True))
     found = judged(problem, free.probe, search, search.plain or base, best, families, begun, settings.rest)
     # A run that is led has little left to explain: it says what is missing, never that nothing is.
     return found if found.verdict == "effects" else free
+
+
+def behind(effect: BoxEffect, family: tuple[str, ...], outputs: Sequence[str]) -> tuple[str, ...]:
+    """Return the family of an effect that guided runs name, with what does the same behind a linear FMU.
+
+    A guide leads what is before the effects at outputs: they are not tried.
+
+    Args:
+        effect: that is named.
+        family: labels that the record does not tell from it.
+        outputs: names of the measured ones.
+
+    Returns:
+        The labels.
+    """
+    kind = ALIKE_BEHIND.get(effect.kind.name)
+    return (*family, *(f"{kind}@{name}" for name in outputs if kind is not None))
 
 
 def _with_fewer(search: BoxSearch, best: BoxFit, other: BoxSearch, base: BoxFit) -> BoxFit | None:

@@ -185,6 +185,9 @@ def _verdict(
     if effects and rest.nothing_missing and shown.removed < settings.least_shown:
         why = f"the effects remove {100.0 * max(shown.removed, 0.0):.0f} % of the misfit on data not fitted"
         return "unknown", replace(rest, explained=False, disturbed=False, reasons=(why,))
+    if rest.disturbed and rest.share > settings.solver and any(e.kind.where == PARAMETER for e in effects):
+        why = "a parameter that changes can follow anything, and more than noise is left beside it"
+        return "unknown", replace(rest, disturbed=False, reasons=(why,))
     if effects and rest.nothing_missing:
         return "effects", rest
     if effects:

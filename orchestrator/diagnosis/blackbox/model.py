@@ -1,6 +1,7 @@
 """A record as a map names its columns, and a model: values of parameters, effects, and their values."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,11 @@ class Data:
     def driven(self) -> Array:
         """Return the inputs as the file has them, (rows of the file, inputs)."""
         return self.inputs if self.held is None else self.held
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Return the root mean square of each input, (inputs,): every run with an effect at a port asks for it."""
+        return np.asarray(np.sqrt(np.mean(self.driven**2, axis=0)))
 
     @property
     def step(self) -> float:

@@ -357,7 +357,7 @@ class BoxProblem:
         Returns:
             Shape (places,).
         """
-        sizes = np.sqrt(np.mean(self.data.driven**2, axis=0))
+        sizes = self.data.sizes
         largest = float(sizes.max()) or 1.0
         found = []
         for place in places:

@@ -146,8 +146,8 @@ class Runner:
         own = self.settings
         if len(self._threads) < self._most and self._spent > self._starting:  # now another child has paid
             self._threads.append(ThreadPoolExecutor(1))
-        size = own.chunk if len(plans) >= 2 * own.chunk else 1
-        if together or len(plans) * self.step_cost * len(plans[0].table) < own.small:
+        size = own.chunk if len(plans) >= 2 * own.chunk and not self.lost else 1  # one that hangs is alone then
+        if together or (not self.lost and len(plans) * self.step_cost * len(plans[0].table) < own.small):
             size = len(plans)  # the latter: not worth a second child
         waiting = deque(list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size))
         grid = (start, step, per_row, lead, self.fresh, guide)
@@ -239,11 +239,15 @@ class Runner:
         self._take(answer, chunk, plans, grid, results, steps)
 
     def _allowed(self, steps: int) -> float:
-        """Return the seconds that so many steps may take in this thread's child."""
+        """Return the seconds that so many steps may take in this thread's child.
+
+        An FMU that has hung is known to: with every child that it costs, one more that is late is likelier to hang too.
+        """
         own, expected = self.settings, self.settings.slower * steps * self.step_cost
         if self.step_cost == 0.0:
             return expected + own.loading + own.patience
-        return expected + own.known + (0.0 if threading.get_ident() in self._warm else own.again * self._first)
+        known = own.known / (1 + self.lost)
+        return expected + known + (0.0 if threading.get_ident() in self._warm else own.again * self._first)
 
     def _take(
         self, answer: Any, chunk: list[int], plans: Sequence[Plan], grid: Grid, results: list[Array | None], steps: int

@@ -167,10 +167,21 @@ class BoxSearch(BoxTrials):
 
     def _enriched(self, fit: BoxFit, base: BoxFit) -> BoxFit:
         """Return a fit, or one with what contains an earlier effect in its place: another hid what it lacks."""
+        fit = self._recalled(fit)
         for k in range(len(fit.model.effects) - 1):
             richer = [f for f in self.richer(fit, k) if self.pays(f, fit, base)]
             if richer:
                 return self.fitter.settled(max(richer, key=self.score))
+        return fit
+
+    def _recalled(self, fit: BoxFit) -> BoxFit:
+        """Return a fit, or one by which a signal was something else before the record: noise hid what it was."""
+        for effect in fit.model.effects:
+            for twin in (e for e in self.effects if e.label == effect.label and e.at_rest != effect.at_rest):
+                effects = tuple(twin if e == effect else e for e in fit.model.effects)
+                again = self.fitter.grown(replace(fit.model, effects=effects), fit.level)
+                if again is not None and again.total > fit.total:
+                    fit = self.fitter.settled(again)
         return fit
 
     def pruned(self, fit: BoxFit, base: BoxFit) -> BoxFit:

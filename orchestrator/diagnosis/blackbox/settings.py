@@ -319,10 +319,13 @@ class ProcessSettings(Settings, frozen=True):
 
     loading: Annotated[float, setting("seconds that loading may take: some FMUs unpack a whole tool", gt=0.0)] = 60.0
     patience: Annotated[float, setting("seconds that the first runs may take beyond loading")] = 20.0
-    known: Annotated[float, setting("the same of any batch, beyond what is expected, once runs were timed")] = 5.0
+    known: Annotated[
+        float,
+        setting("the same of any batch, beyond what is expected, once runs were timed; over one more than were lost"),
+    ] = 5.0
     again: Annotated[
         float, setting("times as long as the first answer of the first process that of another may take more", ge=0)
-    ] = 5.0
+    ] = 2.0
     slower: Annotated[float, setting("how many times as long as expected a batch may take", ge=1)] = 20.0
     most_lost: Annotated[
         int, setting("processes that an FMU may cost: one effect that it cannot stand costs a few", ge=0)

@@ -90,19 +90,19 @@ def lost_without(fitter: Fitter, fit: BoxFit, effect: BoxEffect, model: BoxModel
 def made_up_for(fitter: Fitter, fit: BoxFit, effect: BoxEffect) -> BoxModel:
     """Return the model without an effect, the other values where linearisation says that they make up for it best.
 
-    Re-fitted parameters may do all that an effect does (a gain, and all parameters in proportion), and still not be
-    found from where they were beside it: without both the run goes astray.
+    Other values may do all that an effect does (a gain, and all parameters in proportion; a delay on either side), and
+    still not be found from where they were beside it: without both the run goes astray.
 
     Args:
         fitter: gives the filters and the FMU.
         fit: of the model.
-        effect: one of it; where it is not in proportion to its values, the others stay where they are.
+        effect: one of it; where what it does is not in proportion to its values, the others stay where they are.
 
     Returns:
         The model.
     """
     model, at = fit.model.without(effect.label), len(fit.model.p)
-    if not effect.kind.linear:
+    if not (effect.kind.linear or effect.kind.shrinks):
         return model
     place = fit.model.effects.index(effect)
     at += sum(len(values) for values in fit.model.values[:place])

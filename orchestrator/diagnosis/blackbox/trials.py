@@ -75,8 +75,8 @@ class BoxTrials:
     def _least(self, fit: BoxFit, before: BoxFit, base: BoxFit) -> float:
         """Return the gain that what ``fit`` has more than ``before`` must bring.
 
-        A law that is not exact leaves something that no other takes away whole: it is asked for less where it does, and
-        for more where no more than measurement noise is left.
+        A law that is not exact leaves something that no other takes away whole: one that does says that it acts and
+        that there is no noise at the ports, and is asked for as much as two. One that finds no such noise, for more.
         """
         s, share = self.settings, self.fitter.ladder.share
         quiet = share(fit.level) <= s.quiet
@@ -84,7 +84,7 @@ class BoxTrials:
         whole = quiet and share(before.level) > s.quiet and self.explained(fit)
         if before.model.effects and share(before.level) <= self.fitter.settings.rest.solver and self.explained(before):
             return max(least, s.pays_disturbed)  # noise alone is left, and of a law that is not exact a little
-        return min(least, s.pays_disturbed) if whole else least
+        return min(least, 2.0 * s.pays) if whole else least
 
     def _within_laws(self, fit: BoxFit, before: BoxFit) -> bool:
         """Tell whether what ``fit`` explains beyond ``before`` is no more than the laws of that may be off by."""

@@ -224,8 +224,9 @@ def _anew(
             others[promise.effect.label][1].append(promise.values)
     for other, starts in others.values():
         fits = [search.fitter.fit(without.extended(other, other.bounded(values)), best.level) for values in starts]
-        again = [search.fitter.settled(fit) for fit in fits if fit is not None]
-        again += [near[other.label]] if other.label in near else []
+        again = [near[other.label]] if other.label in near else []
+        if nearest := max((fit for fit in fits if fit is not None), key=search.score, default=None):
+            again.append(search.fitter.settled(nearest))
         if again:
             found[other.label] = max(again, key=search.score)
     return found

@@ -16,14 +16,16 @@ from orchestrator.diagnosis.blackbox.whitening import Ladder, realised
 ROWS, NOISE = 200, 1e-3
 TIME = np.linspace(0.0, 1.0, ROWS)
 SCENE = Surroundings(0.01, 1.0, 1.0, TIME)
-GAIN, LAG = (BoxEffect(BANK[name], "u", SCENE) for name in ("input_gain", "input_lag"))
+GAIN, LAG, LIMIT = (BoxEffect(BANK[name], "u", SCENE) for name in ("input_gain", "input_lag", "input_saturation"))
+BEHIND = BoxEffect(BANK["output_lag"], "y", SCENE)
 
 
 def run(model: BoxModel, turns: float) -> np.ndarray:
     """An angle that turns ``turns`` times faster for each part of a ratio: drive and gain over inertia."""
     gain = sum(float(v[0]) for e, v in zip(model.effects, model.values, strict=True) if e is GAIN)
+    late = sum(float(v[0]) for e, v in zip(model.effects, model.values, strict=True) if e in (LAG, BEHIND))
     inertia, drag = model.p
-    return (np.sin(turns * (1.0 + gain) / inertia * TIME) - (1.0 + gain) / drag * TIME**2)[:, None]
+    return (np.sin(turns * (1.0 + gain) / inertia * (TIME - late)) - (1.0 + gain) / drag * TIME**2)[:, None]
 
 
 def fitter(turns: float) -> tuple[Fitter, list[int]]:
@@ -83,7 +85,15 @@ def test_parameters_in_proportion_make_up_for_a_gain() -> None:
 
 def test_what_is_not_in_proportion_leaves_the_others() -> None:
     own, _ = fitter(300.0)
-    model = BoxModel(np.array([0.99, 1.01])).extended(LAG, np.array([0.1])).extended(GAIN, np.array([0.01]))
-    found = made_up_for(own, fit_of(own, model, 300.0), LAG)
+    model = BoxModel(np.array([0.99, 1.01])).extended(LIMIT, np.array([0.1])).extended(GAIN, np.array([0.01]))
+    found = made_up_for(own, fit_of(own, model, 300.0), LIMIT)
     assert found.effects == (GAIN,)
     assert np.array_equal(found.vector, np.array([0.99, 1.01, 0.01]))
+
+
+def test_a_lag_makes_up_for_one_on_the_other_side() -> None:
+    own, _ = fitter(300.0)
+    model = BoxModel(np.ones(2)).extended(LAG, np.array([0.002])).extended(BEHIND, np.array([0.0005]))
+    found = made_up_for(own, fit_of(own, model, 300.0), BEHIND)
+    assert found.effects == (LAG,)
+    assert found.values[0] == pytest.approx([0.0025], rel=1e-3)

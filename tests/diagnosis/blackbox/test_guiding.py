@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.blackbox.diagnose import fitters, prepared
+from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
+from orchestrator.diagnosis.blackbox.diagnose import behind, fitters, prepared
 from orchestrator.diagnosis.blackbox.guiding import guided
 from orchestrator.diagnosis.blackbox.held_out import held_out
 from orchestrator.diagnosis.blackbox.mapping import read_map
@@ -124,3 +125,11 @@ def test_effects_show_where_they_remove_nine_tenths_of_the_squared_misfit():
 
 def test_effects_that_do_not_follow_the_motion_do_not_show():
     assert not _held_out(400.0, 40.0).shows(DEFAULT.rest)
+
+
+@pytest.mark.parametrize(
+    ("name", "family"), [("input_delay", ("output_delay@x", "output_delay@y")), ("input_saturation", ())]
+)
+def test_a_delay_that_guided_runs_name_may_lie_behind_the_fmu(name, family):
+    effect = BoxEffect(BANK[name], "u", Surroundings(0.01, 1.0, 1.0, np.ones(3)))
+    assert behind(effect, ("load@p",), ("x", "y")) == ("load@p", *family)

@@ -117,3 +117,15 @@ def test_what_a_law_at_a_port_may_be_off_by_is_no_further_effect(kind: str, left
     before = BoxFit(model, 0, np.full((ROWS, 1), left), 0.0, 0.0, 0.0, J)
     after = BoxFit(model.extended(further, np.ones(1)), 0, np.zeros((ROWS, 1)), 0.0, 0.0, 0.0, J)
     assert BoxTrials(fitter(np.zeros(ROWS)), ())._within_laws(after, before) is within
+
+
+def test_what_takes_away_all_noise_at_the_port_is_asked_for_as_much_as_two_effects(monkeypatch) -> None:
+    own = fitter(np.zeros(ROWS))
+    trials = BoxTrials(own, ())
+    monkeypatch.setattr(trials, "explained", lambda fit: True)
+    noisy = next(k for k in range(own.ladder.size) if own.ladder.share(k) == 1.8e-3)
+    base = replace(plain(own), decided=-1e4, level=noisy)
+    before = replace(base, decided=-900.0)
+    pays = trials.settings.pays
+    assert trials._least(replace(before, level=0), before, base) == 2.0 * pays
+    assert trials._least(before, before, base) > 3.0 * pays  # noise is left: no law is exact
