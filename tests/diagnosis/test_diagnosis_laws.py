@@ -22,6 +22,8 @@ HIDDEN = {
     "directional friction": ({"dv_l": 0.6}, "directional_friction@load", "difference", 0.6),
     "spring": ({"ks": 12.0}, "spring_load@load", "stiffness", 12.0),
     "varying inertia": ({"jvar": 0.1}, "varying_inertia@load", "amplitude", 0.56),
+    "rate limit": ({"slew": 1500.0}, "rate_limit@actuator", "rate", 1500.0),
+    "friction with load": ({"mu_m": 0.03}, "load_dependent_friction@motor", "coefficient", 0.03),
     "hysteresis": ({"bw": 30.0, "bw_x": 0.01}, "shaft_hysteresis@shaft", "torque", 30.0),
 }
 
@@ -42,6 +44,21 @@ def test_a_law_is_named_and_sized(law: str) -> None:
         value = 0.1 * truth["linear"]["J_l"]
     assert abs(found.effects[0].parameters[parameter].value) == pytest.approx(value, rel=0.03)
     assert max(misfit.after / misfit.noise for misfit in found.misfit) < 1.5
+
+
+@pytest.mark.slow
+def test_both_end_stops_are_named_with_one_stiffness() -> None:
+    record, _ = record_of({"stop": 0.5, "stop_k": 2e4, "stop_d": 0.2}, 4103)
+    found = diagnose(record, MODEL)
+    stops = {effect.name: effect.parameters for effect in found.effects}
+    assert set(stops) == {"lower_end_stop", "upper_end_stop"}
+    for name, angle in (("lower_end_stop", -0.5), ("upper_end_stop", 0.5)):
+        assert stops[name]["angle"].value == pytest.approx(angle, rel=1e-3)
+        assert stops[name]["stiffness"].value == pytest.approx(2e4, rel=0.02)
+        assert stops[name]["dissipation"].value == pytest.approx(0.2, rel=0.05)
+    values = start_values(PLANT, found.workings.final.p)
+    assert values["effects.end_stop.upper"] == pytest.approx(0.5, rel=1e-3)
+    assert values["effects.end_stop.lower"] == pytest.approx(-0.5, rel=1e-3)
 
 
 def test_friction_that_builds_up_is_part_of_the_corrected_plant() -> None:
