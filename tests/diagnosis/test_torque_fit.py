@@ -69,6 +69,13 @@ def test_values_are_told_with_which_a_model_predicts_best(joint) -> None:
     assert not np.array_equal(kept.fit.p, told.fit.p)
 
 
+@pytest.mark.parametrize("name", ["effects.rate_limit.rate", "effects.end_stop.upper", DELAY])
+def test_the_filtered_torque_is_not_asked_for_timing_and_contacts(joint, name: str) -> None:
+    likelihood, parts, found = joint
+    with_it = replace(found, free=(*found.free, Free(AXIS.index(name), 0.1, 0.0, 1e6)))
+    assert torque_fit(likelihood, with_it, parts.fitted) is None
+
+
 @pytest.mark.parametrize("seed", [2, 4])
 def test_values_on_which_both_differ_are_between_them(seed: int) -> None:
     likelihood, parts, found = joint_of(seed, 0.12)

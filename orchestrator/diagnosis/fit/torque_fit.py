@@ -19,6 +19,10 @@ from orchestrator.shared.inference.long_run import long_run_covariance
 
 Array = NDArray[np.float64]
 
+# Of parameters that the filtered torque says nothing of: the drive's timing, and contacts shorter than the filter.
+TIMING_UNITS = ("s", "N.m/s")
+CONTACT = "effects.end_stop."
+
 
 def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | None:
     """Return a fit whose sizes are those of the smallest torque error, in the plant's inverse model.
@@ -35,8 +39,9 @@ def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | N
     plant, settings = likelihood.plant, likelihood.settings.inverse
     inverse = plant.inverse
     free = tuple(entry for entry in found.free if entry.place < len(plant.table))
-    late = any(plant.entry(entry.place).unit == "s" for entry in found.free)
-    if inverse is None or late or not free or plant.value(found.p, plant.drive.lag) > 0.0:
+    entries = [plant.entry(entry.place) for entry in found.free]
+    unseen = any(entry.unit in TIMING_UNITS or entry.name.startswith(CONTACT) for entry in entries)
+    if inverse is None or unseen or not free or plant.value(found.p, plant.drive.lag) > 0.0:
         return None
     position, speed, acceleration, given = motion(likelihood, part)
     if given.size < settings.least_rows * len(free):
