@@ -12,6 +12,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import Sized, sized, with_model_error
 from orchestrator.diagnosis.fit.spread import absent_at_times
+from orchestrator.diagnosis.proof.by_record import by_record
 from orchestrator.diagnosis.proof.horizons import Horizons, horizons, is_driven
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.proof.reported import as_allowed, reported
@@ -336,11 +337,16 @@ def _larger_misfit(likelihood: RecordLikelihood, bases: Sequence[Array], final: 
     """Return the signals whose misfit on held-out data, as it is reported, is larger with effects than without.
 
     Each of ``bases`` counts, parameters without effects, nominal ones too: the likeliest make up for what the model
-    lacks over a sample, and may be worse in free runs.
+    lacks over a sample, and may be worse in free runs. Of several records each counts, too, beyond a share.
     """
     stages = [*(("", p) for p in bases), ("final", final.p)]
     found = held_out_misfit(likelihood, final.q, stages, whole.held_out, "")
-    return tuple(f"the misfit of {one.signal}" for one in found if not one.after <= one.best_before)
+    larger = [f"the misfit of {one.signal}" for one in found if not one.after <= one.best_before]
+    most = 1.0 + likelihood.settings.verdict.larger_of_one
+    for record in by_record(likelihood, final.q, stages, whole.held_out, ""):
+        worse = (one.signal for one in record.misfit if not one.after <= most * one.best_before)
+        larger += [f"the misfit of {signal} in {record.source}" for signal in worse]
+    return tuple(larger)
 
 
 def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: float, whole: Parts) -> bool:
@@ -382,7 +388,7 @@ def _minor(
         fewer = search.reduced(best, scene, effect)
         again = annealed(likelihood, fewer.fit.p, fewer.fit.q, fewer.fit.free, whole, fewer.effects)
         share = after.skill_over(horizons(likelihood, again.p, plain.q, parts.held_out), first=0)
-        if torque_proof(likelihood, again, told, whole).decides(settings.verdict.proven, settings.verdict.good):
+        if torque_proof(likelihood, again, told, whole).decides(settings.search.shown, settings.verdict.good):
             share = 1.0
         found.append((share, effect, fewer))
     share, effect, fewer = min(found, key=lambda one: one[0], default=(math.inf, best.effects[-1], best))

@@ -222,6 +222,9 @@ class VerdictSettings(Settings, frozen=True):
     notable_misfit: Annotated[
         float, setting("times the noise: laws of friction and contact that are nearly right leave up to two", ge=1)
     ] = 3.0
+    larger_of_one: Annotated[
+        float, share("and that of one of several records, of which few runs tell: beyond, they are withdrawn")
+    ] = 0.1
     larger: Annotated[float, share("by which effects may make the held-out misfit larger: beyond, trust is amber")] = (
         0.01
     )
