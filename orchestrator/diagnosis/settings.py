@@ -145,6 +145,9 @@ class SearchSettings(Settings, frozen=True):
     most_friction: Annotated[float, setting("dry friction over the largest torque: with more nothing moves")] = 1.0
     most_torque: Annotated[float, setting("other torques over the largest that was asked for")] = 5.0
     least_limit: Annotated[float, share("of the largest torque: a drive that is limited to less delivers none")] = 0.02
+    least_stop: Annotated[float, share("of the drive's largest torque that an end stop pushes back; softer: none")] = (
+        0.1
+    )
     most_delay: Annotated[float, setting("longest dead time [s]: beyond, the signals do not belong together")] = 0.25
     delay_share: Annotated[float, share("or of the record's length, where that is less")] = 0.1
     most_lag: Annotated[float, setting("slowest drive [s]: a slower one lets next to nothing of `u` through")] = 1.0

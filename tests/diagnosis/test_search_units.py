@@ -513,6 +513,13 @@ def test_a_size_that_no_machine_has_is_refused_and_said_once() -> None:
     assert "1e+04 N.m is more than the drive's largest torque" in search.refused[FRICTION.label]
     assert search.possible([larger], scene) == []
     assert "1e+04" in search.refused[FRICTION.label]
+    search.refused.clear()
+    none = replace(small, effects=())
+    assert search.possible([large], scene, none) == []
+    assert search.refused == {}  # it gains nothing: nobody would have named it
+    gains = replace(large, fit=replace(large.fit, fitted=100.0, validated=50.0))
+    assert search.possible([gains], scene, none) == []
+    assert list(search.refused) == [FRICTION.label]
 
 
 @pytest.mark.parametrize(("lag", "refused"), [(0.9, False), (90.0, True)])
@@ -533,6 +540,17 @@ def test_a_drive_whose_torque_takes_seconds_to_rise_is_refused(friction, seconds
     p = base.fit.p.copy()
     p[limit.places(AXIS)["rate"]] = np.max(np.abs(scene.u)) / seconds
     assert ("too slow for a drive" in implausible(AXIS, limit, p, scene, SETTINGS.search)) is refused
+
+
+@pytest.mark.parametrize(("stiffness", "refused"), [(2.0, True), (20.0, False)])
+def test_a_stop_that_gives_way_is_none(stiffness: float, refused: bool) -> None:
+    """The load's travel ends 0.1 rad beyond the stop; the drive has 4 N.m at the load."""
+    stop = next(effect for effect in DRIVETRAIN.bank if effect.name == "lower_end_stop")
+    scene = Scene(0.01, 1.0, np.ones(3), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, -1.0, 1.0)
+    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    places = stop.places(DRIVETRAIN)
+    p[places["angle"]], p[places["stiffness"]] = -0.9, stiffness
+    assert ("no stop" in implausible(DRIVETRAIN, stop, p, scene, SEARCH)) is refused
 
 
 def test_effects_that_share_a_parameter_fit_it_once() -> None:

@@ -25,6 +25,13 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
     """
     largest = float(np.max(np.abs(scene.u))) * (1.0 if effect.site == "motor" else scene.ratio)
     travel = 2.0 * np.pi * scene.turns / (1.0 if effect.site == "motor" else scene.ratio)
+    if "dissipation" in effect.parameters:
+        angle, stiffness = (float(p[effect.places(plant)[short]]) for short in ("angle", "stiffness"))
+        push = stiffness * max(scene.highest - angle if angle > scene.middle else angle - scene.lowest, 0.0)
+        if push < settings.least_stop * largest:
+            return (
+                f"{effect.name} ({effect.site}) would push back by {push:.3g} only, the drive by {largest:.3g}: no stop"
+            )
     for short, place in effect.places(plant).items():
         if place >= len(plant.table):
             continue

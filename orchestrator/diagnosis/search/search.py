@@ -147,7 +147,7 @@ class Search(Fits):
         found = self.each(lambda one: self.follow(one, current, least), begun)
         found += self.refined(found, current, base, scene)
         found = self.each(lambda candidate: self.rescued(candidate, current, base), found)
-        found = self.on_time(self.possible(found, scene), current, scene)
+        found = self.on_time(self.possible(found, scene, current), current, scene)
         found.sort(key=lambda candidate: candidate.score, reverse=True)
         found = simplest_first(found, self.likelihood.settings.verdict.alike_gain)
         if found and self.earns(found[0], current, base):
@@ -237,14 +237,17 @@ class Search(Fits):
         """
         return candidate.nearly_pays_over(current) and self.predicts(candidate, current)
 
-    def possible(self, found: Sequence[Candidate], scene: Scene) -> list[Candidate]:
-        """Return the candidates whose effects have sizes that a machine may have; note the others.
+    def possible(
+        self, found: Sequence[Candidate], scene: Scene, before: Candidate | None = None
+    ) -> list[Candidate]:  # fmt: skip
+        """Return the candidates whose effects have sizes that a machine may have; note others that might be named.
 
         An effect may be fitted away to such a size by one that comes after it.
 
         Args:
             found: fitted candidates.
             scene: sizes of the record's signals.
+            before: the model that they are built on; None: all are noted.
 
         Returns:
             The candidates.
@@ -254,7 +257,7 @@ class Search(Fits):
             odd = self.odd(candidate.effects, candidate.fit.p, scene)
             if odd is None:
                 kept.append(candidate)
-            elif odd.label not in self.refused:
+            elif odd.label not in self.refused and (before is None or candidate.nearly_pays_over(before)):
                 self.refused[odd.label] = implausible(self.plant, odd, candidate.fit.p, scene, self.settings)
         return kept
 
