@@ -542,6 +542,15 @@ def test_a_drive_whose_torque_takes_seconds_to_rise_is_refused(friction, seconds
     assert ("too slow for a drive" in implausible(AXIS, limit, p, scene, SETTINGS.search)) is refused
 
 
+@pytest.mark.parametrize(("ratio", "refused"), [(0.6, False), (0.8, True)])
+def test_a_resonance_without_a_peak_is_none(ratio: float, refused: bool) -> None:
+    law = next(effect for effect in DRIVETRAIN.bank if effect.name == "extra_resonance")
+    scene = Scene(0.01, 1.0, np.ones(3), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, -1.0, 1.0)
+    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    p[law.places(DRIVETRAIN)["damping_ratio"]] = ratio
+    assert ("no resonance" in implausible(DRIVETRAIN, law, p, scene, SEARCH)) is refused
+
+
 @pytest.mark.parametrize(("stiffness", "refused"), [(2.0, True), (20.0, False)])
 def test_a_stop_that_gives_way_is_none(stiffness: float, refused: bool) -> None:
     """The load's travel ends 0.1 rad beyond the stop; the drive has 4 N.m at the load."""

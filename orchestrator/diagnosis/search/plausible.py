@@ -1,5 +1,7 @@
 """Sizes that no machine has: such candidates are refused, and said in a warning with what they hint at."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,6 +39,8 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
             continue
         value, unit = abs(float(p[place])), plant.table[place].unit
         what = f"{effect.name} ({effect.site}) of {value:.3g} {unit}"
+        if short == "damping_ratio" and value >= math.sqrt(0.5):
+            return f"{effect.name} ({effect.site}) with a damping ratio of {value:.3g} has no peak: no resonance"
         if short == "limit":
             if value < settings.least_limit * float(np.max(np.abs(scene.u))):
                 return f"{what} would leave no torque: `u` may not be what drives the machine"

@@ -7,10 +7,9 @@ must pay on both.
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
-from orchestrator.diagnosis.fit.fitting import Parts
 from orchestrator.diagnosis.proof.horizons import horizons
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
 from orchestrator.diagnosis.search.confirmed import is_confirmed
@@ -343,15 +342,12 @@ class Search(Fits):
         Returns:
             Effects with their guesses.
         """
-        elsewhere = Parts(self.parts.validated, self.parts.validated, self.parts.held_out)
-        late = Screen(self.likelihood, current.fit, elsewhere)
-
-        def of(effect: Effect) -> tuple[Effect, Guesses]:
-            found = self.guesses(screen, effect, scene, current)
-            rests = not effect.amplitudes and self.parts.apart and not any(guess.gain for guess in found)
-            return effect, self.guesses(late, effect, scene, current) if rests else found
-
-        pairs = self.each(of, list(self.eligible(current)))
+        eligible = list(self.eligible(current))
+        pairs = self.each(lambda effect: (effect, self.guesses(screen, effect, scene, current)), eligible)
+        rest = {one.label for one, own in pairs if not one.amplitudes and not any(guess.gain for guess in own)}
+        if self.parts.apart and rest:
+            late = Screen(self.likelihood, current.fit, replace(self.parts, fitted=self.parts.validated))
+            pairs = [(e, self.guesses(late, e, scene, current) if e.label in rest else own) for e, own in pairs]
         return sorted((pair for pair in pairs if pair[1]), key=lambda pair: pair[1][0].gain, reverse=True)
 
     def guesses(self, screen: Screen, effect: Effect, scene: Scene, current: Candidate) -> Guesses:
