@@ -224,6 +224,7 @@ def _end_stop(side: str) -> Effect:
 
 
 def _load_dependent(site: str) -> Effect:
+    # Measured friction builds up at one stiffness, here at one distance: a quarter of its gain may be left.
     return Effect(
         "load_dependent_friction", site, group("load_dependent_friction", f"{site}.coefficient"), "coefficient",
         lambda scene: 0.01, lambda scene: {"presliding": (_build_up(scene, site)[0],)}, amplitudes=("coefficient",),
