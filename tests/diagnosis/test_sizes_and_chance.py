@@ -336,6 +336,19 @@ def test_what_makes_the_misfit_larger_is_never_green() -> None:
         assert sum("20 % larger with what is named" in reason for reason in trust.reasons) == expected
 
 
+@pytest.mark.parametrize(
+    ("verdict", "tails", "said"),
+    [("parameters", 9.0, True), ("none", 9.0, True), ("parameters", 2.5, False), ("effects", 9.0, False)],
+)
+def test_bursts_are_no_noise_of_a_sound_channel(verdict: str, tails: float, said: bool) -> None:
+    found = replace(horizons([0.1, 0.1, 0.1, 0.1]), r_squared=np.array([0.99]))
+    misfit = (Misfit("theta_m", "rad", 0.1, (("nominal", 0.1), ("parameters", 0.1))),)
+    left = Remainder(0.0, 1.0, 1.0, (), tails=tails)
+    trust = doubts(verdict, left, False, Proof(found, found), [], misfit, (), SETTINGS.verdict)
+    assert any("bursts" in reason for reason in trust.reasons) is said
+    assert trust.level.word == ("amber" if said else "green")
+
+
 def test_torque_noise_passes_the_lag_of_the_drive() -> None:
     likelihood, _ = drivetrain_likelihood()
     free = (Free(likelihood.plant.index("b_m"), 0.01, 0.0, 10.0),)

@@ -124,6 +124,9 @@ def doubts(
             found.append(f"the misfit of {entry.signal} on held-out data is {share:.0f} % larger with what is named")
     if floor_off and structured(left, settings):
         found.append("what the final model leaves is no noise")
+    if verdict in ("none", "parameters") and left.tails > settings.pulses:
+        disturbed = "at times a channel, or the torque, is disturbed"
+        found.append(f"what is left comes in bursts (excess kurtosis {left.tails:.0f}): {disturbed}")
     if left.growth > settings.grown:
         found.append(f"innovations are {left.growth:.1f} times larger on the held-out part")
     worst = float(min(proof.final.r_squared))
