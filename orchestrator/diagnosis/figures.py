@@ -225,6 +225,8 @@ def _abscissa(effect: Effect, p: Array, diagnosis: Diagnosis, x: Array, time: Ar
         ), "phase of the cycle [rad]"
     if effect.against == "angle":
         return np.mod(x[:, body.angle], 2.0 * np.pi), "load angle [rad]"
+    if effect.against == "position":
+        return x[:, body.angle], "load position [rad]"
     if effect.site == "shaft":
         return plant.twist(p, x), "twist [rad]"
     return time, "time [s]"

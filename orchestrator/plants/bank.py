@@ -219,7 +219,8 @@ def _end_stop(side: str) -> Effect:
         "angle", lambda s: 1e-4 * travel(s),
         lambda s: {"angle": angles(s), "stiffness": stiffness(s), "dissipation": (0.1,)},
         scales=lambda s: {"stiffness": 0.1 * stiffness(s)[1], "dissipation": 0.1}, tries=3,
-        tolerance={"effects.end_stop.stiffness": 0.01}, leaves=0.06, against="angle",
+        tolerance={"effects.end_stop.stiffness": 0.01}, leaves=0.06, against="position",
+        shared=("stiffness", "dissipation"),
     )  # fmt: skip
 
 
@@ -309,7 +310,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "spring_load", "load", group("spring_load", "stiffness", "angle"), "stiffness",
         lambda s: 0.01 * s.torque * s.ratio**2 / (2.0 * np.pi * max(s.turns, 1e-9)), lambda s: {"angle": (0.0,)},
-        amplitudes=("stiffness",), scales=lambda s: {"angle": 0.05}, against="angle",
+        amplitudes=("stiffness",), scales=lambda s: {"angle": 0.05}, against="position",
     ),
     Effect(
         "varying_inertia", "load", group("varying_inertia", "amplitude", "phase"), "amplitude",

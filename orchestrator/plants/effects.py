@@ -111,7 +111,9 @@ class Effect:
         tries: how many starts, of different values of the first parameter in ``starts``, are fitted in full.
         tolerance: name in the plant's table -> share of its value to which laws of this kind, of which none is exact,
             leave the parameter undefined (standard deviation; measured on records made with other laws).
-        against: quantity against which its law is drawn: "speed", "angle" of the load; "": that of its site.
+        against: quantity against which its law is drawn: "speed", "angle" of the load within a turn, its
+            "position" over all turns; "": that of its site.
+        shared: parameters that another effect may need: they stay as they are when this one is taken out.
         memory: it has a state of its own that no encoder shows: a stretch of a record cannot be begun in its middle.
         measurement: it is no physics of the machine but a property of its log.
     """
@@ -141,6 +143,7 @@ class Effect:
     tries: int = 1
     tolerance: dict[str, float] = field(default_factory=dict)
     against: str = ""
+    shared: tuple[str, ...] = ()
     memory: bool = False
     measurement: bool = False
 
@@ -173,7 +176,7 @@ class Effect:
         return moved
 
     def taken_out(self, plant: Places, p: Array, default: Array, refitted: Collection[int]) -> Array:
-        """Return parameters ``p`` with the effect switched off, its parameters at their ``default``.
+        """Return parameters ``p`` with the effect switched off, its parameters but shared ones at their ``default``.
 
         Args:
             plant: to which the effect belongs.
@@ -188,7 +191,7 @@ class Effect:
         for short, place in self.places(plant).items():
             if self._holder(plant, short) in refitted:
                 moved[self._holder(plant, short)] += moved[place]
-            moved[place] = default[place]
+            moved[place] = moved[place] if short in self.shared else default[place]
         return moved
 
     def _holder(self, plant: Places, short: str) -> int:

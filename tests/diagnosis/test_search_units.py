@@ -570,6 +570,10 @@ def test_effects_that_share_a_parameter_fit_it_once() -> None:
     places = [one.place for one in free]
     assert len(stops) == 2
     assert len(places) == len(set(places)) == len(search.linear()) + 4  # two angles, one stiffness, one dissipation
+    lower, upper = (stop.places(DRIVETRAIN) for stop in stops)
+    p[[lower["angle"], upper["angle"], lower["stiffness"]]] = -1.0, 1.0, 77.0
+    left = search.without(p, stops[0])
+    assert (left[lower["angle"]], left[upper["angle"]], left[upper["stiffness"]]) == (-1e12, 1.0, 77.0)
 
 
 def test_a_request_that_never_changes_has_no_limit_of_its_rate() -> None:
