@@ -184,9 +184,7 @@ def _draw_law(axis: Axes, diagnosis: Diagnosis, effect: Effect, fit: Fit) -> Non
     what is missing with it.
     """
     w = diagnosis.workings
-    without = fit.p.copy()
-    for place in effect.places(w.plant).values():
-        without[place] = w.nominal[place]
+    without = effect.taken_out(w.plant, fit.p, w.nominal, ())
     missing = missing_torque(w.likelihood, replace(w.base, p=without), plain=True)
     left = missing_torque(w.likelihood, replace(w.base, p=fit.p), plain=True)
     _, states = w.likelihood.innovations(fit.p, fit.q)
