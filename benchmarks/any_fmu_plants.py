@@ -159,7 +159,7 @@ def rates(number, x, u, f, p, inside):
         d[0] = (u[0] + f - p[2] * (x[0] - x[1]) - p[4] * (x[0] - u[1])) / p[0]
         d[1] = (p[2] * (x[0] - x[1]) - g * (x[1] - u[1])) / p[1]
     elif number == 9:
-        d[0] = (u[0] + f - 9.81 * x[0] / p[1]) / p[0]
+        d[0] = (u[0] + f) / p[0] - 9.81 * x[0] / p[1]  # the valve feels the volume
     elif number == 10:
         d[0] = (u[0] + f - p[0] * x[0] - 0.01 * u[1]) / p[1]
     else:

@@ -17,7 +17,6 @@ from orchestrator.diagnosis.blackbox.draft import drafted
 from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, validated
 from orchestrator.diagnosis.blackbox.judged import BoxOutcome
 from orchestrator.diagnosis.blackbox.mapping import read_map
-from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.rate import decimated, factor_of
 from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
@@ -60,7 +59,6 @@ class FmuDiagnosisResult(Result):
 
     Attributes:
         outcome: verdict, effects, parameters, misfit and what is left.
-        data: the record's columns.
         delivered: the corrected system, once it has been written.
         validation: misfit on a second record, if one was given.
         settings: thresholds that were used.
@@ -69,7 +67,6 @@ class FmuDiagnosisResult(Result):
 
     command: ClassVar[str] = "diagnose"
     outcome: BoxOutcome
-    data: Data
     arguments: Mapping[str, Any] = field(default_factory=dict)
     delivered: list[Delivered] = field(default_factory=list)
     validation: tuple[OutputMisfit, ...] = ()
@@ -179,8 +176,8 @@ class FmuDiagnosisResult(Result):
         """Write the held-out part, a figure and the corrected system."""
         from orchestrator.diagnosis.blackbox.figures import draw_signals
 
-        write_signals(folder / "diagnose.csv", self.outcome, self.data)
-        draw_signals(folder / "diagnose_signals.png", self.outcome, self.data)
+        write_signals(folder / "diagnose.csv", self.outcome)
+        draw_signals(folder / "diagnose_signals.png", self.outcome)
         if self.outcome.verdict != "unknown":
             self.delivered[:] = [deliver(folder / "corrected.ssp", self.outcome)]
 
@@ -189,15 +186,15 @@ class FmuDiagnosisResult(Result):
         self.outcome.problem.runner.close()
 
 
-def write_signals(path: Path, outcome: BoxOutcome, data: Data) -> None:
+def write_signals(path: Path, outcome: BoxOutcome) -> None:
     """Write measured and simulated outputs of all rows.
 
     Args:
         path: the CSV file.
         outcome: of the diagnosis.
-        data: the record's rows.
     """
     problem = outcome.problem
+    data = problem.data
     header = ["time", *problem.inputs]
     columns = [data.time, *data.inputs.T]
     for k, name in enumerate(problem.outputs):
@@ -251,7 +248,7 @@ def of_a_box(
         raise
     files = {"record": record, "fmu": fmu, "map": map, "validate": validate}
     arguments = {name: str(path) for name, path in files.items() if path is not None}
-    result = FmuDiagnosisResult(outcome, data, arguments, validation=shown, settings=used)
+    result = FmuDiagnosisResult(outcome, arguments, validation=shown, settings=used)
     weakref.finalize(result, outcome.problem.runner.close)  # child processes end with the result, or at exit
     return result
 

@@ -197,7 +197,7 @@ def difference(path: Path, outcome: BoxOutcome, jacobi: bool = False) -> float:
     """
     problem = outcome.problem
     fitted = problem.must_simulate(outcome.model)
-    step = problem.h / problem.m
+    step = problem.step
     table = series_of(problem, problem.n)
     start = float(problem.data.time[0])
     signals = {_system(name, "in"): Samples(table[:, k], step, start) for k, name in enumerate(problem.inputs)}
@@ -298,8 +298,10 @@ def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], attachment: str) ->
         given |= dict(zip(("endElement", "endConnector"), end, strict=True)) if end[0] else {"endConnector": end[1]}
         etree.SubElement(wires, tag("ssd", "Connection"), given)
     options, data = problem.map.options, problem.data
-    add_master(system, problem.h / problem.m, options.tolerance)
-    add_experiment(root, float(data.time[0]), float(data.time[-1]), problem.h / problem.m)
+    add_master(system, problem.step, options.tolerance)
+    begin = float(data.time[0])
+    end = begin + (problem.n - 1) * problem.m * problem.step if problem.short else float(data.time[-1])
+    add_experiment(root, begin, end, problem.step)
     require_valid(root, "ssd", STRUCTURE)
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 

@@ -5,20 +5,19 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.diagnosis.blackbox.judged import BoxOutcome
-from orchestrator.diagnosis.blackbox.model import Data
 
 
-def draw_signals(path: Path, outcome: BoxOutcome, data: Data) -> None:
+def draw_signals(path: Path, outcome: BoxOutcome) -> None:
     """Draw outputs, and the residuals of each model in units of the noise at a scale of its own; shaded: held out.
 
     Args:
         path: the picture.
         outcome: of the diagnosis.
-        data: the record.
     """
     from matplotlib.figure import Figure
 
     problem = outcome.problem
+    data = problem.data
     count = len(problem.outputs)
     figure = Figure(figsize=(10.0, 2.2 * 3 * count), layout="constrained")
     axes = np.atleast_1d(figure.subplots(3 * count, 1, sharex=True))

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.blackbox.clock import compared_later, own_clock
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.model import BoxModel, Data
 from orchestrator.diagnosis.blackbox.problem import BoxProblem, series_of
@@ -90,6 +91,10 @@ def opened(
             data, given, runner, _affordable(runner, given, data, progress, settings), rough, settings=settings
         )
         _settle_resets(problem)
+        clock = own_clock(problem)
+        if clock is not None:
+            problem.short, problem.m, problem.late = clock.short, clock.m, clock.late
+            problem.data = compared_later(data, clock.late)
         return problem, _pushed(problem)
     except BaseException:
         runner.close()
@@ -115,7 +120,7 @@ def _passing(runner: Runner, given: Map, data: Data, settings: BoxSettings) -> l
     for table, c in zip(pushed, connected, strict=True):
         table[0, runner.inputs.index(c.target)] += own.pushed
     gains = []
-    for step in (problem.h / problem.m, problem.h / problem.m / own.shorter):
+    for step in (problem.step, problem.step / own.shorter):
         runs = runner.run([Plan(plan, table) for table in (plain, *pushed)], float(data.time[0]), step, 1)
         rows = [y[-1] for y in runs if y is not None]
         if len(rows) < len(runs):
@@ -232,7 +237,7 @@ def _settle_resets(problem: BoxProblem) -> None:
     plain = series_of(problem, problem.n)
     mine = Plan(problem.starts(problem.nominal), plain)
     between = Plan(problem.starts(BoxModel(other)), plain * 1.1)
-    runner, grid = problem.runner, (float(problem.data.time[0]), problem.h / problem.m, problem.m)
+    runner, grid = problem.runner, (float(problem.data.time[0]), problem.step, problem.m)
     count, bar = len(problem.outputs), problem.settings.probe.repeats
 
     def alike(one: Array | None, two: Array | None) -> bool:
@@ -269,9 +274,13 @@ def _pushed(problem: BoxProblem) -> Probe:
             f"the FMU has a fixed step of its own, or is slow: {problem.m} communication steps in a sample instead of "
             f"{wanted}"
         )
+    if problem.short:
+        notes.append("the FMU goes by a clock of its own: communication steps are cut a little short to keep in time")
+    if problem.late:
+        notes.append(f"the FMU takes its inputs {problem.late:.3g} s late: the record is compared as much later")
     sign, blind = {}, []
     plain = series_of(problem, problem.n)
-    start, step = float(problem.data.time[0]), problem.h / problem.m
+    start, step = float(problem.data.time[0]), problem.step
     for name, port in problem.map.ports.items():
         place = problem.runner.inputs.index(port.input)
         pushed = plain.copy()
@@ -312,7 +321,7 @@ def _tunable(problem: BoxProblem, base: Array) -> tuple[str, ...]:
     runner, found = problem.runner, []
     half, plain = (problem.n // 2) * problem.m, series_of(problem, problem.n)
     values = problem.starts(problem.nominal)
-    start, step, count = float(problem.data.time[0]), problem.h / problem.m, len(problem.outputs)
+    start, step, count = float(problem.data.time[0]), problem.step, len(problem.outputs)
     for place, name in enumerate(runner.tunables):
         table = np.hstack([plain, np.tile([values[n] for n in runner.tunables], (len(plain), 1))])
         spread = next(u.standard_deviation for u in problem.map.uncertain if u.name == name)

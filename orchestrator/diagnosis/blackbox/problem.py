@@ -34,6 +34,8 @@ class BoxProblem:
         sign: of each port and cut, the direction in which its effort acts.
         units: of the variables that have one.
         settings: thresholds.
+        short: share by which a communication step is cut short, for an FMU that goes by a clock of its own.
+        late: by how much such an FMU takes its inputs late [s]; outputs of ``data`` are as late.
     """
 
     data: Data
@@ -44,6 +46,8 @@ class BoxProblem:
     sign: dict[str, float] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     settings: BoxSettings = DEFAULT
+    short: float = 0.0
+    late: float = 0.0
     _from_inputs: Surrogate | None = field(init=False, default=None, repr=False)
     _tables: dict[tuple[int, int], Array] = field(init=False, default_factory=dict, repr=False)
 
@@ -56,6 +60,11 @@ class BoxProblem:
     def h(self) -> float:
         """Return the sample time [s]."""
         return self.data.step
+
+    @property
+    def step(self) -> float:
+        """Return the communication step [s]."""
+        return self.h / self.m * (1.0 - self.short)
 
     @property
     def guide(self) -> Guide | None:
@@ -134,7 +143,7 @@ class BoxProblem:
         places = {key: k for k, key in reversed(list(enumerate(keys)))}
         order = list(places)
         wanted, start = [plans[places[key]] for key in order], float(self.data.time[0])
-        found = self.runner.run(wanted, start, self.h / self.m, 1, guide=self.guide)
+        found = self.runner.run(wanted, start, self.step, 1, guide=self.guide)
         by_key = dict(zip(order, found, strict=True))
         return [by_key[key] for key in keys]
 
@@ -216,7 +225,7 @@ class BoxProblem:
             parameters that may change within a run, where one does.
         """
         table = plain
-        step = self.h / self.m
+        step = self.step
         if any(effect.kind.where == PARAMETER for effect in model.effects):
             starts = self.starts(model)
             constant = np.tile([starts[name] for name in self.runner.tunables], (len(plain), 1))
@@ -236,7 +245,7 @@ class BoxProblem:
     def _follows(self, effect: BoxEffect, steps: int) -> Array:
         """Return what a parameter follows in every communication step: the time [s], or a signal."""
         if not effect.signal:
-            return np.asarray((np.arange(steps) + 0.5) * (self.h / self.m))
+            return np.asarray((np.arange(steps) + 0.5) * self.step)
         signal = self.data.signals[:, list(self.map.signals).index(effect.signal)]
         return np.repeat(signal[: steps // self.m], self.m)
 
@@ -285,7 +294,7 @@ class BoxProblem:
             if y.base is not None:
                 y = y.copy()
             column = self.outputs.index(effect.place)
-            y[:, column] = at_output(effect, y[:, column], self.h / self.m, float(values[0]), self.m)
+            y[:, column] = at_output(effect, y[:, column], self.step, float(values[0]), self.m)
         return y[:: self.m]
 
     def impulses(self, model: BoxModel, length: int, places: Sequence[int] | None = None) -> tuple[Surrogate, Array]:

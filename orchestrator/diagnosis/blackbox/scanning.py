@@ -117,7 +117,7 @@ class _Sight:
     def _arriving(self, effect: BoxEffect, value: float) -> list[Array]:
         """Return what an effect in series changes of its input."""
         fine = self._table[:, self._fitter.problem.runner.inputs.index(effect.place)]
-        return [at_input(effect, fine, self._fitter.problem.h / self._fitter.problem.m, value) - fine]
+        return [at_input(effect, fine, self._fitter.problem.step, value) - fine]
 
     def _felt(self, effect: BoxEffect, value: float) -> list[Array]:
         """Return the efforts, sine and cosine, of a ripple of this wavenumber over the motion."""

@@ -249,6 +249,12 @@ class ProbeSettings(Settings, frozen=True):
     fewest: Annotated[int, setting("runs that the probes and the first fit take", ge=1)] = 20
     fewest_each: Annotated[int, setting("further runs for each uncertain value", ge=0)] = 6
     slow: Annotated[float, setting("seconds of a run from which the user is told")] = 0.5
+    sliver: Annotated[
+        float, share("of a communication step by which it is cut short: above rounding, below all that an output shows")
+    ] = 1e-9
+    smooth: Annotated[
+        float, share("of a response, or of a step of an FMU's own, by which it may leave a smooth curve")
+    ] = 1e-4
     moves: Annotated[float, share("of a variable's size by which a parameter or a port must change it")] = 1e-9
     impulse: Annotated[float, share("of the drive: the pulse that measures a response")] = 0.5
     grows: Annotated[

@@ -1,0 +1,119 @@
+"""FMUs that go by a clock of their own: fixed steps until the end of a communication step is reached."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from orchestrator.diagnosis.blackbox.model import Data
+from orchestrator.diagnosis.blackbox.problem import BoxProblem, series_of
+from orchestrator.diagnosis.blackbox.runner import Plan
+
+Array = NDArray[np.float64]
+
+FINE = 60
+"""Communication steps in a sample that show the steps of an FMU's own; many whole numbers divide it."""
+AT_REST, AFTER = 3, 8
+"""Steps of its own before an input changes, and after that."""
+
+
+@dataclass(frozen=True)
+class OwnClock:
+    """How an FMU that goes by a clock of its own is stepped.
+
+    Attributes:
+        short: share by which communication steps are cut short; negative: drawn out.
+        m: communication steps in a sample: each holds as many of the FMU's own.
+        late: by how much it acts late on its inputs [s].
+    """
+
+    short: float
+    m: int
+    late: float
+
+
+def own_clock(problem: BoxProblem) -> OwnClock | None:
+    """Return how an FMU that goes by a clock of its own is stepped; None for one that keeps to communication points.
+
+    Where the steps of an FMU fit in a communication step, rounding decides whether it takes one more: outputs are then
+    a step ahead now and then, which looks like an added inertia. Steps that end clearly before or after those of the
+    FMU's own clock leave nothing to rounding; of the two, the one that is nearer to what the FMU does as it is called.
+
+    Args:
+        problem: with the communication step that was wanted.
+
+    Returns:
+        The clock.
+    """
+    sliver, own = problem.settings.probe.sliver, problem.settings.probe
+    table, step = series_of(problem, problem.n), problem.h / problem.m
+    plain, before, behind = (_run(problem, table, step * (1.0 - short), problem.m) for short in (0.0, sliver, -sliver))
+    if plain is None or before is None or behind is None or float(np.max(np.abs(before - behind))) <= own.repeats:
+        return None
+    off = [float(np.sum((y - plain) ** 2)) for y in (before, behind)]
+    short = sliver if off[0] <= off[1] else -sliver
+    ticks = _ticks(problem, short)
+    if ticks == 0:
+        return OwnClock(short, problem.m, 0.0)
+    m = max(k for k in range(1, max(problem.m, 1) * 2 + 1) if ticks % k == 0)
+    return OwnClock(short, m, _late_by(problem, problem.h / ticks * (1.0 - short)))
+
+
+def compared_later(data: Data, late: float) -> Data:
+    """Return a record whose outputs are those of ``late`` seconds before: what an FMU that is late shows by then.
+
+    Args:
+        data: the record.
+        late: seconds.
+
+    Returns:
+        The record.
+    """
+    return replace(data, outputs=CubicSpline(data.time, data.outputs)(data.time - late))
+
+
+def _run(problem: BoxProblem, table: Array, step: float, per_row: int) -> Array | None:
+    """Return outputs over the noise at every ``per_row``-th step of the nominal FMU; None where it failed."""
+    plan = Plan(problem.starts(problem.nominal), table)
+    y = problem.runner.run([plan], float(problem.data.time[0]), step, per_row)[0]
+    return None if y is None else np.asarray(y[:, : len(problem.outputs)] / problem.noise)
+
+
+def _ticks(problem: BoxProblem, short: float) -> int:
+    """Return how many steps of its own an FMU takes in a sample; 0 where it is no whole number, or too large."""
+    rows = min(problem.n, 12)
+    table = np.repeat(series_of(problem, rows)[:: problem.m], FINE, axis=0)
+    y = _run(problem, table, problem.h / FINE * (1.0 - short), 1)
+    if y is None:
+        return 0
+    moves = np.any(np.diff(y, axis=0) != 0.0, axis=1).reshape(-1, FINE).sum(axis=1)[1:]
+    ticks = int(np.median(moves))
+    return ticks if 0 < ticks < FINE and np.all(moves == ticks) else 0
+
+
+def _late_by(problem: BoxProblem, tick: float) -> float:
+    """Return by how much an FMU acts late on its inputs [s]; 0 where its response does not tell.
+
+    Rates that were found at the end of a step of its own stand at the beginning of the next, with the inputs of before:
+    a Runge-Kutta method of order four is late by a sixth of a step. What an output does after an input has changed is
+    smooth from the first step on; it began where that curve, or its derivative if it sets in with a slope of zero, is
+    zero.
+    """
+    own = problem.settings.probe
+    rest = np.repeat(series_of(problem, 2)[:1], AT_REST + AFTER, axis=0)
+    sent = rest.copy()
+    sent[AT_REST:, 0] += own.impulse * problem.drive([0])[0]
+    base, moved = _run(problem, rest, tick, 1), _run(problem, sent, tick, 1)
+    if base is None or moved is None:
+        return 0.0
+    response = (moved - base)[AT_REST + 1 :]
+    y = response[:, int(np.argmax(np.abs(response[-1])))]
+    n = np.arange(1.0, AFTER + 1.0)
+    curve = np.polynomial.Polynomial.fit(n, y, 5)
+    if y[3] == 0.0 or np.max(np.abs(curve(n) - y)) > own.smooth * np.max(np.abs(y)):
+        return 0.0
+    order = int(np.clip(np.rint(np.log2(abs(y[7] / y[3]))), 1, 3))
+    begins = curve.deriv(order - 1).roots() if order > 1 else curve.roots()
+    real = [float(t.real) for t in np.atleast_1d(begins) if abs(t.imag) < own.smooth and own.smooth < t.real <= 1.0]
+    return min(real, default=0.0) * tick
