@@ -299,9 +299,9 @@ def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], attachment: str) ->
         etree.SubElement(wires, tag("ssd", "Connection"), given)
     options, data = problem.map.options, problem.data
     add_master(system, problem.step, options.tolerance)
-    begin = float(data.time[0])
-    end = begin + (problem.n - 1) * problem.m * problem.step if problem.short else float(data.time[-1])
-    add_experiment(root, begin, end, problem.step)
+    first = float(data.time[0])
+    last = first + (problem.n - 1) * problem.m * problem.step if problem.short else float(data.time[-1])
+    add_experiment(root, first, last, problem.step)
     require_valid(root, "ssd", STRUCTURE)
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 
