@@ -282,7 +282,8 @@ def diagnose(
     Args:
         record: a measured record, or its path; one encoder or two, at least 200 rows. Or several of one machine, which
             then share parameters and effects.
-        model: what it is compared with (default: ``read_model()``), or the path of any FMI 2.0 co-simulation FMU.
+        model: what it is compared with (default: ``read_model()``), or the path of its TOML file, or the path of any
+            FMI 2.0 co-simulation FMU.
         map: with an FMU, the TOML file of columns, uncertain parameters and ports; it runs in a child process.
         validate: another record, or its path, on which the misfit is shown too.
         settings: thresholds, or the path of a TOML file with those that differ from the default.
@@ -308,6 +309,8 @@ def diagnose(
         >>> oc.diagnose("axis.csv", "axis.fmu", "axis_map.toml").effects[0].name
         'coulomb_friction'
     """
+    if map is None and isinstance(model, (Path, str)) and Path(model).suffix == ".toml":
+        model = read_model(Path(model))
     if map is not None or isinstance(model, (Path, str)):
         if with_law:
             raise ScenarioError(

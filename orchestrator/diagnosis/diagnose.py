@@ -10,7 +10,7 @@ from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.together import at_one_rate, series
 from orchestrator.diagnosis.outcome import Diagnosis, LearnedLaw, Named, Workings
-from orchestrator.diagnosis.passes import Pass, Progress, honest, passes
+from orchestrator.diagnosis.passes import Pass, Progress, passes
 from orchestrator.diagnosis.proof.by_record import by_record, repeats
 from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law
@@ -20,6 +20,7 @@ from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
 from orchestrator.diagnosis.search.finer import finer_of
 from orchestrator.diagnosis.search.model_space import in_metres
 from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.diagnosis.standing import honest
 from orchestrator.diagnosis.verdict.admission import check_comparable, check_diagnosable, check_resolved
 from orchestrator.diagnosis.verdict.evidence import Evidence, evidence
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of

@@ -52,7 +52,8 @@ def test_what_is_found_with_the_torque_as_given_counts_where_the_torque_settles_
 
     def found(name: str, is_unknown: bool) -> SimpleNamespace:
         return SimpleNamespace(
-            name=name, unknown=is_unknown, hopeless=False, likelihood=likelihood, left=SimpleNamespace(growth=1.0),
+            name=name, unknown=is_unknown, hopeless=False, fell=frozenset(), likelihood=likelihood,
+            left=SimpleNamespace(growth=1.0),
             proof=SimpleNamespace(torque=TorqueProof(settles, 0.95, sure=True)),
             search=SimpleNamespace(stopped=False, steps=[step]),
         )  # fmt: skip
@@ -65,6 +66,29 @@ def test_what_is_found_with_the_torque_as_given_counts_where_the_torque_settles_
     signals, nominal = likelihood.signals, likelihood.nominal
     got = rules.passes(SimpleNamespace(plant=AXIS), signals, parts, nominal, DEFAULT_SETTINGS, lambda *_: None)
     assert (got.name, len(searches), any(searches)) == (chosen, asked, changed == "input_delay")
+
+
+@pytest.mark.parametrize(
+    ("unknown", "suspects", "chosen"), [(False, ("b",), "barred"), (True, ("b",), "barred"), (True, (), "first")]
+)
+def test_what_came_second_is_looked_for_where_what_came_first_fell(monkeypatch, unknown, suspects, chosen) -> None:
+    likelihood, parts, _ = joint_of(1, 0.12)
+    asked: list[frozenset[str]] = []
+
+    def found(name: str, is_unknown: bool, fell: frozenset[str], effects: tuple[str, ...]) -> SimpleNamespace:
+        return SimpleNamespace(
+            name=name, unknown=is_unknown, hopeless=True, fell=fell, best=SimpleNamespace(effects=effects),
+            likelihood=likelihood, left=SimpleNamespace(growth=1.0), search=SimpleNamespace(stopped=False, steps=[]),
+        )  # fmt: skip
+
+    def search(*_, barred: frozenset[str] = frozenset()) -> SimpleNamespace:
+        asked.append(barred)
+        return found("barred", unknown, frozenset(), suspects) if barred else found("first", True, frozenset({"a"}), ())
+
+    monkeypatch.setattr(rules, "_search", search)
+    signals, nominal = likelihood.signals, likelihood.nominal
+    got = rules.passes(SimpleNamespace(plant=AXIS), signals, parts, nominal, DEFAULT_SETTINGS, lambda *_: None)
+    assert (got.name, asked) == (chosen, [frozenset(), frozenset({"a"})])
 
 
 def test_the_model_file_tells_which_of_two_sizes_holds(tmp_path: Path) -> None:

@@ -13,12 +13,12 @@ from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.fit.sizes import _with_robust_errors, sized, with_model_error
 from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.outcome import Misfit
-from orchestrator.diagnosis.passes import _harm_over_fewer, _is_weak, _larger_misfit, honest
 from orchestrator.diagnosis.proof import horizons as proof_horizons
 from orchestrator.diagnosis.proof.free_run import FreeRun, free_run
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.proof.torque import TorqueProof
 from orchestrator.diagnosis.search.candidate import Candidate, simplest_first
+from orchestrator.diagnosis.standing import _harm_over_fewer, _is_weak, _larger_misfit, honest
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
 from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED, Proof, doubts, is_unknown, refuted, structured
@@ -153,7 +153,7 @@ def test_long_runs_that_disagree_are_no_harm_beside_many_that_are_better(monkeyp
         def undecided_over(self, other: "Errors") -> tuple[str, ...]:
             return disagree
 
-    monkeypatch.setattr("orchestrator.diagnosis.passes.horizons", lambda *_: Errors())
+    monkeypatch.setattr("orchestrator.diagnosis.standing.horizons", lambda *_: Errors())
     noise = TorqueNoise(likelihood, final, np.zeros(1), p)
     assert _harm_over_fewer(likelihood, final, fewer, Parts(*(slice(10, 100),) * 3), noise) == harm
 
@@ -195,7 +195,7 @@ def test_a_size_that_may_be_zero_stands_where_predictions_miss_it(monkeypatch, d
         def surely_better_than(self, other: "Errors") -> tuple[str, ...]:
             return self.better
 
-    monkeypatch.setattr("orchestrator.diagnosis.passes.horizons", lambda *_: Errors(lost))
+    monkeypatch.setattr("orchestrator.diagnosis.standing.horizons", lambda *_: Errors(lost))
     found = _is_weak(search_of(likelihood), effect, final, Errors(kept), 1e-3, Parts(*(slice(10, 100),) * 3))
     assert found is weak
 

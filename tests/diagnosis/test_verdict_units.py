@@ -7,13 +7,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis import passes as rules
-from orchestrator.diagnosis import verdict
+from orchestrator.diagnosis import rest, verdict
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit, split
 from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.outcome import Named
-from orchestrator.diagnosis.passes import _growth, _left, passes
+from orchestrator.diagnosis.passes import passes
+from orchestrator.diagnosis.rest import growth_of, is_off_floor, left_of
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
+from orchestrator.diagnosis.standing import outweighs_one_run
 from orchestrator.diagnosis.verdict.naming import METRIC, named, unit_of
 from orchestrator.diagnosis.verdict.remainder import (
     Predictable,
@@ -292,9 +293,9 @@ def test_a_floor_says_nothing_where_the_noise_was_overrated(
     per_sample: float, off: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rows = PARTS.seen.stop - PARTS.seen.start
-    monkeypatch.setattr(rules, "_over_floor", lambda *_: per_sample * rows)
+    monkeypatch.setattr(rest, "_over_floor", lambda *_: per_sample * rows)
     likelihood, final = SimpleNamespace(settings=SETTINGS), SimpleNamespace()
-    assert rules._is_off_floor(likelihood, final, PARTS, 0.0) is off  # type: ignore[arg-type]
+    assert is_off_floor(likelihood, final, PARTS, 0.0) is off  # type: ignore[arg-type]
 
 
 def test_notes_name_what_cannot_be_told_apart() -> None:
@@ -324,14 +325,14 @@ def test_what_is_left_of_the_final_fit() -> None:
     first = fit(likelihood, p, 1e-4, (), PARTS)
     whole = Parts(PARTS.seen, PARTS.validated, PARTS.held_out)
     base, final = fit(likelihood, likelihood.nominal, 1e-2, (), whole), fit(likelihood, p, 1e-4, (), whole)
-    found = _left(likelihood, base, final, first, PARTS, 1e-4)
+    found = left_of(likelihood, base, final, first, PARTS, 1e-4)
     floor = noise_floor(likelihood, PARTS, 1e-4, p)
     assert found.missing == pytest.approx(floor - final.fitted)
     assert found.explained == pytest.approx(1.0 - (floor - final.fitted) / (floor - base.fitted))
     better = replace(base, fitted=floor + 1.0)
-    assert _left(likelihood, better, final, first, PARTS, 1e-4).explained == 0.0
+    assert left_of(likelihood, better, final, first, PARTS, 1e-4).explained == 0.0
     z = likelihood.whitened(p, 1e-4)
-    assert _growth(likelihood.over(180), final, whole) == pytest.approx(np.std(z[180:240]) / np.std(z[10:180]))
+    assert growth_of(likelihood.over(180), final, whole) == pytest.approx(np.std(z[180:240]) / np.std(z[10:180]))
 
 
 def quick(**verdict):
@@ -368,7 +369,9 @@ def test_what_shows_on_the_last_part_alone_is_sought_with_the_first_held_out() -
     y[180:, 0] = y[179, 0] + late.signals.y[180:, 0] - late.signals.y[179, 0]
     moved = replace(likelihood, signals=replace(likelihood.signals, y=y))
     found = passed(quick(), moved)
-    grown = _growth(moved.over(180), fit(moved, p, 1e-4, (), PARTS), Parts(PARTS.seen, PARTS.validated, PARTS.held_out))
+    grown = growth_of(
+        moved.over(180), fit(moved, p, 1e-4, (), PARTS), Parts(PARTS.seen, PARTS.validated, PARTS.held_out)
+    )
     assert grown > 3.0
     if found.unknown:
         assert found.left.growth > 3.0 or found.left.explained < 0.4
@@ -412,4 +415,4 @@ def test_one_run_says_nothing_against_what_many_show(names, better, stands) -> N
     bank = {effect.label: effect for effect in DRIVETRAIN.bank}
     labels = ("one sample", "50 ms", "500 ms", "2 s", "whole part")
     after = SimpleNamespace(surely_better_than=lambda before: better, labels=labels, long=2)
-    assert rules.outweighs_one_run([bank[name] for name in names], SimpleNamespace(), after) is stands
+    assert outweighs_one_run([bank[name] for name in names], SimpleNamespace(), after) is stands

@@ -135,6 +135,7 @@ def _teeth_may_part(plant: Plant, p: Array) -> bool:
     return plant.shaft is not None and bool(plant.shaft.gap) and plant.value(p, plant.shaft.gap) > 0.0
 
 
+@np.errstate(over="ignore", invalid="ignore")  # a run that runs away is infinitely far off
 def _closest(
     plant: Plant, p: Array, guess: Array, signals: Signals, part: slice, settings: FreeRunSettings, history: bool
 ) -> FreeRun:
@@ -177,8 +178,7 @@ def _closest(
         lambda gain, after: gain == 0.0 or gain < settings.enough * after,
     )  # fmt: skip
     straight = bool(foretold) and abs(foretold[0] - 1.0) < settings.straight
-    with np.errstate(over="ignore"):  # a run that runs away is infinitely far off
-        error = np.sqrt(np.mean((out - measured) ** 2, axis=0))
+    error = np.sqrt(np.mean((out - measured) ** 2, axis=0))
     return FreeRun(out, start, error, straight)
 
 

@@ -29,12 +29,14 @@ class ModelSpace:
     Attributes:
         likelihood, model, parts: what is searched.
         as_given: the torque counts as it stands in the record: what may change it on its way is not looked for.
+        barred: labels of effects that are not looked for.
     """
 
     likelihood: RecordLikelihood
     model: Model
     parts: Parts
     as_given: bool = field(default=False, kw_only=True)
+    barred: frozenset[str] = field(default=frozenset(), kw_only=True)
 
     @property
     def plant(self) -> Plant:
@@ -55,7 +57,7 @@ class ModelSpace:
         Yields:
             Each effect.
         """
-        present = {effect.label for effect in current.effects}
+        present = {effect.label for effect in current.effects} | self.barred
         replaced = {effect.needs for effect in current.effects}
         one_way = self.one_way
         timed = any(is_of_torques_time(self.plant, effect) for effect in current.effects)
