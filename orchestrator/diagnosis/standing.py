@@ -95,9 +95,9 @@ def what_stands(
         ):
             harm = ()  # one run, which adds up every disturbance
         fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
+        harm = harm or _larger_misfit(likelihood, bases, final.fit, whole)
         if weak is None and not harm and fewer.effects:
             harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
-        harm = harm or _larger_misfit(likelihood, bases, final.fit, whole)
         why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
         why = "it has come to a size that no machine has" if odd else why
         if weak is None and not harm:

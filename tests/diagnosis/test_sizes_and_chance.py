@@ -2,6 +2,7 @@
 
 from copy import copy
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from orchestrator.diagnosis.proof.free_run import FreeRun, free_run
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.proof.torque import TorqueProof
 from orchestrator.diagnosis.search.candidate import Candidate, simplest_first
-from orchestrator.diagnosis.standing import _harm_over_fewer, _is_weak, _larger_misfit, honest
+from orchestrator.diagnosis.standing import _harm_over_fewer, _is_weak, _larger_misfit, _minor, honest
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
 from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED, Proof, doubts, is_unknown, refuted, structured
@@ -168,6 +169,39 @@ def test_a_larger_misfit_of_held_out_data_is_harm() -> None:
     assert _larger_misfit(likelihood, [right.p], right, parts) == ()
     for bases in ([right.p, wrong.p], [wrong.p, right.p]):  # the best of them counts
         assert _larger_misfit(likelihood, bases, wrong, parts) == ("the misfit of theta_m",)
+
+
+@pytest.mark.parametrize(("times", "worse"), [(1.09, ()), (1.12, ("the misfit of theta_m in b.csv",))])
+def test_of_several_records_none_may_get_more_than_a_tenth_worse(monkeypatch, times: float, worse) -> None:
+    likelihood, p = axis_likelihood()
+    parts = Parts(slice(10, 120), slice(120, 160), slice(160, likelihood.stop))
+    fit = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
+    one = SimpleNamespace(signal="theta_m", best_before=1.0, after=times)
+    records = [
+        SimpleNamespace(source=n, misfit=[m])
+        for n, m in (("a.csv", SimpleNamespace(**vars(one) | {"after": 0.5})), ("b.csv", one))
+    ]
+    monkeypatch.setattr("orchestrator.diagnosis.standing.by_record", lambda *_: records)
+    assert _larger_misfit(likelihood, [fit.p], fit, parts) == worse
+
+
+@pytest.mark.parametrize(("removed", "falls"), [(0.6, False), (0.4, True)])
+def test_an_effect_that_takes_half_of_the_torque_error_stands_beside_a_rest(monkeypatch, removed, falls) -> None:
+    likelihood, p = axis_likelihood()
+    search = search_of(likelihood)
+    effect = next(e for e in likelihood.plant.bank if e.label == "coulomb_friction@motor")
+    fit = Fit(p, 1e-3, np.zeros((likelihood.stop, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
+    best, fewer = (Candidate(names, fit, search.settings) for names in ((effect,), ()))
+    standing = "orchestrator.diagnosis.standing"
+    for name, value in {
+        "held_out_misfit": [SimpleNamespace(after=1e3, noise=1.0)], "is_off_floor": True, "left_of": None,
+        "structured": True, "annealed": fit, "horizons": None, "torque_proof": TorqueProof(removed, 0.95, sure=True),
+    }.items():  # fmt: skip
+        monkeypatch.setattr(f"{standing}.{name}", lambda *_, value=value, **__: value)
+    monkeypatch.setattr(search, "reduced", lambda *_: fewer)
+    after = SimpleNamespace(skill_over=lambda *_, **__: 0.01)  # predictions are as bad without it
+    found = _minor(search, search.parts, fit, best, fit, fit, after)
+    assert (found is not None) is falls
 
 
 @pytest.mark.parametrize(
