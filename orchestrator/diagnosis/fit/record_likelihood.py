@@ -258,9 +258,10 @@ class RecordLikelihood:
         if not colour.usable:
             return -math.inf
         e = colour.white(z, part)
-        if not np.all(np.isfinite(e)):
+        with np.errstate(over="ignore", invalid="ignore"):
+            covariance = e.T @ e / len(e)
+        if not np.all(np.isfinite(covariance)):
             return -math.inf  # an unstable predictor explains nothing
-        covariance = e.T @ e / len(e)
         roots = self.gains(q, p).roots[part]
         logdet = np.linalg.slogdet(covariance)[1] - 2.0 * np.linalg.slogdet(colour.root)[1]
         scale = np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2)))
