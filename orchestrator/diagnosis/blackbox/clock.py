@@ -56,8 +56,9 @@ def own_clock(problem: BoxProblem) -> OwnClock | None:
     ticks = _ticks(problem, short)
     if ticks == 0:
         return OwnClock(short, problem.m, 0.0)
-    m = max(k for k in range(1, max(problem.m, 1) * 2 + 1) if ticks % k == 0)
-    return OwnClock(short, m, _late_by(problem, problem.h / ticks * (1.0 - short)))
+    rows = problem.data.factor  # of the file for a sample: each is a whole number of communication steps
+    fitting = [k for k in range(rows, 2 * problem.m + 1, rows) if ticks % k == 0]
+    return OwnClock(short, max(fitting, default=problem.m), _late_by(problem, problem.h / ticks * (1.0 - short)))
 
 
 def compared_later(data: Data, late: float) -> Data:
@@ -84,6 +85,7 @@ def _ticks(problem: BoxProblem, short: float) -> int:
     """Return how many steps of its own an FMU takes in a sample; 0 where it is no whole number, or too large."""
     rows = min(problem.n, 12)
     table = np.repeat(series_of(problem, rows)[:: problem.m], FINE, axis=0)
+    table[:, 0] += problem.settings.probe.impulse * problem.drive([0])[0]  # so that something moves
     y = _run(problem, table, problem.h / FINE * (1.0 - short), 1)
     if y is None:
         return 0
