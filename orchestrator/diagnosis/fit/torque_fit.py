@@ -105,7 +105,8 @@ def share_explained(left: Array, given: Array) -> float:
 def motion(likelihood: RecordLikelihood, part: slice) -> tuple[Array, Array, Array, Array]:
     """Return position, speed, acceleration and measured torque of a part, all behind one filter.
 
-    Rows around a reversal are left out: behind the filter, dry friction turns round slowly.
+    Rows around a reversal are left out: behind the filter, dry friction turns round slowly. So are rows at rest: there
+    it holds against whatever torque is asked.
 
     Args:
         likelihood: of the record.
@@ -132,6 +133,7 @@ def _filtered(likelihood: RecordLikelihood, rows: slice) -> tuple[Array, Array, 
     reach = round(1.0 / settings.cut_off)
     reversals = np.diff(np.sign(speed), prepend=np.sign(speed[0])) != 0.0
     away = np.convolve(reversals, np.ones(2 * reach + 1), "same") < 0.5
+    away &= np.abs(speed) > settings.at_rest * np.percentile(np.abs(speed), 99.0)
     border = 4 * reach  # where the filter settles
     kept = np.flatnonzero(away[border:-border])[:: max(reach // 2, 1)] + border
     return position[kept], speed[kept], acceleration[kept], given[kept]

@@ -95,5 +95,9 @@ class InverseSettings(Settings, frozen=True):
     cut_off: Annotated[float, setting("of half the sampling rate", gt=0, le=0.99)] = 0.2
     decimation: Annotated[int, setting("factor by which torques are decimated", ge=2)] = 10
     least_rows: Annotated[int, setting("filtered rows for each value that is fitted to them", ge=2)] = 10
+    at_rest: Annotated[
+        float,
+        share("of the speed that 99 of 100 rows stay below; slower ones rest, held by any friction there is"),
+    ] = 0.03
     closer: Annotated[float, share("of prediction errors (geometric mean) below which its values are told")] = 0.9
     border: Annotated[int, setting("samples at either end where the filters settle", ge=1)] = 50
