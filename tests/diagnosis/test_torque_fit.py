@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,7 +16,8 @@ from orchestrator.diagnosis.fit.torque_fit import torque_fit
 from orchestrator.diagnosis.proof.reported import _between, reported
 from orchestrator.diagnosis.proof.torque import TorqueProof, torque_proof
 from orchestrator.plants.effects import Effect
-from tests.support.robot_joint import DRY, INERTIA, VISCOUS, joint_record
+from orchestrator.records.record import Record
+from tests.support.robot_joint import DRY, INERTIA, VISCOUS, joint_record, resting_record
 from tests.support.short_records import AXIS, axis_likelihood, drivetrain_likelihood
 
 FRICTION = "effects.coulomb_friction.motor.torque"
@@ -28,16 +30,21 @@ def free_of(*names: str) -> tuple[Free, ...]:
     return tuple(Free(AXIS.index(name), 0.1 * TRUE.get(name, 0.1), 0.0, 1e3) for name in names)
 
 
-def joint_of(seed: int, share: float) -> tuple[RecordLikelihood, Parts, Fit]:
-    """Return a joint under position control, and its fit by likelihood."""
+def of_record(record: Record) -> tuple[RecordLikelihood, Parts, np.ndarray]:
+    """Return the likelihood of a joint's record, its parts, and where a fit starts."""
     nominal = AXIS.extended([entry.default for entry in AXIS.table])
     nominal[[AXIS.index("J"), AXIS.index("b")]] = 1.0, 2.4
-    analyses = at_one_rate([joint_record(seed, share=share)], AXIS, nominal, DEFAULT_SETTINGS)
+    analyses = at_one_rate([record], AXIS, nominal, DEFAULT_SETTINGS)
     signals, parts = series([one.record for one in analyses], 0.0, DEFAULT_SETTINGS)
     likelihood = RecordLikelihood(AXIS, signals, nominal, parts.validated.stop, DEFAULT_SETTINGS)
     start = nominal.copy()
     start[AXIS.index(FRICTION)], start[AXIS.index("presliding.motor")] = 1.0, np.log(2e-4)
-    whole = Parts(parts.seen, parts.validated, parts.held_out)
+    return likelihood, Parts(parts.seen, parts.validated, parts.held_out), start
+
+
+def joint_of(seed: int, share: float) -> tuple[RecordLikelihood, Parts, Fit]:
+    """Return a joint under position control, and its fit by likelihood."""
+    likelihood, whole, start = of_record(joint_record(seed, share=share))
     return likelihood, whole, fit(likelihood, start, 3.0, free_of(*TRUE), whole)
 
 
@@ -56,6 +63,18 @@ def test_a_controller_misleads_predictions_not_the_torque_that_is_needed(joint) 
         assert needed.p[own] == pytest.approx(true, rel=0.15)
         assert abs(needed.p[own] - true) < 3.0 * needed.standard_error(own)
     assert needed.p[AXIS.index("presliding.motor")] == found.p[AXIS.index("presliding.motor")]
+
+
+@pytest.mark.parametrize(("at_rest", "off"), [(0.03, (0.0, 0.04)), (0.0, (0.08, 1.0))])
+def test_rows_at_rest_say_nothing_of_the_size_of_friction(at_rest: float, off: tuple[float, float]) -> None:
+    likelihood, parts, start = of_record(resting_record(5))
+    own = msgspec.structs.replace(likelihood.settings.inverse, at_rest=at_rest)
+    likelihood = replace(likelihood, settings=msgspec.structs.replace(likelihood.settings, inverse=own))
+    z = likelihood.whitened(start, 3.0)
+    found = Fit(start, 3.0, z, free_of(*TRUE), np.eye(len(TRUE)), 0.0, 0.0)
+    needed = torque_fit(likelihood, found, parts.fitted)
+    error = abs(needed.p[AXIS.index(FRICTION)] / DRY - 1.0)
+    assert off[0] <= error < off[1]
 
 
 def test_values_are_told_with_which_a_model_predicts_best(joint) -> None:

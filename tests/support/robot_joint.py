@@ -52,3 +52,27 @@ def joint_record(seed: int, late: int = 0, seconds: float = 12.0, share: float =
     angles, torques = _run(asked, speed, coupling, late, 20)
     torques += 0.2 * share * np.sqrt(np.mean(drive**2)) * rng.standard_normal(time.size)
     return record_from_columns({"time": time, "u": torques, "theta_m": angles}, "joint")
+
+
+@njit
+def _driven(torque, finer):
+    angle, rate, bristle = 0.0, 0.0, 0.0
+    angles = np.empty(torque.size)
+    for n in range(torque.size):
+        angles[n] = angle
+        for _ in range(finer):
+            bristle += STEP / finer * (rate - abs(rate) * bristle / BRISTLE)
+            rate += STEP / finer * (torque[n] - VISCOUS * rate - DRY / BRISTLE * bristle) / INERTIA
+            angle += STEP / finer * rate
+    return angles
+
+
+def resting_record(seed: int, seconds: float = 24.0) -> Record:
+    """Return a record of 1 kHz of the joint driven by a torque that rises and falls: half of the time it sticks."""
+    rng = np.random.default_rng(seed)
+    time = STEP * np.arange(round(seconds / STEP))
+    torque = 2.0 * DRY * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * time / 6.0))
+    angles = np.round(_driven(torque, 40) / COUNT) * COUNT
+    return record_from_columns(
+        {"time": time, "u": torque + 0.01 * DRY * rng.standard_normal(time.size), "theta_m": angles}, "ramps"
+    )
