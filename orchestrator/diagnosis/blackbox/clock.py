@@ -12,11 +12,6 @@ from orchestrator.diagnosis.blackbox.runner import Plan
 
 Array = NDArray[np.float64]
 
-FINE = 60
-"""Communication steps in a sample that show the steps of an FMU's own; many whole numbers divide it."""
-AT_REST, AFTER = 3, 8
-"""Steps of its own before an input changes, and after that."""
-
 
 @dataclass(frozen=True)
 class OwnClock:
@@ -83,15 +78,16 @@ def _run(problem: BoxProblem, table: Array, step: float, per_row: int) -> Array 
 
 def _ticks(problem: BoxProblem, short: float) -> int:
     """Return how many steps of its own an FMU takes in a sample; 0 where it is no whole number, or too large."""
+    fine = problem.settings.probe.finely
     rows = min(problem.n, 12)
-    table = np.repeat(series_of(problem, rows)[:: problem.m], FINE, axis=0)
+    table = np.repeat(series_of(problem, rows)[:: problem.m], fine, axis=0)
     table[:, 0] += problem.settings.probe.impulse * problem.drive([0])[0]  # so that something moves
-    y = _run(problem, table, problem.h / FINE * (1.0 - short), 1)
+    y = _run(problem, table, problem.h / fine * (1.0 - short), 1)
     if y is None:
         return 0
-    moves = np.any(np.diff(y, axis=0) != 0.0, axis=1).reshape(-1, FINE).sum(axis=1)[1:]
+    moves = np.any(np.diff(y, axis=0) != 0.0, axis=1).reshape(-1, fine).sum(axis=1)[1:]
     ticks = int(np.median(moves))
-    return ticks if 0 < ticks < FINE and np.all(moves == ticks) else 0
+    return ticks if 0 < ticks < fine and np.all(moves == ticks) else 0
 
 
 def _late_by(problem: BoxProblem, tick: float) -> float:
@@ -103,19 +99,20 @@ def _late_by(problem: BoxProblem, tick: float) -> float:
     zero.
     """
     own = problem.settings.probe
-    rest = np.repeat(series_of(problem, 2)[:1], AT_REST + AFTER, axis=0)
+    rest = np.repeat(series_of(problem, 2)[:1], own.before_push + own.after_push, axis=0)
     sent = rest.copy()
-    sent[AT_REST:, 0] += own.impulse * problem.drive([0])[0]
+    sent[own.before_push :, 0] += own.impulse * problem.drive([0])[0]
     base, moved = _run(problem, rest, tick, 1), _run(problem, sent, tick, 1)
     if base is None or moved is None:
         return 0.0
-    response = (moved - base)[AT_REST + 1 :]
+    response = (moved - base)[own.before_push + 1 :]
     y = response[:, int(np.argmax(np.abs(response[-1])))]
-    n = np.arange(1.0, AFTER + 1.0)
+    half = len(y) // 2 - 1
+    n = np.arange(1.0, own.after_push + 1.0)
     curve = np.polynomial.Polynomial.fit(n, y, 5)
-    if y[3] == 0.0 or np.max(np.abs(curve(n) - y)) > own.smooth * np.max(np.abs(y)):
+    if y[half] == 0.0 or np.max(np.abs(curve(n) - y)) > own.smooth * np.max(np.abs(y)):
         return 0.0
-    order = int(np.clip(np.rint(np.log2(abs(y[7] / y[3]))), 1, 3))
+    order = int(np.clip(np.rint(np.log2(abs(y[-1] / y[half]))), 1, 3))
     begins = curve.deriv(order - 1).roots() if order > 1 else curve.roots()
     real = [float(t.real) for t in np.atleast_1d(begins) if abs(t.imag) < own.smooth and own.smooth < t.real <= 1.0]
     return min(real, default=0.0) * tick

@@ -18,9 +18,6 @@ from orchestrator.shared.inference.normal import NORMAL_95, interval_95
 
 Array = NDArray[np.float64]
 
-LEAST = 1e-290
-"""What is smaller is reported as zero."""
-
 
 @dataclass(frozen=True)
 class ValueEstimate:
@@ -177,7 +174,7 @@ def estimates_of(
     """
 
     def one(name: str, value: float, error: float, unit: str, nominal: float | None = None) -> ValueEstimate:
-        value = 0.0 if abs(value) < LEAST else value  # a way that must not be zero to divide by it
+        value = 0.0 if abs(value) < 1e-290 else value  # a way that is kept from zero, to divide by it
         return ValueEstimate(name, value, error, interval_95(value, error), unit, nominal)
 
     parameters = tuple(

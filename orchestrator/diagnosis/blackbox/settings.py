@@ -252,6 +252,11 @@ class ProbeSettings(Settings, frozen=True):
     sliver: Annotated[
         float, share("of a communication step by which it is cut short: above rounding, below all that an output shows")
     ] = 1e-9
+    finely: Annotated[
+        int, setting("communication steps in a sample that show an FMU's own: many whole numbers divide it", ge=10)
+    ] = 60
+    before_push: Annotated[int, setting("steps of its own before an input is pushed, to see when it answers", ge=1)] = 3
+    after_push: Annotated[int, setting("and after that: a polynomial of degree 5 follows them", ge=8)] = 8
     smooth: Annotated[
         float, share("of a response, or of a step of an FMU's own, by which it may leave a smooth curve")
     ] = 1e-4
