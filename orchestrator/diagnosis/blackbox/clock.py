@@ -41,13 +41,17 @@ def own_clock(problem: BoxProblem) -> OwnClock | None:
     Returns:
         The clock.
     """
-    sliver, own = problem.settings.probe.sliver, problem.settings.probe
-    table, step = series_of(problem, problem.n), problem.h / problem.m
-    plain, before, behind = (_run(problem, table, step * (1.0 - short), problem.m) for short in (0.0, sliver, -sliver))
-    if plain is None or before is None or behind is None or float(np.max(np.abs(before - behind))) <= own.repeats:
+    own, table = problem.settings.probe, series_of(problem, problem.n)
+    before, behind = (
+        _run(problem, table, problem.step * (1.0 - short), problem.m) for short in (own.sliver, -own.sliver)
+    )
+    if before is None or behind is None or float(np.max(np.abs(before - behind))) <= own.repeats:
+        return None
+    plain = _run(problem, table, problem.step, problem.m)
+    if plain is None:
         return None
     off = [float(np.sum((y - plain) ** 2)) for y in (before, behind)]
-    short = sliver if off[0] <= off[1] else -sliver
+    short = own.sliver if off[0] <= off[1] else -own.sliver
     ticks = _ticks(problem, short)
     if ticks == 0:
         return OwnClock(short, problem.m, 0.0)
@@ -64,8 +68,10 @@ def compared_later(data: Data, late: float) -> Data:
         late: seconds.
 
     Returns:
-        The record.
+        The record; itself where nothing is late.
     """
+    if late == 0.0:
+        return data
     return replace(data, outputs=CubicSpline(data.time, data.outputs)(data.time - late))
 
 

@@ -61,6 +61,7 @@ def prepared(
     problem.map = reduced(given, probe)
     problem.sign = probe.sign
     y = problem.must_simulate(problem.nominal)
+    data = problem.data
     rough = [noise_of(given, data, r) for r in (data.outputs, data.outputs - y)]
     problem.noise = np.sqrt(np.minimum(*rough) ** 2 + probe.solver_error**2)
     return problem, probe

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.bank import CUT, PORT, BoxEffect
+from orchestrator.diagnosis.blackbox.clock import compared_later
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel, Data
@@ -227,7 +228,7 @@ def validated(problem: BoxProblem, models: Sequence[BoxModel], data: Data) -> tu
     Raises:
         FmuError: the FMU does not run over it.
     """
-    second = replace(problem, data=data)
+    second = replace(problem, data=compared_later(data, problem.late))
     runs = second.simulate(models)
     found = [y for y in runs if y is not None]
     if len(found) < len(runs):

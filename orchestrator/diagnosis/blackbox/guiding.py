@@ -7,7 +7,7 @@ state nor for a reset within a run.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +163,7 @@ def guided(problem: BoxProblem) -> GuidedProblem | None:
         for port in problem.map.ports.values()
         if port.position in problem.outputs
     ]
-    given = {f: getattr(problem, f) for f in ("data", "map", "runner", "m", "noise", "sign", "units", "settings")}
+    given = {f.name: getattr(problem, f.name) for f in fields(BoxProblem) if f.init}
     answers = GuidedProblem(**given, pulls=tuple(places)).answers() if places else None
     if answers is None:
         return None

@@ -94,7 +94,7 @@ def opened(
         clock = own_clock(problem)
         if clock is not None:
             problem.short, problem.m, problem.late = clock.short, clock.m, clock.late
-            problem.data = compared_later(data, clock.late) if clock.late else data
+            problem.data = compared_later(data, clock.late)
         return problem, _pushed(problem)
     except BaseException:
         runner.close()

@@ -225,7 +225,6 @@ class BoxProblem:
             parameters that may change within a run, where one does.
         """
         table = plain
-        step = self.step
         if any(effect.kind.where == PARAMETER for effect in model.effects):
             starts = self.starts(model)
             constant = np.tile([starts[name] for name in self.runner.tunables], (len(plain), 1))
@@ -239,7 +238,7 @@ class BoxProblem:
             if table is plain:
                 table = plain.copy()
             column = self.runner.inputs.index(effect.place)
-            table[:, column] = at_input(effect, table[:, column], step, float(values[0]))
+            table[:, column] = at_input(effect, table[:, column], self.step, float(values[0]))
         return table
 
     def _follows(self, effect: BoxEffect, steps: int) -> Array:

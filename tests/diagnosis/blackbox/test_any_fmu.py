@@ -274,7 +274,7 @@ def test_an_fmu_with_a_step_of_its_own_is_stepped_by_it(made):
 def test_an_fmu_that_goes_by_its_own_clock_is_kept_in_time(made, domain):
     _, *files = made(domain, rows=700, fault="own_clock")
     tick = {"Spring": 2e-3, "Tanks": 0.25}[domain.name]
-    found = diagnose(*files)
+    found = diagnose(*files, validate=files[0])
     found.close()
     problem = found.outcome.problem
     assert problem.h / problem.m == pytest.approx(tick * round(problem.h / problem.m / tick))
@@ -282,6 +282,7 @@ def test_an_fmu_that_goes_by_its_own_clock_is_kept_in_time(made, domain):
     assert problem.late == pytest.approx(tick / 6.0, rel=0.01)  # what Runge and Kutta give their first rates
     assert found.verdict in ("none", "parameters")
     assert any("clock of its own" in note for note in found.outcome.probe.notes)
+    assert max(misfit.corrected for misfit in found.validation) < 1.2  # a second record is compared as late
 
 
 def test_steps_are_finer_where_they_shift_what_is_well_known(made):

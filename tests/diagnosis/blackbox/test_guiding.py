@@ -74,6 +74,15 @@ def test_a_guided_run_stays_with_the_record_whatever_the_inertia(opened):
 
 
 @needs_compiler
+def test_a_guided_run_keeps_the_time_of_an_fmu_with_a_clock_of_its_own(opened):
+    problem, _ = opened(SPRING)
+    problem.short, problem.late = 1e-9, 3e-4
+    led = guided(problem)
+    assert (led.step, led.late) == (problem.step, problem.late)
+    assert led.step < problem.h / problem.m
+
+
+@needs_compiler
 def test_a_store_is_led_by_its_level_alone(opened):
     led = guided(opened(TANKS, ("input_saturation",))[0])
     assert [pull.massive for pull in led.pulls] == [False]
