@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,23 +84,20 @@ def passes(
     limit = settings.search.time_limit
     allowed = Stopwatch(limit or math.inf)
     likelihood = RecordLikelihood(model.plant, signals, nominal, parts.validated.stop, settings)
-    found = _search(model, likelihood, parts, parts, settings.search.most_effects, progress, allowed, finer)
+    search = partial(_search, model, likelihood, parts, parts, settings.search.most_effects, progress, allowed, finer)
+    found = search()
     first = int(size * (1.0 - settings.fit.looked_at))  # as many samples as are held out
     if found.unknown and not found.search.stopped and allowed.over:
         note = f"a search with the record's parts exchanged was not begun after {limit:g} s"
         found = replace(found, withdrawn=(note, *found.withdrawn))
     if found.unknown and _asks_the_drive(found) and not allowed.over:
         # In a closed loop a drive that hides its torque predicts well, and hides friction too: the torque decides.
-        other = _search(
-            model, likelihood, parts, parts, settings.search.most_effects, progress, allowed, finer, as_given=True
-        )
+        other = search(as_given=True)
         settled = other.proof.torque.decides(settings.verdict.proven, settings.verdict.good)
         found = other if settled and not other.unknown else found
     if found.unknown and found.fell and not found.best.effects and not allowed.over:
         # What came first and fell hid what came second, if only as a suspect.
-        other = _search(
-            model, likelihood, parts, parts, settings.search.most_effects, progress, allowed, finer, barred=found.fell
-        )
+        other = search(barred=found.fell)
         found = other if not other.unknown or other.best.effects else found
     if found.unknown and not found.hopeless and not allowed.over:
         # What shows on the deciding part alone (a limit that is reached once) must be fitted to be found.
@@ -130,7 +128,7 @@ def _search(
     whole = Parts(parts.seen, parts.validated, parts.held_out)
     plain = annealed(likelihood, base.fit.p, base.fit.q, base.fit.free, whole, ())
     standing = what_stands(search, whole, parts, base, plain, best)
-    best, final, withdrawn = standing.best, standing.final.fit, standing.notes
+    best, final, withdrawn = standing.best, standing.final.fit, tuple(standing.withdrawn.values())
     lowest = ladder(settings.levels, best.effects, standing.efficient.q)[-1]
     logged = _of_the_log(search, whole, plain, best)
     left = left_of(likelihood, logged, standing.efficient, best.fit, parts, lowest)

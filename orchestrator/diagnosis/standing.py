@@ -36,8 +36,7 @@ class Standing:
         efficient: its fit to all that may be looked at.
         base, final: fits without effects and with them, sizes as they are reported.
         proof: what both predict on held-out data.
-        notes: why effects were withdrawn.
-        withdrawn: their labels.
+        withdrawn: why effects were, in words, by their labels.
     """
 
     best: Candidate
@@ -45,8 +44,7 @@ class Standing:
     base: Sized
     final: Sized
     proof: Proof
-    notes: tuple[str, ...]
-    withdrawn: tuple[str, ...]
+    withdrawn: dict[str, str]
 
 
 def what_stands(
@@ -75,8 +73,7 @@ def what_stands(
     sized_base = sized(likelihood, plain, whole, (), ladder(levels, (), plain.q))
     before = horizons(likelihood, sized_base.fit.p, plain.q, whole.held_out)
     bases = (likelihood.nominal, sized_base.fit.p)
-    notes: list[str] = []
-    withdrawn: list[str] = []
+    withdrawn: dict[str, str] = {}
     while best.effects:
         efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
         final = reported(likelihood, efficient, whole, best.effects, ladder(levels, best.effects, efficient.q))
@@ -95,7 +92,8 @@ def what_stands(
         ):
             harm = ()  # one run, which adds up every disturbance
         fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
-        harm = harm or _larger_misfit(likelihood, bases, final.fit, whole)
+        if weak is None:
+            harm = harm or _larger_misfit(likelihood, bases, final.fit, whole)
         if weak is None and not harm and fewer.effects:
             harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
         why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
@@ -103,16 +101,13 @@ def what_stands(
         if weak is None and not harm:
             small = _minor(search, parts, plain, best, efficient, final.fit, after)
             if small is None:
-                return Standing(
-                    best, efficient, sized_base, final, Proof(before, after, torque), tuple(notes), tuple(withdrawn)
-                )
+                return Standing(best, efficient, sized_base, final, Proof(before, after, torque), withdrawn)
             out, fewer = small
             why = "what is left is no noise, and more than it explains"
-        notes.append(f"{out.name} ({out.site}) was withdrawn: {why}")
-        withdrawn.append(out.label)
+        withdrawn[out.label] = f"{out.name} ({out.site}) was withdrawn: {why}"
         best = fewer
     final = replace(sized_base, fit=honest(likelihood, sized_base.fit, (), whole))
-    return Standing(base, plain, sized_base, final, Proof(before, before), tuple(notes), tuple(withdrawn))
+    return Standing(base, plain, sized_base, final, Proof(before, before), withdrawn)
 
 
 def outweighs_one_run(effects: Sequence[Effect], before: Horizons, after: Horizons) -> bool:

@@ -191,7 +191,8 @@ class Effect:
         for short, place in self.places(plant).items():
             if self._holder(plant, short) in refitted:
                 moved[self._holder(plant, short)] += moved[place]
-            moved[place] = moved[place] if short in self.shared else default[place]
+            if short not in self.shared:
+                moved[place] = default[place]
         return moved
 
     def _holder(self, plant: Places, short: str) -> int:

@@ -176,10 +176,9 @@ def test_of_several_records_none_may_get_more_than_a_tenth_worse(monkeypatch, ti
     likelihood, p = axis_likelihood()
     parts = Parts(slice(10, 120), slice(120, 160), slice(160, likelihood.stop))
     fit = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
-    one = SimpleNamespace(signal="theta_m", best_before=1.0, after=times)
     records = [
-        SimpleNamespace(source=n, misfit=[m])
-        for n, m in (("a.csv", SimpleNamespace(**vars(one) | {"after": 0.5})), ("b.csv", one))
+        SimpleNamespace(source=name, misfit=[SimpleNamespace(signal="theta_m", best_before=1.0, after=after)])
+        for name, after in (("a.csv", 0.5), ("b.csv", times))
     ]
     monkeypatch.setattr("orchestrator.diagnosis.standing.by_record", lambda *_: records)
     assert _larger_misfit(likelihood, [fit.p], fit, parts) == worse

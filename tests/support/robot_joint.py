@@ -12,6 +12,17 @@ BRISTLE = 2e-4  # rad over which dry friction builds up
 
 
 @njit
+def _moved(angle, rate, bristle, acting, coupling, finer):
+    """Return angle, speed and bristle one row later."""
+    for _ in range(finer):
+        bristle += STEP / finer * (rate - abs(rate) * bristle / BRISTLE)
+        torque = acting - VISCOUS * rate - DRY / BRISTLE * bristle + coupling
+        rate += STEP / finer * torque / INERTIA
+        angle += STEP / finer * rate
+    return angle, rate, bristle
+
+
+@njit
 def _run(asked, speed, coupling, late, finer):
     angle, rate, bristle, before, filtered = 0.0, 0.0, 0.0, 0.0, 0.0
     angles, torques = np.empty(asked.size), np.empty(asked.size)
@@ -22,11 +33,7 @@ def _run(asked, speed, coupling, late, finer):
         angles[n] = seen
         torques[n] = 400.0 * INERTIA * (asked[n] - seen) + 40.0 * INERTIA * (speed[n] - filtered)
         acting = torques[max(n - late, 0)]
-        for _ in range(finer):
-            bristle += STEP / finer * (rate - abs(rate) * bristle / BRISTLE)
-            torque = acting - VISCOUS * rate - DRY / BRISTLE * bristle + coupling[n]
-            rate += STEP / finer * torque / INERTIA
-            angle += STEP / finer * rate
+        angle, rate, bristle = _moved(angle, rate, bristle, acting, coupling[n], finer)
     return angles, torques
 
 
@@ -60,10 +67,7 @@ def _driven(torque, finer):
     angles = np.empty(torque.size)
     for n in range(torque.size):
         angles[n] = angle
-        for _ in range(finer):
-            bristle += STEP / finer * (rate - abs(rate) * bristle / BRISTLE)
-            rate += STEP / finer * (torque[n] - VISCOUS * rate - DRY / BRISTLE * bristle) / INERTIA
-            angle += STEP / finer * rate
+        angle, rate, bristle = _moved(angle, rate, bristle, torque[n], 0.0, finer)
     return angles
 
 
