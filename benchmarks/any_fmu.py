@@ -11,6 +11,7 @@ import argparse
 import json
 import resource
 import tempfile
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,12 +21,15 @@ import numpy as np
 from benchmarks.any_fmu_plants import INSIDE, PLANTS, Case, Maker, Plant
 from orchestrator.api.any_fmu import FmuDiagnosisResult
 from orchestrator.api.diagnose import diagnose
+from orchestrator.diagnosis.blackbox.deliver import deliver
 from orchestrator.errors import OrchestratorError
 from tests.support.box_fmu import DOMAINS, coupled_record, record, write_fmu, write_map, write_record, write_scenario
 
 SAME = {"input_offset": "load", "load": "input_offset"}
 LEAST, MOST = 3.0, 60.0
 """Sizes of effects: what they change at an output, over its noise."""
+QUICK = 10e-6
+"""Step of an FMU [s] up to which the time of a record is counted apart."""
 TOLD = 0.5
 """What an effect must change beyond what parameters and another effect take up, over the noise, to be counted apart."""
 
@@ -112,6 +116,10 @@ class Tally:
     z: list[float] = field(default_factory=list)
     z_sizes: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
+    passed: list[tuple[float, float]] = field(default_factory=list)
+    """Time that passed [s], and the cost of a step [s], of each record."""
+    delivered: list[float] = field(default_factory=list)
+    """Difference of each corrected system from its fit, over the noise."""
 
     def take(self, kind: str, verdict: str, names: tuple[str, ...], sizes: tuple[float, ...],
              parameters: tuple[float, ...], found: FmuDiagnosisResult, told: float) -> None:  # fmt: skip
@@ -147,17 +155,26 @@ class Tally:
         if self.errors:
             shown = (100 * np.quantile(self.errors, q) for q in (0.5, 0.9))
             print("error of the size: median {:.3f} %, 90 % {:.3f} %".format(*shown))
-        for name, z in (("parameters", self.z), ("sizes", self.z_sizes)):
+        for which, z in (("parameters", self.z), ("sizes", self.z_sizes)):
             if z:
-                print(f"{name} within their 95 % intervals: {100 * np.mean(np.abs(z) < 1.96):.1f} % of {len(z)}")
+                print(f"{which} within their 95 % intervals: {100 * np.mean(np.abs(z) < 1.96):.1f} % of {len(z)}")
         if self.seconds:
             print(f"processor time a record [s]: median {np.median(self.seconds):.1f}, most {max(self.seconds):.1f}")
+        for which, most in (("", np.inf), (f", {1e6 * QUICK:g} us a step at most", QUICK)):
+            passed = [seconds for seconds, cost in self.passed if cost <= most]
+            if passed:
+                quantiles = "median {:.1f}, 99 % {:.1f}, most {:.1f}".format(*np.quantile(passed, (0.5, 0.99, 1.0)))
+                print(f"time that passed a record [s], {len(passed)} records{which}: {quantiles}")
+        if self.delivered:
+            shown = "median {:.3g}, most {:.3g}".format(*np.quantile(self.delivered, (0.5, 1.0)))
+            print(f"{len(self.delivered)} corrected.ssp, difference from the fit over the noise: {shown}")
 
 
 def judged(tally: Tally, kind: str, label: str, names: tuple[str, ...], sizes: tuple[float, ...],
-           parameters: tuple[float, ...], files: tuple[Path, Path, Path], told: float = np.inf) -> None:  # fmt: skip
+           parameters: tuple[float, ...], files: tuple[Path, Path, Path], told: float = np.inf,
+           delivers: bool = False) -> None:  # fmt: skip
     """Diagnose one record, print a line."""
-    begun = processor_time()
+    begun, at = processor_time(), time.monotonic()
     try:
         found = diagnose(*files)
     except OrchestratorError as error:
@@ -165,18 +182,26 @@ def judged(tally: Tally, kind: str, label: str, names: tuple[str, ...], sizes: t
         tally.counts.setdefault(kind, {}).setdefault("error", 0)
         tally.counts[kind]["error"] += 1
         return
+    o = found.outcome
+    tally.passed.append((time.monotonic() - at, o.problem.runner.step_cost))
+    if delivers and found.effects:
+        before = processor_time()
+        tally.delivered.append(deliver(files[0].with_name("corrected.ssp"), o).difference)
+        begun += processor_time() - before
     found.close()
     tally.seconds.append(processor_time() - begun)
     verdict = right(kind, names, found)
     tally.take(kind, verdict, names, sizes, parameters, found, told)
-    o, level = found.outcome, found.trust.level.word
+    level = found.trust.level.word
     shown = ", ".join(
         f"{f.effect.label}={f.estimates[0].value:.5g} +- {f.estimates[0].standard_error:.2g}" for f in found.effects
     )
     print(
         f"{kind:8s}{label} {verdict:7s}{found.verdict:10s} {level:5s} {shown} "
         f"true {', '.join(f'{s:.5g}' for s in sizes)} "
-        f"misfit {max(m.corrected for m in o.misfit):.3f} {tally.seconds[-1]:.1f} s {o.runs} runs "
+        f"misfit {max(m.corrected for m in o.misfit):.3f} {tally.seconds[-1]:.1f} s {tally.passed[-1][0]:.1f} s passed "
+        f"{o.runs} runs of {1e6 * tally.passed[-1][1]:.2g} us a step "
+        f"{f'ssp {tally.delivered[-1]:.2g} ' if delivers and found.effects else ''}"
         f"{[f.family for f in found.effects if f.family] or ''} {o.suspects or ''} "
         f"{'' if verdict == 'right' else o.rest.reasons}",
         flush=True,
@@ -209,7 +234,7 @@ def made_records(args: argparse.Namespace, tally: Tally) -> None:
             files = (case.write(folder / "record.csv"), fmus[case.plant.number], case.plant.map(folder / "map.toml"))
             label = (f"{case.plant.name[:14]:15s}{'closed' if case.closed else 'open':7s}{'+'.join(case.names):42s}"
                      f"{case.ratio:7.1f} {case.told:6.2f}")  # fmt: skip
-            judged(tally, kind, label, case.names, case.sizes, case.parameters, files, case.told)
+            judged(tally, kind, label, case.names, case.sizes, case.parameters, files, case.told, args.deliver)
 
 
 def main() -> None:
@@ -221,6 +246,7 @@ def main() -> None:
     parser.add_argument("--foreign", type=Path, metavar="DIR", help="FMUs of others, by the names of their plants")
     parser.add_argument("--records", type=Path, metavar="DIR", help="judge the records of a folder")
     parser.add_argument("--disturbance", type=float, default=0.0, help="coloured noise at the port, over the drive")
+    parser.add_argument("--deliver", action="store_true", help="write and run corrected.ssp, compare it to the fit")
     parser.add_argument("--plants", type=int, nargs="*", default=[], help="numbers of the plants that take part")
     parser.add_argument("--write", type=Path, metavar="DIR", help="write the examples of the documentation, and stop")
     args = parser.parse_args()
