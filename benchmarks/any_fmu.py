@@ -153,8 +153,8 @@ class Tally:
         for kind, misfits in self.misfits.items():
             print(f"misfit over noise, {kind}: median {np.median(misfits):.3f}, 90 % {np.quantile(misfits, 0.9):.3f}")
         if self.errors:
-            shown = (100 * np.quantile(self.errors, q) for q in (0.5, 0.9))
-            print("error of the size: median {:.3f} %, 90 % {:.3f} %".format(*shown))
+            percent = (100 * np.quantile(self.errors, q) for q in (0.5, 0.9))
+            print("error of the size: median {:.3f} %, 90 % {:.3f} %".format(*percent))
         for which, z in (("parameters", self.z), ("sizes", self.z_sizes)):
             if z:
                 print(f"{which} within their 95 % intervals: {100 * np.mean(np.abs(z) < 1.96):.1f} % of {len(z)}")

@@ -257,6 +257,15 @@ def _followed(parts: tuple[Part, ...]) -> list[str]:
     return list(dict.fromkeys(p.effect.signal for p in parts if p.effect is not None and p.effect.signal))
 
 
+def _turn(part: Part) -> int:
+    """Return when a part before an FMU has its turn within a step: a signal passes all of them in one step.
+
+    What depends at once on what was fed looks at that before it changes.
+    """
+    at_once = part.effect is None and bool(part.values["q2"])
+    return -1 if at_once else (PARAMETER, INPUT, "", CUT, PORT).index(part.where)
+
+
 def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], attachment: str) -> bytes:
     problem, members = outcome.problem, outcome.problem.runner.subject.members
     spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp", "oms")}
@@ -270,9 +279,7 @@ def _structure(outcome: BoxOutcome, parts: tuple[Part, ...], attachment: str) ->
     for name in problem.outputs:
         _connector(connectors, _system(name, "out"), "output")
     elements = etree.SubElement(system, tag("ssd", "Elements"))
-    # Effects before the FMU: where a master runs one after the other, they come first within a step.
-    # What depends at once on what was fed looks at that before it changes.
-    ahead = sorted((p for p in parts if p.where != OUTPUT), key=lambda p: not (p.effect is None and p.values["q2"]))
+    ahead = sorted((p for p in parts if p.where != OUTPUT), key=_turn)
     behind = [p for p in parts if p.where == OUTPUT]
     wired = _wires(outcome, parts)
     for part in ahead:

@@ -13,6 +13,7 @@ from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
 from orchestrator.diagnosis.blackbox.bank import PORT
+from orchestrator.diagnosis.blackbox.deliver import deliver
 from orchestrator.diagnosis.blackbox.diagnose import prepared
 from orchestrator.diagnosis.blackbox.mapping import read_map
 from orchestrator.diagnosis.blackbox.reading import read_data
@@ -108,6 +109,21 @@ def test_the_command_delivers_a_system_that_reproduces_the_fit(made, tmp_path):
     with opened_ssp(out / "corrected.ssp") as corrected:
         assert corrected.system.execution_order() == ("quadratic_drag_1", "plant")  # as in the fit
     assert {p.name for p in out.iterdir()} >= {"corrected.ssp", "report.html", "diagnose.csv", "diagnose_signals.png"}
+
+
+def test_the_order_in_which_effects_were_found_changes_nothing_in_what_is_delivered(made, tmp_path):
+    _, *files = made(SPRING, ("input_delay", "quadratic_drag"))
+    found = diagnose(*files)
+    try:
+        outcome = found.outcome
+        assert {f.effect.kind.name for f in outcome.effects} == {"input_delay", "quadratic_drag"}
+        turned = dataclasses.replace(
+            outcome.model, effects=outcome.model.effects[::-1], values=outcome.model.values[::-1]
+        )
+        for model in (outcome.model, turned):
+            assert deliver(tmp_path / "corrected.ssp", dataclasses.replace(outcome, model=model)).difference < 0.1
+    finally:
+        found.close()
 
 
 def test_calibration_finds_the_parameters_within_their_intervals(made):
