@@ -167,15 +167,22 @@ class BoxSearch(BoxTrials):
 
     def _enriched(self, fit: BoxFit, base: BoxFit) -> BoxFit:
         """Return a fit, or one with what contains an earlier effect in its place: another hid what it lacks."""
-        fit = self._recalled(fit)
+        fit = self.recalled(fit)
         for k in range(len(fit.model.effects) - 1):
             richer = [f for f in self.richer(fit, k) if self.pays(f, fit, base)]
             if richer:
                 return self.fitter.settled(max(richer, key=self.score))
         return fit
 
-    def _recalled(self, fit: BoxFit) -> BoxFit:
-        """Return a fit, or one by which a signal was something else before the record: noise hid what it was."""
+    def recalled(self, fit: BoxFit) -> BoxFit:
+        """Return a fit, or one by which a signal was something else before the record: noise hid what it was.
+
+        Args:
+            fit: of a model.
+
+        Returns:
+            The likelier of both.
+        """
         for effect in fit.model.effects:
             for twin in (e for e in self.effects if e.label == effect.label and e.at_rest != effect.at_rest):
                 effects = tuple(twin if e == effect else e for e in fit.model.effects)

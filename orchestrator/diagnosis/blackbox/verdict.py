@@ -226,7 +226,7 @@ def _anew(
         fits = [search.fitter.fit(without.extended(other, other.bounded(values)), best.level) for values in starts]
         again = [near[other.label]] if other.label in near else []
         if nearest := max((fit for fit in fits if fit is not None), key=search.score, default=None):
-            again.append(search.fitter.settled(nearest))
+            again.append(search.recalled(search.fitter.settled(nearest)))
         if again:
             found[other.label] = max(again, key=search.score)
     return found

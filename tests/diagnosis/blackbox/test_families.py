@@ -43,6 +43,7 @@ def search(totals: dict[str, float], *steps: SearchStep, share: float = 0.0) -> 
         ladder=SimpleNamespace(share=lambda level: share),
     )
     return SimpleNamespace(
+        recalled=lambda found: found,
         fitter=fitter, steps=steps, earlier=(), settings=DEFAULT.search, score=lambda found: found.total,
         richer=lambda fit, k: [],
     )  # fmt: skip

@@ -15,6 +15,7 @@ from orchestrator.diagnosis.blackbox.rest import Rest
 from orchestrator.diagnosis.blackbox.runner import Runner
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
+from orchestrator.diagnosis.blackbox.verdict import _anew
 
 SCENE = Surroundings(0.01, 1.0, 1.0, np.ones(3))
 NONE = np.zeros((1, 1))
@@ -31,9 +32,21 @@ def test_what_a_signal_was_before_the_record_is_asked_again_beside_further_effec
     search = BoxSearch(fitter, [HELD, AT_REST, LOAD])
     for effect in (HELD, AT_REST):
         model = BoxModel(np.zeros(0)).extended(effect, np.array([0.1])).extended(LOAD, np.array([2.0]))
-        found = search._recalled(fit(model))
+        found = search.recalled(fit(model))
         assert found.model.effects == (AT_REST, LOAD)
         assert np.array_equal(found.model.vector, [0.1, 2.0])
+
+
+def test_what_a_signal_was_before_the_record_is_asked_of_a_rival_too() -> None:
+    lag = BoxModel(np.zeros(0)).extended(BoxEffect(BANK["input_lag"], "u", SCENE), np.array([0.1]))
+    best = BoxFit(lag, 0, NONE, -10.0, 0.0, 0.0, NONE)
+    fitter = SimpleNamespace(
+        grown=lambda model, level: fit(model), settled=lambda found: found, ladder=SimpleNamespace(share=lambda k: 0.0),
+        fit=lambda model, level: fit(model),
+    )  # fmt: skip
+    search = BoxSearch(fitter, [HELD, AT_REST])
+    held = fit(BoxModel(np.zeros(0)).extended(HELD, np.array([0.1])))
+    assert _anew(search, best, lag.effects[0], {}, [held])["input_delay@u"].model.effects == (AT_REST,)
 
 
 def test_an_fmu_that_has_hung_is_waited_for_less_long() -> None:
