@@ -15,7 +15,7 @@ _PUBLIC = {
     "CheckResult": "orchestrator.api.check",
     "ConvergenceError": "orchestrator.errors",
     "DesignResult": "orchestrator.api.design",
-    "DiagnosisResult": "orchestrator.api.diagnose",
+    "DiagnosisResult": "orchestrator.api.diagnosed",
     "ExportedSsp": "orchestrator.api.ssp",
     "EstimateResult": "orchestrator.api.estimate",
     "InspectResult": "orchestrator.api.inspect",

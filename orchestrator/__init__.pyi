@@ -12,8 +12,8 @@ from orchestrator.api.check import CheckResult as CheckResult
 from orchestrator.api.check import check as check
 from orchestrator.api.design import DesignResult as DesignResult
 from orchestrator.api.design import design as design
-from orchestrator.api.diagnose import DiagnosisResult as DiagnosisResult
 from orchestrator.api.diagnose import diagnose as diagnose
+from orchestrator.api.diagnosed import DiagnosisResult as DiagnosisResult
 from orchestrator.api.estimate import EstimateResult as EstimateResult
 from orchestrator.api.estimate import estimate as estimate
 from orchestrator.api.inspect import InspectResult as InspectResult

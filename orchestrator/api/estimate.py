@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 import msgspec
 
 from orchestrator.api.arguments import chosen_settings
-from orchestrator.api.diagnose import DiagnosisResult
 from orchestrator.api.diagnose import diagnose as find_missing
+from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.live import fitted_live
 from orchestrator.api.methods import HEAD, MethodResult, described, method_entry, method_row

@@ -22,7 +22,7 @@ LOAD = next(effect for effect in AXIS.bank if effect.label == "load_torque@load"
 PLACE = AXIS.index("effects.load_torque.torque")
 LEVEL = SETTINGS.levels[-1]
 TORQUE = 0.02  # N.m, of 8 that drive the axis
-SEARCH = "orchestrator.diagnosis.search.search"
+JUDGE = "orchestrator.diagnosis.search.judging"
 
 
 def record(early: float = TORQUE, late: float = TORQUE):
@@ -118,7 +118,7 @@ def test_a_small_effect_pays_by_what_both_parts_gain_together(
     fitted: float, decided: float, late: float, noise: bool, earns: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A true effect that was missed: 17.7 where it was fitted, 0.1 on the part that decides, five errors from zero."""
-    monkeypatch.setattr(f"{SEARCH}.is_noise", lambda *_: noise)
+    monkeypatch.setattr(f"{JUDGE}.is_noise", lambda *_: noise)
     likelihood = record(TORQUE, late)
     search = search_of(likelihood)
     candidate, base = gaining(*models(likelihood), fitted, decided)
