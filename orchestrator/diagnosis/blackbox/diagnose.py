@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,9 @@ from orchestrator.diagnosis.blackbox.judged import BoxOutcome, judged
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.model import Data
+from orchestrator.diagnosis.blackbox.noise import noise_of
 from orchestrator.diagnosis.blackbox.parts import BoxParts, interleaved, parts_of
-from orchestrator.diagnosis.blackbox.probing import Probe, noise_of, opened, reduced
+from orchestrator.diagnosis.blackbox.probing import Probe, opened, reduced
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings, RestSettings
@@ -62,9 +64,9 @@ def prepared(
     problem.sign = probe.sign
     y = problem.must_simulate(problem.nominal)
     data = problem.data
-    rough = [noise_of(given, data, r) for r in (data.outputs, data.outputs - y)]
-    problem.noise = np.sqrt(np.minimum(*rough) ** 2 + probe.solver_error**2)
-    return problem, probe
+    noise, notes = noise_of(given, data, [data.outputs, data.outputs - y], settings.probe)
+    problem.noise = np.sqrt(noise**2 + probe.solver_error**2)
+    return problem, replace(probe, notes=probe.notes + notes)
 
 
 def fitters(problem: BoxProblem, parts: BoxParts, settings: BoxSettings = DEFAULT) -> list[Fitter]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.blackbox.clock import compared_later, own_clock
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.model import BoxModel, Data
+from orchestrator.diagnosis.blackbox.noise import noise_of
 from orchestrator.diagnosis.blackbox.problem import BoxProblem, series_of
 from orchestrator.diagnosis.blackbox.runner import Plan, Runner
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
@@ -19,9 +20,6 @@ from orchestrator.errors import FmuError
 
 Array = NDArray[np.float64]
 Progress = Callable[[str], None]
-
-TRIMMED = 0.7767
-"""Mean magnitude of Gaussian noise of variance 1 without the largest hundredth."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def opened(
     inputs, reads = _names_of(given, subject)
     runner = Runner(subject, inputs, reads, given.tunable, given.options.tolerance, True, workers, settings.process)
     try:
-        rough = noise_of(given, data, data.outputs)
+        rough, _ = noise_of(given, data, [data.outputs], settings.probe)
         runner.through = _passing(runner, given, data, settings)
         problem = BoxProblem(
             data, given, runner, _affordable(runner, given, data, progress, settings), rough, settings=settings
@@ -135,29 +133,6 @@ def _passing(runner: Runner, given: Map, data: Data, settings: BoxSettings) -> l
             if abs(at_once[k, at]) > own.at_once * abs(gains[0][k, at]):
                 found.append(Through(n, k, float(at_once[k, at])))
     return found
-
-
-def noise_of(given: Map, data: Data, residual: Array) -> Array:
-    """Return the noise of each output: as given, else from third differences of what no model should follow.
-
-    Args:
-        given: the map.
-        data: the record.
-        residual: (n, outputs) measured minus simulated.
-
-    Returns:
-        Shape (outputs,), in the units of the outputs.
-    """
-    found = []
-    for k, entry in enumerate(given.outputs.values()):
-        if entry.noise is not None:
-            found.append(entry.noise * abs(entry.factor))
-            continue
-        # Its mean without the largest hundredth: a median is no measure of what comes in whole counts.
-        rough = np.sort(np.abs(np.diff(residual[:, k], 3)))[: int(0.99 * (len(residual) - 3))]
-        estimate = float(np.mean(rough)) / TRIMMED / np.sqrt(20.0)
-        found.append(max(estimate, 1e-9 * float(np.max(np.abs(data.outputs[:, k]))), 1e-300))
-    return np.array(found)
 
 
 def _affordable(runner: Runner, given: Map, data: Data, progress: Progress, settings: BoxSettings) -> int:

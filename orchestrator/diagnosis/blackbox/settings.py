@@ -246,6 +246,10 @@ class ProbeSettings(Settings, frozen=True):
         float, share("of communication steps in which nothing moves, from which an FMU has a coarser grid of its own")
     ] = 0.15
     repeats: Annotated[float, share("of the noise by which two runs of one model may differ")] = 1e-3
+    louder: Annotated[
+        float, setting("times the noise that a map gives, above which the record's own counts: below is chance", ge=1)
+    ] = 1.1
+    loudest: Annotated[float, setting("the same from which it is no noise: something moves", ge=1)] = 2.0
     fewest: Annotated[int, setting("runs that the probes and the first fit take", ge=1)] = 20
     fewest_each: Annotated[int, setting("further runs for each uncertain value", ge=0)] = 6
     slow: Annotated[float, setting("seconds of a run from which the user is told")] = 0.5

@@ -1,0 +1,64 @@
+"""The noise of each output: what a map says of it, and what a record shows."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.blackbox.mapping import Map
+from orchestrator.diagnosis.blackbox.model import Data
+from orchestrator.diagnosis.blackbox.settings import ProbeSettings
+
+Array = NDArray[np.float64]
+
+TRIMMED = 0.7767
+"""Mean magnitude of Gaussian noise of variance 1 without the largest hundredth."""
+
+
+def noise_of(
+    given: Map, data: Data, traces: Sequence[Array], settings: ProbeSettings
+) -> tuple[Array, tuple[str, ...]]:  # fmt: skip
+    """Return the noise of each output: as given, else from third differences of what no model should follow.
+
+    A data sheet knows the encoder, not the counts, the cable and the differentiator behind it: where the record shows
+    somewhat more than the map says, that is believed. Far more is something that moves.
+
+    Args:
+        given: the map.
+        data: the record.
+        traces: (n, outputs) each: what was measured, and what a model leaves of it; the smoothest counts.
+        settings: of the probes.
+
+    Returns:
+        Shape (outputs,), in the units of the outputs; and a sentence for each output whose record shows more.
+    """
+    shown = np.min([third_differences(trace) for trace in traces], axis=0)
+    found, notes = [], []
+    for (name, entry), rough, measured in zip(given.outputs.items(), shown, data.outputs.T, strict=True):
+        if entry.noise is None:
+            found.append(max(rough, 1e-9 * float(np.max(np.abs(measured))), 1e-300))
+            continue
+        said = entry.noise * abs(entry.factor)
+        believed = settings.louder * said < rough <= settings.loudest * said
+        found.append(rough if believed else said)
+        if rough > settings.louder * said:
+            used = "that is used" if believed else "the map's is used: it may be motion that the FMU lacks"
+            notes.append(
+                f"output `{name}`: the map says a noise of {entry.noise:.3g}, the record shows "
+                f"{rough / abs(entry.factor):.3g}: {used}"
+            )
+    return np.array(found), tuple(notes)
+
+
+def third_differences(trace: Array) -> Array:
+    """Return the standard deviation of white noise that has the third differences of signals.
+
+    Args:
+        trace: (n, outputs).
+
+    Returns:
+        Shape (outputs,).
+    """
+    # Their mean without the largest hundredth: a median is no measure of what comes in whole counts.
+    rough = np.sort(np.abs(np.diff(trace, 3, axis=0)), axis=0)[: int(0.99 * (len(trace) - 3))]
+    return np.asarray(np.mean(rough, axis=0) / TRIMMED / np.sqrt(20.0))
