@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 TRIMMED = 0.7767
 """Mean magnitude of Gaussian noise of variance 1 without the largest hundredth."""
+SCATTER = 1.18
+"""Relative standard deviation of what third differences of white noise say of it, times the root of the rows."""
 
 
 def noise_of(
@@ -33,15 +35,16 @@ def noise_of(
         Shape (outputs,), in the units of the outputs; and a sentence for each output whose record shows more.
     """
     shown = np.min([third_differences(trace) for trace in traces], axis=0)
+    least = 1.0 + settings.louder * SCATTER / np.sqrt(len(data.outputs))
     found, notes = [], []
     for (name, entry), rough, measured in zip(given.outputs.items(), shown, data.outputs.T, strict=True):
         if entry.noise is None:
             found.append(max(rough, 1e-9 * float(np.max(np.abs(measured))), 1e-300))
             continue
         said = entry.noise * abs(entry.factor)
-        believed = settings.louder * said < rough <= settings.loudest * said
+        believed = least * said < rough <= settings.loudest * said
         found.append(rough if believed else said)
-        if rough > settings.louder * said:
+        if rough > least * said:
             used = "that is used" if believed else "the map's is used: it may be motion that the FMU lacks"
             notes.append(
                 f"output `{name}`: the map says a noise of {entry.noise:.3g}, the record shows "

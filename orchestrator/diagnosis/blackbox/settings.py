@@ -247,9 +247,9 @@ class ProbeSettings(Settings, frozen=True):
     ] = 0.15
     repeats: Annotated[float, share("of the noise by which two runs of one model may differ")] = 1e-3
     louder: Annotated[
-        float, setting("times the noise that a map gives, above which the record's own counts: below is chance", ge=1)
-    ] = 1.1
-    loudest: Annotated[float, setting("the same from which it is no noise: something moves", ge=1)] = 2.0
+        float, setting("standard deviations of chance by which a record's noise must exceed that of its map to count")
+    ] = 3.0
+    loudest: Annotated[float, setting("times that noise, from which it is none: something moves", ge=1)] = 2.0
     fewest: Annotated[int, setting("runs that the probes and the first fit take", ge=1)] = 20
     fewest_each: Annotated[int, setting("further runs for each uncertain value", ge=0)] = 6
     slow: Annotated[float, setting("seconds of a run from which the user is told")] = 0.5
