@@ -242,9 +242,7 @@ class RestSettings(Settings, frozen=True):
 class ProbeSettings(Settings, frozen=True):
     """What an FMU is asked before it is believed."""
 
-    stuck: Annotated[
-        float, share("of communication steps in which nothing moves, from which an FMU has a coarser grid of its own")
-    ] = 0.15
+    stuck: Annotated[float, share("of steps in which nothing moves, from which an FMU has a coarser grid")] = 0.15
     repeats: Annotated[float, share("of the noise by which two runs of one model may differ")] = 1e-3
     louder: Annotated[
         float, setting("standard deviations of chance by which a record's noise must exceed that of its map to count")
