@@ -39,11 +39,11 @@ def test_every_setting_is_used() -> None:
 def test_no_threshold_lies_about_in_the_room() -> None:
     """Numbers other than units, halves and guards against a division by zero belong to the settings."""
     allowed = {"0.0", "0.5", "1.0", "2.0", "4.0", "100.0", "-1.0", "0.1"}
-    shown = {"figures.py", "settings.py"}  # looks, and the settings themselves
+    shown = {"figures.py", "settings.py", "probe_settings.py"}  # looks, and the settings themselves
     arithmetic = {"STEADY", "SHORTEST_ONSET", "SMOOTHED", "AMPLITUDES"}  # of arithmetic, no thresholds
     room = ROOT / "orchestrator" / "diagnosis"
     # Tables of starts; formats of files, and what files may hold; a fact of the normal distribution.
-    measures = {"bank", "binding", "draft", "mapping", "probing", "reading", "runner"}
+    measures = {"bank", "binding", "draft", "mapping", "noise", "reading", "runner"}
     measuring = {room / "blackbox" / f"{name}.py" for name in measures}
     for path in sorted(set(room.rglob("*.py")) - measuring):
         if path.name in shown:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.model import Data
-from orchestrator.diagnosis.blackbox.settings import ProbeSettings
+from orchestrator.diagnosis.blackbox.probe_settings import ProbeSettings
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ def noise_of(
     """Return the noise of each output: as given, else from third differences of what no model should follow.
 
     A data sheet knows the encoder, not the counts, the cable and the differentiator behind it: where the record shows
-    somewhat more than the map says, that is believed. Far more is something that moves.
+    more than the map says, that is believed. Far more is something that moves. Less may be noise that was filtered.
 
     Args:
         given: the map.
@@ -32,7 +32,7 @@ def noise_of(
         settings: of the probes.
 
     Returns:
-        Shape (outputs,), in the units of the outputs; and a sentence for each output whose record shows more.
+        Shape (outputs,), in the units of the outputs; and a sentence for each output whose record shows another.
     """
     shown = np.min([third_differences(trace) for trace in traces], axis=0)
     least = 1.0 + settings.louder * SCATTER / np.sqrt(len(data.outputs))
@@ -44,8 +44,13 @@ def noise_of(
         said = entry.noise * abs(entry.factor)
         believed = least * said < rough <= settings.loudest * said
         found.append(rough if believed else said)
-        if rough > least * said:
-            used = "that is used" if believed else "the map's is used: it may be motion that the FMU lacks"
+        if believed:
+            used = "that is used"
+        elif rough > said:
+            used = "the map's is used, for so much may be motion that the FMU lacks"
+        else:
+            used = "the map's is used, and intervals are as wide as that asks for"
+        if rough > least * said or settings.quieter * rough < said:
             notes.append(
                 f"output `{name}`: the map says a noise of {entry.noise:.3g}, the record shows "
                 f"{rough / abs(entry.factor):.3g}: {used}"

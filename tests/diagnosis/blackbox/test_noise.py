@@ -38,9 +38,11 @@ def test_the_noise_is_that_of_third_differences_counts_included(count):
     [
         (None, TRUE, ""),
         (TRUE, TRUE, ""),
-        (2.0 * TRUE, 2.0 * TRUE, ""),  # what is slow and no noise does not show in differences
+        (1.5 * TRUE, 1.5 * TRUE, ""),
+        (4.0 * TRUE, 4.0 * TRUE, "intervals are as wide"),  # noise that was filtered hardly shows in differences
         (0.7 * TRUE, TRUE, "that is used"),
-        (0.2 * TRUE, 0.2 * TRUE, "the map's is used"),
+        (0.2 * TRUE, TRUE, "that is used"),
+        (0.02 * TRUE, 0.02 * TRUE, "the FMU lacks"),
     ],
 )
 def test_a_map_that_says_too_little_is_put_right_and_one_that_is_far_off_is_believed(given, expected, told):
