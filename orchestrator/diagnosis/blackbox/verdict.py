@@ -198,7 +198,28 @@ def _beside(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> dict[str, Box
     rivals.sort(key=search.score, reverse=True)
     # The best has been fitted further since its step; what did as well there is fitted anew beside it.
     behind = [near.pop(label) for label in close if best.total - near[label].total > search.settings.family]
-    return _anew(search, best, effect, near, [*behind, *rivals])
+    near = _anew(search, best, effect, near, [*behind, *rivals])
+    same = _the_same(search, best, effect)
+    if same is not None and same.effects[-1].label not in near:
+        again = search.fitter.fit(same, best.level)
+        near |= {} if again is None else {same.effects[-1].label: search.fitter.settled(again)}
+    return near
+
+
+def _the_same(search: BoxSearch, best: BoxFit, effect: BoxEffect) -> BoxModel | None:
+    """Return the best model with a load in the place of an offset of its port's input, or the other way round.
+
+    Both are one constant at one input, whatever the FMU; a step that has fitted one may not have fitted the other.
+    """
+    problem, value = search.fitter.problem, best.model.values[best.model.effects.index(effect)]
+    for other in search.effects:
+        pair = {one.kind.name: one for one in (effect, other)}
+        if set(pair) != {"load", "input_offset"} or other.label in labels(best):
+            continue
+        port = pair["load"].place
+        if problem.map.ports[port].input == pair["input_offset"].place:
+            return best.model.without(effect.label).extended(other, -problem.sign.get(port, 1.0) * value)
+    return None
 
 
 def _anew(

@@ -41,11 +41,12 @@ def search(totals: dict[str, float], *steps: SearchStep, share: float = 0.0) -> 
         fit=fitted,
         settled=lambda found: found,
         ladder=SimpleNamespace(share=lambda level: share),
+        problem=SimpleNamespace(),
     )
     return SimpleNamespace(
         recalled=lambda found: found,
         fitter=fitter, steps=steps, earlier=(), settings=DEFAULT.search, score=lambda found: found.total,
-        richer=lambda fit, k: [],
+        richer=lambda fit, k: [], effects=(),
     )  # fmt: skip
 
 
@@ -106,6 +107,30 @@ def test_what_stood_beside_an_effect_in_an_earlier_search_is_fitted_anew() -> No
     found = search({"input_lag": -70.0, "load": -12.0})
     found.earlier = (step,)
     assert settled_names(found, best)[1] == (("load@p",),)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("name", "twin"), [("input_offset", "load"), ("load", "input_offset")])
+def test_a_load_is_an_offset_of_its_ports_input_though_no_step_fitted_both(name: str, twin: str, sign: float) -> None:
+    places = {"input_offset": "u", "load": "p", "input_lag": "u"}
+    own, other, lag = (BoxEffect(BANK[kind], places[kind], SCENE) for kind in (name, twin, "input_lag"))
+    found, started = search({}), []
+    found.effects = (lag, own, other)
+    ports = {"p": SimpleNamespace(input="u")}
+    found.fitter.problem = SimpleNamespace(map=SimpleNamespace(ports=ports), sign={"p": sign})
+
+    def fitted(model: BoxModel, level: int) -> BoxFit:
+        started.append(model)
+        return BoxFit(model, 0, NONE, -10.0, 0.0, 0.0, NONE)
+
+    found.fitter.fit = fitted
+    best = BoxModel(np.zeros(0)).extended(lag, np.array([0.1])).extended(own, np.array([3.0]))
+    assert settled_names(found, BoxFit(best, 0, NONE, -10.0, 0.0, 0.0, NONE))[1] == ((), (other.label,))
+    assert [model.values[-1][0] for model in started] == [-sign * 3.0]
+    places["input_offset"] = "another"
+    found.effects = tuple(BoxEffect(BANK[kind], places[kind], SCENE) for kind in (name, twin))
+    elsewhere = BoxModel(np.zeros(0)).extended(found.effects[0], np.array([3.0]))
+    assert settled_names(found, BoxFit(elsewhere, 0, NONE, -10.0, 0.0, 0.0, NONE))[1] == ((),)
 
 
 def test_what_does_better_in_the_place_of_an_effect_stays_there() -> None:
