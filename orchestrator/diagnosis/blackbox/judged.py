@@ -26,7 +26,7 @@ from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings, RestSettings
-from orchestrator.diagnosis.blackbox.sites import alike_one_way
+from orchestrator.diagnosis.blackbox.sites import alike_one_way, of_its_hold
 from orchestrator.diagnosis.blackbox.verdict import recovered
 from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows, on_finer_steps
 
@@ -125,8 +125,8 @@ def judged(
             return judged(problem, probe, search, base, fewer, others, begun, settings)
     one_way = alike_one_way(problem)
     families = tuple(
-        tuple(dict.fromkeys((*family, *one_way.get(effect.label, ()))))
-        for effect, family in zip(best.model.effects, families, strict=True)
+        tuple(dict.fromkeys((*family, *one_way.get(e.label, ()), *of_its_hold(problem, e, values[k][0].value))))
+        for k, (e, family) in enumerate(zip(best.model.effects, families, strict=True))
     )
     stages = _stages(problem, base, last)
     on_held_out = held_out(problem, stages, fitter.parts.held_out, settings)

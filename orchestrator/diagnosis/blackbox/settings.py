@@ -249,6 +249,7 @@ class PlaceSettings(Settings, frozen=True):
     one_way: Annotated[
         float, share("of a port's travel that it may go back, and still turns one way: friction is a load then")
     ] = 0.01
+    half_a_row: Annotated[float, share("by which a delay may miss half a row, and may be a matter of the hold")] = 0.05
     least_phase: Annotated[float, setting("radians of a ripple within the motion, from which it is no spring")] = 4.0
     most_cycles: Annotated[int, setting("wavenumbers that are looked through", ge=1)] = 500
     once: Annotated[float, share("of a turn by which a ripple must differ from gravity, which comes once a turn")] = (

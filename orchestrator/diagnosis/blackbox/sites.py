@@ -169,3 +169,22 @@ def _of_cuts(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+def of_its_hold(problem: BoxProblem, effect: BoxEffect, value: float) -> tuple[str, ...]:
+    """Return what says that an input which is late by half a row may be held instead of late.
+
+    Straight lines between rows lie half a row ahead of values that are held.
+
+    Args:
+        problem: the FMU and the record.
+        effect: that was found.
+        value: its first one [s].
+
+    Returns:
+        ``hold@`` and the input; empty where that is no reading of it.
+    """
+    if effect.kind.name not in ("input_delay", "input_lag") or problem.map.inputs[effect.place].hold != "linear":
+        return ()
+    half = 0.5 * problem.data.step / problem.data.factor
+    return (f"hold@{effect.place}",) if abs(value - half) < problem.settings.place.half_a_row * half else ()
