@@ -104,7 +104,8 @@ class FmuDiagnosisResult(Result):
         lines: list[Block] = [f"Verdict: {o.verdict}: {self.statement}"]
         for found in o.effects:
             values = ", ".join(
-                f"{e.name} = {e.value:.5g} +- {e.standard_error:.2g} {e.unit}".rstrip() for e in found.estimates
+                f"{e.name} = {e.value:.5g} +- {e.standard_error:.2g} {'' if e.unit == '1' else e.unit}".rstrip()
+                for e in found.estimates
             )
             lines.append(f"  {found.effect.kind.name} at {found.effect.place}: {values}")
             if found.family:

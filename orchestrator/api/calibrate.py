@@ -16,6 +16,7 @@ from orchestrator.diagnosis.blackbox.reading import read_data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.subject import subject_of
 from orchestrator.diagnosis.blackbox.trust import calibration_doubts
+from orchestrator.errors import ScenarioError
 from orchestrator.shared.isolation.walls import support
 from orchestrator.shared.results.any_fmu import BoxCalibrationFound, CalibratedOutputFound, LearnedParameterFound
 from orchestrator.shared.settings import as_tables
@@ -113,6 +114,8 @@ def calibrate(
     """
     used = chosen_settings(settings, BoxSettings)
     subject = subject_of(Path(fmu))
+    if not isinstance(map, (Path, str)):
+        raise ScenarioError("`map` must be the path of a TOML file, but is not", "map")
     given = read_map(Path(map), subject)
     data = read_data(Path(record), given, used.read)
     data = decimated(data, factor_of(data, used.rate))

@@ -121,6 +121,15 @@ def _any_fmu(args: argparse.Namespace) -> int:
     for name in ("model", "time_limit"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
+    for name in ("part", "resample", "rate"):
+        if getattr(args, name) is not None:
+            raise ScenarioError(
+                f"`{name}` must be left out with an FMU of others, whose record is read as it is, but is given", name
+            )
+    if args.no_search:
+        raise ScenarioError(
+            "`no_search` must be left out with an FMU of others: `calibrate` searches none", "no_search"
+        )
     if args.with_law:
         raise ScenarioError("`with_law` must be left out with an FMU of others, of which no law is learned", "with_law")
     note_missing_walls()
@@ -132,7 +141,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
         return 0
     if args.map is None:
         raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
-    with staged(args.out) as folder:
+    with staged(args.out, replaces=("corrected.ssp",)) as folder:
         found = diagnose(
             path, fmu, args.map, validate=args.validate, settings=args.settings,
             progress=lambda done, expected, what: say(what),

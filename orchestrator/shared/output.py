@@ -6,7 +6,7 @@ import math
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,11 +22,12 @@ DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by 
 
 
 @contextmanager
-def staged(directory: Path) -> Iterator[Path]:
+def staged(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path]:
     """Yield a staging directory whose files are moved into ``directory`` when the block ends without error.
 
     Args:
         directory: where the files shall end up; made when it does not exist.
+        replaces: names of files that not every run writes: one of an earlier run goes where this one writes none.
 
     Yields:
         The staging directory.
@@ -48,7 +49,10 @@ def staged(directory: Path) -> Iterator[Path]:
         ) from None
     try:
         yield staging
+        stale = [name for name in replaces if not (staging / name).exists()]
         _publish(staging, directory)
+        for name in stale:
+            (directory / name).unlink(missing_ok=True)
     except OSError as error:
         named = error.filename is not None and str(staging) in str(error.filename)
         # A write that fails names no file: it may have been standard output, a cache or a temporary file.

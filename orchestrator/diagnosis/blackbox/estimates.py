@@ -103,7 +103,8 @@ def errors_of(fitter: Fitter, fit: BoxFit, rows: Rows, noisy: bool = True) -> Ar
     errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     if not noisy:
         # The scores' own long-run covariance (White, Econometrica 50(1), 1982).
-        scores = np.einsum("no,nov->nv", fitter.whitened(fit.y, fit.level), fitter.ladder[fit.level].whiten(fit.J))
+        white = fitter.ladder[fit.level].whiten(fit.J)  # of the rows looked at, where the FMU failed beyond them
+        scores = np.einsum("no,nov->nv", fitter.whitened(fit.y, fit.level)[: len(white)], white)
         sandwich = covariance @ long_run_covariance(scores[rows]) @ covariance
         errors = np.maximum(errors, np.sqrt(np.maximum(np.diag(sandwich), 0.0)))
     at = len(fit.model.p)
@@ -192,6 +193,23 @@ def estimates_of(
         )
         at += len(found)
     return parameters, values
+
+
+def as_told(effect: BoxEffect, values: tuple[ValueEstimate, ...]) -> tuple[ValueEstimate, ...]:
+    """Return the values of an effect as a user has them: a gain is the factor, 1 where there is none.
+
+    Args:
+        effect: that was found.
+        values: as they were fitted, a gain by what it has more than 1.
+
+    Returns:
+        The values.
+    """
+    if not effect.kind.name.endswith("_gain"):
+        return values
+    return tuple(
+        replace(one, value=1.0 + one.value, interval=(1.0 + one.interval[0], 1.0 + one.interval[1])) for one in values
+    )
 
 
 def _units_at(problem: BoxProblem, effect: BoxEffect) -> tuple[str, ...]:

@@ -247,6 +247,8 @@ class Fitter(BoxLikelihood):
         """Return the best of a whole step and parts of it that gains, with its run and likelihood."""
         J = J * _smooth(model)
         step = self.step(model, y, J, k, rows, damping)
+        if not np.all(np.isfinite(step)):
+            return None
         e0 = self.whitened(y, k)
         change = self.ladder[k].whiten((J @ step)[:, :, None])[:, :, 0]
         self._expected = self.likelihood(e0 - change, k, rows) - self.likelihood(e0, k, rows)

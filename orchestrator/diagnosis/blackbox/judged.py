@@ -12,6 +12,7 @@ from orchestrator.diagnosis.blackbox.estimates import (
     FoundEffect,
     OutputMisfit,
     ValueEstimate,
+    as_told,
     errors_of,
     estimates_of,
     misfits,
@@ -26,7 +27,7 @@ from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.diagnosis.blackbox.rest import Rest, rest_of
 from orchestrator.diagnosis.blackbox.search import BoxSearch
 from orchestrator.diagnosis.blackbox.settings import BoxSearchSettings, RestSettings
-from orchestrator.diagnosis.blackbox.sites import alike_one_way, of_its_hold
+from orchestrator.diagnosis.blackbox.sites import alike_at_input, alike_one_way
 from orchestrator.diagnosis.blackbox.verdict import recovered
 from orchestrator.diagnosis.blackbox.whole import doubted, on_all_rows, on_finer_steps
 
@@ -123,16 +124,16 @@ def judged(
         for k, fewer in _with_one_less(problem, fitter, base, best, settings):
             others = families[:k] + families[k + 1 :]
             return judged(problem, probe, search, base, fewer, others, begun, settings)
-    one_way = alike_one_way(problem)
+    one_way, like = alike_one_way(problem), alike_at_input(problem, best.model.effects, values)
     families = tuple(
-        tuple(dict.fromkeys((*family, *one_way.get(e.label, ()), *of_its_hold(problem, e, values[k][0].value))))
+        tuple(dict.fromkeys(label for label in (*family, *one_way.get(e.label, ()), *like[k]) if label != e.label))
         for k, (e, family) in enumerate(zip(best.model.effects, families, strict=True))
     )
     stages = _stages(problem, base, last)
     on_held_out = held_out(problem, stages, fitter.parts.held_out, settings)
     gained = best.total - base.total
     verdict, rest = _verdict(search, last, values, rest, refuted, on_held_out, gained, settings)
-    named = tuple(FoundEffect(e, values[k], gained, families[k]) for k, e in enumerate(last.model.effects))
+    named = tuple(FoundEffect(e, as_told(e, values[k]), gained, families[k]) for k, e in enumerate(last.model.effects))
     suspects = tuple(e.label for e in best.model.effects) if verdict == "unknown" else ()
     if suspects:
         suspects += tuple(dict.fromkeys(label for family in families for label in family))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.model import Data
 from orchestrator.diagnosis.blackbox.probe_settings import ProbeSettings
+from orchestrator.diagnosis.blackbox.problem import BoxProblem
 
 Array = NDArray[np.float64]
 
@@ -23,7 +24,8 @@ def noise_of(
     """Return the noise of each output: as given, else from third differences of what no model should follow.
 
     A data sheet knows the encoder, not the counts, the cable and the differentiator behind it: where the record shows
-    more than the map says, that is believed. Far more is something that moves. Less may be noise that was filtered.
+    more than the map says, that is believed. Far more is something that moves, and so is more at a rate that was
+    brought down. Less may be noise that was filtered.
 
     Args:
         given: the map.
@@ -42,7 +44,7 @@ def noise_of(
             found.append(max(rough, 1e-9 * float(np.max(np.abs(measured))), 1e-300))
             continue
         said = entry.noise * abs(entry.factor)
-        believed = least * said < rough <= settings.loudest * said
+        believed = data.factor == 1 and least * said < rough <= settings.loudest * said
         found.append(rough if believed else said)
         if believed:
             used = "that is used"
@@ -56,6 +58,27 @@ def noise_of(
                 f"{rough / abs(entry.factor):.3g}: {used}"
             )
     return np.array(found), tuple(notes)
+
+
+def begins_elsewhere(problem: BoxProblem, y: Array, settings: ProbeSettings) -> tuple[str, ...]:
+    """Return a sentence for each output that is far from its run in the first rows: few effects are so quick.
+
+    Args:
+        problem: the FMU and the record, its noise known.
+        y: (n, outputs) the run of the nominal model.
+        settings: of the probes.
+
+    Returns:
+        The sentences.
+    """
+    rows = settings.first_rows if problem.data.factor == 1 else 1
+    off = np.max(np.abs(problem.residual(y)[:rows]), axis=0)
+    return tuple(
+        f"output `{name}` is {times:.0f} times its noise off in its first rows: it has an offset, or the record does "
+        "not begin where the FMU does, and what is named may be that: say where in [start], or cut it to begin at rest"
+        for name, times in zip(problem.outputs, off, strict=True)
+        if times > settings.away
+    )
 
 
 def third_differences(trace: Array) -> Array:

@@ -17,6 +17,10 @@ class ProbeSettings(Settings, frozen=True):
     quieter: Annotated[float, setting("times a record's noise from which that of its map is told to be more", ge=1)] = (
         2.0
     )
+    first_rows: Annotated[int, setting("rows in which a record shows where it begins, at rest or in motion", ge=1)] = 3
+    away: Annotated[
+        float, setting("times its noise that an output is off in the first rows, from which the start is another", ge=1)
+    ] = 30.0
     fewest: Annotated[int, setting("runs that the probes and the first fit take", ge=1)] = 20
     fewest_each: Annotated[int, setting("further runs for each uncertain value", ge=0)] = 6
     slow: Annotated[float, setting("seconds of a run from which the user is told")] = 0.5

@@ -53,10 +53,7 @@ def read_data(path: Path, given: Map, settings: ReadSettings = DEFAULT.read) -> 
     step = (time[-1] - time[0]) / (len(time) - 1)
     off = np.abs(time - time[0] - step * np.arange(len(time)))
     if not step > 0.0 or float(off.max()) > settings.uneven * step * np.sqrt(len(time)):
-        row = int(np.argmax(off)) + 1
-        raise RecordError(
-            f"{path}: row {row}: time must grow by {step:.6g} s from row to row, but is {time[row - 1]:g}"
-        )
+        raise RecordError(f"{path}: {_unevenness(time, settings)}")
     inputs = [
         e.factor * _column(path, header, rows, e.column, f"$.inputs.{name}.column") for name, e in given.inputs.items()
     ]
@@ -76,6 +73,26 @@ def read_data(path: Path, given: Map, settings: ReadSettings = DEFAULT.read) -> 
     ]
     others = np.column_stack(signals) if signals else np.zeros((len(even), 0))
     return Data(even, np.column_stack(inputs), np.column_stack(outputs), str(path), others)
+
+
+def _unevenness(time: Array, settings: ReadSettings) -> str:
+    """Return what is wrong with times that do not grow evenly, in words."""
+    grown = np.diff(time)
+    usual = float(np.median(grown))
+    if not usual > 0.0:
+        return f"column of times must grow from row to row, but most rows grow by {usual:g} s"
+    steps = grown / usual
+    odd = np.abs(steps - 1.0) > settings.lost
+    whole = bool(np.all(np.abs(steps[odd] - np.rint(steps[odd])) < settings.whole))
+    said = f"time must grow by {usual:.6g} s from row to row, but"
+    if not odd.any() or not whole:
+        worst = float(np.max(np.abs(grown - usual)))
+        return (
+            f"{said} is up to {worst:.3g} s off: where the stamps alone jitter, put {usual:.6g} s times the row there"
+        )
+    row = int(np.argmax(odd))
+    what = "is a row there twice?" if steps[row] < settings.lost else "rows are missing: keep the part before or after"
+    return f"row {row + 2}: {said} grows by {grown[row]:.6g} s, from {time[row]:.10g} to {time[row + 1]:.10g}: {what}"
 
 
 def _split(path: Path) -> tuple[list[str], list[list[str]]]:

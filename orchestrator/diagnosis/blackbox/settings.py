@@ -250,6 +250,7 @@ class PlaceSettings(Settings, frozen=True):
         float, share("of a port's travel that it may go back, and still turns one way: friction is a load then")
     ] = 0.01
     half_a_row: Annotated[float, share("by which a delay may miss half a row, and may be a matter of the hold")] = 0.05
+    as_wide: Annotated[float, setting("standard errors within which a dead zone is as wide as an offset")] = 3.0
     least_phase: Annotated[float, setting("radians of a ripple within the motion, from which it is no spring")] = 4.0
     most_cycles: Annotated[int, setting("wavenumbers that are looked through", ge=1)] = 500
     once: Annotated[float, share("of a turn by which a ripple must differ from gravity, which comes once a turn")] = (
@@ -326,6 +327,8 @@ class ReadSettings(Settings, frozen=True):
 
     least_rows: Annotated[int, setting("rows that a record must have: half of them are fitted", ge=8)] = 100
     uneven: Annotated[float, share("of a sample by which a time may be off")] = 0.01
+    lost: Annotated[float, share("of a sample by which a step of time shows that a row is lost or there twice")] = 0.5
+    whole: Annotated[float, share("of a sample by which it may miss whole ones then: else the stamps jitter")] = 0.1
 
 
 class BoxRateSettings(Settings, frozen=True):

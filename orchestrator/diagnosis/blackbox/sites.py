@@ -1,5 +1,7 @@
 """Where effects could act around an FMU, and how large the signals there are."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,7 @@ from orchestrator.diagnosis.blackbox.bank import (
     BoxEffect,
     Surroundings,
 )
+from orchestrator.diagnosis.blackbox.estimates import ValueEstimate
 from orchestrator.diagnosis.blackbox.followed import Motion, measured_motions
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
 
@@ -171,20 +174,34 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def of_its_hold(problem: BoxProblem, effect: BoxEffect, value: float) -> tuple[str, ...]:
-    """Return what says that an input which is late by half a row may be held instead of late.
+def alike_at_input(
+    problem: BoxProblem, effects: Sequence[BoxEffect], values: Sequence[Sequence[ValueEstimate]]
+) -> tuple[tuple[str, ...], ...]:
+    """Return what effects at an input stand for that is none of the bank, for each of them.
 
-    Straight lines between rows lie half a row ahead of values that are held.
+    Straight lines between rows lie half a row ahead of values that are held: an input that is late by that may be held
+    (``hold``). An offset and a dead zone as wide leave one direction as it is, and nothing of the other: an input that
+    goes one way only (``one_way``).
 
     Args:
         problem: the FMU and the record.
-        effect: that was found.
-        value: its first one [s].
+        effects: that were found.
+        values: of each.
 
     Returns:
-        ``hold@`` and the input; empty where that is no reading of it.
+        Labels, with ``@`` and the input.
     """
-    if effect.kind.name not in ("input_delay", "input_lag") or problem.map.inputs[effect.place].hold != "linear":
-        return ()
-    half = 0.5 * problem.data.step / problem.data.factor
-    return (f"hold@{effect.place}",) if abs(value - half) < problem.settings.place.half_a_row * half else ()
+    own, half = problem.settings.place, 0.5 * problem.data.step / problem.data.factor
+    found: list[tuple[str, ...]] = []
+    for effect, estimates in zip(effects, values, strict=True):
+        name, place, value = effect.kind.name, effect.place, estimates[0]
+        labels: list[str] = []
+        if name in ("input_delay", "input_lag") and problem.map.inputs[place].hold == "linear":
+            labels += [f"hold@{place}"] if abs(value.value - half) < own.half_a_row * half else []
+        for other, (size, *_) in zip(effects, values, strict=True):
+            if other.place == place and {name, other.kind.name} == {"input_offset", "input_dead_zone"}:
+                spread = own.as_wide * float(np.hypot(value.standard_error, size.standard_error))
+                apart = abs(abs(value.value) - abs(size.value))
+                labels += [f"one_way@{place}"] if apart < spread + own.half_a_row * abs(size.value) else []
+        found.append(tuple(labels))
+    return tuple(found)

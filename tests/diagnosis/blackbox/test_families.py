@@ -9,7 +9,6 @@ from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
-from orchestrator.diagnosis.blackbox.sites import of_its_hold
 from orchestrator.diagnosis.blackbox.steps import SearchStep
 from orchestrator.diagnosis.blackbox.verdict import settled_names
 
@@ -176,21 +175,3 @@ def test_beside_noise_a_rival_starts_from_what_it_promises_too(monkeypatch) -> N
     assert told(0.0) == ((),)
     assert told(0.02, unit="W") == (("coulomb_friction@p",),)  # heat has no friction
     assert told(0.02) == (("input_offset@p",),)  # every machine has: it stands for the offset
-
-
-@pytest.mark.parametrize(
-    ("name", "hold", "value", "said"),
-    [
-        ("input_delay", "linear", 0.0051, True),
-        ("input_lag", "linear", 0.0049, True),
-        ("input_delay", "linear", 0.0056, False),
-        ("input_delay", "zero", 0.005, False),
-        ("input_gain", "linear", 0.005, False),
-    ],
-)
-def test_a_delay_of_half_a_row_may_be_a_matter_of_the_hold(name: str, hold: str, value: float, said: bool) -> None:
-    problem = SimpleNamespace(
-        map=SimpleNamespace(inputs={"u": SimpleNamespace(hold=hold)}),
-        data=SimpleNamespace(step=0.04, factor=4), settings=DEFAULT,
-    )  # fmt: skip
-    assert of_its_hold(problem, BoxEffect(BANK[name], "u", SCENE), value) == (("hold@u",) if said else ())
