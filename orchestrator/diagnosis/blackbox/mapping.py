@@ -90,6 +90,8 @@ class Options(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     tolerance: float | None = None
     time: str = "time"
+    time_factor: float = 1.0
+    """Seconds in a unit of that column: 1e-3 for milliseconds."""
     substeps: int = 4
     """Communication steps in a sample."""
     budget: float = 600.0
@@ -197,6 +199,8 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
         if not math.isfinite(signal.reference):
             raise ScenarioError(f"{source}: $.signals.{name}.reference must be finite, but is {signal.reference!r}")
     _check_connections(written, subject, look)
+    if not 0.0 < written.options.time_factor < math.inf:
+        raise ScenarioError(f"{source}: $.options.time_factor must be positive, but is {written.options.time_factor:g}")
     if not 1 <= written.options.substeps <= 1000:
         raise ScenarioError(f"{source}: $.options.substeps must be 1 to 1000, but is {written.options.substeps}")
     uncertain: list[ModelParameter] = []

@@ -47,7 +47,7 @@ def read_data(path: Path, given: Map, settings: ReadSettings = DEFAULT.read) -> 
         RecordError: the file is missing or unreadable, a column is not there, or its values cannot be used.
     """
     header, rows = _split(path)
-    time = _column(path, header, rows, given.options.time, "$.options.time")
+    time = given.options.time_factor * _column(path, header, rows, given.options.time, "$.options.time")
     if len(time) < settings.least_rows:
         raise RecordError(f"{path}: must have at least {settings.least_rows} rows, but has {len(time)}")
     step = (time[-1] - time[0]) / (len(time) - 1)

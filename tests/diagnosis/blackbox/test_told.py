@@ -10,9 +10,10 @@ from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.estimates import ValueEstimate, as_told, errors_of
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.diagnosis.blackbox.mapping import Options
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.noise import begins_elsewhere
-from orchestrator.diagnosis.blackbox.reading import _unevenness
+from orchestrator.diagnosis.blackbox.reading import _unevenness, read_data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
 from orchestrator.diagnosis.blackbox.sites import alike_at_input
 from orchestrator.shared.output import staged
@@ -132,3 +133,13 @@ def test_a_step_that_is_no_number_is_none():
     fitter = object.__new__(Fitter)
     fitter.step = lambda *words: np.array([np.nan])
     assert fitter._moved(BoxModel(np.zeros(1)), NONE, np.ones((1, 1, 1)), 0, slice(0, 1), 0.0, 0.0, 1) is None
+
+
+def test_times_in_milliseconds_are_read_as_seconds(tmp_path):
+    rows = "\n".join(f"{5 * k},{k % 7},{k % 5}" for k in range(400))
+    (tmp_path / "r.csv").write_text(f"ms,u,y\n{rows}\n")
+    entry = SimpleNamespace(column="u", factor=1.0), SimpleNamespace(column="y", factor=1.0)
+    given = SimpleNamespace(
+        options=Options(time="ms", time_factor=1e-3), inputs={"u": entry[0]}, outputs={"y": entry[1]}, signals={}
+    )
+    assert read_data(tmp_path / "r.csv", given).step == pytest.approx(5e-3)
