@@ -57,6 +57,9 @@ class BoxSearchSettings(Settings, frozen=True):
     surely: Annotated[
         float, setting("times the gain that names an effect, from which linearisation alone tells that it is needed")
     ] = 5.0
+    ahead_of_it: Annotated[
+        float, share("of what is missing, that inputs which come a little earlier must explain for it to be said")
+    ] = 0.8
     rest: Annotated[float, share("of its gain, what others must promise once one explains the record")] = 0.3
     most: Annotated[int, setting("effects that are named at most", ge=0)] = 4
     beam: Annotated[int, setting("models that are carried on", ge=1)] = 2

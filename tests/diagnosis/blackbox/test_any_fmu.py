@@ -87,11 +87,21 @@ def test_where_nothing_is_hidden_nothing_is_named(made, disturbance):
     assert not found.effects
 
 
+def test_outputs_that_come_before_their_inputs_are_told(made):
+    case, path, *files = made(SPRING)
+    write_record(path, dataclasses.replace(case, y=np.vstack([case.y[1:], case.y[-1:]])))
+    found = diagnose(path, *files)
+    found.close()
+    assert found.verdict == "unknown"
+    assert any("inputs were logged a row late" in warning for warning in found.warnings)
+
+
 def test_a_load_that_comes_is_unknown_and_says_when(made):
     case, *files = made(SPRING, ("unknown_coming_load",))
     found = diagnose(*files)
     found.close()
     assert found.verdict == "unknown"
+    assert not any("earlier" in warning for warning in found.warnings)
     assert not found.effects
     assert found.outcome.where
     assert case.sizes[0] > 0.0
