@@ -40,6 +40,5 @@ def comes_ahead(search: BoxSearch, base: BoxFit) -> tuple[str, ...]:
     _, explains, words = max(found, default=(0.0, 0.0, ""))
     if explains < search.settings.ahead_of_it:
         return ()
-    return (
-        f"{100.0 * min(explains, 1.0):.0f} % of what is missing would be explained by inputs that come earlier by {words}",
-    )
+    much = 100.0 * min(explains, 1.0)
+    return (f"{much:.0f} % of what is missing would be explained by inputs that come earlier by {words}",)

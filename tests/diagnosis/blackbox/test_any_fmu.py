@@ -93,7 +93,7 @@ def test_outputs_that_come_before_their_inputs_are_told(made):
     found = diagnose(path, *files)
     found.close()
     assert found.verdict == "unknown"
-    assert any("inputs were logged a row late" in warning for warning in found.warnings)
+    assert any("inputs were logged a row late" in warning for warning in found.outcome.warnings)
 
 
 def test_a_load_that_comes_is_unknown_and_says_when(made):
@@ -101,7 +101,7 @@ def test_a_load_that_comes_is_unknown_and_says_when(made):
     found = diagnose(*files)
     found.close()
     assert found.verdict == "unknown"
-    assert not any("earlier" in warning for warning in found.warnings)
+    assert not any("earlier" in warning for warning in found.outcome.warnings)
     assert not found.effects
     assert found.outcome.where
     assert case.sizes[0] > 0.0
@@ -167,7 +167,7 @@ def test_a_calibration_of_what_misses_an_effect_is_red_and_its_file_is_of_its_ty
     assert not found.explained
     assert found.trust.level == "red"
     assert found.settings["calibration"]["learned"] == 0.99
-    assert any("hardly determined" in text for text in found.warnings)
+    assert any("hardly determined" in text for text in found.outcome.warnings)
 
 
 def test_a_drafted_map_can_be_used_as_it_is(made, tmp_path):
