@@ -66,6 +66,7 @@ class FmuDiagnosisResult(Result):
     """
 
     command: ClassVar[str] = "diagnose"
+    replaces: ClassVar[tuple[str, ...]] = ("corrected.ssp",)
     outcome: BoxOutcome
     arguments: Mapping[str, Any] = field(default_factory=dict)
     delivered: list[Delivered] = field(default_factory=list)

@@ -28,6 +28,8 @@ class Result:
     """
 
     command: ClassVar[str]
+    replaces: ClassVar[tuple[str, ...]] = ()
+    """Files that not every result of the command has: those of an earlier one do not stay."""
     arguments: Mapping[str, Any]
 
     @property
@@ -95,7 +97,7 @@ class Result:
             OutputError: the folder cannot be written.
         """
         place = Path(out)
-        with staged(place) as folder:
+        with staged(place, self.replaces) as folder:
             self.write(folder, place)
         return place / "report.html"
 

@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _any_fmu(args: argparse.Namespace) -> int:
     """Diagnose an FMU that is not ours, or several, or draft the map."""
-    from orchestrator.api.any_fmu import draft_map
+    from orchestrator.api.any_fmu import FmuDiagnosisResult, draft_map
 
     if len(args.records) > 1:
         raise ScenarioError("`records` must be one with an FMU of others", "records")
@@ -141,7 +141,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
         return 0
     if args.map is None:
         raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
-    with staged(args.out, replaces=("corrected.ssp",)) as folder:
+    with staged(args.out, FmuDiagnosisResult.replaces) as folder:
         found = diagnose(
             path, fmu, args.map, validate=args.validate, settings=args.settings,
             progress=lambda done, expected, what: say(what),
