@@ -33,8 +33,8 @@ def comes_ahead(search: BoxSearch, base: BoxFit) -> tuple[str, ...]:
     for moved, words in ((replace(data, inputs=between), HELD), (replace(data, outputs=behind), LOGGED)):
         other = Fitter(replace(problem, data=moved), fitter.ladder, fitter.parts, fitter.settings)
         again = other.fit(base.model, base.level)
-        if again is not None:
-            again = other.settled(again)
+        again = None if again is None else other.settled(again)
+        if again is not None and again.total - base.total > search.settings.pays:
             explains = recovered(base, again, len(problem.outputs), len(fitter.parts.looked_at))
             found.append((again.total, explains, words))
     _, explains, words = max(found, default=(0.0, 0.0, ""))
