@@ -16,7 +16,7 @@ from .port_laws import across, built_up, cuts, distance_of, has_memory, resistan
 FEEDBACK = "feedback"
 SERIES = (
     "gain", "offset", "delay", "lag", "saturation", "dead_zone", "rate_limit", "quantisation", "drift", "dependence",
-    "connection",
+    "connection", "late_reading",
 )  # fmt: skip
 
 
@@ -146,6 +146,8 @@ class AttachedEffect(Fmi2Slave):
             return value * round(u / value) if value > 0.0 else u
         if kind == "delay":
             return self._delayed(u, step, value)
+        if kind == "late_reading":
+            return self._late(u, step, value)
         if kind == "lag":
             if value <= 0.0:
                 return u
@@ -164,6 +166,28 @@ class AttachedEffect(Fmi2Slave):
         if last > whole + 2:
             del self._past[0]
         return (1.0 - share) * newer + share * older
+
+    def _late(self, u: float, step: float, delay: float) -> float:
+        """Return what was to be read ``delay`` earlier, by a cubic through four samples.
+
+        ``q1``: steps in a sample of the inputs: where it is 3 or more, no cubic reaches beyond a jump of these.
+        """
+        self._past.append(u)
+        now, per_sample = self._steps + 1, int(self.q1)
+        if len(self._past) > int(delay / step) + per_sample + 5:
+            del self._past[0]
+        oldest = now - len(self._past) + 1
+        place = max(now - delay / step, float(oldest))
+        first = int(place) - 1
+        if per_sample >= 3:
+            begin = per_sample * int(place / per_sample)
+            first = min(max(first, begin), begin + per_sample - 3)
+        first = min(max(first, oldest), now - 3)
+        if first < oldest:
+            return self._past[int(place) - oldest]
+        t, (a, b, c, d) = place - first, self._past[first - oldest : first - oldest + 4]
+        ends = d * t * (t - 1) * (t - 2) / 6 - a * (t - 1) * (t - 2) * (t - 3) / 6
+        return ends + b * t * (t - 2) * (t - 3) / 2 - c * t * (t - 1) * (t - 3) / 2
 
     def _limited(self, u: float, step: float, rate: float) -> float:
         gap = u - self._held

@@ -143,6 +143,8 @@ def parts_of(outcome: BoxOutcome) -> tuple[Part, ...]:
                 given["q2"] = problem.map.signals[effect.signal].reference
         else:
             given |= {"series": SERIES.index(effect.kind.name.partition("_")[2]), "law": 0, "at_rest": effect.at_rest}
+            if effect.kind.name == "output_delay":
+                given |= {"series": SERIES.index("late_reading"), "q1": float(problem.m)}
         found.append(Part(f"{effect.kind.name}_{k + 1}", effect, given))
     return tuple(found)
 

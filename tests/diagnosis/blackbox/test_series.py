@@ -78,6 +78,23 @@ def test_the_effect_fmu_does_what_was_fitted(signal, kind, value):
         compare(signal + 0.7, kind, value, at_rest)
 
 
+@pytest.mark.parametrize("delay", [0.31, 1.0, 2.6, 4.0, 9.7])
+@pytest.mark.parametrize("m", [1, 2, 4, 8])
+def test_the_effect_fmu_reads_an_output_as_late_as_was_fitted(signal, delay, m):
+    effect = AttachedEffect(instance_name="effect")
+    effect.series, effect.q0, effect.q1 = SERIES.index("late_reading"), delay * STEP, float(m)
+    effect.exit_initialization_mode()
+    found = []
+    for k, u in enumerate(signal[1:]):
+        effect.signal = float(u)
+        assert effect.do_step(k * STEP, STEP)
+        found.append(effect.result)
+    fitted = series.later(signal, STEP, delay * STEP, m)
+    rows = np.arange(4 * m + 16, len(signal), m)  # those that are compared: what lies between sees no jump ahead
+    error = np.abs(np.array(found)[rows - 1] - fitted[rows])
+    assert np.max(error) < (1e-12 if m >= 3 or delay >= 2.0 else 0.5 * np.max(np.abs(np.diff(signal, 2))))
+
+
 def compare(signal, kind, value, at_rest):
     effect = AttachedEffect(instance_name="effect")
     effect.series, effect.q0, effect.at_rest = SERIES.index(kind), value, at_rest
