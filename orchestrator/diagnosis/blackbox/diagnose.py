@@ -14,7 +14,7 @@ from orchestrator.diagnosis.blackbox.judged import BoxOutcome, judged
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.mapping import Map
 from orchestrator.diagnosis.blackbox.model import Data
-from orchestrator.diagnosis.blackbox.noise import begins_elsewhere, noise_of
+from orchestrator.diagnosis.blackbox.noise import begins_elsewhere, lone_rows, noise_of
 from orchestrator.diagnosis.blackbox.parts import BoxParts, interleaved, parts_of
 from orchestrator.diagnosis.blackbox.probing import Probe, opened, reduced
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
@@ -66,7 +66,7 @@ def prepared(
     data = problem.data
     noise, notes = noise_of(given, data, [data.outputs, data.outputs - y], settings.probe)
     problem.noise = np.sqrt(noise**2 + probe.solver_error**2)
-    notes += begins_elsewhere(problem, y, settings.probe)
+    notes += begins_elsewhere(problem, y, settings.probe) + lone_rows(problem, y, settings.probe)
     return problem, replace(probe, notes=probe.notes + notes)
 
 

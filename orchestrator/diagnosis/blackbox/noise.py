@@ -81,6 +81,34 @@ def begins_elsewhere(problem: BoxProblem, y: Array, settings: ProbeSettings) -> 
     )
 
 
+def lone_rows(problem: BoxProblem, y: Array, settings: ProbeSettings) -> tuple[str, ...]:
+    """Return a sentence for each output with rows that leave their neighbours far behind, if few.
+
+    Args:
+        problem: the FMU and the record, its noise known.
+        y: (n, outputs) the run of the nominal model.
+        settings: of the probes.
+
+    Returns:
+        The sentences.
+    """
+    left = problem.residual(y)
+    off = np.abs(left[1:-1] - 0.5 * (left[:-2] + left[2:]))
+    padded = np.pad(off, ((1, 1), (0, 0)))
+    # Beside a row alone its neighbours are off by half as much; at a jump that stays two are off by as much.
+    lone = (off > settings.alone) & (off > 1.5 * padded[:-2]) & (off > 1.5 * padded[2:])
+    found = []
+    for name, times, rows in zip(problem.outputs, off.T, lone.T, strict=True):
+        if 0 < np.count_nonzero(rows) <= settings.few * len(rows):
+            worst = int(np.argmax(times))
+            found.append(
+                f"output `{name}` leaves its neighbours by {times[worst]:.0f} times its noise in one row at "
+                f"{problem.data.time[worst + 1]:.6g} s (so many: {np.count_nonzero(rows)}): outliers of the log make a "
+                "verdict `unknown`, and should be mended there"
+            )
+    return tuple(found)
+
+
 def third_differences(trace: Array) -> Array:
     """Return the standard deviation of white noise that has the third differences of signals.
 

@@ -21,6 +21,10 @@ class ProbeSettings(Settings, frozen=True):
     away: Annotated[
         float, setting("times its noise that an output is off in the first rows, from which the start is another", ge=1)
     ] = 30.0
+    alone: Annotated[float, setting("times its noise by which a row leaves its neighbours, to be an outlier", ge=1)] = (
+        20.0
+    )
+    few: Annotated[float, share("of the rows that are outliers at most: more are the motion's own")] = 0.01
     fewest: Annotated[int, setting("runs that the probes and the first fit take", ge=1)] = 20
     fewest_each: Annotated[int, setting("further runs for each uncertain value", ge=0)] = 6
     slow: Annotated[float, setting("seconds of a run from which the user is told")] = 0.5

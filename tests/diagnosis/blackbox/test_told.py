@@ -12,7 +12,7 @@ from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.mapping import Options
 from orchestrator.diagnosis.blackbox.model import BoxModel
-from orchestrator.diagnosis.blackbox.noise import begins_elsewhere
+from orchestrator.diagnosis.blackbox.noise import begins_elsewhere, lone_rows
 from orchestrator.diagnosis.blackbox.reading import _unevenness, read_data
 from orchestrator.diagnosis.blackbox.settings import DEFAULT
 from orchestrator.diagnosis.blackbox.sites import alike_at_input
@@ -93,6 +93,22 @@ def test_a_record_that_begins_elsewhere_is_told(factor, row, said):
     notes = begins_elsewhere(problem, np.zeros((50, 2)), DEFAULT.probe)
     assert len(notes) == said
     assert all("`v` is 100 times" in note and "[start]" in note for note in notes)
+
+
+@pytest.mark.parametrize(("rows", "said"), [([], False), ([20], True), ([20, 200], True), ([20, 21, 22], False)])
+def test_a_row_that_leaves_its_neighbours_is_told(rows, said):
+    residual = np.random.default_rng(1).standard_normal((400, 2)) + np.linspace(0.0, 900.0, 400)[:, None]
+    residual[rows, 1] += 60.0
+    if len(rows) == 3:
+        residual[23:, 1] += 60.0  # a jump that stays
+    problem = SimpleNamespace(
+        outputs=["x", "v"], data=SimpleNamespace(time=0.1 * np.arange(400)), residual=lambda y: residual + y
+    )
+    notes = lone_rows(problem, np.zeros((400, 2)), DEFAULT.probe)
+    assert len(notes) == said
+    assert all("`v`" in note and f"(so many: {len(rows)})" in note for note in notes)
+    residual[::9, 1] += 60.0
+    assert not lone_rows(problem, np.zeros((400, 2)), DEFAULT.probe)  # what comes often is the motion's own
 
 
 def test_a_file_of_an_earlier_run_goes_where_this_one_writes_none(tmp_path):
