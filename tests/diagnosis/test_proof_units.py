@@ -242,16 +242,6 @@ def test_a_start_that_needs_several_steps_gets_them() -> None:
     assert once.rms[0] > 1.5 * found.rms[0]
 
 
-def test_a_linear_run_is_differenced_once(monkeypatch) -> None:
-    likelihood, p = axis_likelihood(200)
-    ran, simulated = [], proof.free_run.simulate
-    monkeypatch.setattr(proof.free_run, "simulate", lambda *words: ran.append(words[2]) or simulated(*words))
-    found = free_run(AXIS, p, np.array([0.2, 6.0, 0, 0, 0, 0, 0, 0]), likelihood.signals, slice(0, 200), FREE_RUN)
-    assert found.rms[0] < 1.1 * likelihood.signals.noise[0]
-    assert found.straight
-    assert len(ran) == 4  # the guess, its angle and its speed moved, and the step that they foretell
-
-
 @pytest.mark.parametrize(("growing", "lengths"), [((0.2,), [150, 30, 150]), ((0.01, 0.4, 1.0), [150, 10, 60, 150])])
 def test_growing_parts_are_shares_of_the_part(monkeypatch, growing: tuple[float, ...], lengths: list[int]) -> None:
     likelihood, p = axis_likelihood(200, effects__coulomb_friction__motor__torque=3.0)

@@ -175,7 +175,7 @@ def _closest(
     damping = Damping(settings.damping, 0.0, lambda H: settings.fade * float(np.trace(H)), settings.tries)
     (start, out), _ = damped_fit(
         (first, outputs(first)), linearise, damping, settings.iterations,
-        lambda gain, after: gain < settings.enough * after or abs(foretold[-1] - 1.0) < settings.enough,
+        lambda gain, after: gain == 0.0 or gain < settings.enough * after,
     )  # fmt: skip
     straight = bool(foretold) and abs(foretold[0] - 1.0) < settings.straight
     error = np.sqrt(np.mean((out - measured) ** 2, axis=0))

@@ -167,7 +167,7 @@ def test_a_calibration_of_what_misses_an_effect_is_red_and_its_file_is_of_its_ty
     assert not found.explained
     assert found.trust.level == "red"
     assert found.settings["calibration"]["learned"] == 0.99
-    assert any("hardly determined" in text for text in found.outcome.warnings)
+    assert any("hardly determined" in text for text in found.warnings)
 
 
 def test_a_drafted_map_can_be_used_as_it_is(made, tmp_path):

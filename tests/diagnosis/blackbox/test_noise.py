@@ -22,7 +22,7 @@ def record(count: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
 def noise(given: float | None, seen: np.ndarray, *traces: np.ndarray, factor: float = 1.0):
     entry = SimpleNamespace(noise=given, factor=factor)
     values, notes = noise_of(
-        SimpleNamespace(outputs={"y": entry}), SimpleNamespace(outputs=seen), [seen, *traces], DEFAULT.probe
+        SimpleNamespace(outputs={"y": entry}), SimpleNamespace(outputs=seen, factor=1), [seen, *traces], DEFAULT.probe
     )
     return float(values[0]), notes
 
