@@ -118,14 +118,9 @@ def _any_fmu(args: argparse.Namespace) -> int:
     if args.scenario is not None and (args.fmu is not None or args.scenario.suffix.lower() != ".toml"):
         raise ScenarioError("`scenario` must be a TOML file, without `fmu`, but is not", "scenario", "fmu")
     fmu = args.fmu if args.scenario is None else args.scenario
-    for name in ("model", "time_limit"):
+    for name in ("model", "time_limit", "part", "resample", "rate"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
-    for name in ("part", "resample", "rate"):
-        if getattr(args, name) is not None:
-            raise ScenarioError(
-                f"`{name}` must be left out with an FMU of others, whose record is read as it is, but is given", name
-            )
     if args.no_search:
         raise ScenarioError(
             "`no_search` must be left out with an FMU of others: `calibrate` searches none", "no_search"

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.blackbox.ahead import comes_ahead
 from orchestrator.diagnosis.blackbox.bank import INPUT, PORT, BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.guiding import guided
@@ -172,7 +173,10 @@ def _diagnosed(
                 search, base, best = other, found, fewer if other.explained(fewer) else other.run(fewer, found)
     best, families = settled_names(search, best)
     free = judged(problem, probe, search, base, best, families, begun, settings.rest)
-    return free if free.verdict != "unknown" or search.late else _guided(free, progress, begun, settings)
+    if free.verdict != "unknown" or search.late:
+        return free
+    led = _guided(free, progress, begun, settings)
+    return led if led is not free else replace(free, warnings=free.warnings + comes_ahead(search, base))
 
 
 def _guided(free: BoxOutcome, progress: Progress, begun: float, settings: BoxSettings) -> BoxOutcome:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.ahead import comes_ahead
 from orchestrator.diagnosis.blackbox.bank import PARAMETER
 from orchestrator.diagnosis.blackbox.estimates import (
     FoundEffect,
@@ -139,13 +138,12 @@ def judged(
     if suspects:
         suspects += tuple(dict.fromkeys(label for family in families for label in family))
     share = recovered(base, best, len(problem.outputs), len(seen))
-    early = comes_ahead(search, base) if verdict == "unknown" and fitter.problem is problem and not search.late else ()
     return BoxOutcome(
         verdict, named if verdict == "effects" else (), suspects, parameters,
         misfits(problem, stages, fitter.parts.held_out), base.model if verdict == "unknown" else last.model,
         rest, on_held_out, probe,
         _where_of(problem, rest, settings.stands_out) if verdict == "unknown" else (),
-        _warned(probe, search, verdict, best, share) + early, base.model, problem, stages, search,
+        _warned(probe, search, verdict, best, share), base.model, problem, stages, search,
         time.monotonic() - begun, problem.runner.runs,
     )  # fmt: skip
 
