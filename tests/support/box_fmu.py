@@ -281,7 +281,7 @@ def record(domain: Domain, names: tuple, rng, n: int = 1200, scale: float = 1.0,
             size = round(20.0 * share * FINE) * fine_step
         elif name == "input_quantisation":
             size = 0.25 * share * drive
-        elif name == "unknown_dropouts":
+        elif name in ("unknown_dropouts", "sensed_input"):
             size = 0.0
         else:
             kind = KINDS[name]
@@ -294,6 +294,8 @@ def record(domain: Domain, names: tuple, rng, n: int = 1200, scale: float = 1.0,
         if name.startswith("input_"):
             arriving = _through(name, u, fine_step, size) if len(arriving) and np.array_equal(
                 arriving, np.repeat(u[:-1], FINE)) else arriving  # fmt: skip
+        if name == "sensed_input":  # straight lines between rows, which the record's rows are points of
+            arriving = np.interp((np.arange((n - 1) * FINE) + 0.5) / FINE, np.arange(n), u)
         if name == "unknown_dropouts":
             arriving = arriving.copy()
             for at in rng.integers(0, n - 10, 12):

@@ -96,6 +96,14 @@ def test_outputs_that_come_before_their_inputs_are_told(made):
     assert any("inputs were logged a row late" in warning for warning in found.outcome.warnings)
 
 
+def test_an_input_that_was_sensed_and_is_held_is_told(made):
+    _, *files = made(SPRING, ("sensed_input",))
+    found = diagnose(*files)
+    found.close()
+    assert found.verdict != "effects"
+    assert any("half a row" in warning and 'hold = "linear"' in warning for warning in found.outcome.warnings)
+
+
 def test_a_load_that_comes_is_unknown_and_says_when(made):
     case, *files = made(SPRING, ("unknown_coming_load",))
     found = diagnose(*files)
@@ -309,6 +317,17 @@ def test_an_fmu_that_goes_by_its_own_clock_is_kept_in_time(made, domain):
     assert found.verdict in ("none", "parameters")
     assert any("clock of its own" in note for note in found.outcome.probe.notes)
     assert max(misfit.corrected for misfit in found.validation) < 1.2  # a second record is compared as late
+
+
+def test_the_clock_of_an_fmu_that_rests_at_first_is_seen(made):
+    case, path, *files = made(SPRING, fault="own_clock")
+    rest = 12
+    u, y = (np.concatenate([np.zeros((rest, *v.shape[1:])), v[:-rest]]) for v in (case.u, case.y))
+    write_record(path, dataclasses.replace(case, u=u, y=y))
+    found = diagnose(path, *files)
+    found.close()
+    assert found.outcome.problem.short != 0.0
+    assert found.verdict in ("none", "parameters")
 
 
 def test_steps_are_finer_where_they_shift_what_is_well_known(made):
