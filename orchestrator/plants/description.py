@@ -107,7 +107,7 @@ class Plant:
         bank: the effects that it may lack.
         stage: returns the compiled equations.
         runner: returns the compiled, event-located simulation
-            ``run(start, p, early, late, first, h, out)``; see :mod:`orchestrator.diagnosis.proof.free_run`. The start
+            ``run(start, p, early, late, first, h, out)``; see :mod:`orchestrator.diagnosis.proof.simulation`. The start
             has the eight states and a ninth entry, the request [N.m] behind a second lag and a limited rate.
         shaft: between the two bodies; None: a single body.
         resonance: an added inertia; None: the plant has none.
@@ -119,6 +119,7 @@ class Plant:
         refused: values by name -> why records cannot be diagnosed against such a plant; "": they can.
         realised: predictor's parameters -> those of the FMU (n,), with what the predictor alone has fitted put in.
         inverse: (position, speed, acceleration, p) -> torque [N.m] that such a motion needs; None: not defined.
+        learned: a law that was learned is part of its equations.
     """
 
     name: str
@@ -142,6 +143,7 @@ class Plant:
     refused: Callable[[Mapping[str, float]], str] = _nothing_refused
     realised: Callable[[Array], Array] | None = None
     inverse: Callable[[Array, Array, Array, Array], Array] | None = None
+    learned: bool = False
     _index: dict[str, int] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
@@ -335,10 +337,7 @@ class Plant:
         Returns:
             Shape (states, states), in the order of ``states``.
         """
-        rates = self.stage().rates
-        plain = self.extended([entry.default for entry in self.table])
-        for name in self.linear:
-            plain[self.index(name)] = p[self.index(name)]
+        rates, plain = self.stage().rates, self._plain(p)
         columns = []
         for place in self.states:
             x = [0.0] * STATES
@@ -346,6 +345,25 @@ class Plant:
             rate = rates(tuple(x), (0.0, 0.0), plain, 0.0)
             columns.append([rate[s] for s in self.states])
         return np.array(columns).T
+
+    def request_column(self, p: Array) -> Array:
+        """Return (states,): what a unit request of the drive does to the rates of the linear plant.
+
+        Args:
+            p: the predictor's parameters, (n,).
+
+        Returns:
+            The column that belongs to :meth:`jacobian`.
+        """
+        rate = self.stage().rates((0.0,) * STATES, (0.0, 0.0), self._plain(p), 1.0)
+        return np.array([rate[s] for s in self.states])
+
+    def _plain(self, p: Array) -> Array:
+        """Return the predictor's parameters with every effect off."""
+        plain = self.extended([entry.default for entry in self.table])
+        for name in self.linear:
+            plain[self.index(name)] = p[self.index(name)]
+        return plain
 
     def torque_columns(self, p: Array) -> Array:
         """Return (states, sites): what a unit torque at each of :attr:`sites` does to the rates.

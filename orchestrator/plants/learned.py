@@ -196,7 +196,7 @@ def with_law(plant: Plant, clocked: bool = False) -> Plant:
         Parameter(DRY, "N.m", 0.0, 0.0, BIG, "Dry friction within the learned law"),
     )
     first = len(plant.names)
-    extended = replace(plant, nuisances=(*plant.nuisances, *added), realised=np.asarray, _index={})
+    extended = replace(plant, nuisances=(*plant.nuisances, *added), realised=np.asarray, learned=True, _index={})
     extended = replace(extended, followers=() if clocked else plant.followers, _index={})
     stage = cache(lambda: _stage(plant, first, clocked))
     extended = replace(extended, stage=stage, _index={})

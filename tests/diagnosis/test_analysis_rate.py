@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.fit.rate import analysed, decimated
-from orchestrator.diagnosis.proof.free_run import simulate
+from orchestrator.diagnosis.proof.simulation import simulate
 from orchestrator.plants.predictor import coarse_runner_of
 from orchestrator.records.record import Record, record_from_columns
 from tests.support.short_records import AXIS, DRIVETRAIN, SETTINGS, signals_from

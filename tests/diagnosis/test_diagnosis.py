@@ -13,7 +13,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.signals import signals_of
 from orchestrator.diagnosis.fit.spread import widened
 from orchestrator.diagnosis.outcome import Diagnosis
-from orchestrator.diagnosis.proof.free_run import simulate
+from orchestrator.diagnosis.proof.simulation import simulate
 from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.diagnosis.verdict.admission import check_diagnosable

@@ -12,7 +12,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.runs import Run, in_parts, in_time, stretches
 from orchestrator.diagnosis.fit.together import series
 from orchestrator.diagnosis.proof.by_record import repeats
-from orchestrator.diagnosis.proof.free_run import simulate
+from orchestrator.diagnosis.proof.simulation import simulate
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.plants.known.drivetrain import PLANT

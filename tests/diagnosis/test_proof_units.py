@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis import proof
-from orchestrator.diagnosis.proof.free_run import _steps, free_run, simulate
+from orchestrator.diagnosis.proof.free_run import _steps, free_run
 from orchestrator.diagnosis.proof.misfit import held_out_misfit, running, segments
+from orchestrator.diagnosis.proof.simulation import simulate
 from orchestrator.plants.predictor import MOST_STEPS, coarse_steps, runs_coarsely, waves_of
 from tests.support.short_records import (
     AXIS,
@@ -246,7 +247,7 @@ def test_a_start_that_needs_several_steps_gets_them() -> None:
 def test_growing_parts_are_shares_of_the_part(monkeypatch, growing: tuple[float, ...], lengths: list[int]) -> None:
     likelihood, p = axis_likelihood(200, effects__coulomb_friction__motor__torque=3.0)
     sought, closest = [], proof.free_run._closest
-    monkeypatch.setattr(proof.free_run, "_closest", lambda *words: sought.append(words[4]) or closest(*words))
+    monkeypatch.setattr(proof.free_run, "_closest", lambda *words: sought.append(words[2]) or closest(*words))
     quick = msgspec.structs.replace(FREE_RUN, iterations=1, growing=growing, close=1.0)
     guess = np.array([5.0, -40.0, 0, 0, 0, 0, 0, 0])
     found = free_run(AXIS, p, guess, likelihood.signals, slice(50, 200), quick)

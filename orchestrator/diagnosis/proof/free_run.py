@@ -1,8 +1,4 @@
-"""Free-run simulation of the exact, event-located plant over a part of a record, and the misfit that it leaves.
-
-Two bodies that rub vibrate against stiction at every oscillation of their shaft. To locate each of these events, and
-to follow other nonlinear effects to twelve digits, costs up to a hundred times what the predictor does: it runs in the
-exact plant's place there, but not where teeth meet.
+"""Free runs of a model over a part of a record, from the initial state that lies closest, and what they miss.
 
 The initial state of the simulation is not measured. It starts from the predictor's estimate at the first sample
 (which has seen earlier samples only) and is then chosen so that the simulation lies closest to the measurement:
@@ -15,14 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.runs import in_time
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.proof.settings import FreeRunSettings
+from orchestrator.diagnosis.proof.simulation import Simulation
 from orchestrator.plants.description import Plant
-from orchestrator.plants.predictor import FINER, coarse_runner_of, coarse_steps, runs_coarsely
 from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
-from pyfmu_sources.drive_request import UNASKED
 
 Array = NDArray[np.float64]
 
@@ -44,58 +38,6 @@ class FreeRun:
     straight: bool = False
 
 
-def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice, history: bool = True) -> Array:
-    """Return the simulated encoder angles (n, 2) of a part of a record.
-
-    Args:
-        plant: the plant.
-        p: its parameters.
-        start: (8,) state at the part's first sample.
-        signals: of the record; requests before the part matter when there is a dead time.
-        part: samples to simulate.
-        history: requests before the part are still under way in a dead time; False: there were none, as in an FMU
-            that starts with the part.
-
-    Returns:
-        The angles [rad].
-    """
-    begin, end, _ = part.indices(signals.size)
-    rows, place = in_time(signals.runs, begin, signals.size)
-    limit = p[plant.index(plant.drive.limit)]
-    delay = plant.value(p, plant.drive.delay)
-    u = np.clip(signals.aligned(plant, p).u[rows], -limit, limit)
-    whole = int(np.floor(delay / signals.h + 1e-9))
-    first = delay - whole * signals.h
-    at = np.arange(place, place + end - begin)
-    mean, followed = plant.followed(p, u, signals.h)
-    by_the_predictor = history and runs_coarsely(plant, p)
-    acting = mean if by_the_predictor else u
-    late, early = (_requests(acting, at - back, 0 if history else place) for back in (whole, whole + 1))
-    out = np.empty((end - begin, 2))
-    first = max(first, 0.0)
-    if by_the_predictor:
-        steps = coarse_steps(plant, p, signals.h, signals.turn)
-        coarse = coarse_runner_of(plant)
-        coarse(tuple(start.tolist()), p, early, late, first, signals.h, (steps, FINER * steps), out)
-        return _offset(plant, p, out)
-    asked = float(followed[max(place - whole, 0)])
-    memory = (float(start[7]), asked) if history else (0.0, UNASKED)
-    plant.runner()((*start[:7].tolist(), *memory), plant.own(p), early, late, first, signals.h, out)
-    return _offset(plant, p, out)
-
-
-def _offset(plant: Plant, p: Array, out: Array) -> Array:
-    """Return angles (n, 2) with the offsets of their encoders added."""
-    for channel, name in enumerate(plant.offsets):
-        out[:, channel] += p[plant.index(name)]
-    return out
-
-
-def _requests(u: Array, at: NDArray[np.int64], first: int) -> Array:
-    """Return the requests at samples ``at``; there were none before ``first``."""
-    return np.where(at >= first, u[np.maximum(at, 0)], u[0] if first == 0 else 0.0)
-
-
 def free_run(
     plant: Plant, p: Array, guess: Array, signals: Signals, part: slice, settings: FreeRunSettings, history: bool = True
 ) -> FreeRun:
@@ -111,22 +53,23 @@ def free_run(
         signals: of the record.
         part: samples to simulate.
         settings: of the search for the initial state.
-        history: as in :func:`simulate`.
+        history: as in :class:`Simulation`.
 
     Returns:
         Initial state and angles.
     """
-    first = _closest(plant, p, guess, signals, part, settings, history)
+    model = Simulation(plant, p, signals, history)
+    first = _closest(model, guess, part, settings)
     if (first.straight and not _teeth_may_part(plant, p)) or float(np.max(first.rms / signals.noise)) < settings.close:
         return first
     begin, end, _ = part.indices(signals.size)
     start, run = guess, first
     for share in settings.growing:
         length = max(round(share * (end - begin)), settings.least_samples)
-        run = _closest(plant, p, start, signals, slice(begin, begin + length), settings, history)
+        run = _closest(model, start, slice(begin, begin + length), settings)
         start = run.start
     if len(run.outputs) < len(first.outputs):
-        run = _closest(plant, p, start, signals, part, settings, history)
+        run = _closest(model, start, part, settings)
     cost, other = (float(np.sum((r.rms / signals.noise) ** 2)) for r in (first, run))
     return run if other < cost else first
 
@@ -136,16 +79,15 @@ def _teeth_may_part(plant: Plant, p: Array) -> bool:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a run that runs away is infinitely far off
-def _closest(
-    plant: Plant, p: Array, guess: Array, signals: Signals, part: slice, settings: FreeRunSettings, history: bool
-) -> FreeRun:
+def _closest(model: Simulation, guess: Array, part: slice, settings: FreeRunSettings) -> FreeRun:
     """Return the free run at which a descent from the ``guess`` of its initial state ends (damped Gauss-Newton)."""
+    plant, signals = model.plant, model.signals
     m = signals.channels
-    measured, scale = signals.aligned(plant, p).y[part, :m], signals.noise
-    free = _free_places(plant, p)
+    measured, scale = model.aligned.y[part, :m], signals.noise
+    free = _free_places(plant, model.p)
 
     def outputs(start: Array) -> Array:
-        return simulate(plant, p, start, signals, part, history)[:, :m]
+        return model.run(start, part)[:, :m]
 
     def cost(out: Array) -> float:
         return float(np.sum(((out - measured) / scale) ** 2))
@@ -200,9 +142,8 @@ def start_answers(
     """
     free, m = _free_places(plant, p), signals.channels
     steps = _steps(plant, run.start, signals, free, settings)
-    return _answers(
-        lambda start: simulate(plant, p, start, signals, part)[:, :m], run.start, run.outputs, free, steps, plant
-    )
+    model = Simulation(plant, p, signals)
+    return _answers(lambda start: model.run(start, part)[:, :m], run.start, run.outputs, free, steps, plant)
 
 
 def _answers(

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.proof.free_run import FreeRun, free_run, simulate
+from orchestrator.diagnosis.proof.free_run import FreeRun, free_run
 from orchestrator.diagnosis.proof.misfit import running
 from orchestrator.diagnosis.proof.settings import HorizonSettings
+from orchestrator.diagnosis.proof.simulation import Simulation
 from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.long_run import long_run_covariance
 from orchestrator.shared.inference.normal import of_many
@@ -227,12 +228,12 @@ def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> H
     plant, signals, proof = likelihood.plant, likelihood.signals, likelihood.settings.proof
     settings, m, h = proof.horizons, signals.channels, signals.h
     _, states = likelihood.over(signals.size).innovations(p, q)
-    stretches = signals.stretches(part)
+    model, stretches = Simulation(plant, p, signals), signals.stretches(part)
     labels, errors, plain, squares = [], [], [], []
     for span in (0.0, *settings.spans):
         reach = max(1, min(round(span / h), min(rows.stop - rows.start for rows in stretches) // 3))
         starts = _starts(stretches, reach, settings.starts)
-        ran, moved = _predicted(likelihood, p, states, starts, reach)
+        ran, moved = _predicted(model, states, starts, reach)
         labels.append(f"{1e3 * span:g} ms" if span else "one sample")
         errors.append(np.sqrt(np.mean(ran, axis=0)))
         plain.append(np.sqrt(np.mean(moved, axis=0)))
@@ -296,18 +297,15 @@ def _starts(stretches: Sequence[slice], reach: int, count: int) -> list[int]:
     return np.unique(np.concatenate(found)).tolist()
 
 
-def _predicted(
-    likelihood: RecordLikelihood, p: Array, states: Array, starts: Sequence[int], reach: int
-) -> tuple[Array, Array]:
+def _predicted(model: Simulation, states: Array, starts: Sequence[int], reach: int) -> tuple[Array, Array]:
     """Return squared errors (starts, channels) of runs over ``reach`` samples, and of a motion on at constant speed."""
-    plant, signals = likelihood.plant, likelihood.signals
-    bodies = plant.bodies[: signals.channels]
-    y = signals.aligned(plant, p).y
+    signals, y = model.signals, model.aligned.y
+    bodies = model.plant.bodies[: signals.channels]
     angles, speeds = [body.angle for body in bodies], [body.speed for body in bodies]
     ran, moved = [], []
     for start in starts:
         truth = y[start + reach, : signals.channels]
-        run = simulate(plant, p, states[start], signals, slice(start, start + reach + 1))
+        run = model.run(states[start], slice(start, start + reach + 1))
         ran.append(run[-1, : signals.channels] - truth)
         moved.append(states[start][angles] + reach * signals.h * states[start][speeds] - truth)
     return np.square(np.array(ran)), np.square(np.array(moved))

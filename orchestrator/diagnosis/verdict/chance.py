@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.proof.free_run import simulate, start_answers
+from orchestrator.diagnosis.proof.free_run import start_answers
 from orchestrator.diagnosis.proof.horizons import Runs, sure_of_one
+from orchestrator.diagnosis.proof.simulation import simulate
 from orchestrator.diagnosis.verdict.where import missing_torque
 from orchestrator.shared.inference.colour import WHITE
 

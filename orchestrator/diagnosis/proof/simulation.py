@@ -1,0 +1,134 @@
+"""A model that is run over parts of a record from given states, by the cheapest of three ways that are exact enough.
+
+Without effects the plant is linear, and each sample's motion is a matrix. Two bodies that rub vibrate against stiction
+at every oscillation of their shaft: to locate each of these events, and to follow other nonlinear effects to twelve
+digits, costs up to a hundred times what the predictor does, which runs in the exact plant's place there. Where teeth
+meet, and whatever else there is, the exact, event-located plant itself runs.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.runs import in_time
+from orchestrator.diagnosis.fit.signals import Signals
+from orchestrator.plants.description import Plant
+from orchestrator.plants.linear_run import is_linear, linear_run_of
+from orchestrator.plants.predictor import FINER, coarse_runner_of, coarse_steps, runs_coarsely
+from pyfmu_sources.drive_request import UNASKED
+
+Array = NDArray[np.float64]
+Kernel = Callable[[Array, Array, Array, Array], None]
+"""``kernel(start, early, late, out)``: requests in both pieces of each sample; fills the angles (n, 2)."""
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A model, ready to be run: what does not depend on where a run starts is done once.
+
+    Attributes:
+        plant: the plant.
+        p: its parameters.
+        signals: of the record; requests before a part matter when there is a dead time.
+        history: requests before a part are still under way in a dead time; False: there were none, as in an FMU that
+            starts with the part.
+    """
+
+    plant: Plant
+    p: Array
+    signals: Signals
+    history: bool = True
+
+    def run(self, start: Array, part: slice) -> Array:
+        """Return the simulated encoder angles (n, 2) of a part of the record.
+
+        Args:
+            start: (8,) state at the part's first sample.
+            part: samples to simulate.
+
+        Returns:
+            The angles [rad].
+        """
+        begin, end, _ = part.indices(self.signals.size)
+        rows, place = in_time(self.signals.runs, begin, self.signals.size)
+        first_row = int(rows[0])
+        if first_row not in self._acting:
+            self._acting[first_row] = self._requests_of(self.aligned.u[rows])
+        acting, asked = self._acting[first_row]
+        whole, _ = self._dead_time
+        at = np.arange(place, place + end - begin)
+        late, early = (_requests(acting, at - back, 0 if self.history else place) for back in (whole, whole + 1))
+        out = np.empty((end - begin, 2))
+        if self._kernel is not None:
+            self._kernel(start, early, late, out)
+        else:
+            self._run_exactly(start, float(asked[max(place - whole, 0)]), early, late, out)
+        for channel, name in enumerate(self.plant.offsets):
+            out[:, channel] += self.p[self.plant.index(name)]
+        return out
+
+    @cached_property
+    def aligned(self) -> Signals:
+        """The signals as they were, from how the log has them."""
+        return self.signals.aligned(self.plant, self.p)
+
+    @cached_property
+    def _acting(self) -> dict[int, tuple[Array, Array]]:
+        """By the first row of each record: what is requested in each sample, and what is at its beginning."""
+        return {}
+
+    def _requests_of(self, u: Array) -> tuple[Array, Array]:
+        limit = self.p[self.plant.index(self.plant.drive.limit)]
+        u = np.clip(u, -limit, limit)
+        mean, followed = self.plant.followed(self.p, u, self.signals.h)
+        return (u if self._kernel is None else mean), followed
+
+    @cached_property
+    def _dead_time(self) -> tuple[int, float]:
+        """Whole samples of it, and what is left [s]."""
+        delay, h = self.plant.value(self.p, self.plant.drive.delay), self.signals.h
+        whole = int(np.floor(delay / h + 1e-9))
+        return whole, max(delay - whole * h, 0.0)
+
+    @cached_property
+    def _kernel(self) -> Kernel | None:
+        """What runs in the exact plant's place; None where nothing does."""
+        plant, p, h = self.plant, self.p, self.signals.h
+        _, first = self._dead_time
+        if self.history and is_linear(plant, p):
+            return linear_run_of(plant, p, first, h)
+        if not (self.history and runs_coarsely(plant, p)):
+            return None
+        steps = coarse_steps(plant, p, h, self.signals.turn)
+        coarse = coarse_runner_of(plant)
+        return lambda start, early, late, out: coarse(
+            tuple(start.tolist()), p, early, late, first, h, (steps, FINER * steps), out
+        )
+
+    def _run_exactly(self, start: Array, asked: float, early: Array, late: Array, out: Array) -> None:
+        _, first = self._dead_time
+        memory = (float(start[7]), asked) if self.history else (0.0, UNASKED)
+        own = self.plant.own(self.p)
+        self.plant.runner()((*start[:7].tolist(), *memory), own, early, late, first, self.signals.h, out)
+
+
+def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice, history: bool = True) -> Array:
+    """Return one run (n, 2) of a model over a part of a record.
+
+    Args:
+        plant, p, signals, history: as in :class:`Simulation`.
+        start: (8,) state at the part's first sample.
+        part: samples to simulate.
+
+    Returns:
+        The angles [rad].
+    """
+    return Simulation(plant, p, signals, history).run(start, part)
+
+
+def _requests(u: Array, at: NDArray[np.int64], first: int) -> Array:
+    """Return the requests at samples ``at``; there were none before ``first``."""
+    return np.where(at >= first, u[np.maximum(at, 0)], u[0] if first == 0 else 0.0)
