@@ -23,6 +23,7 @@ from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
 from orchestrator.diagnosis.verdict.judgement import Proof
 from orchestrator.diagnosis.verdict.remainder import structured
 from orchestrator.plants.effects import Effect
+from orchestrator.shared.cores import spread
 
 Array = NDArray[np.float64]
 
@@ -229,13 +230,15 @@ def _minor(
     if not structured(left_of(likelihood, plain, efficient, best.fit, parts, lowest), settings.verdict):
         return None
     whole, scene = Parts(parts.seen, parts.validated, parts.held_out), scene_of(likelihood, best.fit)
-    found: list[tuple[float, Effect, Candidate]] = []
-    for effect in (one for one in best.effects if not one.measurement):
+
+    def without(effect: Effect) -> tuple[float, Effect, Candidate]:
         fewer = search.reduced(best, scene, effect)
         again = annealed(likelihood, fewer.fit.p, fewer.fit.q, fewer.fit.free, whole, fewer.effects)
         share = after.skill_over(horizons(likelihood, again.p, plain.q, parts.held_out), first=0)
         if torque_proof(likelihood, again, told, whole).decides(settings.search.shown, settings.verdict.good):
             share = 1.0
-        found.append((share, effect, fewer))
+        return share, effect, fewer
+
+    found = spread(without, [one for one in best.effects if not one.measurement])
     share, effect, fewer = min(found, key=lambda one: one[0], default=(math.inf, best.effects[-1], best))
     return (effect, fewer) if share < settings.verdict.proven else None

@@ -229,15 +229,16 @@ def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> H
     settings, m, h = proof.horizons, signals.channels, signals.h
     _, states = likelihood.over(signals.size).innovations(p, q)
     model, stretches = Simulation(plant, p, signals), signals.stretches(part)
-    labels, errors, plain, squares = [], [], [], []
-    for span in (0.0, *settings.spans):
+    spans = (0.0, *settings.spans)
+
+    def ahead(span: float) -> tuple[Array, Array]:
         reach = max(1, min(round(span / h), min(rows.stop - rows.start for rows in stretches) // 3))
-        starts = _starts(stretches, reach, settings.starts)
-        ran, moved = _predicted(model, states, starts, reach)
-        labels.append(f"{1e3 * span:g} ms" if span else "one sample")
-        errors.append(np.sqrt(np.mean(ran, axis=0)))
-        plain.append(np.sqrt(np.mean(moved, axis=0)))
-        squares.append(ran)
+        return _predicted(model, states, _starts(stretches, reach, settings.starts), reach)
+
+    squares, moved = zip(*spread(ahead, spans[::-1]), strict=True)  # the longest first
+    squares, moved = squares[::-1], moved[::-1]
+    labels = [f"{1e3 * span:g} ms" if span else "one sample" for span in spans]
+    errors, plain = ([np.sqrt(np.mean(one, axis=0)) for one in each] for each in (squares, moved))
     none = np.full(m, np.nan)
 
     def closest(rows: slice) -> tuple[FreeRun, slice]:
@@ -245,20 +246,20 @@ def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> H
 
     pieces = running(part, signals, proof)
     pieces = pieces[:: math.ceil(len(pieces) / settings.most_segments)]
-    runs: list[tuple[tuple[FreeRun, slice], ...]] = []
-    if len(pieces) > 1:
-        runs.append(tuple(spread(closest, pieces)))
+    pieces = pieces if len(pieces) > 1 else []
+    ran = spread(closest, [*stretches, *pieces])  # the longest first
+    runs = [tuple(some) for some in (ran[len(stretches) :], ran[: len(stretches)]) if some]
+    if pieces:
         labels.append(f"{proof.segment:g} s")
         errors.append(np.sqrt(np.mean(np.square([run.rms[:m] for run, _ in runs[0]]), axis=0)))
         plain.append(none)
-    runs.append(tuple(spread(closest, stretches)))
     rows_of = [rows.stop - rows.start for _, rows in runs[-1]]
     whole = np.sqrt(np.average([run.rms[:m] ** 2 for run, _ in runs[-1]], axis=0, weights=rows_of))
     spreads = [np.var(signals.y[rows, :m], axis=0) for _, rows in runs[-1]]
     r_squared = np.asarray(1.0 - whole**2 / np.maximum(np.average(spreads, axis=0, weights=rows_of), 1e-300))
     return Horizons(
         (*labels, "whole part"), np.array([*errors, whole]), np.array([*plain, none]), r_squared, signals.noise,
-        tuple(squares), tuple(runs), settings,
+        squares, tuple(runs), settings,
     )  # fmt: skip
 
 

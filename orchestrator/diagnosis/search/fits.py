@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Parts, followed
+from orchestrator.diagnosis.fit.fitting import Fit, Parts, followed
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, best_settled, ladder
 from orchestrator.diagnosis.search.confirmed import most_gain
 from orchestrator.diagnosis.search.model_space import ModelSpace
@@ -49,6 +49,7 @@ class Fits(ModelSpace):
     steps: list[ForwardStep] = field(default_factory=list)
     done: int = 0
     _counting: Lock = field(default_factory=Lock)
+    _reduced: dict[tuple[object, ...], Fit] = field(default_factory=dict)
 
     def rescued(self, candidate: Candidate, current: Candidate, base: Candidate) -> Candidate:
         """Fit a candidate to both parts when it gains much on the first and fails on the second.
@@ -168,7 +169,7 @@ class Fits(ModelSpace):
         return self.candidate(begun.effects, followed(self.likelihood, begun.fit, self.parts, levels))
 
     def reduced(self, current: Candidate, scene: Scene, effect: Effect) -> Candidate:
-        """Return ``current`` without one of its effects: fitted again from there, or as it was found on the way.
+        """Return ``current`` without one of its effects: fitted again from there, once, or as it was found on the way.
 
         Args:
             current: the model to build on.
@@ -179,10 +180,14 @@ class Fits(ModelSpace):
             The candidate.
         """
         kept = tuple(e for e in current.effects if e is not effect)
-        p = self.without(current.fit.p, effect)
-        fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
-        self.tick(f"without {effect.label}")
-        return max((self.candidate(kept, fitted), *self.known(kept)), key=lambda candidate: candidate.score)
+        start, q = self.without(current.fit.p, effect), current.fit.q
+        asked = (id(self.likelihood), start.tobytes(), q, tuple(e.label for e in kept))
+        if asked not in self._reduced:
+            free = self.free(kept, scene)
+            self._reduced[asked] = annealed(self.likelihood, start, q, free, self.parts, kept)
+            self.tick(f"without {effect.label}")
+        again = self.candidate(kept, self._reduced[asked])
+        return max((again, *self.known(kept)), key=lambda candidate: candidate.score)
 
     def simplified(self, current: Candidate, scene: Scene, effect: Effect, simpler: Effect) -> Candidate:
         """Return ``current`` with a simpler law of one size in the place of one of its effects, fitted again.
