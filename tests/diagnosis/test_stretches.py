@@ -192,7 +192,7 @@ def test_a_linear_run_has_one_best_start(monkeypatch: pytest.MonkeyPatch, gap: f
     closest = module._closest
 
     def counted(*arguments, **named):  # type: ignore[no-untyped-def]
-        begun.append(arguments[4])
+        begun.append(arguments[2])
         return closest(*arguments, **named)
 
     monkeypatch.setattr(module, "_closest", counted)
