@@ -1,5 +1,6 @@
 """What a model leaves: measurement noise, noise with a small disturbance, or more."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,36 +64,36 @@ def rest_of(fitter: Fitter, fit: BoxFit, rows: slice, settings: RestSettings = D
     Returns:
         The shares, and why it counts as unexplained.
     """
-    ladder = fitter.ladder
+    ladder, outputs = fitter.ladder, fitter.problem.outputs
     e = fitter.whitened(fit.y, fit.level)[rows]
     free = fitter.whitened(fit.y, 0)[rows]
     count = e.size
     square = float(np.sum(free * free))
     explained = square < count + settings.deviations * np.sqrt(2.0 * count)
-    explained = bool(explained) and not _reasons(free, settings)
+    explained = bool(explained) and not _reasons(free, outputs, settings)
     share = ladder.share(fit.level)
-    reasons = _reasons(e, settings)
+    reasons = _reasons(e, outputs, settings)
     blocks = np.array([np.mean(part * part, axis=0) for part in np.array_split(e, settings.blocks)])
     disturbed = not explained and share <= settings.most_port_noise and not reasons
     return Rest(explained, disturbed, share, tuple(reasons), blocks)
 
 
-def _reasons(e: Array, s: RestSettings) -> list[str]:
+def _reasons(e: Array, outputs: Sequence[str], s: RestSettings) -> list[str]:
     """Return what distinguishes innovations (n, outputs) from white noise of variance 1 (less: it was overstated)."""
     found = []
     n = len(e)
-    for k in range(e.shape[1]):
-        x = e[:, k]
+    for name, own in zip(outputs, e.T, strict=True):
+        x = own
         mean_square = float(np.mean(x * x))
         if mean_square - 1.0 > s.deviations * np.sqrt(2.0 / n):
-            found.append(f"output {k + 1}: {mean_square:.2f} times the expected power")
+            found.append(f"output `{name}`: {mean_square:.2f} times the expected power")
         x = (x - x.mean()) / max(float(x.std()), 1e-300)
         lags = [float(np.mean(x[lag:] * x[:-lag])) for lag in range(1, s.lags + 1)]
         if float(np.sum(np.square(lags))) * n > s.lags + s.most_correlated * np.sqrt(2.0 * s.lags):
-            found.append(f"output {k + 1}: correlated from sample to sample")
+            found.append(f"output `{name}`: correlated from sample to sample")
         if float(np.mean(x**4)) - 3 > s.most_kurtosis:
-            found.append(f"output {k + 1}: comes in bursts")
-        parts = np.array([np.mean(p * p) for p in np.array_split(e[:, k], s.blocks)])
+            found.append(f"output `{name}`: comes in bursts")
+        parts = np.array([np.mean(p * p) for p in np.array_split(own, s.blocks)])
         if float(parts.max()) / mean_square - 1.0 > s.deviations * np.sqrt(2.0 * s.blocks / n):
-            found.append(f"output {k + 1}: changes with time")
+            found.append(f"output `{name}`: changes with time")
     return found

@@ -19,7 +19,7 @@ from orchestrator.shared.trust import Level
 SEARCH = BoxSearchSettings()
 NOISE = Rest(True, False, 0.0, (), np.ones((8, 1)))
 DISTURBED = replace(NOISE, explained=False, disturbed=True, share=1e-4)
-LEFT = replace(NOISE, explained=False, reasons=("output 1: comes in bursts",))
+LEFT = replace(NOISE, explained=False, reasons=("output `x`: comes in bursts",))
 GOOD = OutputMisfit("phi", 1e-4, 50.0, 40.0, 1.02, "rad")
 FRICTION = FoundEffect(SimpleNamespace(label="coulomb_friction@shaft"), (), 900.0, ())
 
