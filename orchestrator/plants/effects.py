@@ -54,6 +54,7 @@ class Scene:
         turns: travel of the motor in revolutions.
         lowest, highest: angles [rad] between which the load moves.
         cycles: name of a periodic effect -> cycles per revolution at the peaks of its frequency scan.
+        angles: (n,) of the load [rad], sample by sample; empty: not known.
     """
 
     h: float
@@ -69,6 +70,7 @@ class Scene:
     lowest: float
     highest: float
     cycles: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    angles: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def middle(self) -> float:

@@ -562,6 +562,19 @@ def test_a_stop_that_gives_way_is_none(stiffness: float, refused: bool) -> None:
     assert ("no stop" in implausible(DRIVETRAIN, stop, p, scene, SEARCH)) is refused
 
 
+@pytest.mark.parametrize(
+    ("angles", "refused"),
+    [((-1.0, -1.0, 0.0, 1.0), True), ((-1.0, 0.0, 1.0, -1.0), False), ((0.0, 1.0, -1.0, 0.0), False)],
+)
+def test_a_stop_that_is_touched_as_a_record_begins_alone_is_none(angles: tuple[float, ...], refused: bool) -> None:
+    stop = next(effect for effect in DRIVETRAIN.bank if effect.name == "lower_end_stop")
+    scene = Scene(0.01, 1.0, np.ones(4), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, -1.0, 1.0, angles=np.array(angles))
+    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    places = stop.places(DRIVETRAIN)
+    p[places["angle"]], p[places["stiffness"]] = -0.9, 20.0
+    assert ("never again" in implausible(DRIVETRAIN, stop, p, scene, SEARCH)) is refused
+
+
 def test_effects_that_share_a_parameter_fit_it_once() -> None:
     likelihood, p = drivetrain_likelihood()
     stops = tuple(effect for effect in DRIVETRAIN.bank if effect.name.endswith("end_stop"))

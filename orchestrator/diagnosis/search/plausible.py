@@ -29,11 +29,14 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
     travel = 2.0 * np.pi * scene.turns / (1.0 if effect.site == "motor" else scene.ratio)
     if "dissipation" in effect.parameters:
         angle, stiffness = (float(p[effect.places(plant)[short]]) for short in ("angle", "stiffness"))
-        push = stiffness * max(scene.highest - angle if angle > scene.middle else angle - scene.lowest, 0.0)
+        upper = angle > scene.middle
+        push = stiffness * max(scene.highest - angle if upper else angle - scene.lowest, 0.0)
         if push < settings.least_stop * largest:
             return (
                 f"{effect.name} ({effect.site}) would push back by {push:.3g} only, the drive by {largest:.3g}: no stop"
             )
+        if _never_again(scene.angles > angle if upper else scene.angles < angle):
+            return f"{effect.name} ({effect.site}) is touched as the record begins, and never again: no stop, a start"
     for short, place in effect.places(plant).items():
         if place >= len(plant.table):
             continue
@@ -61,3 +64,9 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
         elif effect.site == "actuator" and short == "time_constant" and value > settings.most_lag:
             return f"{what} is too slow for a drive: next to nothing of `u` would get through"
     return ""
+
+
+def _never_again(touched: NDArray[np.bool_]) -> bool:
+    """Tell whether samples (n,) are touched from the first on, and none once they have been left."""
+    left = np.flatnonzero(~touched)
+    return bool(touched.size and touched[0] and left.size and not np.any(touched[left[0] :]))

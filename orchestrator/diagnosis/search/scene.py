@@ -24,12 +24,16 @@ def scene_of(likelihood: RecordLikelihood, model: Fit) -> Scene:
     first, last = plant.bodies[0], plant.bodies[-1]
     turns = float(np.ptp(x[:, first.angle])) / (2.0 * np.pi)
     speeds = rms(x[:, first.speed]), rms(x[:, last.speed])
-    reach = float(np.min(x[:, last.angle])), float(np.max(x[:, last.angle]))
+    angles = x[:, last.angle].copy()
+    reach = float(np.min(angles)), float(np.max(angles))
     if plant.shaft is None:
         inertia = plant.value(p, first.inertia)
-        return Scene(signals.h, signals.torque, signals.u, *speeds, 1.0, inertia, 1.0, 1.0, turns, *reach)
+        return Scene(
+            signals.h, signals.torque, signals.u, *speeds, 1.0, inertia, 1.0, 1.0, turns, *reach, angles=angles
+        )
     twist = float(np.quantile(np.abs(plant.twist(p, x)), likelihood.settings.search.twist_quantile))
     inertia, stiffness = (plant.value(likelihood.nominal, name) for name in (last.inertia, plant.shaft.stiffness))
     return Scene(
-        signals.h, signals.torque, signals.u, *speeds, twist, inertia, stiffness, plant.ratio(p), turns, *reach
+        signals.h, signals.torque, signals.u, *speeds, twist, inertia, stiffness, plant.ratio(p), turns, *reach,
+        angles=angles,
     )  # fmt: skip
