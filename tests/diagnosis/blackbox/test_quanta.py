@@ -45,6 +45,7 @@ def fitter_of(u: np.ndarray) -> Fitter:
 
     y = run(model_of(0.0, QUANTUM))
     problem = SimpleNamespace(
+        outputs=("y",),
         n=len(u),
         map=SimpleNamespace(uncertain=[SimpleNamespace(standard_deviation=1.0, minimum=-1.0, maximum=1.0)]),
         nominal=BoxModel(np.zeros(1)),
