@@ -417,6 +417,19 @@ def test_a_true_model_may_be_off_by_its_own_standard_errors() -> None:
     assert np.ptp(drifts(replace(sure, covariance=np.array([[np.nan]])))) == 0.0
 
 
+def test_chance_says_nothing_of_a_model_that_may_run_away() -> None:
+    likelihood, p = axis_likelihood()
+    plant, part = likelihood.plant, slice(10, 60)
+    wild = (Free(plant.index("b"), 0.01, -1e9, 1e9),)
+    growing = (
+        600.0 * plant.value(p, "J") / (50 * likelihood.signals.h)
+    )  # by exp(600) over the part, if b is so far below
+    model = Fit(p, 1e-3, np.zeros((1, 1)), wild, np.array([[growing**2]]), 0.0, 0.0)
+    run = FreeRun(np.zeros((50, 1)), np.zeros(8), np.zeros(1))
+    chance = TorqueNoise(likelihood, model, np.zeros(10), p)(((run, part),), ((run, part),))
+    assert not np.all(np.isfinite(chance))  # and no increase is larger than that
+
+
 def test_a_shifted_log_is_put_right() -> None:
     t = np.arange(400)
     h, late, lead = 0.005, 1.3, 2.25

@@ -39,6 +39,7 @@ class TorqueNoise:
     torque: Array
     before: Array
 
+    @np.errstate(over="ignore", invalid="ignore")  # a draw of an unstable model is infinitely far off
     def __call__(self, mine: Runs, theirs: Runs) -> Array:
         """Return the largest increase (channels,) of the mean squared error of free runs that chance explains.
 
