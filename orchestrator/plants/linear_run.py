@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
+from orchestrator.plants.design import LinearModel, sampled
 from orchestrator.shared.numba_cache import kept
 
 Array = NDArray[np.float64]
@@ -33,8 +34,8 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
     """Return ``run(start, early, late, out)`` of a model that :func:`is_linear`.
 
     It fills out (n, 2), the angles, from start (8,); in each sample the request ``early`` (n,) acts for ``first`` [s],
-    then ``late`` (n,). Over each of both pieces the motion is the exponential of the plant's matrix (Van Loan, IEEE
-    Trans. Automatic Control 23(3), 1978): no error of a step adds up.
+    then ``late`` (n,). Over each of both pieces the motion is the exponential of the plant's matrix: no error of a
+    step adds up.
 
     Args:
         plant: the plant.
@@ -46,12 +47,13 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
         The function.
     """
     A, B = plant.jacobian(p), plant.request_column(p)
-    kept_rows = [row for row, place in enumerate(plant.states) if _moves(plant, p, place)]
-    places = [plant.states[row] for row in kept_rows]
-    A, B = A[np.ix_(kept_rows, kept_rows)], B[kept_rows]
-    before, by_early = _solved(A, B, first)
-    behind, by_late = _solved(A, B, h - first)
-    phi, by_early = behind @ before, behind @ by_early
+    places = list(moving(plant, p))
+    rows = [plant.states.index(place) for place in places]
+    A, B = A[np.ix_(rows, rows)], B[rows, None]
+    model = LinearModel(A, B, C=np.eye(len(places)), states=())
+    before, by_early = sampled(model, first)
+    behind, by_late = sampled(model, h - first)
+    phi, by_early, by_late = behind @ before, (behind @ by_early).ravel(), by_late.ravel()
     shown = np.array([places.index(place) if place in places else -1 for place in (0, 2)])
 
     def run(start: Array, early: Array, late: Array, out: Array) -> None:
@@ -60,20 +62,18 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
     return run
 
 
-def _moves(plant: Plant, p: Array, place: int) -> bool:
-    """Tell whether a state is one of the linear plant: without a lag the drive has none."""
-    return place != plant.drive.torque or plant.value(p, plant.drive.lag) > 0.0
+def moving(plant: Plant, p: Array) -> tuple[int, ...]:
+    """Return the places of the states that the linear plant has: without a lag the drive has none.
 
+    Args:
+        plant: the plant.
+        p: the predictor's parameters.
 
-def _solved(A: Array, B: Array, h: float) -> tuple[Array, Array]:
-    """Return what becomes of a state (k, k), and what a held request adds (k,), after ``h`` [s]."""
-    from scipy.linalg import expm
-
-    k = len(B)
-    block = np.zeros((k + 1, k + 1))
-    block[:k, :k], block[:k, k] = A, B
-    both = np.asarray(expm(block * h))
-    return np.ascontiguousarray(both[:k, :k]), np.ascontiguousarray(both[:k, k])
+    Returns:
+        The places, in the order of the plant's states.
+    """
+    lagged = plant.value(p, plant.drive.lag) > 0.0
+    return tuple(place for place in plant.states if place != plant.drive.torque or lagged)
 
 
 @kept(error_model="numpy", nogil=True)

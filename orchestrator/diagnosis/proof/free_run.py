@@ -15,6 +15,7 @@ from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.proof.settings import FreeRunSettings
 from orchestrator.diagnosis.proof.simulation import Simulation
 from orchestrator.plants.description import Plant
+from orchestrator.plants.linear_run import moving
 from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
 
@@ -84,7 +85,7 @@ def _closest(model: Simulation, guess: Array, part: slice, settings: FreeRunSett
     plant, signals = model.plant, model.signals
     m = signals.channels
     measured, scale = model.aligned.y[part, :m], signals.noise
-    free = _free_places(plant, model.p)
+    free = moving(plant, model.p)
 
     def outputs(start: Array) -> Array:
         return model.run(start, part)[:, :m]
@@ -140,7 +141,7 @@ def start_answers(
     Returns:
         The derivatives, per unit of each place.
     """
-    free, m = _free_places(plant, p), signals.channels
+    free, m = moving(plant, p), signals.channels
     steps = _steps(plant, run.start, signals, free, settings)
     model = Simulation(plant, p, signals)
     return _answers(lambda start: model.run(start, part)[:, :m], run.start, run.outputs, free, steps, plant)
@@ -167,11 +168,6 @@ def _followed(plant: Plant, start: Array) -> Array:
     for place, followed in plant.followers:
         moved[place] = moved[followed]
     return moved
-
-
-def _free_places(plant: Plant, p: Array) -> tuple[int, ...]:
-    lagged = plant.value(p, plant.drive.lag) > 0.0
-    return tuple(place for place in plant.states if place != plant.drive.torque or lagged)
 
 
 def _steps(
