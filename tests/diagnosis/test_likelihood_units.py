@@ -11,6 +11,7 @@ from scipy.linalg import expm
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, anneal, decided, fit, log_prior, settled, split
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, _largest_speed, measurement_matrix
+from orchestrator.diagnosis.fit.reference import Reference
 from orchestrator.diagnosis.fit.signals import Signals, noise_level, signals_of
 from orchestrator.diagnosis.fit.slope import Free, taken
 from orchestrator.plants.measurement import LEAD, SHIFT
@@ -170,7 +171,7 @@ def test_gains_are_computed_once_and_shared() -> None:
 
 def test_gains_along_a_linear_motion_are_riccatis() -> None:
     likelihood, p = drivetrain_likelihood(size=60)
-    plain, along = likelihood._solve(Q, None), likelihood._solve(Q, p)
+    plain, along = likelihood._solve(Q, None), likelihood._solve(Q, Reference(p))
     assert np.allclose(along.gains, plain.gains, rtol=2e-3, atol=1e-4 * np.abs(plain.gains).max())
     assert np.allclose(along.roots, plain.roots, rtol=2e-3, atol=1e-4 * plain.roots.max())
 

@@ -70,7 +70,7 @@ def fitted(likelihood: RecordLikelihood, effects: tuple[Effect, ...], q: float) 
 def test_a_stretch_is_not_ruled_by_what_came_before_it() -> None:
     likelihood, place = halfway("b", 2.0, 3.0), AXIS.index("b")
     late = slice(500, 800)
-    own, part = likelihood.alone(late)
+    own, part = likelihood.alone(late, likelihood.nominal, 1e-5)
     assert np.array_equal(own.signals.y[part], likelihood.signals.y[late])
     free = (Free(place, 0.1, 0.0, 100.0),)
     found = fit(own, likelihood.nominal, 1e-5, free, Parts(part, part, part), most=0)

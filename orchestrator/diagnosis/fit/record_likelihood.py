@@ -5,11 +5,12 @@ torques of standard deviation ``q`` on motor and load; they depend on the sample
 state is not known) and not on the candidate, so one set of gains serves all candidates at one ``q``.
 
 With one encoder and a gap before what is not measured, models with a gap share another set: that of a filter linearised
-along the motion of one of them, the ``reference``.
+along the motion of one of them, the ``reference``, from the state in which the record finds it. A filter that starts
+without it takes the load for anywhere in the gap, and is lost where the teeth first meet.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.fit.reference import Reference, Start
 from orchestrator.diagnosis.fit.riccati import riccati
 from orchestrator.diagnosis.fit.signals import Signals
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -46,7 +48,7 @@ class RecordLikelihood:
     nominal: Array
     stop: int
     settings: DiagnosisSettings
-    reference: Array | None = None  # parameters of a model with a gap, along whose motion gains are taken; None: none
+    reference: Reference | None = None
     _gains: dict[tuple[float, bytes], Gains] = field(default_factory=dict)
     _halted: Event = field(default_factory=Event)
 
@@ -70,13 +72,16 @@ class RecordLikelihood:
         shorter.stop = stop
         return shorter
 
-    def alone(self, part: slice) -> tuple["RecordLikelihood", slice]:
+    def alone(self, part: slice, p: Array, q: float) -> tuple["RecordLikelihood", slice]:
         """Return the likelihood of a part as a record of its own, and where the part lies in that.
 
-        Close to free runs, predictions of a part are ruled by all that came before it: its own starts anew.
+        Close to free runs, predictions of a part are ruled by all that came before it: its own starts anew. Of what no
+        encoder sees it starts where a model finds it.
 
         Args:
             part: the samples.
+            p: (parameters,) of the model.
+            q: its process noise.
 
         Returns:
             Both; those of the whole where there are several records.
@@ -86,21 +91,30 @@ class RecordLikelihood:
         begin = max(part.start - self.settings.likelihood.head, 0)
         rows = slice(begin, part.stop)
         signals = replace(self.signals, y=np.ascontiguousarray(self.signals.y[rows]), u=self.signals.u[rows])
-        own = replace(self, signals=signals, stop=part.stop - begin, _gains={})
+        reference = self._reference(p)
+        if reference is not None and reference.starts and begin:
+            state = self.innovations(p, q)[1][begin, list(self.plant.states)]
+            reference = replace(reference, starts=(replace(reference.starts[0], state=state),))
+        own = replace(self, signals=signals, stop=part.stop - begin, reference=reference, _gains={})
         return own, slice(part.start - begin, part.stop - begin)
 
-    def about(self, reference: Array) -> "RecordLikelihood":
-        """Return the likelihood whose gains for models with a gap are those along the motion of ``reference``.
+    def about(self, p: Array, starts: Sequence[Start] = ()) -> "RecordLikelihood":
+        """Return the likelihood whose gains for models with a gap are those along the motion of one of them.
 
-        It is the same one where every body has its encoder, or the reference has no gap.
+        It is the same one where every body has its encoder, or the model has no gap.
 
         Args:
-            reference: (parameters,) of a model.
+            p: (parameters,) of the model.
+            starts: where each record begins; none: that is not known.
 
         Returns:
             The likelihood.
         """
-        return replace(self, reference=reference) if self.is_hidden(reference) else self
+        return replace(self, reference=Reference(p, tuple(starts))) if self.is_hidden(p) else self
+
+    def _reference(self, p: Array | None) -> Reference | None:
+        """Return the reference of a model with parameters ``p``; None: it needs none."""
+        return self.reference if p is not None and self.is_hidden(p) else None
 
     def is_hidden(self, p: Array) -> bool:
         """Tell whether a model ``p`` has a gap before a body that is not measured.
@@ -126,8 +140,8 @@ class RecordLikelihood:
         Returns:
             Gains and roots of every sample.
         """
-        reference = self.reference if self.reference is not None and p is not None and self.is_hidden(p) else None
-        key = (q, b"" if reference is None else reference.tobytes())
+        reference = self._reference(p)
+        key = (q, b"" if reference is None else reference.key)
         if key not in self._gains:
             self._gains[key] = self._solve(q, reference)
         return self._gains[key]
@@ -160,7 +174,7 @@ class RecordLikelihood:
         raw, states = np.empty((n, 2)), np.empty((n, STATES))
         signals = self.signals.aligned(self.plant, p)
         offsets = [p[place] for place in self._offsets] + [0.0, 0.0]
-        for rows, u, start in self._records(signals, n):
+        for rows, u, start in self._records(signals, n, self._reference(p)):
             errors, corrected = np.empty((len(u), 2)), np.empty((len(u), STATES))
             self._predict(
                 signals.y[rows], *self.delivered(p, u), p, signals.h, self.substeps(p), gains[rows],
@@ -189,13 +203,17 @@ class RecordLikelihood:
                 return np.asarray(first[:, None])
             return np.column_stack([first, roots[:, 1, 0] * raw[:, 0] + roots[:, 1, 1] * raw[:, 1]])
 
-    def _records(self, signals: Signals, stop: int) -> Iterator[tuple[Any, Array, tuple[float, ...]]]:
+    def _records(
+        self, signals: Signals, stop: int, reference: Reference | None
+    ) -> Iterator[tuple[Any, Array, tuple[float, ...]]]:
         """Yield of each record its rows before ``stop``, its requests there and its initial state."""
+        known = None if reference is None else reference.starts
         if not signals.runs:
-            yield slice(0, stop), signals.u[:stop], self._start
-        for run in signals.runs:
+            yield slice(0, stop), signals.u[:stop], self._known_state(known[0]) if known else self._start
+        for number, run in enumerate(signals.runs):
             rows = run.rows[run.rows < stop]
-            yield rows, signals.u[rows], self._initial_state(int(run.rows[0]))
+            start = self._known_state(known[number]) if known else self._initial_state(int(run.rows[0]))
+            yield rows, signals.u[rows], start
 
     def delivered(self, p: Array, u: Array) -> tuple[Array, Array, float]:
         """Return what of the requests ``u`` (n,) reaches the drive in each sample: limited, then late.
@@ -275,13 +293,23 @@ class RecordLikelihood:
                 start[body.angle] = float(y[0, channel])
             else:
                 start[body.angle] = float(y[0, 0] / self.plant.ratio(self.nominal))
+        return self._followed(start)
+
+    def _known_state(self, known: Start) -> tuple[float, ...]:
+        start = [0.0] * STATES
+        for place, value in zip(self.plant.states, known.state, strict=True):
+            start[place] = float(value)
+        return self._followed(start)
+
+    def _followed(self, start: list[float]) -> tuple[float, ...]:
         for place, followed in self.plant.followers:
             start[place] = start[followed]
         return tuple(start)
 
-    def _solve(self, q: float, reference: Array | None) -> Gains:
+    def _solve(self, q: float, reference: Reference | None) -> Gains:
         plant = self.plant
-        signals = self.signals if reference is None else self.signals.aligned(plant, reference)
+        about = None if reference is None else reference.p
+        signals = self.signals if about is None else self.signals.aligned(plant, about)
         m, n = signals.channels, signals.size
         at = {place: row for row, place in enumerate(plant.states)}
         size, p = len(plant.states), self.nominal
@@ -302,16 +330,20 @@ class RecordLikelihood:
         P[drive, drive] = signals.torque**2 if plant.value(p, plant.drive.lag) > 0.0 else 0.0
         gains, roots = np.zeros((n, size, m)), np.zeros((n, m, m))
         noises = [run.noise for run in signals.runs] or [signals.noise]
-        for (rows, u, start), noise in zip(self._records(signals, n), noises, strict=True):
+        spreads = [P] * len(noises)
+        if reference is not None and reference.starts:
+            spreads = [start.covariance for start in reference.starts]
+        records = self._records(signals, n, reference)
+        for (rows, u, start), noise, spread in zip(records, noises, spreads, strict=True):
             own, factors, R = np.zeros((len(u), size, m)), np.zeros((len(u), m, m)), np.diag(noise**2)
-            if reference is None:
-                riccati(A, C, Q, R, P, own, factors)
+            if about is None:
+                riccati(A, C, Q, R, spread, own, factors)
             else:
-                offsets = [reference[place] for place in self._offsets] + [0.0, 0.0]
+                offsets = [about[place] for place in self._offsets] + [0.0, 0.0]
                 follower_of(plant)(
-                    signals.y[rows], *self.delivered(reference, u), reference, signals.h, self.substeps(reference),
+                    signals.y[rows], *self.delivered(about, u), about, signals.h, self.substeps(about),
                     (offsets[0], offsets[1]), start, np.array(plant.states),
-                    np.array([at[body.angle] for body in plant.bodies[:m]]), P, Q, R, own, factors,
+                    np.array([at[body.angle] for body in plant.bodies[:m]]), spread, Q, R, own, factors,
                 )  # fmt: skip
             gains[rows], roots[rows] = own, factors
         full = np.zeros((n, STATES, 2))

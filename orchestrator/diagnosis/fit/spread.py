@@ -137,7 +137,7 @@ def _block_fits(likelihood: RecordLikelihood, whole: Fit, part: slice) -> list[t
     )
     found = []
     for start, stop in itertools.pairwise(edges):
-        own, block = likelihood.alone(slice(start, stop))
+        own, block = likelihood.alone(slice(start, stop), whole.p, whole.q)
         fitted = fit(own, whole.p, whole.q, free, Parts(block, block, block), settings.block_iterations)
         found.append((own, block, fitted))
     return found

@@ -182,7 +182,7 @@ class Fits(ModelSpace):
         kept = tuple(e for e in current.effects if e is not effect)
         start, q = self.without(current.fit.p, effect), current.fit.q
         about = self.likelihood.reference
-        asked = (start.tobytes(), q, tuple(e.label for e in kept), b"" if about is None else about.tobytes())
+        asked = (start.tobytes(), q, tuple(e.label for e in kept), b"" if about is None else about.key)
         if asked not in self._reduced:
             free = self.free(kept, scene)
             self._reduced[asked] = annealed(self.likelihood, start, q, free, self.parts, kept)

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.reference import Reference, Start
 from orchestrator.errors import ConvergenceError
 from orchestrator.estimation.joint import JointLikelihood
-from orchestrator.estimation.likelihood import Likelihood
+from orchestrator.estimation.likelihood import GapFit, Likelihood
 from orchestrator.estimation.methods.maximum_likelihood import fit_record
 from orchestrator.estimation.problem import IMPULSE, make_problem
 from orchestrator.plants.known.drivetrain import PLANT
@@ -45,8 +46,10 @@ def at_the_floor(likelihood: RecordLikelihood, model: Fit, part: slice) -> bool:
     return lacking < likelihood.settings.verdict.least_missing * (part.stop - part.start)
 
 
-def gap_of_the_estimator(likelihood: RecordLikelihood, model: Model, part: slice, deadline: float) -> Array | None:
-    """Return the parameters of the model with the gap that the estimator finds in a part of a record.
+def gap_of_the_estimator(
+    likelihood: RecordLikelihood, model: Model, part: slice, deadline: float
+) -> Reference | None:  # fmt: skip
+    """Return the model with the gap that the estimator finds in a part of a record, and where the record begins.
 
     Args:
         likelihood: of a record of the motor's encoder alone.
@@ -55,16 +58,17 @@ def gap_of_the_estimator(likelihood: RecordLikelihood, model: Model, part: slice
         deadline: by the monotonic clock [s].
 
     Returns:
-        Parameters in the predictor's order; None: it found none, or not in time, or the plant is not its own.
+        The model; without a start where the part is not the record's beginning. None: it found none, or not in time, or
+        the plant is not its own.
     """
     if likelihood.plant is not PLANT:
         return None
-    signals = likelihood.signals
+    signals, begins = likelihood.signals, part.start <= likelihood.settings.likelihood.head
     problems = [
         make_problem(
             Record(signals.h * np.arange(rows.stop - rows.start), signals.u[rows], signals.y[rows, 0].copy()), model
         )
-        for rows in signals.stretches(part)
+        for rows in signals.stretches(slice(0, part.stop) if begins else part)
     ]
     threads = usable_cores()
     estimated = (
@@ -82,4 +86,16 @@ def gap_of_the_estimator(likelihood: RecordLikelihood, model: Model, part: slice
     place = likelihood.plant.index("contact.onset")
     lacking = float(fit.point.theta[estimated.problem.index(IMPULSE)]) / likelihood.plant.value(p, "c")
     p[place] = math.log(max(lacking, SHORTEST_ONSET))
-    return p
+    return Reference(p, _starts(fit, len(problems)) if begins else ())
+
+
+def _starts(fit: GapFit, records: int) -> tuple[Start, ...]:
+    """Return where each record begins, by a fit of the estimator."""
+    names, found = fit.likelihood.problem.names, []
+    free = fit.free.tolist()
+    for number in range(1, records + 1):
+        own = [name if number == 1 else f"{name}@{number}" for name in (PLANT.starts[s] for s in PLANT.states)]
+        places = [names.index(name) for name in own]
+        rows = [free.index(place) for place in places]
+        found.append(Start(fit.point.theta[places], fit.covariance[np.ix_(rows, rows)]))
+    return tuple(found)

@@ -97,14 +97,14 @@ class Search(Judge):
         one_sided = likelihood.signals.channels < len(self.plant.bodies)
         if gap is None or self.most == 0 or not one_sided or at_the_floor(likelihood, base.fit, self.parts.fitted):
             return None
-        p = gap_of_the_estimator(likelihood, self.model, self.parts.fitted, time.monotonic() + self.allowed.left)
+        found = gap_of_the_estimator(likelihood, self.model, self.parts.fitted, time.monotonic() + self.allowed.left)
         self.tick(f"{gap.label}, estimated")
-        if p is None:
+        if found is None:
             return None
-        free = self.free((gap,), scene_of(likelihood, base.fit))
+        free, p = self.free((gap,), scene_of(likelihood, base.fit)), found.p
         first = max(level for level in likelihood.settings.levels if level <= self.settings.first_hidden)
         for _ in range(self.settings.linearised):
-            self.likelihood = likelihood.about(p)
+            self.likelihood = likelihood.about(p, found.starts)
             fitted = annealed(self.likelihood, p, first, free, self.parts, (gap,))
             p, first = fitted.p, fitted.q
             self.tick(gap.label)
