@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +96,10 @@ def passes(
         other = search(as_given=True)
         settled = other.proof.torque.decides(settings.verdict.proven, settings.verdict.good)
         found = other if settled and not other.unknown else found
+    if found.unknown and _has_torque(found) and not allowed.over:
+        # A controller that hides what acts on the axis leaves it in the torque.
+        other = search(as_given=True, of_torque=True)
+        found = other if not other.unknown and other.best.effects else found
     if found.unknown and found.fell and not found.best.effects and not allowed.over:
         # What came first and fell hid what came second, if only as a suspect.
         other = search(barred=found.fell)
@@ -116,13 +121,11 @@ def passes(
 
 def _search(
     model: Model, likelihood: RecordLikelihood, parts: Parts, used: Parts, most: int, progress: Progress,
-    allowed: Stopwatch, finer: Finer | None, as_given: bool = False, barred: frozenset[str] = frozenset(),
+    allowed: Stopwatch, finer: Finer | None, **how: Any,
 ) -> Pass:  # fmt: skip
     """Search for at most ``most`` effects with the parts ``used``; judge what is left on ``parts``."""
     settings = likelihood.settings
-    search = Search(
-        likelihood, model, used, progress, allowed, most=most, finer=finer, as_given=as_given, barred=barred
-    )
+    search = Search(likelihood, model, used, progress, allowed, most=most, finer=finer, **how)
     base, best = search.run()
     likelihood = search.likelihood  # its gains may be those of a gap now
     whole = Parts(parts.seen, parts.validated, parts.held_out)
@@ -176,10 +179,16 @@ def _search(
 
 def _asks_the_drive(found: Pass) -> bool:
     """Tell whether a search without an end has changed the torque on its way, of an axis whose torque can be asked."""
-    plant, steps = found.likelihood.plant, found.search.steps
+    steps = found.search.steps
     changed = any(changes_the_torque(one) for step in steps if step.accepted for one in step.candidates[0].effects)
+    return changed and _has_torque(found)
+
+
+def _has_torque(found: Pass) -> bool:
+    """Tell whether a search without an end was of an axis whose torque can be asked."""
+    plant = found.likelihood.plant
     prompt = plant.inverse is not None and plant.value(found.likelihood.nominal, plant.drive.lag) == 0.0
-    return changed and prompt and not found.search.stopped
+    return prompt and not found.search.stopped
 
 
 def _of_the_log(search: Search, whole: Parts, plain: Fit, best: Candidate) -> Fit:

@@ -20,6 +20,7 @@ from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
+from orchestrator.diagnosis.verdict.gain import far_off
 from orchestrator.diagnosis.verdict.judgement import Proof
 from orchestrator.diagnosis.verdict.remainder import structured
 from orchestrator.plants.effects import Effect
@@ -55,8 +56,8 @@ def what_stands(
 
     An effect is withdrawn when its size, within what the model's error leaves open, is not far from zero, or when with
     it the model predicts worse, at any horizon and by more than chance, than without it or than re-fitted parameters
-    alone, or its misfit on held-out data is larger than that of nominal or re-fitted parameters, or what is left is no
-    noise and more than it explains.
+    alone (nominal ones, where those lie far outside what the model file allows), or its misfit on held-out data is
+    larger than that of nominal or re-fitted parameters, or what is left is no noise and more than it explains.
 
     Args:
         search: that found the model.
@@ -74,6 +75,9 @@ def what_stands(
     sized_base = sized(likelihood, plain, whole, (), ladder(levels, (), plain.q))
     before = horizons(likelihood, sized_base.fit.p, plain.q, whole.held_out)
     bases = (likelihood.nominal, sized_base.fit.p)
+    rival = before
+    if far_off(search.model, sized_base.fit.p, verdict):  # values that no such machine has are no standard
+        rival = horizons(likelihood, likelihood.nominal, plain.q, whole.held_out)
     withdrawn: dict[str, str] = {}
     while best.effects:
         efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
@@ -87,7 +91,7 @@ def what_stands(
         )
         noise = torque_noise(likelihood, final.fit, whole.fitted, sized_base.fit.p)
         torque = torque_proof(likelihood, plain, final.fit, whole)
-        out, harm = weak or best.effects[-1], after.harm_over(before, noise)
+        out, harm = weak or best.effects[-1], after.harm_over(rival, noise)
         if harm == after.labels[-1:] and (
             torque.decides(verdict.proven, verdict.good) or outweighs_one_run(best.effects, before, after)
         ):

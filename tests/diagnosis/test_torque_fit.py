@@ -77,6 +77,18 @@ def test_rows_at_rest_say_nothing_of_the_size_of_friction(at_rest: float, off: t
     assert off[0] <= error < off[1]
 
 
+@pytest.mark.parametrize(("untold", "told"), [(1e-3, INERTIA), (1e6, 0.5 * INERTIA)])
+def test_what_the_torque_does_not_tell_is_as_the_model_file_states(joint, untold: float, told: float) -> None:
+    likelihood, parts, found = joint
+    own = msgspec.structs.replace(likelihood.settings.inverse, untold=untold)
+    likelihood = replace(likelihood, settings=msgspec.structs.replace(likelihood.settings, inverse=own))
+    stated = (0.4 * INERTIA, 0.1 * INERTIA / np.sqrt(3.0))  # any inertia from 0.3 to 0.5 of the true one
+    free = tuple(replace(entry, prior=stated) if entry.place == AXIS.index("J") else entry for entry in found.free)
+    needed = torque_fit(likelihood, replace(found, free=free), parts.fitted)
+    assert needed.p[AXIS.index("J")] == pytest.approx(told, rel=0.15)
+    assert needed.p[AXIS.index(FRICTION)] == pytest.approx(DRY, rel=0.15)
+
+
 def test_values_are_told_with_which_a_model_predicts_best(joint) -> None:
     likelihood, parts, found = joint
     effects = (BANK["coulomb_friction"],)

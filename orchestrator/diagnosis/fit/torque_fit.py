@@ -7,13 +7,17 @@ one, does not (inverse dynamic identification; Gautier and Poignet, Control Engi
 loop it is the other way round; predictions tell which of both holds.
 """
 
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.shared.inference.colour import colour_of
 from orchestrator.shared.inference.long_run import long_run_covariance
 
@@ -22,10 +26,13 @@ Array = NDArray[np.float64]
 # Of parameters that the filtered torque says nothing of: the drive's timing, and contacts shorter than the filter.
 TIMING_UNITS = ("s", "N.m/s")
 CONTACT = "effects.end_stop."
+UNIFORM = math.sqrt(3.0)  # half of an interval over the standard deviation of the uniform distribution on it
 
 
 def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | None:
     """Return a fit whose sizes are those of the smallest torque error, in the plant's inverse model.
+
+    A value that the torque does not tell is one that the model file allows.
 
     Args:
         likelihood: of the record.
@@ -54,13 +61,14 @@ def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | N
         p[places] = values * scales
         return np.asarray(given - inverse(position, speed, acceleration, p))
 
-    from scipy.optimize import least_squares
-
     low, high = (np.array([getattr(entry, end) for entry in free]) / scales for end in ("minimum", "maximum"))
-    start = np.clip(found.p[places] / scales, low, high)
-    solved = least_squares(missing, start, bounds=(low, np.maximum(high, low + 1e-9)), x_scale="jac")
+    solved = _solved(missing, found.p[places] / scales, low, high)
     if not np.all(np.isfinite(solved.x)):
         return None
+    scaled = _covariance(np.asarray(solved.jac), solved.fun, likelihood.settings.fit.blocks)
+    least, most = _stated(free, scales, solved.x, settings.untold * np.sqrt(np.diag(scaled)))
+    if np.any(least > low) or np.any(most < high):
+        solved = _solved(missing, solved.x, np.maximum(low, least), np.minimum(high, most))
     p = found.p.copy()
     p[places] = solved.x * scales
     z = likelihood.whitened(p, found.q)
@@ -68,9 +76,30 @@ def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | N
         return None
     covariance = found.covariance.copy()
     own = [found.free.index(entry) for entry in free]
-    scaled = _covariance(np.asarray(solved.jac), solved.fun, likelihood.settings.fit.blocks)
     covariance[np.ix_(own, own)] = scaled * np.outer(scales, scales)
     return replace(found, p=p, z=z, covariance=covariance, colour=colour_of(z, part))
+
+
+def _solved(missing: Callable[[Array], Array], start: Array, low: Array, high: Array) -> Any:
+    """Return scipy's least-squares solution between bounds."""
+    from scipy.optimize import least_squares
+
+    return least_squares(missing, np.clip(start, low, high), bounds=(low, np.maximum(high, low + 1e-9)), x_scale="jac")
+
+
+def _stated(free: Sequence[Free], scales: Array, values: Array, doubt: Array) -> tuple[Array, Array]:
+    """Return bounds of scaled values: what is stated of those that lie outside of that by no more than ``doubt``.
+
+    Of a motion that hardly accelerates, the torque tells no inertia: it is one of those that the data sheet allows.
+    """
+    least, most = np.full(len(free), -np.inf), np.full(len(free), np.inf)
+    for n, entry in enumerate(free):
+        if entry.prior is None:
+            continue
+        middle, reach = entry.prior[0] / scales[n], UNIFORM * entry.prior[1] / scales[n]
+        if reach < abs(values[n] - middle) <= reach + doubt[n]:
+            least[n], most[n] = middle - reach, middle + reach
+    return least, most
 
 
 def explained(likelihood: RecordLikelihood, found: Fit, part: slice) -> float:

@@ -99,5 +99,9 @@ class InverseSettings(Settings, frozen=True):
         float,
         share("of the speed that 99 of 100 rows stay below; slower ones rest, held by any friction there is"),
     ] = 0.03
+    untold: Annotated[
+        float,
+        setting("standard errors by which a value may miss what is stated, and be taken for it", gt=0),
+    ] = 2.0
     closer: Annotated[float, share("of prediction errors (geometric mean) below which its values are told")] = 0.9
     border: Annotated[int, setting("samples at either end where the filters settle", ge=1)] = 50

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from orchestrator.diagnosis.search.by_torque import by_torque
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, annealed, simplest_first
 from orchestrator.diagnosis.search.fits import Guesses, TimeUpError
 from orchestrator.diagnosis.search.hidden_gap import at_the_floor, gap_of_the_estimator
@@ -27,10 +28,12 @@ class Search(Judge):
 
     Attributes:
         most: effects that are named at most.
+        of_torque: laws are fitted to the torque that the motion needs, not to the motion.
         stopped: its time was up before its end.
     """
 
     most: int = field(kw_only=True)
+    of_torque: bool = field(default=False, kw_only=True)
     stopped: bool = False
 
     def run(self) -> tuple[Candidate, Candidate]:
@@ -41,6 +44,8 @@ class Search(Judge):
         """
         base = self.base()
         current = ground = base
+        if self.of_torque:
+            return base, by_torque(self, base, self.most)
         try:
             self.hidden = self.hidden_gap(base)
             while len(current.effects) < self.most and len(self.steps) < self.settings.most_steps:

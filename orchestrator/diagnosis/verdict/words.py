@@ -33,7 +33,8 @@ def warnings_of(found: Pass, named: Sequence[Named], channels: int, encoders: in
             share = f"{100 * min(max(left.explained, 0), 1):.0f} %" if left.missing > 0.0 else "an unknown share"
             warnings.append(f"{names} would take {share} of it{little}")
     elif found.floor_off and left.missing > 0.0 and left.explained < settings.mostly_explained:
-        warnings.append(f"{100 * (1 - left.explained):.0f} % {LEFT_OVER}; it {kind_of_rest(left, settings)}")
+        share = f"{100 * min(1.0 - left.explained, 1.0):.0f} %"
+        warnings.append(f"{share} {LEFT_OVER}; it {kind_of_rest(left, settings)}")
     present = {effect.label for effect in found.best.effects}  # what was refused at first may have been found later
     refused = (why for label, why in found.search.refused.items() if label not in present)
     warnings += [*found.withdrawn, *(f"refused: {why}" for why in refused)]

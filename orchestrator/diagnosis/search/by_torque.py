@@ -1,0 +1,128 @@
+"""A search by the torque that a motion needs, for an axis whose controller hides what acts on it from predictions.
+
+A controller that answers every disturbance leaves the motion as it was asked for. Of such a record predictions of the
+motion take the answer for a drive: the likeliest model is a heavy one that hardly moves, whatever law is added to it.
+The torque of the inverse model tells friction from inertia then (Gautier and Poignet, Control Engineering Practice
+9(12), 2001). Laws are fitted to the torque of the fitted part and ranked by it; what is found counts only where it
+explains the torque of the deciding part, and goes through every test of what a search by predictions finds.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fit.fitting import Fit
+from orchestrator.diagnosis.fit.torque_fit import motion, share_explained, torque_fit
+from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, simplest_first
+from orchestrator.diagnosis.search.judging import Judge
+from orchestrator.diagnosis.search.scene import scene_of
+from orchestrator.plants.effects import Effect, Scene
+from orchestrator.shared.inference.long_run import long_run_covariance
+
+Array = NDArray[np.float64]
+Motion = tuple[Array, Array, Array, Array]
+
+QUARTERS = tuple(0.5 * math.pi * n for n in range(4))  # phases from which a fit finds any other
+
+
+def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
+    """Return the best model that the torque tells; its steps are noted in ``search``.
+
+    Args:
+        search: of an axis that has an inverse model.
+        base: the model without effects.
+        most: effects that are named at most.
+
+    Returns:
+        The model; ``base`` where the torque of the deciding part does not settle it.
+    """
+    likelihood, parts = search.likelihood, search.parts
+    plain = torque_fit(likelihood, base.fit, parts.fitted)
+    if plain is None:
+        return base
+    moved = [motion(likelihood, part) for part in (parts.fitted, parts.validated)]
+    current, ground = replace(base, fit=plain), None
+    while len(current.effects) < most:
+        scene = scene_of(likelihood, current.fit)
+        tried = search.each(lambda e: _added(search, current, e, scene, moved[0]), list(search.eligible(current)))  # noqa: B023
+        found = [one for one in tried if one is not None]
+        if not found:
+            break
+        before, *found = _told(search, moved, [current, *found])
+        found = sorted(search.possible(found, scene, before), key=lambda one: one.score, reverse=True)
+        found = simplest_first(found, likelihood.settings.verdict.alike_gain)
+        ground = ground or before
+        accepted = bool(found) and found[0].pays_over(before, ground)
+        search.steps.append(ForwardStep(before, tuple(found), accepted))
+        if not accepted:
+            break
+        current = found[0]
+    without, left = (_missing(search, one.p, moved[1]) for one in (plain, current.fit))
+    verdict = likelihood.settings.verdict
+    removed = 1.0 - float(left @ left) / float(without @ without)
+    settled = removed > verdict.proven and share_explained(left, moved[1][3]) > verdict.good
+    return current if settled else base
+
+
+def _added(search: Judge, current: Candidate, effect: Effect, scene: Scene, moved: Motion) -> Candidate | None:
+    """Return ``current`` with one more effect, fitted to the torque; None: it has no part in the inverse model."""
+    likelihood, effects = search.likelihood, (*current.effects, effect)
+    free = search.free(effects, scene)
+    least, best = math.inf, None
+    for start in _starts(effect, scene):
+        p = effect.put(search.plant, current.fit.p, start, search.refitted)
+        if np.array_equal(_missing(search, p, moved), _missing(search, current.fit.p, moved)):
+            return None
+        begun = Fit(p, current.fit.q, current.fit.z, free, np.eye(len(free)), -math.inf, -math.inf)
+        found = torque_fit(likelihood, begun, search.parts.fitted)
+        if found is None:
+            return None
+        left = float(np.sum(_missing(search, found.p, moved) ** 2))
+        if left < least:
+            least, best = left, found
+    return None if best is None else Candidate(effects, best, search.settings)
+
+
+def _starts(effect: Effect, scene: Scene) -> Iterator[dict[str, float]]:
+    """Yield values from which an effect is fitted: what a screen regresses on starts at a small amount of it."""
+    starts, unit = effect.starts(scene), effect.unit_of_size(scene)
+    sizes = dict.fromkeys(effect.amplitudes, unit)
+    for combination in itertools.product(*starts.values()):
+        values = dict(zip(starts, combination, strict=True)) | sizes
+        if effect.phase:
+            yield from (values | {effect.phase: phase} for phase in QUARTERS)
+        else:
+            yield values
+
+
+def _missing(search: Judge, p: Array, moved: Motion) -> Array:
+    """Return the measured torque less what a model needs for a motion, (n,)."""
+    position, speed, acceleration, given = moved
+    assert search.plant.inverse is not None
+    return np.asarray(given - search.plant.inverse(position, speed, acceleration, p))
+
+
+def _told(search: Judge, moved: list[Motion], found: list[Candidate]) -> list[Candidate]:
+    """Return candidates with the log-likelihood of the torque of both parts in their fits.
+
+    Neighbouring rows miss the same torque: as many count as are independent of what the best candidate leaves.
+    """
+    missing = [[_missing(search, one.fit.p, part) for part in moved] for one in found]
+    best = min(missing, key=lambda parts: sum(float(left @ left) for left in parts))
+    counts = [_independent(left) for left in best]
+    told = []
+    for one, parts in zip(found, missing, strict=True):
+        fitted, decided = (-0.5 * n * math.log(float(np.mean(left**2))) for n, left in zip(counts, parts, strict=True))
+        told.append(replace(one, fit=replace(one.fit, fitted=fitted, validated=decided)))
+    return told
+
+
+def _independent(left: Array) -> float:
+    """Return how many independent values a series in time is worth."""
+    centred = left - left.mean()
+    spread = float(long_run_covariance(centred[:, None])[0, 0])
+    return left.size * min(float(centred @ centred) / max(spread, 1e-300), 1.0)
