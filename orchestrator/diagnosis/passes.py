@@ -93,13 +93,10 @@ def passes(
         found = replace(found, withdrawn=(note, *found.withdrawn))
     if found.unknown and _asks_the_drive(found) and not allowed.over:
         # In a closed loop a drive that hides its torque predicts well, and hides friction too: the torque decides.
-        other = search(as_given=True)
-        settled = other.proof.torque.decides(settings.verdict.proven, settings.verdict.good)
-        found = other if settled and not other.unknown else found
+        found = _settled_by_torque(search(as_given=True), found)
     if found.unknown and _has_torque(found) and not allowed.over:
         # A controller that hides what acts on the axis leaves it in the torque.
-        other = search(as_given=True, of_torque=True)
-        found = other if not other.unknown and other.best.effects else found
+        found = _settled_by_torque(search(as_given=True, of_torque=True), found)
     if found.unknown and found.fell and not found.best.effects and not allowed.over:
         # What came first and fell hid what came second, if only as a suspect.
         other = search(barred=found.fell)
@@ -182,6 +179,13 @@ def _asks_the_drive(found: Pass) -> bool:
     steps = found.search.steps
     changed = any(changes_the_torque(one) for step in steps if step.accepted for one in step.candidates[0].effects)
     return changed and _has_torque(found)
+
+
+def _settled_by_torque(other: Pass, found: Pass) -> Pass:
+    """Return another pass where it names something that the held-out torque settles, else the one found before."""
+    verdict = other.likelihood.settings.verdict
+    settled = not other.unknown and other.proof.torque.decides(verdict.proven, verdict.good)
+    return other if settled else found
 
 
 def _has_torque(found: Pass) -> bool:

@@ -85,6 +85,7 @@ def is_confirmed(likelihood: RecordLikelihood, model: Fit, before: Fit, parts: P
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")  # without the effect the predictor may run away: it is not nothing
 def most_gain(likelihood: RecordLikelihood, model: Fit, without: Array, part: slice) -> float:
     """Return the log-likelihood that a part may be expected to gain by an effect which is all there.
 
