@@ -62,6 +62,15 @@ def test_a_torque_that_no_law_explains_names_none(record, model) -> None:
     assert best is base
 
 
+def test_a_part_that_stands_still_is_not_asked(record, model) -> None:
+    search = search_of(record, model)
+    y = search.likelihood.signals.y.copy()
+    y[search.parts.validated] = y[search.parts.validated.start]
+    search.likelihood = replace(search.likelihood, signals=replace(search.likelihood.signals, y=y))
+    base, best = search.run()
+    assert best is base
+
+
 def test_what_the_torque_tells_is_named_where_it_predicts_better(record, model) -> None:
     found = diagnose(record, model)
     (friction,) = found.effects

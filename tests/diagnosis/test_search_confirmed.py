@@ -7,7 +7,7 @@ import pytest
 
 from orchestrator.diagnosis.fit.fitting import Fit, fit
 from orchestrator.diagnosis.search.candidate import Candidate
-from orchestrator.diagnosis.search.confirmed import is_confirmed, share_of
+from orchestrator.diagnosis.search.confirmed import is_confirmed, most_gain, share_of
 from orchestrator.shared.inference.colour import WHITE, Colour
 from tests.support.short_records import (
     AXIS,
@@ -123,3 +123,12 @@ def test_a_small_effect_pays_by_what_both_parts_gain_together(
     search = search_of(likelihood)
     candidate, base = gaining(*models(likelihood), fitted, decided)
     assert search.earns(candidate, base, base) is earns
+
+
+def test_a_model_that_runs_away_without_an_effect_answers_to_it() -> None:
+    likelihood = record()
+    model, _ = models(likelihood)
+    away = model.p.copy()
+    away[AXIS.index("b")] = -1e4
+    assert not most_gain(likelihood, model, away, PARTS.fitted) < 1e9
+    assert most_gain(likelihood, model, model.p, PARTS.fitted) == 0.0

@@ -45,6 +45,8 @@ def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
     if plain is None:
         return base
     moved = [motion(likelihood, part) for part in (parts.fitted, parts.validated)]
+    if min(part[3].size for part in moved) < likelihood.settings.inverse.least_rows:
+        return base  # a part of it stands still
     current, ground = replace(base, fit=plain), None
     while len(current.effects) < most:
         scene = scene_of(likelihood, current.fit)
@@ -116,7 +118,9 @@ def _told(search: Judge, moved: list[Motion], found: list[Candidate]) -> list[Ca
     counts = [_independent(left) for left in best]
     told = []
     for one, parts in zip(found, missing, strict=True):
-        fitted, decided = (-0.5 * n * math.log(float(np.mean(left**2))) for n, left in zip(counts, parts, strict=True))
+        fitted, decided = (
+            -0.5 * n * math.log(max(float(np.mean(left**2)), 1e-300)) for n, left in zip(counts, parts, strict=True)
+        )
         told.append(replace(one, fit=replace(one.fit, fitted=fitted, validated=decided)))
     return told
 
