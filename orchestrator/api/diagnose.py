@@ -30,7 +30,7 @@ from orchestrator.records.record import Record
 @overload
 def diagnose(
     record: Record | Path | str | Sequence[Record | Path | str],
-    model: Model | None = None,
+    model: Model | Path | str | None = None,
     *,
     validate: Record | Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,

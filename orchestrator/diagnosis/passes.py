@@ -17,7 +17,7 @@ from orchestrator.diagnosis.proof.horizons import horizons, is_driven
 from orchestrator.diagnosis.rest import growth_of, is_off_floor, left_of
 from orchestrator.diagnosis.search.candidate import Candidate, annealed, ladder
 from orchestrator.diagnosis.search.finer import Finer
-from orchestrator.diagnosis.search.model_space import changes_the_torque
+from orchestrator.diagnosis.search.model_space import changes_the_torque, is_of_torques_time
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -145,7 +145,10 @@ def _search(
     follows = not (named and floor_off) or proof.final.follows(verdict.good)  # asked beside a rest alone
     follows = follows or proof.torque.decides(verdict.proven, verdict.good)
     follows = follows or is_driven(likelihood, final.p, proof.final, verdict.good)
-    why = refuted(floor_off, follows, far, [f"{one.name} ({one.site})" for one in passing]) if named else ""
+    limits = any(changes_the_torque(e) and not is_of_torques_time(likelihood.plant, e) for e in best.effects)
+    hiding = limits and _tells_torque(likelihood) and floor_off and left.explained < verdict.mostly_explained
+    words = [f"{one.name} ({one.site})" for one in passing]
+    why = refuted(floor_off, follows, far, words, hiding) if named else ""
     if why:
         withdrawn = (*withdrawn, f"nothing is named: {why}")
     unknown = search.stopped or bool(why) or is_unknown(left, floor_off, proof, named, bool(far), verdict)
@@ -190,9 +193,13 @@ def _settled_by_torque(other: Pass, found: Pass) -> Pass:
 
 def _has_torque(found: Pass) -> bool:
     """Tell whether a search without an end was of an axis whose torque can be asked."""
-    plant = found.likelihood.plant
-    prompt = plant.inverse is not None and plant.value(found.likelihood.nominal, plant.drive.lag) == 0.0
-    return prompt and not found.search.stopped
+    return _tells_torque(found.likelihood) and not found.search.stopped
+
+
+def _tells_torque(likelihood: RecordLikelihood) -> bool:
+    """Tell whether the torque that a motion needs is known: of a single axis without lag."""
+    plant = likelihood.plant
+    return plant.inverse is not None and plant.value(likelihood.nominal, plant.drive.lag) == 0.0
 
 
 def _of_the_log(search: Search, whole: Parts, plain: Fit, best: Candidate) -> Fit:

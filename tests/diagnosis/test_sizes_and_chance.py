@@ -261,6 +261,18 @@ def test_pulses_are_outweighed_by_skill_at_every_horizon_only() -> None:
     assert is_unknown(left, True, settled, False, False, SETTINGS.verdict)
 
 
+def test_bursts_below_the_floor_are_no_misfit() -> None:
+    follows = replace(horizons([0.1, 0.1, 0.1, 0.1]), r_squared=np.array([0.99]))
+    lost = replace(follows, plain=np.full((4, 1), 0.2), r_squared=np.array([0.5]))
+    repeated = (Predictable("motor", "speed", 9.0, 0.01),)
+    left = Remainder(-5.0, 0.0, 1.0, (), tails=9.0)
+    for rest, final, unknown in (
+        (left, follows, False), (left, lost, True), (replace(left, missing=100.0), follows, True),
+        (replace(left, predictable=repeated), follows, True), (replace(left, growth=9.0), follows, True),
+    ):  # fmt: skip
+        assert is_unknown(rest, True, Proof(follows, final), False, False, SETTINGS.verdict) is unknown
+
+
 def test_the_torque_settles_what_free_runs_that_are_lost_cannot() -> None:
     lost = replace(horizons([0.1, 1.0, 5.0, 9.0]), plain=np.full((4, 1), 0.1), r_squared=np.array([-50.0]))
     left = Remainder(100.0, 0.1, 1.0, ())
@@ -298,6 +310,7 @@ def test_what_is_named_must_leave_the_stated_machine_and_follow_the_motion() -> 
     assert not refuted(True, True, (), ())
     assert "`J`" in refuted(False, True, ("J",), ())
     assert "without friction (motor)" in refuted(True, True, (), ("friction (motor)",))
+    assert refuted(True, True, (), (), hiding=True).startswith("a limit keeps torque from the machine")
 
 
 def test_the_drive_must_matter_where_only_runs_of_seconds_follow() -> None:

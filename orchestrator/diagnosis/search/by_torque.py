@@ -86,7 +86,18 @@ def _added(search: Judge, current: Candidate, effect: Effect, scene: Scene, move
         left = float(np.sum(_missing(search, found.p, moved) ** 2))
         if left < least:
             least, best = left, found
+    if best is not None and effect.phase:  # as it is told: an amplitude of one sign, a phase within a turn
+        best = torque_fit(likelihood, replace(best, p=_wrapped(search, best.p, effect)), search.parts.fitted)
     return None if best is None else Candidate(effects, best, search.settings)
+
+
+def _wrapped(search: Judge, p: Array, effect: Effect) -> Array:
+    """Return parameters with the amplitude of a wave positive, and its phase between plus and minus half a turn."""
+    places, p = effect.places(search.plant), p.copy()
+    size, phase = places[effect.size], places[effect.phase]
+    turned = p[phase] + (math.pi if p[size] < 0.0 else 0.0)
+    p[size], p[phase] = abs(p[size]), math.remainder(turned, 2.0 * math.pi)
+    return p
 
 
 def _starts(effect: Effect, scene: Scene) -> Iterator[dict[str, float]]:

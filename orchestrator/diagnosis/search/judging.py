@@ -9,6 +9,7 @@ from orchestrator.diagnosis.search.confirmed import is_confirmed
 from orchestrator.diagnosis.search.finer import Finer, is_timed
 from orchestrator.diagnosis.search.fits import Array, Fits
 from orchestrator.diagnosis.search.plausible import implausible
+from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.verdict.remainder import is_noise
 from orchestrator.plants.effects import Effect, Scene
 
@@ -146,6 +147,30 @@ class Judge(Fits):
             return False
 
         return [candidate for candidate, good in zip(found, self.each(stands, found), strict=True) if good]
+
+    def still_on_time(self, current: Candidate) -> Candidate:
+        """Return a model without those of its effects of the drive's timing that do not show at the measured rate.
+
+        What came after such an effect may be what it stood for.
+
+        Args:
+            current: the model that was found.
+
+        Returns:
+            The model that is left.
+        """
+        finer = self.finer
+        for effect in current.effects[:-1]:
+            if finer is None or not is_timed(self.plant, effect):
+                continue
+            scene = scene_of(self.likelihood, current.fit)
+            fewer = self.reduced(current, scene, effect)
+            free = (self.free(current.effects, scene), self.free(fewer.effects, scene))
+            self.tick(f"{effect.label}, as it was measured")
+            if finer.refutes(current, fewer, free):
+                self.refused.setdefault(effect.label, finer.words(effect))
+                current = fewer
+        return current
 
     def predicts(self, candidate: Candidate, current: Candidate) -> bool:
         """Tell whether a candidate predicts the deciding part far better than the model before it, at long horizons.

@@ -57,6 +57,7 @@ class Search(Judge):
                     break
                 current = self.prune(step.candidates[0], ground) if step.accepted else step.before
                 ground = current if _is_ground(current) else ground
+            current = self.still_on_time(current)
         except TimeUpError:
             self.stopped = True
         return base, self.beside_hidden(current)

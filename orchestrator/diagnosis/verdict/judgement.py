@@ -10,7 +10,7 @@ from orchestrator.diagnosis.outcome import Misfit
 from orchestrator.diagnosis.proof.horizons import Horizons
 from orchestrator.diagnosis.proof.torque import TorqueProof
 from orchestrator.diagnosis.settings import VerdictSettings
-from orchestrator.diagnosis.verdict.remainder import Remainder, structured
+from orchestrator.diagnosis.verdict.remainder import Remainder, repeats, structured
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 Array = NDArray[np.float64]
@@ -58,7 +58,9 @@ def is_unknown(
     settled = named and proof.torque.decides(settings.proven, settings.good)
     if proof.final.is_hopeless(settings.hopeless) and (named or floor_off) and not settled:
         return True
-    if not floor_off:
+    # Bursts that, their colour taken out, lie below the noise floor are no misfit.
+    below = left.missing <= 0.0 and proof.final.follows(settings.good) and not repeats(left, settings)
+    if not floor_off or below:
         return left.growth > settings.grown
     if proven or settled:
         return False
@@ -66,16 +68,20 @@ def is_unknown(
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
 
 
-def refuted(floor_off: bool, follows: bool, far_off: Sequence[str], passing: Sequence[str]) -> str:
+def refuted(
+    floor_off: bool, follows: bool, far_off: Sequence[str], passing: Sequence[str], hiding: bool = False
+) -> str:  # fmt: skip
     """Return why what the final model has is no finding, in words; empty: nothing speaks against it.
 
-    Effects make up for another machine too: a prescribed motion takes next to no inertia, and waves for a spring.
+    Effects make up for another machine too: a prescribed motion takes next to no inertia, and waves for a spring. Of a
+    motion that a controller holds, any law that keeps the controller's answers from the machine predicts better.
 
     Args:
         floor_off: more is left than measurement noise.
         follows: the final model, which has effects, follows the motion of the held-out part.
         far_off: names of parameters whose re-fitted values lie far outside what the model file allows.
         passing: names of effects that a stretch of the record is without.
+        hiding: one of the effects keeps torque from the machine, and much of the misfit is left.
 
     Returns:
         The words.
@@ -85,6 +91,8 @@ def refuted(floor_off: bool, follows: bool, far_off: Sequence[str], passing: Seq
         return f"with it {names} would lie far outside what the model file allows: a value, or a unit, may be wrong"
     if floor_off and not follows:
         return "with it free runs over the held-out part do not follow the motion: `u` may not be what drives it"
+    if hiding:
+        return "a limit keeps torque from the machine, and much of the misfit is left: what a loop answers looks so"
     if passing:
         return f"a stretch of the record is without {' and '.join(passing)}: it changes with time"
     return ""

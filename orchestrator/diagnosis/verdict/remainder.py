@@ -106,8 +106,19 @@ def structured(left: Remainder, settings: VerdictSettings) -> bool:
     Returns:
         True when it is.
     """
-    if left.tails > settings.heavy:
-        return True
+    return left.tails > settings.heavy or repeats(left, settings)
+
+
+def repeats(left: Remainder, settings: VerdictSettings) -> bool:
+    """Tell whether what is left repeats with a signal of the record.
+
+    Args:
+        left: what the final model leaves.
+        settings: the rules' thresholds.
+
+    Returns:
+        True when it does.
+    """
     return any(
         entry.gain > settings.structured or (entry.share > settings.large_share and entry.gain > settings.likely)
         for entry in left.predictable

@@ -1,0 +1,117 @@
+"""Single axes that a controller leads along a path, of any size: an independent simulation with LuGre friction.
+
+Inertias go over five decades. The loop is a position controller with speed and integral action on an encoder of counts;
+the torque that is recorded is its request with white noise that the axis does not feel.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from orchestrator.records.record import Record, record_from_columns
+
+Array = NDArray[np.float64]
+
+STEP, ROWS = 1e-3, 12000
+HIDDEN = ("none", "friction", "gravity", "friction and gravity", "drag", "by hand", "growing friction", "ripple")
+CYCLES = 17  # of the ripple, a turn
+RIGHT: dict[str, set[str]] = {
+    "friction": {"coulomb_friction"}, "gravity": {"gravity_load"}, "drag": {"quadratic_drag"},
+    "friction and gravity": {"coulomb_friction", "gravity_load"}, "ripple": {"torque_ripple"},
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LedAxis:
+    """A case: what is hidden, the record, the values that a data sheet states, and the true ones.
+
+    Attributes:
+        hidden: one of ``HIDDEN``.
+        record: its torque and position.
+        stated: inertia and viscous friction, up to 40 and 60 % off.
+        right: names of the effects that are right; empty: none is.
+        truth: true values.
+    """
+
+    hidden: str
+    record: Record
+    stated: tuple[float, float]
+    right: set[str]
+    truth: dict[str, float]
+
+
+@njit
+def _led(asked, speed, noise, push, law, gains, bristle, count, finer):
+    """Return measured angles and torques; ``law``: inertia, viscous, dry, gravity, drag, ripple."""
+    inertia, viscous, dry, gravity, drag, ripple = law
+    angle, rate, bent, integral, filtered, before = asked[0], 0.0, 0.0, 0.0, 0.0, asked[0]
+    angles, torques = np.empty(asked.size), np.empty(asked.size)
+    h = STEP / finer
+    for n in range(asked.size):
+        seen = np.round(angle / count) * count
+        filtered += 0.4 * ((seen - before) / STEP - filtered)
+        before = seen
+        integral += (asked[n] - seen) * STEP
+        torque = gains[0] * (asked[n] - seen) + gains[1] * (speed[n] - filtered) + gains[2] * integral
+        angles[n], torques[n] = seen, torque + noise[n]
+        for _ in range(finer):
+            bent += h * (rate - abs(rate) * bent / bristle)
+            resists = viscous * rate + dry * bent / bristle + drag * rate * abs(rate)
+            resists += gravity * np.sin(angle + 0.3) + ripple * np.sin(CYCLES * angle)
+            rate += h * (torque - resists + push[n]) / inertia
+            angle += h * rate
+    return angles, torques
+
+
+def _path(rng: np.random.Generator, time: Array) -> tuple[Array, Array]:
+    """Return position and speed that are asked for: five waves, or a speed that rises and falls."""
+    if rng.random() < 0.5:
+        position, speed = np.zeros(time.size), np.zeros(time.size)
+        for k in range(1, 6):
+            w, size, phase = 2.0 * np.pi * k * rng.uniform(0.1, 0.25), rng.normal(0.0, 0.6 / k), rng.uniform(0.0, 6.3)
+            position += size * (np.sin(w * time + phase) - np.sin(phase))
+            speed += size * w * np.cos(w * time + phase)
+        return position, speed
+    period, top = rng.uniform(2.0, 4.0), rng.uniform(1.0, 20.0)
+    speed = top * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * time / period))
+    return STEP * np.cumsum(speed), speed
+
+
+def led_axis(seed: int) -> LedAxis:
+    """Return a case; what is hidden goes round with the seed, its size from half to sixteen times the other torques."""
+    rng, hidden = np.random.default_rng([seed, 77]), HIDDEN[seed % len(HIDDEN)]
+    time = STEP * np.arange(ROWS)
+    inertia, loop = 10.0 ** rng.uniform(-5.0, 0.0), 2.0 * np.pi * rng.uniform(3.0, 12.0)
+    position, speed = _path(rng, time)
+    moves, turns = inertia * float(np.std(np.gradient(speed, STEP))), float(np.std(speed))
+    viscous = moves / turns * 10.0 ** rng.uniform(-1.0, 0.3)
+    plain = math.hypot(moves, viscous * turns)
+    size = plain * 10.0 ** rng.uniform(-0.3, 1.2)
+    dry = size if "friction" in hidden and hidden != "growing friction" else 0.0
+    gravity = size * rng.uniform(0.5, 1.0) if "gravity" in hidden else 0.0
+    drag = size / float(np.mean(speed**2)) if hidden == "drag" else 0.0
+    ripple = 0.7 * size if hidden == "ripple" else 0.0
+    push = np.zeros(ROWS)
+    if hidden == "by hand":
+        for _ in range(6):
+            middle, width = rng.uniform(0.0, time[-1]), rng.uniform(0.1, 0.5)
+            push += size * rng.normal() * np.exp(-0.5 * ((time - middle) / width) ** 2)
+    if hidden == "growing friction":
+        push -= size * np.sign(speed) * (time / time[-1]) ** 2
+    share = float(rng.choice([0.003, 0.02, 0.08]))
+    noise = share * math.hypot(plain, size if hidden != "none" else 0.0) * rng.standard_normal(ROWS)
+    bristle = max(1e-5, 1e-3 * float(np.std(position)))
+    gains = (inertia * loop**2, 1.6 * loop * inertia, 0.2 * inertia * loop**3)
+    count = 2.0 * np.pi / float(rng.choice([4096, 65536]))
+    quick = max(3.0 * math.sqrt(dry / bristle / inertia), 3.0 * turns / bristle)
+    finer = int(min(400, max(20, math.ceil(STEP * quick))))
+    law = (inertia, viscous, dry, gravity, drag, ripple)
+    angles, torques = _led(position, speed, noise, push, law, gains, bristle, count, finer)
+    record = record_from_columns({"time": time, "u": torques, "theta_m": angles}, f"axis-{seed}")
+    stated = (inertia * rng.uniform(0.7, 1.4), viscous * rng.uniform(0.6, 1.6))
+    names = ("J", "b", "coulomb_friction", "gravity_load", "quadratic_drag", "torque_ripple")
+    truth = dict(zip(names, law, strict=True)) | {"noise": share, "size": size / plain}
+    return LedAxis(hidden, record, stated, RIGHT.get(hidden, set()), truth)
