@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from orchestrator.diagnosis.diagnose import DEFAULT_SETTINGS, Diagnosis, diagnose
 from orchestrator.diagnosis.fit.together import at_one_rate
 from orchestrator.diagnosis.search.finer import finer_of, is_timed
+from orchestrator.diagnosis.search.judging import Judge
 from orchestrator.records.model_file import Model, read_model
 from tests.support.robot_joint import DRY, STEP, joint_record
 from tests.support.short_records import AXIS
@@ -70,3 +72,26 @@ def test_records_analysed_as_they_were_measured_are_judged_once() -> None:
 def test_only_laws_that_say_when_torques_act_are_asked() -> None:
     timed = {effect.name for effect in AXIS.bank if is_timed(AXIS, effect)}
     assert timed == {"input_delay", "drive_filter", "early_torque"}
+
+
+@pytest.mark.parametrize(
+    ("refuted", "left"), [(True, ["coulomb_friction"]), (False, ["input_delay", "coulomb_friction"])]
+)
+def test_a_delay_is_asked_again_beside_what_came_after_it(monkeypatch, refuted: bool, left: list[str]) -> None:
+    delay, friction = (next(e for e in AXIS.bank if e.name == name) for name in ("input_delay", "coulomb_friction"))
+    monkeypatch.setattr("orchestrator.diagnosis.search.judging.scene_of", lambda *_: None)
+    finer = SimpleNamespace(refutes=lambda *_: refuted, words=lambda effect: f"{effect.name} does not show")
+    judge = SimpleNamespace(
+        finer=finer, plant=AXIS, likelihood=None, refused={}, timed=set(), tick=lambda what: None,
+        free=lambda effects, scene: (),
+        reduced=lambda current, scene, effect: candidate(*(e for e in current.effects if e is not effect)),
+    )  # fmt: skip
+    found = Judge.still_on_time(judge, candidate(delay, friction))
+    assert [effect.name for effect in found.effects] == left
+    assert list(judge.refused) == ([delay.label] if refuted else [])
+    judge.timed.add((frozenset({friction.label}), delay.label))  # it was asked just now
+    assert Judge.still_on_time(judge, candidate(friction, delay)).effects == (friction, delay)
+
+
+def candidate(*effects) -> SimpleNamespace:
+    return SimpleNamespace(effects=effects, fit=None)

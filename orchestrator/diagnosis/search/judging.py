@@ -21,10 +21,12 @@ class Judge(Fits):
     Attributes:
         refused: effects that were not named, by label, and why.
         finer: the records as they were measured; None: they are searched at that rate.
+        timed: labels of models whose last effect, one of the drive's timing, shows at the measured rate.
     """
 
     refused: dict[str, str] = field(default_factory=dict)
     finer: Finer | None = None
+    timed: set[tuple[frozenset[str], str]] = field(default_factory=set)
 
     def earns(self, candidate: Candidate, current: Candidate, base: Candidate) -> bool:
         """Tell whether a candidate gains enough over the model before it, where it was fitted and where it was not.
@@ -142,6 +144,7 @@ class Judge(Fits):
             free = (self.free(candidate.effects, scene), self.free(current.effects, scene))
             self.tick(f"{effect.label}, as it was measured")
             if not finer.refutes(candidate, current, free):
+                self.timed.add(_beside(current.effects, effect))
                 return True
             self.refused.setdefault(effect.label, finer.words(effect))
             return False
@@ -151,7 +154,7 @@ class Judge(Fits):
     def still_on_time(self, current: Candidate) -> Candidate:
         """Return a model without those of its effects of the drive's timing that do not show at the measured rate.
 
-        What came after such an effect may be what it stood for.
+        What came after such an effect may be what it stood for, and what it stood beside may be gone.
 
         Args:
             current: the model that was found.
@@ -160,8 +163,10 @@ class Judge(Fits):
             The model that is left.
         """
         finer = self.finer
-        for effect in current.effects[:-1]:
-            if finer is None or not is_timed(self.plant, effect):
+        for effect in current.effects:
+            others = [one for one in current.effects if one is not effect]
+            asked = finer is None or not is_timed(self.plant, effect) or _beside(others, effect) in self.timed
+            if finer is None or asked:
                 continue
             scene = scene_of(self.likelihood, current.fit)
             fewer = self.reduced(current, scene, effect)
@@ -185,3 +190,8 @@ class Judge(Fits):
         before, after = (horizons(self.likelihood, c.fit.p, current.fit.q, self.parts.validated)
                          for c in (current, candidate))  # fmt: skip
         return not after.harm_over(before) and after.least_skill_over(before) > self.settings.shown
+
+
+def _beside(others: Sequence[Effect], effect: Effect) -> tuple[frozenset[str], str]:
+    """Return what tells a model whose timing was asked: the labels of its other effects, and of that one."""
+    return frozenset(one.label for one in others), effect.label
