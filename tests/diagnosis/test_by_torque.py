@@ -13,6 +13,7 @@ from orchestrator.diagnosis.search.by_torque import _independent
 from orchestrator.diagnosis.search.search import Search
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.record import Record
+from orchestrator.shared.stopwatch import Stopwatch
 from tests.support.light_rotor import DRY, INERTIA, rotor_record
 from tests.support.short_records import AXIS
 
@@ -85,3 +86,10 @@ def test_neighbours_that_miss_the_same_count_once() -> None:
     white = np.random.default_rng(1).standard_normal(2000)
     assert _independent(white) == pytest.approx(2000, rel=0.3)
     assert _independent(np.repeat(white[:200], 10)) < 400
+
+
+def test_a_search_by_torque_ends_when_its_time_is_up(record, model) -> None:
+    search = replace(search_of(record, model), allowed=Stopwatch(1e-9))
+    base, best = search.run()
+    assert best is base
+    assert search.stopped

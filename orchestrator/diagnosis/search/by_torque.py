@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +51,8 @@ def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
     current, ground = replace(base, fit=plain), None
     while len(current.effects) < most:
         scene = scene_of(likelihood, current.fit)
-        tried = search.each(lambda e: _added(search, current, e, scene, moved[0]), list(search.eligible(current)))  # noqa: B023
+        added = partial(_added, search, current, scene, moved[0])
+        tried = search.each(added, list(search.eligible(current)))
         found = [one for one in tried if one is not None]
         if not found:
             break
@@ -70,7 +72,7 @@ def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
     return current if settled else base
 
 
-def _added(search: Judge, current: Candidate, effect: Effect, scene: Scene, moved: Motion) -> Candidate | None:
+def _added(search: Judge, current: Candidate, scene: Scene, moved: Motion, effect: Effect) -> Candidate | None:
     """Return ``current`` with one more effect, fitted to the torque; None: it has no part in the inverse model."""
     likelihood, effects = search.likelihood, (*current.effects, effect)
     free = search.free(effects, scene)

@@ -163,10 +163,11 @@ class Judge(Fits):
             The model that is left.
         """
         finer = self.finer
+        if finer is None:
+            return current
         for effect in current.effects:
             others = [one for one in current.effects if one is not effect]
-            asked = finer is None or not is_timed(self.plant, effect) or _beside(others, effect) in self.timed
-            if finer is None or asked:
+            if not is_timed(self.plant, effect) or _beside(others, effect) in self.timed:
                 continue
             scene = scene_of(self.likelihood, current.fit)
             fewer = self.reduced(current, scene, effect)

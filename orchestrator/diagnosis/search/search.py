@@ -44,9 +44,9 @@ class Search(Judge):
         """
         base = self.base()
         current = ground = base
-        if self.of_torque:
-            return base, by_torque(self, base, self.most)
         try:
+            if self.of_torque:
+                return base, by_torque(self, base, self.most)
             self.hidden = self.hidden_gap(base)
             while len(current.effects) < self.most and len(self.steps) < self.settings.most_steps:
                 step = self.against_its_like(self.step(current, ground), ground)
