@@ -1,5 +1,6 @@
 """The rules of the search, one by one, and a small search from start to end."""
 
+import math
 from dataclasses import replace
 
 import msgspec
@@ -622,3 +623,23 @@ def test_an_effect_that_a_later_one_has_fitted_away_is_seen(friction) -> None:
         assert search.odd((limit, gravity), p, scene) is odd
         found = [replace(base, effects=(limit, gravity), fit=replace(base.fit, p=p))]
         assert search.possible(found, scene) == ([] if odd else found)
+
+
+def test_a_ripple_of_one_cycle_a_turn_is_told_as_gravity() -> None:
+    gravity, ripple = (next(e for e in AXIS.bank if e.name == name) for name in ("gravity_load", "torque_ripple"))
+    likelihood, _ = axis_likelihood(size=600, effects__gravity_load__amplitude=3.0, effects__gravity_load__phase=0.4)
+    search = search_of(likelihood)
+    base = search.base()
+    scene = scene_of(likelihood, base.fit)
+    values = {"amplitude": 3.0, "cycles_per_rev": 1.0, "phase": 0.4 - math.pi}
+    p = ripple.put(AXIS, base.fit.p, values, search.refitted)
+    found = search.candidate(
+        (ripple,), annealed(likelihood, p, base.fit.q, search.free((ripple,), scene), PARTS, (ripple,))
+    )
+    told = search.as_waves(found, scene)
+    assert told.effects == (gravity,)
+    size, phase = (told.fit.p[place] for place in gravity.places(AXIS).values())
+    assert size == pytest.approx(3.0, rel=0.02)
+    assert phase == pytest.approx(0.4, abs=0.05)
+    assert search.steps[-1].candidates == (told,)
+    assert search.as_waves(told, scene) is told

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit
 from orchestrator.diagnosis.fit.torque_fit import motion, share_explained, torque_fit
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, simplest_first
+from orchestrator.diagnosis.search.fits import QUARTERS
 from orchestrator.diagnosis.search.judging import Judge
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.plants.effects import Effect, Scene
@@ -26,8 +27,6 @@ from orchestrator.shared.inference.long_run import long_run_covariance
 
 Array = NDArray[np.float64]
 Motion = tuple[Array, Array, Array, Array]
-
-QUARTERS = tuple(0.5 * math.pi * n for n in range(4))  # phases from which a fit finds any other
 
 
 def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
@@ -89,17 +88,8 @@ def _added(search: Judge, current: Candidate, scene: Scene, moved: Motion, effec
         if left < least:
             least, best = left, found
     if best is not None and effect.phase:  # as it is told: an amplitude of one sign, a phase within a turn
-        best = torque_fit(likelihood, replace(best, p=_wrapped(search, best.p, effect)), search.parts.fitted)
+        best = torque_fit(likelihood, replace(best, p=search.wrapped(best.p, effect)), search.parts.fitted)
     return None if best is None else Candidate(effects, best, search.settings)
-
-
-def _wrapped(search: Judge, p: Array, effect: Effect) -> Array:
-    """Return parameters with the amplitude of a wave positive, and its phase between plus and minus half a turn."""
-    places, p = effect.places(search.plant), p.copy()
-    size, phase = places[effect.size], places[effect.phase]
-    turned = p[phase] + (math.pi if p[size] < 0.0 else 0.0)
-    p[size], p[phase] = abs(p[size]), math.remainder(turned, 2.0 * math.pi)
-    return p
 
 
 def _starts(effect: Effect, scene: Scene) -> Iterator[dict[str, float]]:

@@ -27,6 +27,9 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
+QUARTERS = tuple(0.5 * np.pi * n for n in range(4))  # phases from which a fit finds any other
+
+
 class TimeUpError(Exception):
     """The search may take no longer."""
 
@@ -197,20 +200,27 @@ class Fits(ModelSpace):
             current: the model to build on.
             scene: sizes of the record's signals.
             effect: of the model.
-            simpler: the law that it contains.
+            simpler: the law that it contains; of a wave, another at any phase.
 
         Returns:
-            The candidate.
+            The candidate; a wave that is put in is its last effect.
         """
         kept = tuple(simpler if one is effect else one for one in current.effects)
         own = {short: float(current.fit.p[place]) for short, place in effect.places(self.plant).items()}
         values = {short: value for short, value in own.items() if short in simpler.nuisances}
-        p = simpler.put(
-            self.plant, self.without(current.fit.p, effect), values | {simpler.size: own[effect.size]}, self.refitted
-        )
-        fitted = annealed(self.likelihood, p, current.fit.q, self.free(kept, scene), self.parts, kept)
+        values[simpler.size] = own[effect.size]
+        starts = [values]
+        if simpler.phase:
+            kept = (*(one for one in kept if one is not simpler), simpler)
+            starts = [values | {simpler.phase: phase} for phase in QUARTERS]
+        bare, free, q = self.without(current.fit.p, effect), self.free(kept, scene), current.fit.q
+        places = [simpler.put(self.plant, bare, start, self.refitted) for start in starts]
+        first = best_settled(self.likelihood, places, q, free, self.parts)
+        if simpler.phase:
+            first = replace(first, p=self.wrapped(first.p, simpler))
         self.tick(f"{simpler.label} for {effect.label}")
-        return self.candidate(kept, fitted)
+        levels = ladder(self.likelihood.settings.levels, kept, q)
+        return self.candidate(kept, followed(self.likelihood, first, self.parts, levels))
 
     def known(self, effects: Sequence[Effect]) -> list[Candidate]:
         """Return the models with the same effects, in whatever order, that the search has met.

@@ -1,5 +1,6 @@
 """The models that a search chooses from: which effects may be added, and which parameters each model fits."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
@@ -136,6 +137,22 @@ class ModelSpace:
                     prior = effect.priors(scene).get(short)
                     free.append(Free(place, scales.get(short, unit), low, high, prior))
         return tuple(free)
+
+    def wrapped(self, p: Array, effect: Effect) -> Array:
+        """Return ``p`` with the amplitude of a wave positive, and its phase within half a turn of zero.
+
+        Args:
+            p: (parameters,) of the predictor.
+            effect: a wave of the bank.
+
+        Returns:
+            A copy; the motion is the same.
+        """
+        places, p = effect.places(self.plant), p.copy()
+        size, phase = places[effect.size], places[effect.phase]
+        turned = p[phase] + (math.pi if p[size] < 0.0 else 0.0)
+        p[size], p[phase] = abs(p[size]), math.remainder(turned, 2.0 * math.pi)
+        return p
 
     def without(self, p: Array, effect: Effect) -> Array:
         """Return ``p`` with one effect switched off.

@@ -315,6 +315,29 @@ class Search(Judge):
             simpler = next((one for one in self.plant.bank if one.label == effect.needs), None)
             if simpler is not None:
                 current = max(current, self.simplified(current, scene, effect, simpler), key=lambda one: one.score)
+        return self.as_waves(current, scene)
+
+    def as_waves(self, current: Candidate, scene: Scene) -> Candidate:
+        """Put a wave of a fixed period in the place of one of any period, where it does as well: gravity for a ripple.
+
+        Args:
+            current: a model.
+            scene: sizes of the record's signals.
+
+        Returns:
+            The candidate.
+        """
+        for effect in current.effects:
+            if not effect.phase or not effect.family:
+                continue
+            for simpler in [one for one in self.eligible(current) if one.phase and one.family == effect.family]:
+                if len(simpler.parameters) >= len(effect.parameters):
+                    continue
+                other = self.simplified(current, scene, effect, simpler)
+                if other.score > current.score:
+                    self.steps.append(ForwardStep(self.reduced(current, scene, effect), (other,), True))
+                    current = other
+                    break
         return current
 
 
