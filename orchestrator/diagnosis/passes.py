@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 
 Progress = Callable[[int, int, str], None]
 
+BY_TORQUE = "found in the torque that the motion needs, and gains are of that: a controller hides it from predictions"
+
 
 @dataclass(frozen=True)
 class Pass:
@@ -96,7 +98,9 @@ def passes(
         found = _settled_by_torque(search(as_given=True), found)
     if found.unknown and _has_torque(found) and not allowed.over:
         # A controller that hides what acts on the axis leaves it in the torque.
-        found = _settled_by_torque(search(as_given=True, of_torque=True), found)
+        other = search(as_given=True, of_torque=True)
+        if _settled_by_torque(other, found) is other:
+            found = replace(other, withdrawn=(BY_TORQUE, *other.withdrawn))
     if found.unknown and found.fell and not found.best.effects and not allowed.over:
         # What came first and fell hid what came second, if only as a suspect.
         other = search(barred=found.fell)

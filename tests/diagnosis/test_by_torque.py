@@ -9,6 +9,7 @@ import pytest
 from orchestrator.diagnosis.diagnose import DEFAULT_SETTINGS, diagnose
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.together import at_one_rate, series
+from orchestrator.diagnosis.passes import BY_TORQUE
 from orchestrator.diagnosis.search.by_torque import _independent
 from orchestrator.diagnosis.search.search import Search
 from orchestrator.records.model_file import Model, read_model
@@ -80,6 +81,7 @@ def test_what_the_torque_tells_is_named_where_it_predicts_better(record, model) 
     ahead = {row.horizon: {error["model"]: error["theta_m"] for error in row.errors} for row in found.horizons}
     assert ahead["500 ms"]["final"] < 0.3 * ahead["500 ms"]["parameters"]
     assert found.trust.level.word == "amber"
+    assert found.warnings[1:2] == (BY_TORQUE,)
 
 
 def test_neighbours_that_miss_the_same_count_once() -> None:
