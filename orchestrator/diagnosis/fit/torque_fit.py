@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.slope import Free
+from orchestrator.plants.description import Plant
 from orchestrator.shared.inference.colour import colour_of
 from orchestrator.shared.inference.long_run import long_run_covariance
 
 Array = NDArray[np.float64]
+Motion = tuple[Array, Array, Array, Array]  # position, speed, acceleration, measured torque
 
 # Of parameters that the filtered torque says nothing of: the drive's timing, and contacts shorter than the filter.
 TIMING_UNITS = ("s", "N.m/s")
@@ -44,14 +46,13 @@ def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | N
         is fitted has no part in it.
     """
     plant, settings = likelihood.plant, likelihood.settings.inverse
-    inverse = plant.inverse
     free = tuple(entry for entry in found.free if entry.place < len(plant.table))
     entries = [plant.entry(entry.place) for entry in found.free]
     unseen = any(entry.unit in TIMING_UNITS or entry.name.startswith(CONTACT) for entry in entries)
-    if inverse is None or unseen or not free or plant.value(found.p, plant.drive.lag) > 0.0:
+    if plant.inverse is None or unseen or not free or plant.value(found.p, plant.drive.lag) > 0.0:
         return None
-    position, speed, acceleration, given = motion(likelihood, part)
-    if given.size < settings.least_rows * len(free):
+    moved = motion(likelihood, part)
+    if moved[3].size < settings.least_rows * len(free):
         return None
     scales = np.array([entry.scale for entry in free])
     places = [entry.place for entry in free]
@@ -59,7 +60,7 @@ def torque_fit(likelihood: RecordLikelihood, found: Fit, part: slice) -> Fit | N
     def missing(values: Array) -> Array:
         p = found.p.copy()
         p[places] = values * scales
-        return np.asarray(given - inverse(position, speed, acceleration, p))
+        return lacking_torque(plant, moved, p)
 
     low, high = (np.array([getattr(entry, end) for entry in free]) / scales for end in ("minimum", "maximum"))
     solved = _solved(missing, found.p[places] / scales, low, high)
@@ -113,9 +114,24 @@ def explained(likelihood: RecordLikelihood, found: Fit, part: slice) -> float:
     Returns:
         The share; negative where it explains less than a constant torque.
     """
-    assert likelihood.plant.inverse is not None
-    position, speed, acceleration, given = motion(likelihood, part)
-    return share_explained(given - likelihood.plant.inverse(position, speed, acceleration, found.p), given)
+    moved = motion(likelihood, part)
+    return share_explained(lacking_torque(likelihood.plant, moved, found.p), moved[3])
+
+
+def lacking_torque(plant: Plant, moved: Motion, p: Array) -> Array:
+    """Return the measured torque less what a model needs for a motion.
+
+    Args:
+        plant: that has an inverse model.
+        moved: position, speed, acceleration and torque, as :func:`motion` returns them.
+        p: (parameters,) of the model.
+
+    Returns:
+        (n,) the rest.
+    """
+    assert plant.inverse is not None
+    position, speed, acceleration, given = moved
+    return np.asarray(given - plant.inverse(position, speed, acceleration, p))
 
 
 def share_explained(left: Array, given: Array) -> float:
@@ -131,7 +147,7 @@ def share_explained(left: Array, given: Array) -> float:
     return 1.0 - float(left @ left) / float(np.sum((given - given.mean()) ** 2))
 
 
-def motion(likelihood: RecordLikelihood, part: slice) -> tuple[Array, Array, Array, Array]:
+def motion(likelihood: RecordLikelihood, part: slice) -> Motion:
     """Return position, speed, acceleration and measured torque of a part, all behind one filter.
 
     Rows around a reversal are left out: behind the filter, dry friction turns round slowly. So are rows at rest: there

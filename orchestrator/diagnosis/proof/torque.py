@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.fit.torque_fit import motion, share_explained, torque_fit
+from orchestrator.diagnosis.fit.torque_fit import lacking_torque, motion, share_explained, torque_fit
 from orchestrator.shared.inference.long_run import long_run_covariance
 
 Array = NDArray[np.float64]
@@ -61,14 +61,14 @@ def torque_proof(likelihood: RecordLikelihood, base: Fit, final: Fit, parts: Par
     best = torque_fit(likelihood, base, parts.fitted)
     if best is None or plant.inverse is None or torque_fit(likelihood, final, parts.fitted) is None:
         return TorqueProof()
-    position, speed, acceleration, given = motion(likelihood, parts.held_out)
-    if given.size < likelihood.settings.inverse.least_rows * len(final.free):
+    moved = motion(likelihood, parts.held_out)
+    if moved[3].size < likelihood.settings.inverse.least_rows * len(final.free):
         return TorqueProof()
-    without, left = (given - plant.inverse(position, speed, acceleration, one.p) for one in (best, final))
+    without, left = (lacking_torque(plant, moved, one.p) for one in (best, final))
     change = left**2 - without**2
     mean, chance = change.mean(), np.sqrt(long_run_covariance((change - change.mean())[:, None])[0, 0]) / change.size
     return TorqueProof(
         removed=max(1.0 - float(left @ left) / float(without @ without), 0.0),
-        explained=share_explained(left, given),
+        explained=share_explained(left, moved[3]),
         sure=bool(mean < -likelihood.settings.proof.horizons.sure * chance),
     )

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit
-from orchestrator.diagnosis.fit.torque_fit import motion, share_explained, torque_fit
+from orchestrator.diagnosis.fit.torque_fit import Motion, lacking_torque, motion, share_explained, torque_fit
 from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep, simplest_first
 from orchestrator.diagnosis.search.fits import QUARTERS
 from orchestrator.diagnosis.search.judging import Judge
@@ -26,7 +26,6 @@ from orchestrator.plants.effects import Effect, Scene
 from orchestrator.shared.inference.long_run import long_run_covariance
 
 Array = NDArray[np.float64]
-Motion = tuple[Array, Array, Array, Array]
 
 
 def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
@@ -64,7 +63,7 @@ def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
         if not accepted:
             break
         current = found[0]
-    without, left = (_missing(search, one.p, moved[1]) for one in (plain, current.fit))
+    without, left = (lacking_torque(search.plant, moved[1], one.p) for one in (plain, current.fit))
     verdict = likelihood.settings.verdict
     removed = 1.0 - float(left @ left) / float(without @ without)
     settled = removed > verdict.proven and share_explained(left, moved[1][3]) > verdict.good
@@ -78,13 +77,13 @@ def _added(search: Judge, current: Candidate, scene: Scene, moved: Motion, effec
     least, best = math.inf, None
     for start in _starts(effect, scene):
         p = effect.put(search.plant, current.fit.p, start, search.refitted)
-        if np.array_equal(_missing(search, p, moved), _missing(search, current.fit.p, moved)):
+        if np.array_equal(lacking_torque(search.plant, moved, p), lacking_torque(search.plant, moved, current.fit.p)):
             return None
         begun = Fit(p, current.fit.q, current.fit.z, free, np.eye(len(free)), -math.inf, -math.inf)
         found = torque_fit(likelihood, begun, search.parts.fitted)
         if found is None:
             return None
-        left = float(np.sum(_missing(search, found.p, moved) ** 2))
+        left = float(np.sum(lacking_torque(search.plant, moved, found.p) ** 2))
         if left < least:
             least, best = left, found
     if best is not None and effect.phase:  # as it is told: an amplitude of one sign, a phase within a turn
@@ -104,19 +103,12 @@ def _starts(effect: Effect, scene: Scene) -> Iterator[dict[str, float]]:
             yield values
 
 
-def _missing(search: Judge, p: Array, moved: Motion) -> Array:
-    """Return the measured torque less what a model needs for a motion, (n,)."""
-    position, speed, acceleration, given = moved
-    assert search.plant.inverse is not None
-    return np.asarray(given - search.plant.inverse(position, speed, acceleration, p))
-
-
 def _told(search: Judge, moved: list[Motion], found: list[Candidate]) -> list[Candidate]:
     """Return candidates with the log-likelihood of the torque of both parts in their fits.
 
     Neighbouring rows miss the same torque: as many count as are independent of what the best candidate leaves.
     """
-    missing = [[_missing(search, one.fit.p, part) for part in moved] for one in found]
+    missing = [[lacking_torque(search.plant, part, one.fit.p) for part in moved] for one in found]
     best = min(missing, key=lambda parts: sum(float(left @ left) for left in parts))
     counts = [_independent(left) for left in best]
     told = []
