@@ -120,6 +120,8 @@ class Plant:
         realised: predictor's parameters -> those of the FMU (n,), with what the predictor alone has fitted put in.
         inverse: (position, speed, acceleration, p) -> torque [N.m] that such a motion needs; None: not defined.
         learned: a law that was learned is part of its equations.
+        seldom: names of parameters that few models have off their defaults, and that cost time in all: where none is,
+            equations run in which they are constants.
     """
 
     name: str
@@ -144,6 +146,7 @@ class Plant:
     realised: Callable[[Array], Array] | None = None
     inverse: Callable[[Array, Array, Array, Array], Array] | None = None
     learned: bool = False
+    seldom: tuple[str, ...] = ()
     _index: dict[str, int] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:

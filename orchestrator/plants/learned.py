@@ -281,15 +281,15 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
 def _runner(plant: Plant) -> Any:
     from orchestrator.shared.numba_cache import kept
 
-    rest_of, reach_of, sample = sample_of(plant)
+    prepared, sample = sample_of(plant)
 
     @kept(error_model="numpy", nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, out: Array) -> None:
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
-        rest, reach = rest_of(p), reach_of(p)
+        common = prepared(p, first, h, (4, 16))
         memory = (0.0, 0.0, 0.0, 0.0)
         for n in range(late.size):
             out[n, 0], out[n, 1] = x[0], x[2]
-            x, memory = sample(x, memory, p, rest, reach, (early[n], late[n]), first, h, (4, 16))
+            x, memory = sample(x, memory, p, common, (early[n], late[n]))
 
     return run

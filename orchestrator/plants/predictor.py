@@ -1,11 +1,8 @@
 """The one-step predictor: the plant's own equations, corrected by fixed gains at every sample.
 
 The predictor is in innovation form: ``e = y - C x``, ``x+ = f(x + K e)``. It is compiled once per plant from the
-same source that runs inside the FMU (:mod:`orchestrator.plants.compiled`), integrated by classical Runge-Kutta steps.
-The direction of dry friction, which that source takes as an argument, builds up over a short distance here (Dahl's
-bristle, Canudas de Wit et al., IEEE Trans. Automatic Control 40(3), 1995): real friction does, innovations become
-differentiable in the parameters, and as the distance goes to zero it is the signum that the FMU uses. In the same way
-the damping of teeth that meet grows with their penetration (Hunt and Crossley, J. Applied Mechanics 42(2), 1975).
+same source that runs inside the FMU (:mod:`orchestrator.plants.compiled`), one sample after the other
+(:mod:`orchestrator.plants.sample`).
 
 Where a gap lies between the encoder and what is not measured, gains of the plant without it lead astray while the
 teeth are apart. They are then those of a filter that is linearised along the motion itself, by differences as wide as
@@ -14,84 +11,21 @@ its own uncertainty (Norgaard, Poulsen and Ravn, Automatica 36(11), 2000): a fla
 
 import math
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
+from orchestrator.plants.sample import is_usual, parameters_of, sample_of
 from orchestrator.shared.numba_cache import UNCOUNTED, kept
 
 Array = NDArray[np.float64]
 
-NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
-LAGGED = 4  # place of the drive's torque in the state
 FINER = 8  # times more steps of a free run in a sample in which dry friction may turn round, as in fits
 MOST_STEPS = 1000  # of a free run in a sample: with values that ask for more a model is lost, and not waited for
 WAVE = 0.05  # of a wave's period: the farthest that a Runge-Kutta step of a free run goes
-CALM = 0.02  # distances of presliding per sample below which it hardly changes
-
-
-@njit(error_model="numpy", **UNCOUNTED)
-def _turned(bristle: float, speed: float, level: float, rest: float, distance: float, h: float) -> Any:
-    """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre)."""
-    if level <= 1e-9 * rest or rest == 0.0:
-        return 0.0, 0.0
-    reach = distance * level / rest
-    settled = reach if speed > 0.0 else -reach
-    new = settled + (bristle - settled) * math.exp(-abs(speed) * h / reach)
-    return new, 0.5 * (bristle + new) / reach
-
-
-@njit(error_model="numpy", **UNCOUNTED)
-def _near_rest(speed: float, acceleration: float, distance: float, h: float) -> Any:
-    """Whether dry friction may turn round within ``h``, so far that steps must be short."""
-    way, change = abs(speed) * h, 1.5 * h * h * abs(acceleration)
-    return way < change + NEAR * distance and way + change > CALM * distance
-
-
-@njit(error_model="numpy", **UNCOUNTED)
-def _along(x: Any, rate: Any, h: float) -> Any:
-    """Return the state after a straight step; the last entry is the memory of the shaft's hysteresis here."""
-    return (
-        x[0] + h * rate[0],
-        x[1] + h * rate[1],
-        x[2] + h * rate[2],
-        x[3] + h * rate[3],
-        x[4] + h * rate[4],
-        x[5] + h * rate[5],
-        x[6] + h * rate[6],
-        x[7] + h * rate[7],
-    )
-
-
-@njit(error_model="numpy", **UNCOUNTED)
-def _delivered(before: float, asked: float, lag: float, h: float) -> Any:
-    """Return the drive's torque at the beginning, in the middle and at the end of a step as it acts, and as it is left.
-
-    It follows what is asked by a lag that may be far quicker than the step. What acts is the straight line with the
-    same impulse and the same moment, which moves a mass as far.
-    """
-    if lag <= 0.0:
-        return before, before, before, before
-    ratio = h / lag
-    if ratio < 1e-3:
-        end = before + (asked - before) * ratio * (1.0 - 0.5 * ratio)
-        return before, 0.5 * (before + end), end, end
-    faded = math.exp(-ratio)
-    mean = (1.0 - faded) / ratio
-    slope = 12.0 * ((1.0 - faded * (1.0 + ratio)) / ratio**2 - 0.5 * mean)
-    off = before - asked
-    return (
-        asked + off * (mean - 0.5 * slope), asked + off * mean, asked + off * (mean + 0.5 * slope), asked + off * faded,
-    )  # fmt: skip
-
-
-@njit(error_model="numpy", **UNCOUNTED)
-def _with_torque(x: Any, torque: float) -> Any:
-    """Return the state with another torque of the drive."""
-    return (x[0], x[1], x[2], x[3], torque, x[5], x[6], x[7])
 
 
 @njit(error_model="numpy", **UNCOUNTED)
@@ -129,82 +63,7 @@ def _root(P: Array) -> Array:
     return root
 
 
-class Sample(NamedTuple):
-    """One sample of a plant: ``rest_of(p)``, ``reach_of(p)`` of its dry friction, and ``sample``, compiled."""
-
-    rest_of: Any
-    reach_of: Any
-    sample: Any
-
-
-@cache
-def sample_of(plant: Plant) -> Sample:
-    """Return the compiled equations of one sample.
-
-    References are counted in them: equations of a plant that say nothing else inherit that, and may make arrays.
-
-    Args:
-        plant: whose equations they are.
-
-    Returns:
-        ``rest_of``, ``reach_of`` and ``sample``.
-    """
-    friction, stage, (at_m, at_l) = plant.stage()
-    at_lag = plant.index(plant.drive.lag)
-
-    @njit(error_model="numpy", forceinline=True)
-    def advanced(x: Any, signs: Any, p: Any, torque: float, step: float) -> Any:
-        begin, middle, end, left = _delivered(x[LAGGED], torque, p[at_lag], step)
-        k1 = stage(_with_torque(x, begin), signs, p, torque)
-        k2 = stage(_with_torque(_along(x, k1, 0.5 * step), middle), signs, p, torque)
-        k3 = stage(_with_torque(_along(x, k2, 0.5 * step), middle), signs, p, torque)
-        k4 = stage(_with_torque(_along(x, k3, step), end), signs, p, torque)
-        new = _along(_along(_along(_along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
-        return _with_torque(new, left)
-
-    @njit(error_model="numpy")
-    def rest_of(p: Any) -> Any:
-        at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
-        sliding = friction((0.0, 1e6, 0.0, 1e6, 0.0, 0.0, 0.0, 0.0), p)
-        return (max(at_rest[0], sliding[0]), max(at_rest[1], sliding[1]))
-
-    @njit(error_model="numpy")
-    def reach_of(p: Any) -> Any:
-        return (math.exp(p[at_m]), math.exp(p[at_l]))
-
-    @njit(error_model="numpy", forceinline=True)
-    def sample(x: Any, memory: Any, p: Any, rest: Any, reach: Any, torques: Any, first: float, h: float,
-               substeps: Any) -> Any:  # fmt: skip
-        """Return the state and what friction remembers (bristles, directions) one sample on."""
-        bristle_m, bristle_l, sign_m, sign_l = memory
-        signs = (sign_m, sign_l)
-        steps = substeps[0]
-        if rest[0] > 0.0 or rest[1] > 0.0:
-            rate = stage(x, signs, p, torques[1])
-            turning_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach[0], h)
-            turning_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach[1], h)
-            if turning_m or turning_l:
-                steps = substeps[1]
-        for piece in range(2):
-            span, torque = (first, torques[0]) if piece == 0 else (h - first, torques[1])
-            if span <= 1e-9 * h:
-                continue
-            count = math.ceil(steps * span / h - 1e-9)
-            step = span / count
-            for _ in range(count):
-                if rest[0] > 0.0 or rest[1] > 0.0:
-                    level = friction(x, p)
-                    bristle_m, sign_m = _turned(bristle_m, x[1], level[0], rest[0], reach[0], step)
-                    bristle_l, sign_l = _turned(bristle_l, x[3], level[1], rest[1], reach[1], step)
-                    signs = (sign_m, sign_l)
-                x = advanced(x, signs, p, torque, step)
-        return x, (bristle_m, bristle_l, signs[0], signs[1])
-
-    return Sample(rest_of, reach_of, sample)
-
-
-@cache
-def predictor_of(plant: Plant) -> Any:
+def predictor_of(plant: Plant, p: Any) -> Any:
     """Return ``predict(y, early, late, first, p, h, substeps, gains, offsets, start, innovations, states)``, compiled.
 
     In each sample the torque ``early`` acts for ``first`` [s], then ``late`` (a dead time is no multiple of ``h``).
@@ -214,11 +73,18 @@ def predictor_of(plant: Plant) -> Any:
 
     Args:
         plant: whose equations it has.
+        p: parameters that it is to be called with.
 
     Returns:
         The function, of machine code.
     """
-    rest_of, reach_of, sample = sample_of(plant)
+    return _predictor(plant, is_usual(plant, p))
+
+
+@cache
+def _predictor(plant: Plant, usual: bool) -> Any:
+    prepared, sample = sample_of(plant)
+    parameters = parameters_of(plant, usual)
 
     @kept(error_model="numpy", nogil=True)
     def predict(
@@ -226,7 +92,8 @@ def predictor_of(plant: Plant) -> Any:
         start: Any, innovations: Array, states: Array,
     ) -> None:  # fmt: skip
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
-        rest, reach = rest_of(p), reach_of(p)
+        values = parameters(p)
+        common = prepared(values, first, h, substeps)
         memory = (0.0, 0.0, 0.0, 0.0)
         for n in range(late.size):
             a = y[n, 0] - x[0] - offsets[0]
@@ -236,31 +103,38 @@ def predictor_of(plant: Plant) -> Any:
             x = _corrected(x, gains[n], a, b)
             for j in range(8):
                 states[n, j] = x[j]
-            x, memory = sample(x, memory, p, rest, reach, (early[n], late[n]), first, h, substeps)
+            x, memory = sample(x, memory, values, common, (early[n], late[n]))
 
     return predict
 
 
-@cache
-def coarse_runner_of(plant: Plant) -> Any:
+def coarse_runner_of(plant: Plant, p: Any) -> Any:
     """Return ``run(start, p, early, late, first, h, substeps, out)``, compiled: the predictor, never corrected.
 
     Args:
         plant: whose equations it has.
+        p: parameters that it is to be called with.
 
     Returns:
         The function, of machine code; its arguments are those of :func:`predictor_of`, and out (n, 2), the angles.
     """
-    rest_of, reach_of, sample = sample_of(plant)
+    return _coarse_runner(plant, is_usual(plant, p))
+
+
+@cache
+def _coarse_runner(plant: Plant, usual: bool) -> Any:
+    prepared, sample = sample_of(plant)
+    parameters = parameters_of(plant, usual)
 
     @kept(error_model="numpy", nogil=True)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, substeps: Any, out: Array) -> None:
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7])
-        rest, reach = rest_of(p), reach_of(p)
+        values = parameters(p)
+        common = prepared(values, first, h, substeps)
         memory = (0.0, 0.0, 0.0, 0.0)
         for n in range(late.size):
             out[n, 0], out[n, 1] = x[0], x[2]
-            x, memory = sample(x, memory, p, rest, reach, (early[n], late[n]), first, h, substeps)
+            x, memory = sample(x, memory, values, common, (early[n], late[n]))
 
     return run
 
@@ -347,7 +221,7 @@ def follower_of(plant: Plant) -> Any:
     Returns:
         The function, of machine code.
     """
-    rest_of, reach_of, sample = sample_of(plant)
+    prepared, sample = sample_of(plant)
     followers = np.array(plant.followers, dtype=np.int64).reshape(-1, 2)
 
     @njit(error_model="numpy")
@@ -368,7 +242,7 @@ def follower_of(plant: Plant) -> Any:
         places: Any, measured: Any, P: Array, Q: Array, R: Array, gains: Array, roots: Array,
     ) -> None:  # fmt: skip
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], 0.0)
-        rest, reach = rest_of(p), reach_of(p)
+        common = prepared(p, first, h, substeps)
         memory = (0.0, 0.0, 0.0, 0.0)
         k, m = places.size, measured.size
         C = np.zeros((m, k))
@@ -390,11 +264,11 @@ def follower_of(plant: Plant) -> Any:
             root = _root(P)
             torques = (early[n], late[n])
             for j in range(k):
-                ahead, _ = sample(moved(x, places, root[:, j]), memory, p, rest, reach, torques, first, h, substeps)
-                back, _ = sample(moved(x, places, -root[:, j]), memory, p, rest, reach, torques, first, h, substeps)
+                ahead, _ = sample(moved(x, places, root[:, j]), memory, p, common, torques)
+                back, _ = sample(moved(x, places, -root[:, j]), memory, p, common, torques)
                 for i in range(k):
                     spread[i, j] = 0.5 * (ahead[places[i]] - back[places[i]])
             P = spread @ spread.T + Q
-            x, memory = sample(x, memory, p, rest, reach, torques, first, h, substeps)
+            x, memory = sample(x, memory, p, common, torques)
 
     return follow

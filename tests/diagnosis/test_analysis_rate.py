@@ -72,7 +72,7 @@ def test_a_lag_far_quicker_than_a_step_is_solved(step: float) -> None:
     p, u = bench(), np.random.default_rng(5).normal(0.0, 9.0, 500)
     steps, found = DRIVETRAIN.substeps(p, step), np.empty((500, 2))
     assert steps <= 2
-    coarse_runner_of(DRIVETRAIN)((0.0,) * 8, tuple(p.tolist()), u, u, 0.0, step, (steps, 8 * steps), found)
+    coarse_runner_of(DRIVETRAIN, p)((0.0,) * 8, tuple(p.tolist()), u, u, 0.0, step, (steps, 8 * steps), found)
     right = exact(p, u, step)
     twist = right[:, 0] - right[:, 1]
     assert np.std(found[:, 0] - found[:, 1] - twist) < 0.003 * np.std(twist)

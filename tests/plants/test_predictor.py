@@ -24,6 +24,6 @@ def test_equations_of_a_plant_may_make_arrays() -> None:
     p = PLANT.extended([entry.default for entry in PLANT.table])
     angles = [np.empty((50, 2)) for _ in range(2)]
     for plant, out in zip((PLANT, other), angles, strict=True):
-        coarse_runner_of(plant)((0.0,) * 8, p, np.ones(50), np.ones(50), 0.0, 0.01, (1, 8), out)
+        coarse_runner_of(plant, p)((0.0,) * 8, p, np.ones(50), np.ones(50), 0.0, 0.01, (1, 8), out)
     assert angles[0][-1, 0] != 0.0
     assert np.array_equal(*angles)

@@ -53,7 +53,6 @@ class RecordLikelihood:
     _halted: Event = field(default_factory=Event)
 
     def __post_init__(self) -> None:
-        self._predict = predictor_of(self.plant)
         self._delay, self._limit = (self.plant.index(name) for name in (self.plant.drive.delay, self.plant.drive.limit))
         self._offsets = [self.plant.index(name) for name in self.plant.offsets]
         self._substeps = self.plant.substeps(self.nominal, self.signals.h)
@@ -173,10 +172,10 @@ class RecordLikelihood:
         n, gains = self.stop, self.gains(q, p).gains
         raw, states = np.empty((n, 2)), np.empty((n, STATES))
         signals = self.signals.aligned(self.plant, p)
-        offsets = [p[place] for place in self._offsets] + [0.0, 0.0]
+        offsets, predict = [p[place] for place in self._offsets] + [0.0, 0.0], predictor_of(self.plant, p)
         for rows, u, start in self._records(signals, n, self._reference(p)):
             errors, corrected = np.empty((len(u), 2)), np.empty((len(u), STATES))
-            self._predict(
+            predict(
                 signals.y[rows], *self.delivered(p, u), p, signals.h, self.substeps(p), gains[rows],
                 (offsets[0], offsets[1]), start, errors, corrected,
             )  # fmt: skip

@@ -103,7 +103,7 @@ class Simulation:
         if not (self.history and runs_coarsely(plant, p)):
             return None
         steps = coarse_steps(plant, p, h, self.signals.turn)
-        coarse = coarse_runner_of(plant)
+        coarse = coarse_runner_of(plant, p)
         return lambda start, early, late, out: coarse(
             tuple(start.tolist()), p, early, late, first, h, (steps, FINER * steps), out
         )

@@ -18,6 +18,13 @@ Array = NDArray[np.float64]
 
 NUISANCES = ("presliding.motor", "presliding.load", "contact.onset")
 
+SELDOM = (
+    "alpha", "backlash_model", "contact_", "restitution", "effects.impact_damping", "effects.gear_eccentricity",
+    "effects.varying_", "effects.periodic_friction", "effects.load_dependent_friction", "effects.extra_resonance",
+    "effects.spring_load", "effects.end_stop", "effects.torque_ripple.second", "effects.torque_ripple.third",
+)  # fmt: skip
+"""How names of parameters begin that few models need, and that take as long as all others together."""
+
 
 def refused(values: Mapping[str, float]) -> str:
     """Return why a drivetrain's backlash model cannot be diagnosed: the one-step predictor is elastic.
@@ -162,4 +169,5 @@ PLANT = Plant(
     runner=_runner,
     refused=refused,
     realised=realised,
+    seldom=tuple(entry.name for entry in dt.PARAMETERS if entry.name.startswith(SELDOM)),
 )

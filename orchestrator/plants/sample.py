@@ -1,0 +1,198 @@
+"""One sample of a plant's motion, compiled: classical Runge-Kutta steps of the plant's own equations.
+
+The direction of dry friction, which those equations take as an argument, builds up over a short distance here (Dahl's
+bristle, Canudas de Wit et al., IEEE Trans. Automatic Control 40(3), 1995): real friction does, innovations become
+differentiable in the parameters, and as the distance goes to zero it is the signum that the FMU uses. In the same way
+the damping of teeth that meet grows with their penetration (Hunt and Crossley, J. Applied Mechanics 42(2), 1975).
+"""
+
+import math
+from functools import cache
+from typing import Any, NamedTuple
+
+from numba import njit
+
+from orchestrator.plants.description import Plant
+from orchestrator.shared.numba_cache import UNCOUNTED
+
+NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
+LAGGED = 4  # place of the drive's torque in the state
+CALM = 0.02  # distances of presliding per sample below which it hardly changes
+
+
+@njit(error_model="numpy", **UNCOUNTED)
+def _turned(bristle: float, speed: float, level: float, rest: float, distance: float, h: float) -> Any:
+    """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre)."""
+    if level <= 1e-9 * rest or rest == 0.0:
+        return 0.0, 0.0
+    reach = distance * level / rest
+    settled = reach if speed > 0.0 else -reach
+    new = settled + (bristle - settled) * math.exp(-abs(speed) * h / reach)
+    return new, 0.5 * (bristle + new) / reach
+
+
+@njit(error_model="numpy", **UNCOUNTED)
+def _near_rest(speed: float, acceleration: float, distance: float, h: float) -> Any:
+    """Whether dry friction may turn round within ``h``, so far that steps must be short."""
+    way, change = abs(speed) * h, 1.5 * h * h * abs(acceleration)
+    return way < change + NEAR * distance and way + change > CALM * distance
+
+
+@njit(error_model="numpy", **UNCOUNTED)
+def _along(x: Any, rate: Any, h: float) -> Any:
+    """Return the state after a straight step; the last entry is the memory of the shaft's hysteresis here."""
+    return (
+        x[0] + h * rate[0],
+        x[1] + h * rate[1],
+        x[2] + h * rate[2],
+        x[3] + h * rate[3],
+        x[4] + h * rate[4],
+        x[5] + h * rate[5],
+        x[6] + h * rate[6],
+        x[7] + h * rate[7],
+    )
+
+
+@njit(error_model="numpy", **UNCOUNTED)
+def _step_of(span: float, steps: int, h: float, lag: float) -> Any:
+    """Return how a ``span`` [s] of a sample is run: number of steps, their length, and what they keep of the torque.
+
+    The drive follows what is asked by a lag that may be far quicker than a step. What is kept is the part of the
+    distance between both that is left at the beginning, in the middle and at the end of a step as it acts, and at its
+    end as it is. What acts is the straight line with the same impulse and the same moment, which moves a mass as far.
+    """
+    if span <= 1e-9 * h:
+        return 0, 0.0, 0.0, 0.0, 0.0, 0.0
+    count = math.ceil(steps * span / h - 1e-9)
+    step = span / count
+    if lag <= 0.0:
+        return count, step, 1.0, 1.0, 1.0, 1.0
+    ratio = step / lag
+    if ratio < 1e-3:
+        left = 1.0 - ratio * (1.0 - 0.5 * ratio)
+        return count, step, 1.0, 0.5 * (1.0 + left), left, left
+    left = math.exp(-ratio)
+    mean = (1.0 - left) / ratio
+    slope = 12.0 * ((1.0 - left * (1.0 + ratio)) / ratio**2 - 0.5 * mean)
+    return count, step, mean - 0.5 * slope, mean, mean + 0.5 * slope, left
+
+
+@njit(error_model="numpy", **UNCOUNTED)
+def _with_torque(x: Any, torque: float) -> Any:
+    """Return the state with another torque of the drive."""
+    return (x[0], x[1], x[2], x[3], torque, x[5], x[6], x[7])
+
+
+class Sample(NamedTuple):
+    """One sample of a plant, compiled.
+
+    Attributes:
+        prepared: ``prepared(p, first, h, substeps)``: what all samples of a run have in common. ``first`` [s] is the
+            length of a sample's first piece, ``substeps`` are the steps of a sample and of one in which dry friction
+            may turn round.
+        sample: ``sample(x, memory, p, common, torques)``: the state and what friction remembers (bristles, directions)
+            one sample on, with the torques that act in both of its pieces.
+    """
+
+    prepared: Any
+    sample: Any
+
+
+@cache
+def sample_of(plant: Plant) -> Sample:
+    """Return the compiled equations of one sample.
+
+    References are counted in them: equations of a plant that say nothing else inherit that, and may make arrays.
+
+    Args:
+        plant: whose equations they are.
+
+    Returns:
+        What prepares a run, and what runs one sample.
+    """
+    friction, stage, (at_m, at_l) = plant.stage()
+    at_lag = plant.index(plant.drive.lag)
+
+    @njit(error_model="numpy", forceinline=True)
+    def advanced(x: Any, signs: Any, p: Any, torque: float, way: Any) -> Any:
+        _, step, begin, middle, end, left = way
+        off = x[LAGGED] - torque
+        k1 = stage(_with_torque(x, torque + off * begin), signs, p, torque)
+        k2 = stage(_with_torque(_along(x, k1, 0.5 * step), torque + off * middle), signs, p, torque)
+        k3 = stage(_with_torque(_along(x, k2, 0.5 * step), torque + off * middle), signs, p, torque)
+        k4 = stage(_with_torque(_along(x, k3, step), torque + off * end), signs, p, torque)
+        new = _along(_along(_along(_along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
+        return _with_torque(new, torque + off * left)
+
+    @njit(error_model="numpy")
+    def prepared(p: Any, first: float, h: float, substeps: Any) -> Any:
+        at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
+        sliding = friction((0.0, 1e6, 0.0, 1e6, 0.0, 0.0, 0.0, 0.0), p)
+        rest = (max(at_rest[0], sliding[0]), max(at_rest[1], sliding[1]))
+        reach = (math.exp(p[at_m]), math.exp(p[at_l]))
+        lag = p[at_lag]
+        usual = (_step_of(first, substeps[0], h, lag), _step_of(h - first, substeps[0], h, lag))
+        turning = (_step_of(first, substeps[1], h, lag), _step_of(h - first, substeps[1], h, lag))
+        return rest, reach, h, usual, turning
+
+    @njit(error_model="numpy", forceinline=True)
+    def sample(x: Any, memory: Any, p: Any, common: Any, torques: Any) -> Any:
+        rest, reach, h, ways, turning = common
+        bristle_m, bristle_l, sign_m, sign_l = memory
+        signs = (sign_m, sign_l)
+        rubs = rest[0] > 0.0 or rest[1] > 0.0
+        if rubs:
+            rate = stage(x, signs, p, torques[1])
+            turns_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach[0], h)
+            turns_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach[1], h)
+            if turns_m or turns_l:
+                ways = turning
+        for piece in range(2):
+            torque, way = torques[piece], ways[piece]
+            for _ in range(way[0]):
+                if rubs:
+                    level = friction(x, p)
+                    bristle_m, sign_m = _turned(bristle_m, x[1], level[0], rest[0], reach[0], way[1])
+                    bristle_l, sign_l = _turned(bristle_l, x[3], level[1], rest[1], reach[1], way[1])
+                    signs = (sign_m, sign_l)
+                x = advanced(x, signs, p, torque, way)
+        return x, (bristle_m, bristle_l, signs[0], signs[1])
+
+    return Sample(prepared, sample)
+
+
+@cache
+def parameters_of(plant: Plant, usual: bool) -> Any:
+    """Return ``parameters(p)``, compiled: the parameters as a tuple, which no array of results may overlap.
+
+    Equations that get them so read each once in a run, and leave out what constants do not ask for.
+
+    Args:
+        plant: whose parameters they are.
+        usual: ``plant.seldom`` are their defaults, as constants.
+
+    Returns:
+        The function.
+    """
+    fixed = {plant.index(name) for name in plant.seldom} if usual else set()
+    entries = (repr(float(plant.entry(n).default)) if n in fixed else f"p[{n}]" for n in range(len(plant.names)))
+    # A tuple of a hundred entries, some of them constants, has no other form that the compiler knows.
+    return njit(error_model="numpy", forceinline=True)(eval(f"lambda p: ({', '.join(entries)},)"))
+
+
+def is_usual(plant: Plant, p: Any) -> bool:
+    """Tell whether what models have seldom is absent from one, so that equations without it may run.
+
+    Args:
+        plant: the plant.
+        p: the predictor's parameters.
+
+    Returns:
+        True when each of ``plant.seldom`` is its default.
+    """
+    return all(p[place] == default for place, default in _seldom(plant))
+
+
+@cache
+def _seldom(plant: Plant) -> tuple[tuple[int, float], ...]:
+    return tuple((plant.index(name), plant.entry(plant.index(name)).default) for name in plant.seldom)
