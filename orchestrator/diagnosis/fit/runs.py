@@ -7,6 +7,7 @@ then what decides, then what is held out. So a part is one slice, while the pred
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,4 +97,11 @@ def in_time(runs: Sequence[Run], row: int, size: int) -> tuple[Rows, int]:
         place = int(np.searchsorted(run.rows, row))
         if place < run.rows.size and run.rows[place] == row:
             return run.rows, place
-    return np.arange(size), row
+    return _one_after_the_other(size), row
+
+
+@lru_cache(maxsize=8)  # each run of a model asks for them
+def _one_after_the_other(size: int) -> Rows:
+    rows = np.arange(size)
+    rows.flags.writeable = False
+    return rows

@@ -59,8 +59,8 @@ class Simulation:
             self._acting[first_row] = self._requests_of(self.aligned.u[rows])
         acting, asked = self._acting[first_row]
         whole, _ = self._dead_time
-        at = np.arange(place, place + end - begin)
-        late, early = (_requests(acting, at - back, 0 if self.history else place) for back in (whole, whole + 1))
+        known, rows_asked = 0 if self.history else place, end - begin
+        late, early = (_requests(acting, place - back, rows_asked, known) for back in (whole, whole + 1))
         out = np.empty((end - begin, 2))
         if self._kernel is not None:
             self._kernel(start, early, late, out)
@@ -129,6 +129,9 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
     return Simulation(plant, p, signals, history).run(start, part)
 
 
-def _requests(u: Array, at: NDArray[np.int64], first: int) -> Array:
-    """Return the requests at samples ``at``; there were none before ``first``."""
-    return np.where(at >= first, u[np.maximum(at, 0)], u[0] if first == 0 else 0.0)
+def _requests(u: Array, begin: int, count: int, first: int) -> Array:
+    """Return the requests at ``count`` samples from ``begin`` on; there were none before ``first``."""
+    if begin >= first:
+        return u[begin : begin + count]
+    unknown = min(first - begin, count)
+    return np.concatenate([np.full(unknown, u[0] if first == 0 else 0.0), u[begin + unknown : begin + count]])
