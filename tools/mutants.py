@@ -66,6 +66,7 @@ ROOMS = (
     Room(
         "verdict",
         (
+            "orchestrator/diagnosis/judged.py",
             "orchestrator/diagnosis/passes.py",
             *(f"orchestrator/diagnosis/verdict/{n}.py" for n in ("admission", "remainder", "where", "naming", "words")),
         ),

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.together import at_one_rate, series
+from orchestrator.diagnosis.judged import Pass
 from orchestrator.diagnosis.outcome import Diagnosis, LearnedLaw, Named, Workings
-from orchestrator.diagnosis.passes import Pass, Progress, passes
+from orchestrator.diagnosis.passes import Progress, passes
 from orchestrator.diagnosis.proof.by_record import by_record, repeats
 from orchestrator.diagnosis.proof.horizons import table
 from orchestrator.diagnosis.proof.learned import learned_law

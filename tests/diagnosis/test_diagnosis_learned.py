@@ -10,8 +10,8 @@ from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.slope import Free
+from orchestrator.diagnosis.judged import Pass
 from orchestrator.diagnosis.outcome import LearnedLaw, Misfit
-from orchestrator.diagnosis.passes import Pass
 from orchestrator.diagnosis.proof.clocked import cycle_of
 from orchestrator.diagnosis.proof.curves import curve, drawn, formula_of, knots_of, shortened
 from orchestrator.diagnosis.proof.learned import learned_law

@@ -15,6 +15,7 @@ from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.fit.torque_fit import torque_fit
 from orchestrator.diagnosis.proof.reported import as_allowed
 from orchestrator.diagnosis.proof.torque import TorqueProof
+from orchestrator.diagnosis.search.search import Search
 from orchestrator.records.model_file import Model, read_model
 from tests.diagnosis.test_torque_fit import AXIS, FRICTION, joint_of
 from tests.support.held_arm import held_arm_record
@@ -39,8 +40,8 @@ def test_gravity_and_friction_of_an_arm_that_is_held_up_are_named(tmp_path: Path
 
 @pytest.mark.parametrize(
     ("changed", "settles", "unknown", "chosen", "asked"),
-    [("input_delay", 0.9, False, "given", 2), ("input_delay", 0.5, False, "first", 4),
-     ("input_delay", 0.9, True, "first", 4), ("coulomb_friction", 0.9, False, "first", 3)],
+    [("input_delay", 0.9, False, "given", 2), ("input_delay", 0.5, False, "first", 3),
+     ("input_delay", 0.9, True, "first", 3), ("coulomb_friction", 0.9, False, "first", 2)],
 )  # fmt: skip
 def test_what_is_found_with_the_torque_as_given_counts_where_the_torque_settles_it(
     monkeypatch, changed, settles, unknown, chosen, asked
@@ -58,11 +59,12 @@ def test_what_is_found_with_the_torque_as_given_counts_where_the_torque_settles_
             search=SimpleNamespace(stopped=False, steps=[step]),
         )  # fmt: skip
 
-    def search(*_, as_given: bool = False, of_torque: bool = False) -> SimpleNamespace:
-        searches.append(as_given and not of_torque)
-        return found("given", unknown) if as_given and not of_torque else found("first", True)
+    def judged(search: Search, *_: object) -> SimpleNamespace:
+        searches.append(search.as_given)
+        return found("given", unknown) if search.as_given else found("first", True)
 
-    monkeypatch.setattr(rules, "_search", search)
+    monkeypatch.setattr(rules, "judged", judged)
+    monkeypatch.setattr(Search, "run", lambda search: (None, SimpleNamespace(effects=())))
     signals, nominal = likelihood.signals, likelihood.nominal
     got = rules.passes(SimpleNamespace(plant=AXIS), signals, parts, nominal, DEFAULT_SETTINGS, lambda *_: None)
     assert (got.name, len(searches), any(searches)) == (chosen, asked, changed == "input_delay")
@@ -81,13 +83,14 @@ def test_what_came_second_is_looked_for_where_what_came_first_fell(monkeypatch, 
             likelihood=likelihood, left=SimpleNamespace(growth=1.0), search=SimpleNamespace(stopped=False, steps=[]),
         )  # fmt: skip
 
-    def search(*_, barred: frozenset[str] = frozenset(), of_torque: bool = False, **_how) -> SimpleNamespace:
-        if of_torque:
-            return found("torque", True, frozenset(), ())
-        asked.append(barred)
-        return found("barred", unknown, frozenset(), suspects) if barred else found("first", True, frozenset({"a"}), ())
+    def judged(search: Search, *_: object) -> SimpleNamespace:
+        asked.append(search.barred)
+        if search.barred:
+            return found("barred", unknown, frozenset(), suspects)
+        return found("first", True, frozenset({"a"}), ())
 
-    monkeypatch.setattr(rules, "_search", search)
+    monkeypatch.setattr(rules, "judged", judged)
+    monkeypatch.setattr(Search, "run", lambda search: (None, SimpleNamespace(effects=())))
     signals, nominal = likelihood.signals, likelihood.nominal
     got = rules.passes(SimpleNamespace(plant=AXIS), signals, parts, nominal, DEFAULT_SETTINGS, lambda *_: None)
     assert (got.name, asked) == (chosen, [frozenset(), frozenset({"a"})])

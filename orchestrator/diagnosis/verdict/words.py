@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from orchestrator.diagnosis.judged import Pass
 from orchestrator.diagnosis.outcome import Named
-from orchestrator.diagnosis.passes import Pass
 from orchestrator.diagnosis.settings import VerdictSettings
 from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED
 from orchestrator.diagnosis.verdict.remainder import Predictable, Remainder
