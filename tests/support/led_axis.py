@@ -44,8 +44,14 @@ class LedAxis:
 
 
 @njit
-def _led(asked, speed, noise, push, law, gains, bristle, count, finer):
-    """Return measured angles and torques; ``law``: inertia, viscous, dry, gravity, drag, ripple."""
+def led(asked, speed, noise, push, law, gains, bristle, count, finer):
+    """Return measured angles and torques of steps of 1 ms.
+
+    ``asked`` [rad] and ``speed`` [rad/s] are led to; ``noise`` is on the torque that is measured, ``push`` [N.m] acts
+    on the axis. ``law``: inertia, viscous, dry, gravity, drag, ripple; ``gains`` are those on position, speed and the
+    integral of the position. Friction builds up over ``bristle``, the encoder counts ``count`` [rad]; a step has
+    ``finer`` parts.
+    """
     inertia, viscous, dry, gravity, drag, ripple = law
     angle, rate, bent, integral, filtered, before = asked[0], 0.0, 0.0, 0.0, 0.0, asked[0]
     angles, torques = np.empty(asked.size), np.empty(asked.size)
@@ -109,7 +115,7 @@ def led_axis(seed: int) -> LedAxis:
     quick = max(3.0 * math.sqrt(dry / bristle / inertia), 3.0 * turns / bristle)
     finer = int(min(400, max(20, math.ceil(STEP * quick))))
     law = (inertia, viscous, dry, gravity, drag, ripple)
-    angles, torques = _led(position, speed, noise, push, law, gains, bristle, count, finer)
+    angles, torques = led(position, speed, noise, push, law, gains, bristle, count, finer)
     record = record_from_columns({"time": time, "u": torques, "theta_m": angles}, f"axis-{seed}")
     stated = (inertia * rng.uniform(0.7, 1.4), viscous * rng.uniform(0.6, 1.6))
     names = ("J", "b", "coulomb_friction", "gravity_load", "quadratic_drag", "torque_ripple")
