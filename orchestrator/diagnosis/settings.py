@@ -151,6 +151,9 @@ class SearchSettings(Settings, frozen=True):
     most_delay: Annotated[float, setting("longest dead time [s]: beyond, the signals do not belong together")] = 0.25
     delay_share: Annotated[float, share("or of the record's length, where that is less")] = 0.1
     most_lag: Annotated[float, setting("slowest drive [s]: a slower one lets next to nothing of `u` through")] = 1.0
+    least_damping: Annotated[
+        float, share("least damping ratio of a resonance: steel that is welded rings with some thousandths")
+    ] = 5e-4
     shortlist: Annotated[int, setting("candidates fitted in full: the right one was among them so far", ge=1)] = 6
     worth: Annotated[float, share("least share of the best promise that a candidate must promise to be fitted")] = 0.03
     followed: Annotated[float, share("of the best gain, from which other levels are tried: winners had half")] = 0.2

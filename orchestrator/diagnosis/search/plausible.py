@@ -44,6 +44,8 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
         what = f"{effect.name} ({effect.site}) of {value:.3g} {unit}"
         if short == "damping_ratio" and value >= math.sqrt(0.5):
             return f"{effect.name} ({effect.site}) with a damping ratio of {value:.3g} has no peak: no resonance"
+        if short == "damping_ratio" and value < settings.least_damping:
+            return f"{effect.name} ({effect.site}) with a damping ratio of {value:.3g} would never come to rest"
         if short == "limit":
             if value < settings.least_limit * float(np.max(np.abs(scene.u))):
                 return f"{what} would leave no torque: `u` may not be what drives the machine"
