@@ -4,11 +4,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 from numba import njit
 
 from orchestrator.plants.description import CompiledEquations
+from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.plants.known.servo_axis import PLANT
-from orchestrator.plants.predictor import coarse_runner_of
+from orchestrator.plants.predictor import _coarse_runner, coarse_runner_of
+from orchestrator.plants.sample import is_usual
 
 
 def test_equations_of_a_plant_may_make_arrays() -> None:
@@ -27,3 +30,27 @@ def test_equations_of_a_plant_may_make_arrays() -> None:
         coarse_runner_of(plant, p)((0.0,) * 8, p, np.ones(50), np.ones(50), 0.0, 0.01, (1, 8), out)
     assert angles[0][-1, 0] != 0.0
     assert np.array_equal(*angles)
+
+
+def drivetrain(**changed: float) -> np.ndarray:
+    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    for name, value in {"effects.coulomb_friction.motor.torque": 0.3, **changed}.items():
+        p[DRIVETRAIN.index(name)] = value
+    return p
+
+
+def test_equations_without_what_few_models_have_are_the_same_to_the_last_bit() -> None:
+    rng, p, angles = np.random.default_rng(3), drivetrain(), []
+    early, late = rng.normal(0.0, 20.0, (2, 400))
+    for usual in (True, False):
+        out = np.empty((400, 2))
+        _coarse_runner(DRIVETRAIN, usual)((0.1,) * 8, p, early, late, 3e-4, 1e-3, (2, 16), out)
+        angles.append(out)
+    assert np.ptp(angles[0][:, 1]) > 0.01
+    assert np.array_equal(*angles)
+
+
+@pytest.mark.parametrize("name", DRIVETRAIN.seldom)
+def test_a_model_that_has_one_of_them_runs_whole_equations(name: str) -> None:
+    assert is_usual(DRIVETRAIN, drivetrain())
+    assert not is_usual(DRIVETRAIN, drivetrain(**{name: 0.25}))
