@@ -2,9 +2,9 @@
 
     python -m benchmarks.diagnosis_cost [RECORD.csv --model MODEL.toml] [--shares 0.25 0.5 1]
 
-Without a record it is the README's. The last line is of one row of the predictor, in a model that has what few models
-have (a gap, waves, stops) and in one that has not, which runs equations without them. ``--shares`` diagnoses its first parts, so that cost shows against length. Runs of
-the predictor do not depend on what else the computer does; times do.
+Without a record it is the README's. ``--shares`` diagnoses its first parts, so that cost shows against length. Runs of
+the predictor do not depend on what else the computer does; times do. The last line is of one row of the predictor, in a
+model that has what few models have (a gap, waves, stops) and in one that has not, which runs equations without them.
 """
 
 import argparse
