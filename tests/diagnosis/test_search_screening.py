@@ -182,3 +182,12 @@ def test_the_scene_measures_the_record() -> None:
     assert scene.twist == pytest.approx(np.quantile(np.abs(x[:, 0] / 3.984 - x[:, 2]), 0.995))
     assert (scene.ratio, scene.stiffness, scene.inertia) == (3.984, 3300.0, 5.6)
     assert scene.turns == pytest.approx(np.ptp(x[:, 0]) / (2.0 * np.pi))
+
+
+def test_sizes_of_a_model_that_runs_away_are_no_warning() -> None:
+    likelihood, p = drivetrain_likelihood(300)
+    model = fit(likelihood, p, 0.01, (), PARTS)
+    states = np.full((300, 8), np.inf)
+    states[::2] = -np.inf
+    likelihood.innovations = lambda p, q: (np.zeros((300, 2)), states)
+    assert not np.isfinite(scene_of(likelihood, model).twist)

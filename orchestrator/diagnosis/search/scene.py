@@ -8,6 +8,7 @@ from orchestrator.plants.effects import Scene
 from orchestrator.shared.inference.noise import rms
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a model that runs away
 def scene_of(likelihood: RecordLikelihood, model: Fit) -> Scene:
     """Return the sizes of the record's signals under a fitted model.
 
