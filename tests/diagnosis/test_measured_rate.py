@@ -80,17 +80,29 @@ def test_only_laws_that_say_when_torques_act_are_asked() -> None:
 def test_a_delay_is_asked_again_beside_what_came_after_it(monkeypatch, refuted: bool, left: list[str]) -> None:
     delay, friction = (next(e for e in AXIS.bank if e.name == name) for name in ("input_delay", "coulomb_friction"))
     monkeypatch.setattr("orchestrator.diagnosis.search.judging.scene_of", lambda *_: None)
-    finer = SimpleNamespace(refutes=lambda *_: refuted, words=lambda effect: f"{effect.name} does not show")
+    asked: list[tuple[list[str], ...]] = []
+
+    def refutes(model, without, free) -> bool:
+        asked.append((names(model.effects), names(without.effects), *free))
+        return refuted
+
+    finer = SimpleNamespace(refutes=refutes, words=lambda effect: f"{effect.name} does not show")
     judge = SimpleNamespace(
         finer=finer, plant=AXIS, likelihood=None, refused={}, timed=set(), tick=lambda what: None,
-        free=lambda effects, scene: (),
+        free=lambda effects, scene: names(effects),
         reduced=lambda current, scene, effect: candidate(*(e for e in current.effects if e is not effect)),
     )  # fmt: skip
     found = Judge.still_on_time(judge, candidate(delay, friction))
-    assert [effect.name for effect in found.effects] == left
+    assert names(found.effects) == left
+    both, alone = ["input_delay", "coulomb_friction"], ["coulomb_friction"]
+    assert asked == [(both, alone, both, alone)]
     assert list(judge.refused) == ([delay.label] if refuted else [])
     judge.timed.add((frozenset({friction.label}), delay.label))  # it was asked just now
     assert Judge.still_on_time(judge, candidate(friction, delay)).effects == (friction, delay)
+
+
+def names(effects) -> list[str]:
+    return [effect.name for effect in effects]
 
 
 def candidate(*effects) -> SimpleNamespace:
