@@ -2,9 +2,11 @@
 
 Friction that builds up is that of Dahl's and LuGre's bristle (Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE
 Trans. Automatic Control 40(3), 1995): the torque is ``stiffness z + damping z'`` with ``z' = v - |v| z / reach(v)``,
-where ``reach(v) = distance friction(v) / breakaway`` and ``stiffness = breakaway / distance``. The bristle ``z`` is a
-state while it bends; once it has settled, the part slides at the friction of its speed, without the stiff equation of
-the bristle, until it slows down. The elastic backlash models have it; rigid teeth do not.
+where ``reach(v) = distance friction(v) / breakaway`` and ``stiffness = breakaway / distance``. Friction that grows with
+the torque of the shaft builds up at this stiffness, too, with 1 N.m of it in the breakaway; where there is no other, it
+is set-valued, for its reach goes to zero with that torque. The bristle ``z`` is a state while it bends; once it has
+settled, the part slides at the friction of its speed, without the stiff equation of the bristle, until it slows down.
+The elastic backlash models have it; rigid teeth do not.
 """
 
 from .drivetrain_parameters import (
@@ -149,7 +151,7 @@ def carried_l(x: State, contact: int, p: Parameters) -> float:
 
 
 def rest_m(p: Parameters) -> float:
-    """Return the breakaway torque [N.m] of the motor, without what depends on load and position.
+    """Return the motor's breakaway torque [N.m] at 1 N.m of the shaft's on it, without what depends on the position.
 
     Args:
         p: parameters, in the order of the FMU's table.
@@ -157,11 +159,11 @@ def rest_m(p: Parameters) -> float:
     Returns:
         The torque.
     """
-    return breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
+    return breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M]) + p[P_LOADED_M]
 
 
 def rest_l(p: Parameters) -> float:
-    """Return the breakaway torque [N.m] of the load, without what depends on load and position.
+    """Return the load's breakaway torque [N.m] at 1 N.m of the shaft's on it, without what depends on the position.
 
     Args:
         p: parameters, in the order of the FMU's table.
@@ -169,11 +171,11 @@ def rest_l(p: Parameters) -> float:
     Returns:
         The torque.
     """
-    return breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
+    return breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L]) + p[P_LOADED_L]
 
 
 def builds_up_m(p: Parameters) -> bool:
-    """Tell whether the motor's friction builds up over a distance.
+    """Tell whether the motor's friction builds up over a distance; what only the shaft's torque makes is set-valued.
 
     Args:
         p: parameters, in the order of the FMU's table.
@@ -181,11 +183,12 @@ def builds_up_m(p: Parameters) -> bool:
     Returns:
         True when it does.
     """
-    return p[P_PRESLIDING_M] > 0.0 and rest_m(p) > 0.0 and not is_rigid(p)
+    fixed = breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
+    return p[P_PRESLIDING_M] > 0.0 and fixed > 0.0 and not is_rigid(p)
 
 
 def builds_up_l(p: Parameters) -> bool:
-    """Tell whether the load's friction builds up over a distance.
+    """Tell whether the load's friction builds up over a distance; what only the shaft's torque makes is set-valued.
 
     Args:
         p: parameters, in the order of the FMU's table.
@@ -193,7 +196,8 @@ def builds_up_l(p: Parameters) -> bool:
     Returns:
         True when it does.
     """
-    return p[P_PRESLIDING_L] > 0.0 and rest_l(p) > 0.0 and not is_rigid(p)
+    fixed = breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
+    return p[P_PRESLIDING_L] > 0.0 and fixed > 0.0 and not is_rigid(p)
 
 
 def leaving_speed(distance: float, falls: bool, stribeck_speed: float) -> float:

@@ -225,12 +225,17 @@ def _end_stop(side: str) -> Effect:
 
 
 def _load_dependent(site: str) -> Effect:
-    # Measured friction builds up at one stiffness, here at one distance: a quarter of its gain may be left.
+    def build_up(scene: Scene) -> tuple[float, float]:
+        # Its distance is that at 1 N.m, what is seen is that at the torque which the shaft carries.
+        carried = scene.torque * (scene.ratio if site == "load" else 1.0)
+        distance, width = _build_up(scene, site)
+        return distance - float(np.log(carried)), width
+
     return Effect(
         "load_dependent_friction", site, group("load_dependent_friction", f"{site}.coefficient"), "coefficient",
-        lambda scene: 0.01, lambda scene: {"presliding": (_build_up(scene, site)[0],)}, amplitudes=("coefficient",),
+        lambda scene: 0.01, lambda scene: {"presliding": (build_up(scene)[0],)}, amplitudes=("coefficient",),
         scales=lambda scene: {"presliding": 0.2}, family=f"dry friction of the {site}",
-        nuisances={"presliding": f"presliding.{site}"}, priors=lambda scene: {"presliding": _build_up(scene, site)},
+        nuisances={"presliding": f"presliding.{site}"}, priors=lambda scene: {"presliding": build_up(scene)},
         tolerance={f"effects.load_dependent_friction.{site}.coefficient": 0.01}, leaves=0.25, against="speed",
     )  # fmt: skip
 

@@ -203,13 +203,13 @@ def with_law(plant: Plant, clocked: bool = False) -> Plant:
     return replace(extended, runner=cache(lambda: _runner(extended)), _index={})
 
 
-def _rubs_too(friction: Any, first: int, dry_at: int) -> Any:
-    """Return the compiled levels of dry friction, that of the law included."""
+def _rubs_too(friction: Any, rest: Any, first: int, dry_at: int) -> Any:
+    """Return the compiled levels of dry friction, moving and for the build-up, that of the law included."""
     from numba import njit
 
     @njit(error_model="numpy")
-    def with_dry(x: Any, p: Any) -> Any:
-        at_motor, at_load = friction(x, p)
+    def added(levels: Any, p: Any) -> Any:
+        at_motor, at_load = levels
         kind = int(p[first]) % WITH_SPEED
         if kind == MOTOR_SPEED:
             at_motor += p[dry_at]
@@ -217,13 +217,21 @@ def _rubs_too(friction: Any, first: int, dry_at: int) -> Any:
             at_load += p[dry_at]
         return at_motor, at_load
 
-    return with_dry
+    @njit(error_model="numpy")
+    def with_dry(x: Any, p: Any) -> Any:
+        return added(friction(x, p), p)
+
+    @njit(error_model="numpy")
+    def rest_with_dry(p: Any) -> Any:
+        return added(rest(p), p)
+
+    return with_dry, rest_with_dry
 
 
 def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
     from orchestrator.shared.numba_cache import kept
 
-    friction, rates, presliding = plant.stage()
+    friction, rest, rates, presliding = plant.stage()
     motor, last = plant.bodies[0], plant.bodies[-1]
     J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)
     ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
@@ -232,7 +240,8 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
     knot_at, value_at = first + 1, first + 1 + KNOTS
     since_at, period_at, dry_at = (first + 1 + 2 * KNOTS + n for n in range(3))
 
-    straight, with_dry = compiled("learned_law").straight, _rubs_too(friction, first, dry_at)
+    straight = compiled("learned_law").straight
+    with_dry, rest_with_dry = _rubs_too(friction, rest, first, dry_at)
 
     @kept(error_model="numpy")
     def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
@@ -275,7 +284,7 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
             return (r[0], r[1] + on_motor, r[2], r[3], r[4], a, b, r[7])
         return (r[0], r[1] + on_motor, r[2], r[3] + on_load, r[4], a, b, r[7])
 
-    return CompiledEquations(with_dry, with_torque, presliding)
+    return CompiledEquations(with_dry, rest_with_dry, with_torque, presliding)
 
 
 def _runner(plant: Plant) -> Any:

@@ -110,7 +110,7 @@ def sample_of(plant: Plant) -> Sample:
     Returns:
         What prepares a run, and what runs one sample.
     """
-    friction, stage, (at_m, at_l) = plant.stage()
+    friction, rest_of, stage, (at_m, at_l) = plant.stage()
     at_lag = plant.index(plant.drive.lag)
 
     @njit(error_model="numpy", forceinline=True)
@@ -126,9 +126,7 @@ def sample_of(plant: Plant) -> Sample:
 
     @njit(error_model="numpy")
     def prepared(p: Any, first: float, h: float, substeps: Any) -> Any:
-        at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
-        sliding = friction((0.0, 1e6, 0.0, 1e6, 0.0, 0.0, 0.0, 0.0), p)
-        rest = (max(at_rest[0], sliding[0]), max(at_rest[1], sliding[1]))
+        rest = rest_of(p)
         reach = (math.exp(p[at_m]), math.exp(p[at_l]))
         lag = p[at_lag]
         usual = (_step_of(first, substeps[0], h, lag), _step_of(h - first, substeps[0], h, lag))

@@ -66,6 +66,7 @@ def bristles(values: dict[str, float]) -> dict[str, float]:
     for site, sigma in (("motor", truth.SIGMA_M), ("load", truth.SIGMA_L)):
         coulomb = values.get(f"coulomb_friction.{site}.torque", 0.0)
         rest = max(coulomb, values.get(f"stribeck_friction.{site}.breakaway", 0.0))
+        rest += values.get(f"load_dependent_friction.{site}.coefficient", 0.0)  # of 1 N.m of the shaft's torque
         if rest > 0.0:
             found[f"presliding.{site}.distance"] = rest / sigma
             found[f"presliding.{site}.damping"] = 0.02 * np.sqrt(sigma)

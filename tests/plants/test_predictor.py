@@ -15,7 +15,7 @@ from orchestrator.plants.sample import is_usual
 
 
 def test_equations_of_a_plant_may_make_arrays() -> None:
-    friction, rates, presliding = PLANT.stage()
+    friction, rest, rates, presliding = PLANT.stage()
 
     @njit(error_model="numpy")
     def by_an_array(x: Any, signs: Any, p: Any, u: float) -> Any:
@@ -23,7 +23,7 @@ def test_equations_of_a_plant_may_make_arrays() -> None:
         rate = rates(x, signs, p, made[1])
         return (made[0], rate[1], rate[2], rate[3], rate[4], rate[5], rate[6], rate[7])
 
-    other = replace(PLANT, stage=lambda: CompiledEquations(friction, by_an_array, presliding), _index={})
+    other = replace(PLANT, stage=lambda: CompiledEquations(friction, rest, by_an_array, presliding), _index={})
     p = PLANT.extended([entry.default for entry in PLANT.table])
     angles = [np.empty((50, 2)) for _ in range(2)]
     for plant, out in zip((PLANT, other), angles, strict=True):
@@ -37,6 +37,18 @@ def drivetrain(**changed: float) -> np.ndarray:
     for name, value in {"effects.coulomb_friction.motor.torque": 0.3, **changed}.items():
         p[DRIVETRAIN.index(name)] = value
     return p
+
+
+def test_friction_that_the_shaft_alone_loads_is_there_without_damping_of_the_shaft() -> None:
+    p, n = drivetrain(**{"effects.coulomb_friction.motor.torque": 0.0, "c": 0.0}), 400
+    u = 20.0 * np.sin(0.05 * np.arange(n))
+    plain, coarse, exact = (np.empty((n, 2)) for _ in range(3))
+    coarse_runner_of(DRIVETRAIN, p)((0.0,) * 8, p, u, u, 0.0, 0.005, (4, 32), plain)
+    p[DRIVETRAIN.index("effects.load_dependent_friction.motor.coefficient")] = 0.05
+    coarse_runner_of(DRIVETRAIN, p)((0.0,) * 8, p, u, u, 0.0, 0.005, (4, 32), coarse)
+    DRIVETRAIN.runner()((0.0,) * 9, DRIVETRAIN.own(p), u, u, 0.0, 0.005, exact)
+    assert np.max(np.abs(exact - plain)) > 0.05
+    assert np.max(np.abs(exact - coarse)) < 2e-3
 
 
 def test_equations_without_what_few_models_have_are_the_same_to_the_last_bit() -> None:

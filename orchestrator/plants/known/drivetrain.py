@@ -57,7 +57,8 @@ def _stage() -> CompiledEquations:
     )  # fmt: skip
     alpha_at, end, set_in_at = dt.P_ALPHA, dt.COUNT, dt.P_ONSET
     damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
-    loaded, lag_at = (dt.P_LOADED_M, dt.P_LOADED_L), dt.P_TAU
+    loaded, wavy, lag_at = (dt.P_LOADED_M, dt.P_LOADED_L), (dt.P_WAVY_M, dt.P_WAVY_L), dt.P_TAU
+    rest_m, rest_l = compiled("bristles").rest_m, compiled("bristles").rest_l
 
     @njit(error_model="numpy", **UNCOUNTED)
     def whole(x: Any, u: float) -> Any:
@@ -71,6 +72,11 @@ def _stage() -> CompiledEquations:
             contact = contact_of(twist(full, p), p[alpha_at]) if p[alpha_at] > 0.0 else 1
             shaft = elastic(full, contact, p)
         return friction_m(full, shaft * lever_arm(full, p), p), friction_l(full, shaft, p)
+
+    @njit(error_model="numpy", **UNCOUNTED)
+    def rest(p: Any) -> Any:
+        at_motor, at_load = rest_m(p), rest_l(p)
+        return at_motor if at_motor > 0.0 else abs(p[wavy[0]]), at_load if at_load > 0.0 else abs(p[wavy[1]])
 
     @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
@@ -86,7 +92,7 @@ def _stage() -> CompiledEquations:
         lag = (u - x[4]) / p[lag_at]
         return (r[0], r[1] + motor, r[2], r[3] - load, lag, r[5], r[6], r[10])
 
-    return CompiledEquations(friction, smoothed, (end, end + 1))
+    return CompiledEquations(friction, rest, smoothed, (end, end + 1))
 
 
 @cache
@@ -128,8 +134,8 @@ def realised(p: Array) -> Array:
         The parameters, in the order of the FMU's table.
     """
     own = np.array(p[: dt.COUNT], dtype=float)
-    motor = own[dt.P_COULOMB_M] + own[dt.P_STRIBECK_M] + own[dt.P_BREAKAWAY_M] + own[dt.P_LOADED_M]
-    load = own[dt.P_COULOMB_L] + own[dt.P_STRIBECK_L] + own[dt.P_BREAKAWAY_L] + own[dt.P_LOADED_L]
+    motor = own[dt.P_COULOMB_M] + own[dt.P_STRIBECK_M] + own[dt.P_BREAKAWAY_M]
+    load = own[dt.P_COULOMB_L] + own[dt.P_STRIBECK_L] + own[dt.P_BREAKAWAY_L]
     gap = own[dt.P_ALPHA] if int(own[dt.P_MODEL]) in GRADUAL else 0.0
     places = (dt.P_PRESLIDING_M, dt.P_PRESLIDING_L, dt.P_ONSET)
     for place, on, fitted in zip(places, (motor, load, gap), p[dt.COUNT : dt.COUNT + len(places)], strict=True):

@@ -37,19 +37,24 @@ def stage() -> CompiledEquations:
     from orchestrator.shared.numba_cache import UNCOUNTED, kept
 
     source = compiled("servo_axis")
-    rates, level = source.rates, source.friction
-    end = ap.COUNT
+    rates, level, breakaway = source.rates, source.friction, compiled("axis_equations").rest
+    end, wavy = ap.COUNT, ap.P_WAVY
 
     @njit(error_model="numpy", **UNCOUNTED)
     def friction(x: Any, p: Any) -> Any:
         return level((x[0], x[1], x[4], 0.0, 0.0), p), 0.0
+
+    @njit(error_model="numpy", **UNCOUNTED)
+    def rest(p: Any) -> Any:
+        at_rest = breakaway(p)
+        return at_rest if at_rest > 0.0 else abs(p[wavy]), 0.0
 
     @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
 
-    return CompiledEquations(friction, smoothed, (end, end))
+    return CompiledEquations(friction, rest, smoothed, (end, end))
 
 
 @cache
