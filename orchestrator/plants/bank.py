@@ -236,7 +236,7 @@ def _load_dependent(site: str) -> Effect:
         lambda scene: 0.01, lambda scene: {"presliding": (build_up(scene)[0],)}, amplitudes=("coefficient",),
         scales=lambda scene: {"presliding": 0.2}, family=f"dry friction of the {site}",
         nuisances={"presliding": f"presliding.{site}"}, priors=lambda scene: {"presliding": build_up(scene)},
-        tolerance={f"effects.load_dependent_friction.{site}.coefficient": 0.01}, leaves=0.25, against="speed",
+        tolerance={f"effects.load_dependent_friction.{site}.coefficient": 0.01}, leaves=0.04, against="speed",
     )  # fmt: skip
 
 

@@ -24,7 +24,8 @@ class CompiledEquations(NamedTuple):
 
     Attributes:
         friction: ``friction(x, p)``: levels of dry friction [N.m] of the first and the second body.
-        rest: ``rest(p)``: the levels that their build-up distances belong to; zero: the body has no dry friction.
+        rest: ``rest(p)``: the levels that their build-up distances belong to (zero: the body has no dry friction), and
+            whether each depends on more than the body's speed.
         rates: ``rates(x, signs, p, u)``: derivatives of the eight states; ``signs`` are friction's mean directions.
         presliding: places in ``p`` of the logarithm of friction's build-up distance of either body.
     """

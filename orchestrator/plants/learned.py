@@ -223,7 +223,8 @@ def _rubs_too(friction: Any, rest: Any, first: int, dry_at: int) -> Any:
 
     @njit(error_model="numpy")
     def rest_with_dry(p: Any) -> Any:
-        return added(rest(p), p)
+        levels, varies = rest(p)
+        return added(levels, p), varies
 
     return with_dry, rest_with_dry
 

@@ -21,14 +21,24 @@ CALM = 0.02  # distances of presliding per sample below which it hardly changes
 
 
 @njit(error_model="numpy", **UNCOUNTED)
-def _turned(bristle: float, speed: float, level: float, rest: float, distance: float, h: float) -> Any:
-    """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre)."""
+def _turned(bristle: float, speed: float, level: float, rest: float, varies: bool, distance: float, h: float) -> Any:
+    """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre).
+
+    A level that depends on more than speed may go to zero within a step, and grow again: a bristle bends no farther
+    than it allows, and where it follows at once, so does the direction.
+    """
     if level <= 1e-9 * rest or rest == 0.0:
         return 0.0, 0.0
     reach = distance * level / rest
     settled = reach if speed > 0.0 else -reach
-    new = settled + (bristle - settled) * math.exp(-abs(speed) * h / reach)
-    return new, 0.5 * (bristle + new) / reach
+    ways = abs(speed) * h / reach
+    if not varies:
+        new = settled + (bristle - settled) * math.exp(-ways)
+        return new, 0.5 * (bristle + new) / reach
+    off = min(max(bristle, -reach), reach) - settled
+    left = math.exp(-ways)
+    mean = (1.0 - left) / ways if ways > 1e-6 else 1.0
+    return settled + off * left, (settled + off * mean) / reach
 
 
 @njit(error_model="numpy", **UNCOUNTED)
@@ -126,23 +136,23 @@ def sample_of(plant: Plant) -> Sample:
 
     @njit(error_model="numpy")
     def prepared(p: Any, first: float, h: float, substeps: Any) -> Any:
-        rest = rest_of(p)
+        rest, varies = rest_of(p)
         reach = (math.exp(p[at_m]), math.exp(p[at_l]))
         lag = p[at_lag]
         usual = (_step_of(first, substeps[0], h, lag), _step_of(h - first, substeps[0], h, lag))
         turning = (_step_of(first, substeps[1], h, lag), _step_of(h - first, substeps[1], h, lag))
-        return rest, reach, h, usual, turning
+        return rest, varies, reach, h, usual, turning
 
     @njit(error_model="numpy", forceinline=True)
     def sample(x: Any, memory: Any, p: Any, common: Any, torques: Any) -> Any:
-        rest, reach, h, ways, turning = common
+        rest, varies, reach, h, ways, turning = common
         bristle_m, bristle_l, sign_m, sign_l = memory
         signs = (sign_m, sign_l)
         rubs = rest[0] > 0.0 or rest[1] > 0.0
         if rubs:
-            rate = stage(x, signs, p, torques[1])
-            turns_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach[0], h)
-            turns_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach[1], h)
+            rate, level = stage(x, signs, p, torques[1]), friction(x, p)
+            turns_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach[0] * max(1.0, level[0] / rest[0]), h)
+            turns_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach[1] * max(1.0, level[1] / rest[1]), h)
             if turns_m or turns_l:
                 ways = turning
         for piece in range(2):
@@ -150,8 +160,8 @@ def sample_of(plant: Plant) -> Sample:
             for _ in range(way[0]):
                 if rubs:
                     level = friction(x, p)
-                    bristle_m, sign_m = _turned(bristle_m, x[1], level[0], rest[0], reach[0], way[1])
-                    bristle_l, sign_l = _turned(bristle_l, x[3], level[1], rest[1], reach[1], way[1])
+                    bristle_m, sign_m = _turned(bristle_m, x[1], level[0], rest[0], varies[0], reach[0], way[1])
+                    bristle_l, sign_l = _turned(bristle_l, x[3], level[1], rest[1], varies[1], reach[1], way[1])
                     signs = (sign_m, sign_l)
                 x = advanced(x, signs, p, torque, way)
         return x, (bristle_m, bristle_l, signs[0], signs[1])

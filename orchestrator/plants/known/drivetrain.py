@@ -76,7 +76,9 @@ def _stage() -> CompiledEquations:
     @njit(error_model="numpy", **UNCOUNTED)
     def rest(p: Any) -> Any:
         at_motor, at_load = rest_m(p), rest_l(p)
-        return at_motor if at_motor > 0.0 else abs(p[wavy[0]]), at_load if at_load > 0.0 else abs(p[wavy[1]])
+        levels = (at_motor if at_motor > 0.0 else abs(p[wavy[0]]), at_load if at_load > 0.0 else abs(p[wavy[1]]))
+        varies = (p[loaded[0]] != 0.0 or p[wavy[0]] != 0.0, p[loaded[1]] != 0.0 or p[wavy[1]] != 0.0)
+        return levels, varies
 
     @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:

@@ -47,7 +47,7 @@ def stage() -> CompiledEquations:
     @njit(error_model="numpy", **UNCOUNTED)
     def rest(p: Any) -> Any:
         at_rest = breakaway(p)
-        return at_rest if at_rest > 0.0 else abs(p[wavy]), 0.0
+        return (at_rest if at_rest > 0.0 else abs(p[wavy]), 0.0), (p[wavy] != 0.0, False)
 
     @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
