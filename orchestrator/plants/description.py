@@ -26,12 +26,16 @@ class CompiledEquations(NamedTuple):
         friction: ``friction(x, p)``: levels of dry friction [N.m] of the first and the second body.
         rest: ``rest(p)``: the levels that their build-up distances belong to (zero: the body has no dry friction), and
             whether each depends on more than the body's speed.
+        flanks: ``flanks(p)``: whether there are teeth or end stops that can meet and part.
+        meets: ``meets(x, rates, p, h)``: whether any may do so within ``h`` [s].
         rates: ``rates(x, signs, p, u)``: derivatives of the eight states; ``signs`` are friction's mean directions.
         presliding: places in ``p`` of the logarithm of friction's build-up distance of either body.
     """
 
     friction: Any
     rest: Any
+    flanks: Any
+    meets: Any
     rates: Any
     presliding: tuple[int, int]
 

@@ -232,7 +232,7 @@ def _rubs_too(friction: Any, rest: Any, first: int, dry_at: int) -> Any:
 def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
     from orchestrator.shared.numba_cache import kept
 
-    friction, rest, rates, presliding = plant.stage()
+    friction, rest, flanks, meets, rates, presliding = plant.stage()
     motor, last = plant.bodies[0], plant.bodies[-1]
     J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)
     ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
@@ -285,7 +285,7 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
             return (r[0], r[1] + on_motor, r[2], r[3], r[4], a, b, r[7])
         return (r[0], r[1] + on_motor, r[2], r[3] + on_load, r[4], a, b, r[7])
 
-    return CompiledEquations(with_dry, rest_with_dry, with_torque, presliding)
+    return CompiledEquations(with_dry, rest_with_dry, flanks, meets, with_torque, presliding)
 
 
 def _runner(plant: Plant) -> Any:

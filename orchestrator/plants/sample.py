@@ -120,7 +120,7 @@ def sample_of(plant: Plant) -> Sample:
     Returns:
         What prepares a run, and what runs one sample.
     """
-    friction, rest_of, stage, (at_m, at_l) = plant.stage()
+    friction, rest_of, flanks, meets, stage, (at_m, at_l) = plant.stage()
     at_lag = plant.index(plant.drive.lag)
 
     @njit(error_model="numpy", forceinline=True)
@@ -138,22 +138,22 @@ def sample_of(plant: Plant) -> Sample:
     def prepared(p: Any, first: float, h: float, substeps: Any) -> Any:
         rest, varies = rest_of(p)
         reach = (math.exp(p[at_m]), math.exp(p[at_l]))
-        lag = p[at_lag]
+        lag, meeting = p[at_lag], flanks(p)
         usual = (_step_of(first, substeps[0], h, lag), _step_of(h - first, substeps[0], h, lag))
         turning = (_step_of(first, substeps[1], h, lag), _step_of(h - first, substeps[1], h, lag))
-        return rest, varies, reach, h, usual, turning
+        return rest, varies, meeting, reach, h, usual, turning
 
     @njit(error_model="numpy", forceinline=True)
     def sample(x: Any, memory: Any, p: Any, common: Any, torques: Any) -> Any:
-        rest, varies, reach, h, ways, turning = common
+        rest, varies, meeting, reach, h, ways, turning = common
         bristle_m, bristle_l, sign_m, sign_l = memory
         signs = (sign_m, sign_l)
         rubs = rest[0] > 0.0 or rest[1] > 0.0
-        if rubs:
+        if rubs or meeting:
             rate, level = stage(x, signs, p, torques[1]), friction(x, p)
             turns_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach[0] * max(1.0, level[0] / rest[0]), h)
             turns_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach[1] * max(1.0, level[1] / rest[1]), h)
-            if turns_m or turns_l:
+            if turns_m or turns_l or (meeting and meets(x, rate, p, h)):
                 ways = turning
         for piece in range(2):
             torque, way = torques[piece], ways[piece]

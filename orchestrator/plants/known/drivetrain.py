@@ -16,6 +16,7 @@ from pyfmu_sources.backlash_models import GRADUAL, MODELS
 
 Array = NDArray[np.float64]
 
+SETTING_IN = 4.0  # distances over which the damping of teeth sets in, after which it is all there
 NUISANCES = ("presliding.motor", "presliding.load", "contact.onset")
 
 SELDOM = (
@@ -52,9 +53,10 @@ def _stage() -> CompiledEquations:
 
     source = compiled("equations")
     rates, twist, contact_of, elastic = source.rates, source.twist, source.contact_of, source.elastic_torque
-    twist_rate, lever_arm, friction_m, friction_l = (
-        source.twist_rate, source.lever_arm, source.friction_m, source.friction_l,
+    twist_rate, twist_slope, lever_arm, friction_m, friction_l = (
+        source.twist_rate, source.twist_slope, source.lever_arm, source.friction_m, source.friction_l,
     )  # fmt: skip
+    stops = (dt.P_STOP_LOWER, dt.P_STOP_UPPER)
     alpha_at, end, set_in_at = dt.P_ALPHA, dt.COUNT, dt.P_ONSET
     damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
     loaded, wavy, lag_at = (dt.P_LOADED_M, dt.P_LOADED_L), (dt.P_WAVY_M, dt.P_WAVY_L), dt.P_TAU
@@ -80,6 +82,23 @@ def _stage() -> CompiledEquations:
         varies = (p[loaded[0]] != 0.0 or p[wavy[0]] != 0.0, p[loaded[1]] != 0.0 or p[wavy[1]] != 0.0)
         return levels, varies
 
+    @njit(error_model="numpy", **UNCOUNTED)
+    def flanks(p: Any) -> Any:
+        return p[alpha_at] > 0.0 or p[stops[0]] > -dt.BIG or p[stops[1]] < dt.BIG
+
+    @njit(error_model="numpy", **UNCOUNTED)
+    def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
+        way = abs(x[3]) * h + 0.75 * h * h * abs(rate[3])
+        if abs(x[2] - p[stops[0]]) < way or abs(x[2] - p[stops[1]]) < way:
+            return True
+        if p[alpha_at] == 0.0:
+            return False
+        full = whole(x, 0.0)
+        slope = twist_slope(full, p)
+        depth = abs(twist(full, p)) - p[alpha_at]
+        way = abs(x[1] * slope - x[3]) * h + 0.75 * h * h * abs(rate[1] * slope - rate[3])
+        return -way < depth < way + SETTING_IN * math.exp(p[onset_at])
+
     @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         full = whole(x, u)
@@ -94,7 +113,7 @@ def _stage() -> CompiledEquations:
         lag = (u - x[4]) / p[lag_at]
         return (r[0], r[1] + motor, r[2], r[3] - load, lag, r[5], r[6], r[10])
 
-    return CompiledEquations(friction, rest, smoothed, (end, end + 1))
+    return CompiledEquations(friction, rest, flanks, meets, smoothed, (end, end + 1))
 
 
 @cache

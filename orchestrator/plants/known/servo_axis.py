@@ -38,7 +38,7 @@ def stage() -> CompiledEquations:
 
     source = compiled("servo_axis")
     rates, level, breakaway = source.rates, source.friction, compiled("axis_equations").rest
-    end, wavy = ap.COUNT, ap.P_WAVY
+    end, wavy, stops = ap.COUNT, ap.P_WAVY, (ap.P_STOP_LOWER, ap.P_STOP_UPPER)
 
     @njit(error_model="numpy", **UNCOUNTED)
     def friction(x: Any, p: Any) -> Any:
@@ -49,12 +49,21 @@ def stage() -> CompiledEquations:
         at_rest = breakaway(p)
         return (at_rest if at_rest > 0.0 else abs(p[wavy]), 0.0), (p[wavy] != 0.0, False)
 
+    @njit(error_model="numpy", **UNCOUNTED)
+    def flanks(p: Any) -> Any:
+        return p[stops[0]] > -ap.BIG or p[stops[1]] < ap.BIG
+
+    @njit(error_model="numpy", **UNCOUNTED)
+    def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
+        way = abs(x[1]) * h + 0.75 * h * h * abs(rate[1])
+        return abs(x[0] - p[stops[0]]) < way or abs(x[0] - p[stops[1]]) < way
+
     @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
 
-    return CompiledEquations(friction, rest, smoothed, (end, end))
+    return CompiledEquations(friction, rest, flanks, meets, smoothed, (end, end))
 
 
 @cache
