@@ -24,20 +24,20 @@ class CompiledEquations(NamedTuple):
 
     Attributes:
         friction: ``friction(x, p)``: levels of dry friction [N.m] of the first and the second body.
-        rest: ``rest(p)``: the levels that their build-up distances belong to (zero: the body has no dry friction), and
-            whether each depends on more than the body's speed.
-        flanks: ``flanks(p)``: whether there are teeth or end stops that can meet and part.
-        meets: ``meets(x, rates, p, h)``: whether any may do so within ``h`` [s].
         rates: ``rates(x, signs, p, u)``: derivatives of the eight states; ``signs`` are friction's mean directions.
         presliding: places in ``p`` of the logarithm of friction's build-up distance of either body.
+        rest: ``rest(p)``: the levels that these distances belong to (zero: the body has no dry friction), and whether
+            each depends on more than the body's speed; None: the larger of those at rest and at a high speed.
+        flanks: ``flanks(p)``: whether there are teeth or end stops that can meet and part; None: there are none.
+        meets: ``meets(x, rates, p, h)``: whether any may do so within ``h`` [s]; None as well.
     """
 
     friction: Any
-    rest: Any
-    flanks: Any
-    meets: Any
     rates: Any
     presliding: tuple[int, int]
+    rest: Any = None
+    flanks: Any = None
+    meets: Any = None
 
 
 @dataclass(frozen=True)

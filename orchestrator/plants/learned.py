@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from orchestrator.plants.compiled import compiled
 from orchestrator.plants.description import CompiledEquations, Plant
 from orchestrator.plants.effects import Effect
-from orchestrator.plants.predictor import sample_of
+from orchestrator.plants.sample import completed, sample_of
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 from pyfmu_sources.learned_law import (
     CYCLE_L,
@@ -232,7 +232,8 @@ def _rubs_too(friction: Any, rest: Any, first: int, dry_at: int) -> Any:
 def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
     from orchestrator.shared.numba_cache import kept
 
-    friction, rest, flanks, meets, rates, presliding = plant.stage()
+    equations = completed(plant.stage())
+    rates = equations.rates
     motor, last = plant.bodies[0], plant.bodies[-1]
     J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)
     ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
@@ -242,7 +243,7 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
     since_at, period_at, dry_at = (first + 1 + 2 * KNOTS + n for n in range(3))
 
     straight = compiled("learned_law").straight
-    with_dry, rest_with_dry = _rubs_too(friction, rest, first, dry_at)
+    with_dry, rest_with_dry = _rubs_too(equations.friction, equations.rest, first, dry_at)
 
     @kept(error_model="numpy")
     def with_torque(x: Any, signs: Any, p: Any, u: float) -> Any:
@@ -285,7 +286,7 @@ def _stage(plant: Plant, first: int, clocked: bool) -> CompiledEquations:
             return (r[0], r[1] + on_motor, r[2], r[3], r[4], a, b, r[7])
         return (r[0], r[1] + on_motor, r[2], r[3] + on_load, r[4], a, b, r[7])
 
-    return CompiledEquations(with_dry, rest_with_dry, flanks, meets, with_torque, presliding)
+    return equations._replace(friction=with_dry, rest=rest_with_dry, rates=with_torque)
 
 
 def _runner(plant: Plant) -> Any:

@@ -28,5 +28,5 @@ LATE_LOAD = Effect(
     "late_load", "log", {"shift": SHIFT.name}, "shift", lambda scene: 0.02 * scene.h, _shifts,
     bounds=lambda scene: {"shift": (-LARGEST * scene.h, LARGEST * scene.h)},
     priors=lambda scene: {"shift": (0.0, LIKELY * scene.h)}, both_encoders=True, measurement=True,
-    leaves=0.0,  # samples read later are those samples; torques that act earlier are means of two
+    leaves=0.0,  # samples read later are those samples; of requests only the log tells whether they were held
 )  # fmt: skip

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
-from orchestrator.plants.description import Plant
+from orchestrator.plants.description import CompiledEquations, Plant
 from orchestrator.shared.numba_cache import UNCOUNTED
 
 NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
@@ -108,6 +108,36 @@ class Sample(NamedTuple):
     sample: Any
 
 
+def completed(equations: CompiledEquations) -> CompiledEquations:
+    """Return a plant's equations with what it leaves out: levels of friction at rest, teeth and end stops.
+
+    Args:
+        equations: of the plant.
+
+    Returns:
+        The equations, none of them None.
+    """
+    friction = equations.friction
+
+    @njit(error_model="numpy")
+    def rest(p: Any) -> Any:
+        at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
+        sliding = friction((0.0, 1e6, 0.0, 1e6, 0.0, 0.0, 0.0, 0.0), p)
+        return (max(at_rest[0], sliding[0]), max(at_rest[1], sliding[1])), (False, False)
+
+    @njit(error_model="numpy", **UNCOUNTED)
+    def flanks(p: Any) -> bool:
+        return False
+
+    @njit(error_model="numpy", **UNCOUNTED)
+    def meets(x: Any, rates: Any, p: Any, h: float) -> bool:
+        return False
+
+    return equations._replace(
+        rest=equations.rest or rest, flanks=equations.flanks or flanks, meets=equations.meets or meets
+    )
+
+
 @cache
 def sample_of(plant: Plant) -> Sample:
     """Return the compiled equations of one sample.
@@ -120,7 +150,7 @@ def sample_of(plant: Plant) -> Sample:
     Returns:
         What prepares a run, and what runs one sample.
     """
-    friction, rest_of, flanks, meets, stage, (at_m, at_l) = plant.stage()
+    friction, stage, (at_m, at_l), rest_of, flanks, meets = completed(plant.stage())
     at_lag = plant.index(plant.drive.lag)
 
     @njit(error_model="numpy", forceinline=True)

@@ -456,8 +456,10 @@ def test_a_shifted_log_is_put_right() -> None:
     found = signals.aligned(PLANT, p)
     assert found.y[10:-10, 1] == pytest.approx(np.sin(0.1 * t[10:-10]), abs=2e-5)
     assert np.array_equal(found.y[:, 0], signals.y[:, 0])
-    assert found.u[196:200].tolist() == [1.0, 1.5, 3.0, 3.0]
-    assert found.u.sum() == pytest.approx(signals.u.sum() + 2.25 * 2.0)
+    assert found.u[195:199].tolist() == [1.0, 1.0, 3.0, 3.0]  # whole samples, and the rest of one as a dead time
+    assert found.late == pytest.approx(0.75 * h)
+    assert found.meant[196:200].tolist() == pytest.approx([1.0, 1.5, 3.0, 3.0])
+    assert found.meant.sum() == pytest.approx(signals.u.sum() + 2.25 * 2.0)
 
 
 @pytest.mark.parametrize("late", [2.6, -2.6])

@@ -176,7 +176,7 @@ class RecordLikelihood:
         for rows, u, start in self._records(signals, n, self._reference(p)):
             errors, corrected = np.empty((len(u), 2)), np.empty((len(u), STATES))
             predict(
-                signals.y[rows], *self.delivered(p, u), p, signals.h, self.substeps(p), gains[rows],
+                signals.y[rows], *self.delivered(p, u, signals.late), p, signals.h, self.substeps(p), gains[rows],
                 (offsets[0], offsets[1]), start, errors, corrected,
             )  # fmt: skip
             raw[rows], states[rows] = errors, corrected
@@ -214,18 +214,19 @@ class RecordLikelihood:
             start = self._known_state(known[number]) if known else self._initial_state(int(run.rows[0]))
             yield rows, signals.u[rows], start
 
-    def delivered(self, p: Array, u: Array) -> tuple[Array, Array, float]:
+    def delivered(self, p: Array, u: Array, more: float = 0.0) -> tuple[Array, Array, float]:
         """Return what of the requests ``u`` (n,) reaches the drive in each sample: limited, then late.
 
         Args:
             p: (parameters,) of the predictor.
             u: [N.m].
+            more: by which they are later than the model's dead time [s].
 
         Returns:
             torque (n,) in the first part of each sample, torque (n,) in the rest, length of the first part [s].
         """
         h, stop = self.signals.h, len(u)
-        limit, delay = p[self._limit], float(p[self._delay])
+        limit, delay = p[self._limit], float(p[self._delay]) + more
         if limit < self.settings.likelihood.unlimited:
             u = np.clip(u, -limit, limit)
         u, _ = self.plant.followed(p, u, h)
@@ -340,7 +341,7 @@ class RecordLikelihood:
             else:
                 offsets = [about[place] for place in self._offsets] + [0.0, 0.0]
                 follower_of(plant)(
-                    signals.y[rows], *self.delivered(about, u), about, signals.h, self.substeps(about),
+                    signals.y[rows], *self.delivered(about, u, signals.late), about, signals.h, self.substeps(about),
                     (offsets[0], offsets[1]), start, np.array(plant.states),
                     np.array([at[body.angle] for body in plant.bodies[:m]]), spread, Q, R, own, factors,
                 )  # fmt: skip

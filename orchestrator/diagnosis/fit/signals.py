@@ -33,6 +33,8 @@ class Signals:
         noise: (channels,) standard deviation of the measurement noise, rounding included.
         torque: rms of the drive's torque, the unit in which process noise is counted.
         runs: the records, where there are several.
+        late: time by which requests act after their samples begin [s], less than ``h``: what whole samples, by which
+            torques that act early are read ahead, have too much.
     """
 
     y: Array
@@ -42,6 +44,7 @@ class Signals:
     noise: Array
     torque: float
     runs: tuple[Run, ...] = ()
+    late: float = 0.0
 
     def stretches(self, part: slice) -> list[slice]:
         """Return the stretches of a part within which time goes on.
@@ -79,8 +82,17 @@ class Signals:
         lead, late = (plant.value(p, name) if name in plant.names else 0.0 for name in (LEAD.name, SHIFT.name))
         if lead == 0.0 and late == 0.0:
             return self
-        u = self._each(self.u, lambda asked: _earlier(asked, lead / self.h))
-        return replace(self, u=u, y=self._earlier_load(late / self.h))
+        whole = math.ceil(lead / self.h - 1e-9)
+        u = self._each(self.u, lambda asked: asked[np.minimum(np.arange(asked.size) + whole, asked.size - 1)])
+        return replace(self, u=u, y=self._earlier_load(late / self.h), late=max(whole * self.h - lead, 0.0))
+
+    @cached_property
+    def meant(self) -> Array:
+        """Return the requests (n,) for a slave that takes one a sample: the mean of what acts in each."""
+        share = self.late / self.h
+        return self._each(
+            self.u, lambda asked: asked + share * (asked[np.maximum(np.arange(asked.size) - 1, 0)] - asked)
+        )
 
     def _each(self, values: Array, function: Callable[[Array], Array]) -> Array:
         """Return ``function`` of the values (n,) of each record in time, in their places."""
@@ -124,14 +136,6 @@ class Signals:
         )
         load = angle + rest * one + 0.5 * rest**2 * two
         return np.ascontiguousarray(np.column_stack([self.y[:, 0], load]))
-
-
-def _earlier(u: Array, samples: float) -> Array:
-    """Return requests (n,), each held for a sample, that act ``samples`` earlier: their means over each sample."""
-    whole = math.floor(samples)
-    at = np.arange(u.size) + whole
-    first, second = (u[np.clip(at + n, 0, u.size - 1)] for n in (0, 1))
-    return np.asarray(first + (samples - whole) * (second - first))
 
 
 def signals_of(record: Record, tau: float, settings: LikelihoodSettings, most_noise: Array | None = None) -> Signals:

@@ -144,7 +144,7 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     )
     outputs = w.plant.encoders[:m]
     record = tuple(f"{model}.{name}" for model in models for name in outputs)
-    asked = {model: signals.aligned(w.plant, p).u for model, p in models.items()}
+    asked = {model: signals.aligned(w.plant, p).meant for model, p in models.items()}
     sources = tuple(SignalSource(f"{model}.u", Samples(asked[model][parts[0]], h)) for model in models)
     system = System(instances, (), sources)
     runs: dict[str, list[Array]] = {model: [] for model in models}

@@ -161,7 +161,7 @@ def run_with_law(diagnosis: Diagnosis, law: LearnedLaw, fmu: Path) -> LawRun:
     _, states = likelihood.over(signals.size).innovations(p, fitted.q)
     described = law_of(w.plant, law, w.final.p)
     instance = fmu_instance("law", fmu, {ON: 1})
-    source = SignalSource("law.u", Samples(aligned.u[parts[0]], h))
+    source = SignalSource("law.u", Samples(aligned.meant[parts[0]], h))
     record = tuple(f"law.{name}" for name in encoders)
     outputs: list[Array] = []
     starts: list[dict[str, float]] = []
@@ -171,7 +171,7 @@ def run_with_law(diagnosis: Diagnosis, law: LearnedLaw, fmu: Path) -> LawRun:
             run = free_run(plant, p, states[part.start], signals, part, settings.free_run, history=False)
             given = {plant.starts[place]: float(run.start[place]) for place in plant.states}
             given |= {CLOCK: float(run.start[CLOCK_STATE])} if "since" in described else {}
-            result = session.run({f"law.{n}": v for n, v in given.items()}, {0: Samples(aligned.u[part], h)})
+            result = session.run({f"law.{n}": v for n, v in given.items()}, {0: Samples(aligned.meant[part], h)})
             outputs.append(np.column_stack([result[name] for name in record]))
             difference = max(difference, float(np.max(np.abs(outputs[-1] - run.outputs))))
             starts.append(given)

@@ -56,7 +56,8 @@ class Simulation:
         rows, place = in_time(self.signals.runs, begin, self.signals.size)
         first_row = int(rows[0])
         if first_row not in self._acting:
-            self._acting[first_row] = self._requests_of(self.aligned.u[rows])
+            u = self.aligned.u if self.history else self.aligned.meant
+            self._acting[first_row] = self._requests_of(u[rows])
         acting, asked = self._acting[first_row]
         whole, _ = self._dead_time
         known, rows_asked = 0 if self.history else place, end - begin
@@ -90,6 +91,7 @@ class Simulation:
     def _dead_time(self) -> tuple[int, float]:
         """Whole samples of it, and what is left [s]."""
         delay, h = self.plant.value(self.p, self.plant.drive.delay), self.signals.h
+        delay += self.aligned.late if self.history else 0.0
         whole = int(np.floor(delay / h + 1e-9))
         return whole, max(delay - whole * h, 0.0)
 

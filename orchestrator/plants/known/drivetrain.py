@@ -44,28 +44,33 @@ def refused(values: Mapping[str, float]) -> str:
 
 
 @cache
-def _stage() -> CompiledEquations:
-    """Return the compiled equations, with the damping of teeth that meet growing with their penetration."""
+def _whole() -> Any:
+    """Return ``whole(x, u)``, compiled: the state of the FMU's equations.
+
+    The predictor bends its own bristles, gets a filtered request, and its last state is the shaft's memory.
+    """
     from numba import njit
 
-    from orchestrator.plants.compiled import compiled
-    from orchestrator.shared.numba_cache import UNCOUNTED, kept
-
-    source = compiled("equations")
-    rates, twist, contact_of, elastic = source.rates, source.twist, source.contact_of, source.elastic_torque
-    twist_rate, twist_slope, lever_arm, friction_m, friction_l = (
-        source.twist_rate, source.twist_slope, source.lever_arm, source.friction_m, source.friction_l,
-    )  # fmt: skip
-    stops = (dt.P_STOP_LOWER, dt.P_STOP_UPPER)
-    alpha_at, end, set_in_at = dt.P_ALPHA, dt.COUNT, dt.P_ONSET
-    damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
-    loaded, wavy, lag_at = (dt.P_LOADED_M, dt.P_LOADED_L), (dt.P_WAVY_M, dt.P_WAVY_L), dt.P_TAU
-    rest_m, rest_l = compiled("bristles").rest_m, compiled("bristles").rest_l
+    from orchestrator.shared.numba_cache import UNCOUNTED
 
     @njit(error_model="numpy", **UNCOUNTED)
     def whole(x: Any, u: float) -> Any:
-        # The predictor bends its own bristles, gets a filtered request, and its last state is the shaft's memory.
         return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], 0.0, 0.0, 0.0, x[7], u)
+
+    return whole
+
+
+def _dry() -> tuple[Any, Any]:
+    """Return the compiled levels of dry friction, and those to which distances of presliding belong."""
+    from numba import njit
+
+    from orchestrator.plants.compiled import compiled
+    from orchestrator.shared.numba_cache import UNCOUNTED
+
+    source, bristles, whole = compiled("equations"), compiled("bristles"), _whole()
+    twist, contact_of, elastic, lever_arm = source.twist, source.contact_of, source.elastic_torque, source.lever_arm
+    friction_m, friction_l, rest_m, rest_l = source.friction_m, source.friction_l, bristles.rest_m, bristles.rest_l
+    alpha_at, loaded, wavy = dt.P_ALPHA, (dt.P_LOADED_M, dt.P_LOADED_L), (dt.P_WAVY_M, dt.P_WAVY_L)
 
     @njit(error_model="numpy", **UNCOUNTED)
     def friction(x: Any, p: Any) -> Any:
@@ -81,6 +86,20 @@ def _stage() -> CompiledEquations:
         levels = (at_motor if at_motor > 0.0 else abs(p[wavy[0]]), at_load if at_load > 0.0 else abs(p[wavy[1]]))
         varies = (p[loaded[0]] != 0.0 or p[wavy[0]] != 0.0, p[loaded[1]] != 0.0 or p[wavy[1]] != 0.0)
         return levels, varies
+
+    return friction, rest
+
+
+def _flanks() -> tuple[Any, Any]:
+    """Return, compiled, whether a model has teeth or end stops that meet, and whether any may within a time."""
+    from numba import njit
+
+    from orchestrator.plants.compiled import compiled
+    from orchestrator.shared.numba_cache import UNCOUNTED
+
+    source, whole = compiled("equations"), _whole()
+    twist, twist_slope = source.twist, source.twist_slope
+    alpha_at, onset_at, stops = dt.P_ALPHA, dt.COUNT + 2, (dt.P_STOP_LOWER, dt.P_STOP_UPPER)
 
     @njit(error_model="numpy", **UNCOUNTED)
     def flanks(p: Any) -> Any:
@@ -99,6 +118,22 @@ def _stage() -> CompiledEquations:
         way = abs(x[1] * slope - x[3]) * h + 0.75 * h * h * abs(rate[1] * slope - rate[3])
         return -way < depth < way + SETTING_IN * math.exp(p[onset_at])
 
+    return flanks, meets
+
+
+@cache
+def _stage() -> CompiledEquations:
+    """Return the compiled equations, with the damping of teeth that meet growing with their penetration."""
+    from orchestrator.plants.compiled import compiled
+    from orchestrator.shared.numba_cache import UNCOUNTED, kept
+
+    source, whole = compiled("equations"), _whole()
+    rates, twist, contact_of = source.rates, source.twist, source.contact_of
+    twist_rate, lever_arm = source.twist_rate, source.lever_arm
+    alpha_at, end, set_in_at, lag_at = dt.P_ALPHA, dt.COUNT, dt.P_ONSET, dt.P_TAU
+    damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
+    friction, rest = _dry()
+
     @kept(error_model="numpy", **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         full = whole(x, u)
@@ -113,7 +148,7 @@ def _stage() -> CompiledEquations:
         lag = (u - x[4]) / p[lag_at]
         return (r[0], r[1] + motor, r[2], r[3] - load, lag, r[5], r[6], r[10])
 
-    return CompiledEquations(friction, rest, flanks, meets, smoothed, (end, end + 1))
+    return CompiledEquations(friction, smoothed, (end, end + 1), rest, *_flanks())
 
 
 @cache

@@ -63,7 +63,7 @@ def stage() -> CompiledEquations:
         speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
 
-    return CompiledEquations(friction, rest, flanks, meets, smoothed, (end, end))
+    return CompiledEquations(friction, smoothed, (end, end), rest, flanks, meets)
 
 
 @cache
