@@ -24,7 +24,9 @@ class LikelihoodSettings(Settings, frozen=True):
 
     head: Annotated[int, setting("samples at the start that only settle the state", ge=1)] = 10
     settled: Annotated[int, setting("samples after which states and innovations are shown and judged", ge=1)] = 20
-    finer: Annotated[int, setting("times more steps in a sample in which dry friction may turn round", ge=1)] = 8
+    finer: Annotated[
+        int, setting("times more steps in a sample in which dry friction may turn round, or teeth or stops meet", ge=1)
+    ] = 8
     resonance_step: Annotated[
         float, setting("radians of an added resonance per step: above it, phase is lost", gt=0)
     ] = 0.5

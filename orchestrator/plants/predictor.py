@@ -23,7 +23,7 @@ from orchestrator.shared.numba_cache import UNCOUNTED, kept
 
 Array = NDArray[np.float64]
 
-FINER = 8  # times more steps of a free run in a sample in which dry friction may turn round, as in fits
+FINER = 8  # times more steps of a free run in a sample in which friction may turn round or teeth meet, as in fits
 MOST_STEPS = 1000  # of a free run in a sample: with values that ask for more a model is lost, and not waited for
 WAVE = 0.05  # of a wave's period: the farthest that a Runge-Kutta step of a free run goes
 
@@ -67,7 +67,7 @@ def predictor_of(plant: Plant, p: Any) -> Any:
     """Return ``predict(y, early, late, first, p, h, substeps, gains, offsets, start, innovations, states)``, compiled.
 
     In each sample the torque ``early`` acts for ``first`` [s], then ``late`` (a dead time is no multiple of ``h``).
-    ``substeps`` are the Runge-Kutta steps of a sample, and of one in which dry friction may turn round.
+    ``substeps`` are the Runge-Kutta steps of a sample, and of one in which friction may turn round or teeth meet.
     Shapes: y (n, 2), early and late (n,), gains (n, 8, 2), offsets (2,), start (8,), innovations (n, 2) out,
     states (n, 8) out: the corrected states. ``p`` is the plant's tuple followed by its nuisance parameters.
 

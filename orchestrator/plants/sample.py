@@ -99,7 +99,7 @@ class Sample(NamedTuple):
     Attributes:
         prepared: ``prepared(p, first, h, substeps)``: what all samples of a run have in common. ``first`` [s] is the
             length of a sample's first piece, ``substeps`` are the steps of a sample and of one in which dry friction
-            may turn round.
+            may turn round, or teeth or end stops meet.
         sample: ``sample(x, memory, p, common, torques)``: the state and what friction remembers (bristles, directions)
             one sample on, with the torques that act in both of its pieces.
     """

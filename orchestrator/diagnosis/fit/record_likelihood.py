@@ -238,7 +238,7 @@ class RecordLikelihood:
         return early, late, delay - whole * h
 
     def substeps(self, p: Array) -> tuple[int, int]:
-        """Return Runge-Kutta steps of a sample, and of one in which dry friction may turn round.
+        """Return Runge-Kutta steps of a sample, and of one in which friction may turn round or teeth meet.
 
         An extra resonance may need more than the plant alone.
 
