@@ -217,6 +217,9 @@ class VerdictSettings(Settings, frozen=True):
     pulses: Annotated[
         float, setting("excess kurtosis that only skill at every horizon outweighs: rare, large torques")
     ] = 4.0
+    hardly: Annotated[
+        float, share("of the missing log-likelihood, with less of which explained skill counts like beside pulses")
+    ] = 0.1
     proven: Annotated[
         float, share("share of the squared held-out error that effects remove to stand by themselves")
     ] = 0.75

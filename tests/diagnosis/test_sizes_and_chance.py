@@ -261,6 +261,17 @@ def test_pulses_are_outweighed_by_skill_at_every_horizon_only() -> None:
     assert is_unknown(left, True, settled, False, False, SETTINGS.verdict)
 
 
+def test_what_explains_next_to_nothing_is_outweighed_by_skill_at_every_horizon_only() -> None:
+    base = horizons([0.1, 1.0, 1.0, 1.0])
+    even, late = (Proof(base, horizons([0.1, short, 0.1, 0.1])) for short in (0.1, 0.9))
+    hardly = Remainder(100.0, 0.05, 1.0, (Predictable("load", "angle", 9.0, 0.03),))
+    for left, proof, unknown in (
+        (hardly, late, True), (hardly, even, False), (replace(hardly, explained=0.2), late, False),
+        (replace(hardly, predictable=()), late, False),
+    ):  # fmt: skip
+        assert is_unknown(left, True, proof, True, False, SETTINGS.verdict) is unknown
+
+
 def test_bursts_below_the_floor_are_no_misfit() -> None:
     follows = replace(horizons([0.1, 0.1, 0.1, 0.1]), r_squared=np.array([0.99]))
     lost = replace(follows, plain=np.full((4, 1), 0.2), r_squared=np.array([0.5]))

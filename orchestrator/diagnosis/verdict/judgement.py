@@ -53,8 +53,8 @@ def is_unknown(
     """
     # Of an arm that is held up, free runs are lost whatever the model: the torque that its motion needs tells.
     # Rare, large torques leave short predictions as bad as they were, whatever their mean explains of long ones.
-    proven = named and proof.skill > settings.proven
-    proven = proven and (left.tails < settings.pulses or proof.even_skill > settings.proven)
+    rare = left.tails >= settings.pulses or left.explained < settings.hardly
+    proven = named and proof.skill > settings.proven and (not rare or proof.even_skill > settings.proven)
     settled = named and proof.torque.decides(settings.proven, settings.good)
     if proof.final.is_hopeless(settings.hopeless) and (named or floor_off) and not settled:
         return True
