@@ -173,7 +173,9 @@ class SearchSettings(Settings, frozen=True):
         float, setting("process noise at which a gap without an encoder behind it starts: right models get there", gt=0)
     ] = 1e-3
     linearised: Annotated[int, setting("times that such a gap is fitted, gains taken along the fit before", ge=1)] = 2
-    most_effects: Annotated[int, setting("effects named at most: more have no room in one record", ge=0)] = 4
+    most_effects: Annotated[
+        int, setting("laws named at most, of two end stops one: more have no room in a record", ge=0)
+    ] = 4
     most_steps: Annotated[
         int, setting("forward steps at most: a step may end in a better fit, and no effect", ge=1)
     ] = 10

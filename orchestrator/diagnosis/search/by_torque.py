@@ -34,7 +34,7 @@ def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
     Args:
         search: of an axis that has an inverse model.
         base: the model without effects.
-        most: effects that are named at most.
+        most: laws that are named at most.
 
     Returns:
         The model; ``base`` where the torque of the deciding part does not settle it.
@@ -47,7 +47,7 @@ def by_torque(search: Judge, base: Candidate, most: int) -> Candidate:
     if min(part[3].size for part in moved) < likelihood.settings.inverse.least_rows:
         return base  # a part of it stands still
     current, ground = replace(base, fit=plain), None
-    while len(current.effects) < most:
+    while current.laws < most:
         scene = scene_of(likelihood, current.fit)
         added = partial(_added, search, current, scene, moved[0])
         tried = search.each(added, list(search.eligible(current)))

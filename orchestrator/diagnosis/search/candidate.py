@@ -77,6 +77,17 @@ class Candidate:
         """Return the penalised log-likelihood of both parts of the record that were looked at."""
         return self.fit.fitted + self.fit.validated - self.settings.penalty * parameter_count(self)
 
+    @property
+    def laws(self) -> int:
+        """Return how many laws are named: what a log does is none, and effects that share parameters are one."""
+        return len(
+            {
+                tuple(effect.parameters[short] for short in effect.shared) or (effect.label,)
+                for effect in self.effects
+                if not effect.measurement
+            }
+        )
+
     def gain_over(self, other: "Candidate") -> float:
         """Return the penalised gain over another model.
 

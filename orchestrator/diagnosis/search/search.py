@@ -48,7 +48,7 @@ class Search(Judge):
             if self.of_torque:
                 return base, by_torque(self, base, self.most)
             self.hidden = self.hidden_gap(base)
-            while len(current.effects) < self.most and len(self.steps) < self.settings.most_steps:
+            while current.laws < self.most and len(self.steps) < self.settings.most_steps:
                 step = self.against_its_like(self.step(current, ground), ground)
                 self.steps.append(step)
                 base = base if step.before.effects else step.before
