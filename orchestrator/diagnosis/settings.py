@@ -220,7 +220,8 @@ class VerdictSettings(Settings, frozen=True):
         float, setting("excess kurtosis that only skill at every horizon outweighs: rare, large torques")
     ] = 4.0
     hardly: Annotated[
-        float, share("of the missing log-likelihood, with less of which explained skill counts like beside pulses")
+        float,
+        share("of the missing log-likelihood: with less explained skill counts as beside pulses, with as little none"),
     ] = 0.1
     proven: Annotated[
         float, share("share of the squared held-out error that effects remove to stand by themselves")

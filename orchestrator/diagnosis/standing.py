@@ -100,7 +100,7 @@ def what_stands(
         if weak is None:
             harm = harm or _larger_misfit(likelihood, bases, final.fit, whole)
         if weak is None and not harm and fewer.effects:
-            harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise)
+            harm = _harm_over_fewer(likelihood, final.fit, fewer, whole, noise, best.effects[-1:])
         why = "its size is not far from zero" if weak else f"predictions get worse with it ({', '.join(harm)})"
         why = "it has come to a size that no machine has" if odd else why
         if weak is None and not harm:
@@ -160,21 +160,29 @@ def honest(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect], 
 
 
 def _harm_over_fewer(
-    likelihood: RecordLikelihood, final: Fit, fewer: Candidate, whole: Parts, noise: TorqueNoise
+    likelihood: RecordLikelihood, final: Fit, fewer: Candidate, whole: Parts, noise: TorqueNoise, last: Sequence[Effect]
 ) -> tuple[str, ...]:
     """Return the horizons at which the final model predicts worse than one without its last effect.
 
     That one is taken as the search fitted it, and fitted again to all that may be looked at: a small effect must not
     pass because its model is fitted to more of the record. All start from the filter of the final model.
-    A few long runs that disagree say nothing against an effect with which many short ones are surely better.
+    A few long runs that disagree say nothing against an effect with which many short ones are surely better, nor does
+    the one over the whole part where many predictions are surely better, and half of the long ones' error is gone.
     """
     after = horizons(likelihood, final.p, final.q, whole.held_out)
+    shown = likelihood.settings.search.shown
+
+    def shows(before: Horizons) -> bool:
+        return bool(after.surely_better_than(before)) and after.skill_over(before) > shown
 
     def harm(p: Array) -> tuple[str, ...]:
         before = horizons(likelihood, p, final.q, whole.held_out)
         undecided = after.undecided_over(before) if after.surely_better_than(before) else ()
         found = after.harm_over(before, replace(noise, before=p))
-        return tuple(label for label in found if label not in undecided)
+        found = tuple(label for label in found if label not in undecided)
+        if found == after.labels[-1:] and (outweighs_one_run(last, before, after) or shows(before)):
+            return ()
+        return found
 
     found = harm(fewer.fit.p)
     if found:

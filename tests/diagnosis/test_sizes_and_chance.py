@@ -135,18 +135,26 @@ def test_a_few_runs_that_disagree_decide_nothing() -> None:
     assert with_runs(1.4).undecided_over(with_runs(1.0)) == ()  # one run has no scatter
 
 
-@pytest.mark.parametrize(("better", "disagree", "harm"), [
-    (("one sample",), ("2 s",), ("whole part",)), ((), ("2 s",), ("2 s", "whole part")),
-    (("one sample",), (), ("2 s", "whole part")),
+@pytest.mark.parametrize(("better", "disagree", "removed", "harm"), [
+    (("one sample",), ("2 s",), 0.4, ("whole part",)), (("one sample",), ("2 s",), 0.6, ()),
+    (("500 ms",), ("2 s",), 0.4, ()), ((), ("2 s",), 0.6, ("2 s", "whole part")),
+    (("one sample",), (), 0.6, ("2 s", "whole part")),
 ])  # fmt: skip
-def test_long_runs_that_disagree_are_no_harm_beside_many_that_are_better(monkeypatch, better, disagree, harm) -> None:
+def test_long_runs_that_disagree_are_no_harm_beside_many_that_are_better(
+    monkeypatch, better, disagree, removed, harm
+) -> None:
     likelihood, p = axis_likelihood()
     final = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
     fewer = Candidate((), final, SETTINGS.search)
 
     class Errors:
+        labels, long = ("one sample", "50 ms", "500 ms", "2 s", "whole part"), 2
+
         def harm_over(self, other: "Errors", chance: object) -> tuple[str, ...]:
             return "2 s", "whole part"
+
+        def skill_over(self, other: "Errors") -> float:
+            return removed
 
         def surely_better_than(self, other: "Errors") -> tuple[str, ...]:
             return better
@@ -155,8 +163,11 @@ def test_long_runs_that_disagree_are_no_harm_beside_many_that_are_better(monkeyp
             return disagree
 
     monkeypatch.setattr("orchestrator.diagnosis.standing.horizons", lambda *_: Errors())
+    monkeypatch.setattr("orchestrator.diagnosis.standing.annealed", lambda *_: final)
+    monkeypatch.setattr("orchestrator.diagnosis.standing.reported", lambda *_: SimpleNamespace(fit=final))
     noise = TorqueNoise(likelihood, final, np.zeros(1), p)
-    assert _harm_over_fewer(likelihood, final, fewer, Parts(*(slice(10, 100),) * 3), noise) == harm
+    last = [next(effect for effect in likelihood.plant.bank if effect.label == "gravity_load@load")]
+    assert _harm_over_fewer(likelihood, final, fewer, Parts(*(slice(10, 100),) * 3), noise, last) == harm
 
 
 def test_a_larger_misfit_of_held_out_data_is_harm() -> None:
@@ -265,9 +276,11 @@ def test_what_explains_next_to_nothing_is_outweighed_by_skill_at_every_horizon_o
     base = horizons([0.1, 1.0, 1.0, 1.0])
     even, late = (Proof(base, horizons([0.1, short, 0.1, 0.1])) for short in (0.1, 0.9))
     hardly = Remainder(100.0, 0.05, 1.0, (Predictable("load", "angle", 9.0, 0.03),))
+    idle = Proof(base, base)
     for left, proof, unknown in (
         (hardly, late, True), (hardly, even, False), (replace(hardly, explained=0.2), late, False),
-        (replace(hardly, predictable=()), late, False),
+        (replace(hardly, predictable=()), late, False), (replace(hardly, predictable=()), idle, True),
+        (Remainder(100.0, 0.2, 1.0, ()), idle, False),
     ):  # fmt: skip
         assert is_unknown(left, True, proof, True, False, SETTINGS.verdict) is unknown
 

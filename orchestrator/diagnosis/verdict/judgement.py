@@ -64,6 +64,8 @@ def is_unknown(
         return left.growth > settings.grown
     if proven or settled:
         return False
+    if named and max(left.explained, proof.skill) < settings.hardly:
+        return True
     no_noise = structured(left, settings) or (far_off and not named)
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
 
