@@ -9,8 +9,10 @@ from numba import njit
 
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.plants.known.servo_axis import PLANT
-from orchestrator.plants.predictor import _coarse_runner, coarse_runner_of
+from orchestrator.plants.learned import with_law
+from orchestrator.plants.predictor import _coarse_runner, _predictor, coarse_runner_of, follower_of
 from orchestrator.plants.sample import is_usual
+from orchestrator.shared.code_digest import digest_of
 
 
 def test_equations_of_a_plant_may_make_arrays() -> None:
@@ -29,6 +31,15 @@ def test_equations_of_a_plant_may_make_arrays() -> None:
         coarse_runner_of(plant, p)((0.0,) * 8, p, np.ones(50), np.ones(50), 0.0, 0.01, (1, 8), out)
     assert angles[0][-1, 0] != 0.0
     assert np.array_equal(*angles)
+
+
+@pytest.mark.parametrize("plant", [DRIVETRAIN, PLANT, with_law(DRIVETRAIN), with_law(PLANT)], ids=lambda p: p.name)
+def test_machine_code_of_a_predictor_is_kept(plant) -> None:
+    for usual in (True, False):
+        assert digest_of(_predictor(plant, usual)) is not None
+        assert digest_of(_coarse_runner(plant, usual)) is not None
+    assert digest_of(follower_of(plant)) is not None
+    assert digest_of(plant.runner()) is not None
 
 
 def drivetrain(**changed: float) -> np.ndarray:

@@ -99,11 +99,11 @@ def _flanks() -> tuple[Any, Any]:
 
     source, whole = compiled("equations"), _whole()
     twist, twist_slope = source.twist, source.twist_slope
-    alpha_at, onset_at, stops = dt.P_ALPHA, dt.COUNT + 2, (dt.P_STOP_LOWER, dt.P_STOP_UPPER)
+    alpha_at, onset_at, stops, far = dt.P_ALPHA, dt.COUNT + 2, (dt.P_STOP_LOWER, dt.P_STOP_UPPER), dt.BIG
 
     @njit(error_model="numpy", **UNCOUNTED)
     def flanks(p: Any) -> Any:
-        return p[alpha_at] > 0.0 or p[stops[0]] > -dt.BIG or p[stops[1]] < dt.BIG
+        return p[alpha_at] > 0.0 or p[stops[0]] > -far or p[stops[1]] < far
 
     @njit(error_model="numpy", **UNCOUNTED)
     def meets(x: Any, rate: Any, p: Any, h: float) -> Any:

@@ -38,7 +38,7 @@ def stage() -> CompiledEquations:
 
     source = compiled("servo_axis")
     rates, level, breakaway = source.rates, source.friction, compiled("axis_equations").rest
-    end, wavy, stops = ap.COUNT, ap.P_WAVY, (ap.P_STOP_LOWER, ap.P_STOP_UPPER)
+    end, wavy, stops, far = ap.COUNT, ap.P_WAVY, (ap.P_STOP_LOWER, ap.P_STOP_UPPER), ap.BIG
 
     @njit(error_model="numpy", **UNCOUNTED)
     def friction(x: Any, p: Any) -> Any:
@@ -51,7 +51,7 @@ def stage() -> CompiledEquations:
 
     @njit(error_model="numpy", **UNCOUNTED)
     def flanks(p: Any) -> Any:
-        return p[stops[0]] > -ap.BIG or p[stops[1]] < ap.BIG
+        return p[stops[0]] > -far or p[stops[1]] < far
 
     @njit(error_model="numpy", **UNCOUNTED)
     def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
