@@ -229,7 +229,7 @@ def _load_dependent(site: str) -> Effect:
         # Its distance is that at 1 N.m, what is seen is that at the torque which the shaft carries.
         carried = scene.torque * (scene.ratio if site == "load" else 1.0)
         distance, width = _build_up(scene, site)
-        return distance - float(np.log(carried)), width
+        return distance - float(np.log(max(carried, 1e-9))), width
 
     return Effect(
         "load_dependent_friction", site, group("load_dependent_friction", f"{site}.coefficient"), "coefficient",
