@@ -88,6 +88,14 @@ def test_a_drag_that_changes_widens_its_interval_by_what_it_changes() -> None:
     assert widened(halfway("b", 2.0, 2.0), same, slice(10, 800), ()).standard_error(place) < 0.02
 
 
+def test_a_block_that_says_nothing_of_a_parameter_warns_nobody(monkeypatch) -> None:
+    likelihood = halfway("b", 2.0, 2.0)
+    found, part = fitted(likelihood, (), 1e-5), slice(10, likelihood.stop)
+    monkeypatch.setattr("orchestrator.diagnosis.fit.spread._block_ratios", lambda *_: np.array([1e305]))
+    large = replace(found, covariance=np.array([[1e10]]))
+    assert np.isinf(widened(likelihood, large, part, ()).standard_error(AXIS.index("b")))
+
+
 @pytest.mark.parametrize(("after", "disagree"), [(2.0, False), (3.0, True)])
 def test_blocks_that_disagree_widen_robust_errors(after: float, disagree: bool) -> None:
     likelihood, place = halfway("b", 2.0, after), AXIS.index("b")

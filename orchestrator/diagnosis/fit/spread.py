@@ -36,9 +36,9 @@ def widened(likelihood: RecordLikelihood, found: Fit, part: slice, effects: Sequ
     if not found.free:
         return found
     stretch = np.sqrt(np.maximum(_block_ratios(likelihood, found, part), 1.0))
-    return with_tolerances(
-        likelihood, replace(found, covariance=found.covariance * np.outer(stretch, stretch)), effects
-    )
+    with np.errstate(over="ignore"):  # a block may say next to nothing of a parameter
+        covariance = found.covariance * np.outer(stretch, stretch)
+    return with_tolerances(likelihood, replace(found, covariance=covariance), effects)
 
 
 def with_tolerances(likelihood: RecordLikelihood, found: Fit, effects: Sequence[Effect]) -> Fit:
