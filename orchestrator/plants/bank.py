@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.effects import Effect, Scene, Start
+from orchestrator.plants.effects import LEAST_CYCLES, Effect, Scene, Start
 from pyfmu_sources.drivetrain_parameters import Parameter
 
 Array = NDArray[np.float64]
@@ -153,8 +153,8 @@ def _periodic(
         name, site, group(name, "amplitude", "cycles_per_rev", "phase"), "amplitude", unit,
         lambda scene: {"cycles_per_rev": scene.cycles.get(name, ())}, amplitudes=("amplitude",), phase="phase",
         scales=lambda scene: {"cycles_per_rev": 0.01 / max(scene.turns, 1e-9), "phase": 0.05},
-        bounds=lambda scene: {"cycles_per_rev": (0.7 / max(scene.turns, 1e-9), 1e9)}, family=_periodic_at(site),
-        tolerance={f"effects.{name}.amplitude": tolerance}, leaves=leaves,
+        bounds=lambda scene: {"cycles_per_rev": (LEAST_CYCLES / max(scene.turns, 1e-9), 1e9)},
+        family=_periodic_at(site), tolerance={f"effects.{name}.amplitude": tolerance}, leaves=leaves,
     )  # fmt: skip
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pyfmu_sources.drivetrain_parameters import Parameter
 
 Array = NDArray[np.float64]
+LEAST_CYCLES = 0.7  # of a wave in the travel: what comes round less than that is told from no spring
 
 
 class Places(Protocol):

@@ -555,6 +555,15 @@ def test_a_resonance_without_a_peak_or_without_damping_is_none(ratio: float, ref
     assert why.endswith(refused) if refused else not why
 
 
+@pytest.mark.parametrize(("times", "refused"), [(0.7, True), (0.8, False)])
+def test_a_wave_that_comes_round_no_more_than_it_must_is_none(times: float, refused: bool) -> None:
+    law = next(effect for effect in DRIVETRAIN.bank if effect.name == "torque_ripple")
+    scene = Scene(0.01, 1.0, np.ones(3), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, -1.0, 1.0)
+    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    p[law.places(DRIVETRAIN)["cycles_per_rev"]] = times / scene.turns
+    assert ("no wave" in implausible(DRIVETRAIN, law, p, scene, SEARCH)) is refused
+
+
 @pytest.mark.parametrize(("stiffness", "refused"), [(2.0, True), (20.0, False)])
 def test_a_stop_that_gives_way_is_none(stiffness: float, refused: bool) -> None:
     """The load's travel ends 0.1 rad beyond the stop; the drive has 4 N.m at the load."""

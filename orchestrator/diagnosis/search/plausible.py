@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.settings import SearchSettings
 from orchestrator.plants.description import Plant
-from orchestrator.plants.effects import Effect, Scene
+from orchestrator.plants.effects import LEAST_CYCLES, Effect, Scene
 
 Array = NDArray[np.float64]
 
@@ -42,8 +42,8 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
             continue
         value, unit = abs(float(p[place])), plant.table[place].unit
         what = f"{effect.name} ({effect.site}) of {value:.3g} {unit}"
-        if short == "cycles_per_rev" and value * scene.turns < 1.0:
-            return f"{effect.name} ({effect.site}) does not come round once in the travel: a spring, no wave"
+        if short == "cycles_per_rev" and value * scene.turns < 1.02 * LEAST_CYCLES:
+            return f"{effect.name} ({effect.site}) would come round {LEAST_CYCLES:g} times at most: a spring, no wave"
         if short == "damping_ratio" and value >= math.sqrt(0.5):
             return f"{effect.name} ({effect.site}) with a damping ratio of {value:.3g} has no peak: no resonance"
         if short == "damping_ratio" and value < settings.least_damping:
