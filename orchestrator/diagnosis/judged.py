@@ -12,7 +12,7 @@ from orchestrator.diagnosis.search.model_space import changes_the_torque, is_of_
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.search import Search
 from orchestrator.diagnosis.standing import what_stands
-from orchestrator.diagnosis.verdict.gain import far_off
+from orchestrator.diagnosis.verdict.gain import surely_far_off
 from orchestrator.diagnosis.verdict.judgement import Proof, is_unknown, refuted
 from orchestrator.diagnosis.verdict.remainder import Remainder
 
@@ -69,7 +69,7 @@ def judged(search: Search, base: Candidate, best: Candidate, parts: Parts) -> Pa
     left = replace(left, growth=growth if best.effects else max(growth, left.growth))
     verdict = settings.verdict
     floor_off = is_off_floor(likelihood, standing.efficient, parts, lowest)
-    far = far_off(search.model, final.p, verdict)
+    far = surely_far_off(search.model, final, verdict)
     named = any(not effect.measurement for effect in best.effects)
     proof = standing.proof
     if logged is not plain:  # what putting the log right explains is no proof of an effect

@@ -21,7 +21,7 @@ from orchestrator.diagnosis.proof.torque import TorqueProof
 from orchestrator.diagnosis.search.candidate import Candidate, simplest_first
 from orchestrator.diagnosis.standing import _harm_over_fewer, _is_weak, _larger_misfit, _minor, honest
 from orchestrator.diagnosis.verdict.chance import TorqueNoise, torque_noise
-from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
+from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of, surely_far_off
 from orchestrator.diagnosis.verdict.judgement import UNEXPLAINED, Proof, doubts, is_unknown, refuted, structured
 from orchestrator.diagnosis.verdict.remainder import Predictable, Remainder
 from orchestrator.plants.known.drivetrain import PLANT
@@ -529,3 +529,14 @@ def test_one_gain_is_likelier_than_many_values_off_by_one_factor() -> None:
     for factor, far in ((2.2, []), (2.3, ["J_l"]), (0.5, []), (0.4, ["J_l"])):  # 1.5 squared, either way
         one[model.plant.index("J_l")] = factor * 5.6
         assert far_off(wide, one, SETTINGS.verdict) == far
+
+
+@pytest.mark.parametrize(("error", "far"), [(0.01, ["b_l"]), (0.1, ["b_l"]), (0.2, []), (None, ["b_l"])])
+def test_a_value_that_a_record_does_not_tell_contradicts_nothing(error: float | None, far: list[str]) -> None:
+    model = default_model()
+    p, place = model.plant.extended(model.values), model.plant.index("b_l")
+    p[place] *= 1.4  # stated to 5 %: two of them are allowed
+    free = () if error is None else (Free(place, 0.1, 0.0, 1e12),)
+    found = Fit(p, 1e-3, np.zeros((1, 2)), free, np.eye(len(free)) * (error or 0.0) ** 2, 0.0, 0.0)
+    assert far_off(model, p, SETTINGS.verdict) == ["b_l"]
+    assert surely_far_off(model, found, SETTINGS.verdict) == far

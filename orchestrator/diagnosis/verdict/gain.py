@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.fit.fitting import Fit
 from orchestrator.diagnosis.outcome import Named, ParameterEstimate
 from orchestrator.diagnosis.settings import VerdictSettings
 from orchestrator.records.model_file import Model, ModelParameter
@@ -95,6 +96,29 @@ def far_off(model: Model, p: Array, settings: VerdictSettings) -> list[str]:
         if off > settings.far_off:
             found.append(u.name)
     return found
+
+
+def surely_far_off(model: Model, found: Fit, settings: VerdictSettings) -> list[str]:
+    """Return the names of parameters that lie far outside what the model file allows with all of their intervals.
+
+    A value that a record does not tell contradicts nothing.
+
+    Args:
+        model: nominal values, and how far each may be off.
+        found: the fit.
+        settings: of the verdict.
+
+    Returns:
+        The names.
+    """
+    stated, p = model.plant.extended(model.values), found.p.copy()
+    fitted = {entry.place for entry in found.free}
+    for name in far_off(model, found.p, settings):
+        place = model.plant.index(name)
+        if place in fitted:
+            low, high = found.interval(place)
+            p[place] = min(max(stated[place], low), high)
+    return far_off(model, p, settings)
 
 
 def _uncertainties(model: Model, u: ModelParameter, value: float) -> float:
