@@ -156,6 +156,9 @@ class SearchSettings(Settings, frozen=True):
     least_damping: Annotated[
         float, share("least damping ratio of a resonance: steel that is welded rings with some thousandths")
     ] = 5e-4
+    at_bound: Annotated[
+        float, setting("times the fewest cycles that are looked for: a wave with fewer lies at its bound", ge=1)
+    ] = 1.02
     shortlist: Annotated[int, setting("candidates fitted in full: the right one was among them so far", ge=1)] = 6
     worth: Annotated[float, share("least share of the best promise that a candidate must promise to be fitted")] = 0.03
     followed: Annotated[float, share("of the best gain, from which other levels are tried: winners had half")] = 0.2

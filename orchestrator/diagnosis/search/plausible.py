@@ -42,7 +42,7 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
             continue
         value, unit = abs(float(p[place])), plant.table[place].unit
         what = f"{effect.name} ({effect.site}) of {value:.3g} {unit}"
-        if short == "cycles_per_rev" and value * scene.turns < 1.02 * LEAST_CYCLES:
+        if short == "cycles_per_rev" and value * scene.turns < settings.at_bound * LEAST_CYCLES:
             return f"{effect.name} ({effect.site}) would come round {LEAST_CYCLES:g} times at most: a spring, no wave"
         if short == "damping_ratio" and value >= math.sqrt(0.5):
             return f"{effect.name} ({effect.site}) with a damping ratio of {value:.3g} has no peak: no resonance"
