@@ -49,6 +49,21 @@ def _near_rest(speed: float, acceleration: float, distance: float, h: float) -> 
 
 
 @njit(error_model="numpy", **UNCOUNTED)
+def reached(speed: float, acceleration: float, h: float) -> float:
+    """Return how far [rad] a part may come within ``h``, half again of what its acceleration adds if it stays.
+
+    Args:
+        speed: of the part [rad/s].
+        acceleration: [rad/s^2].
+        h: [s].
+
+    Returns:
+        The way.
+    """
+    return abs(speed) * h + 0.75 * h * h * abs(acceleration)
+
+
+@njit(error_model="numpy", **UNCOUNTED)
 def _along(x: Any, rate: Any, h: float) -> Any:
     """Return the state after a straight step; the last entry is the memory of the shaft's hysteresis here."""
     return (
@@ -180,9 +195,12 @@ def sample_of(plant: Plant) -> Sample:
         signs = (sign_m, sign_l)
         rubs = rest[0] > 0.0 or rest[1] > 0.0
         if rubs or meeting:
-            rate, level = stage(x, signs, p, torques[1]), friction(x, p)
-            turns_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], reach[0] * max(1.0, level[0] / rest[0]), h)
-            turns_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], reach[1] * max(1.0, level[1] / rest[1]), h)
+            rate, near_m, near_l = stage(x, signs, p, torques[1]), reach[0], reach[1]
+            if varies[0] or varies[1]:  # no other level is above that at rest
+                level = friction(x, p)
+                near_m, near_l = near_m * max(1.0, level[0] / rest[0]), near_l * max(1.0, level[1] / rest[1])
+            turns_m = rest[0] > 0.0 and _near_rest(x[1], rate[1], near_m, h)
+            turns_l = rest[1] > 0.0 and _near_rest(x[3], rate[3], near_l, h)
             if turns_m or turns_l or (meeting and meets(x, rate, p, h)):
                 ways = turning
         for piece in range(2):

@@ -14,6 +14,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood, _larg
 from orchestrator.diagnosis.fit.reference import Reference
 from orchestrator.diagnosis.fit.signals import Signals, noise_level, signals_of
 from orchestrator.diagnosis.fit.slope import Free, taken
+from orchestrator.diagnosis.proof.simulation import Simulation
 from orchestrator.plants.measurement import LEAD, SHIFT
 from orchestrator.records.record import record_from_columns
 from orchestrator.shared.inference.colour import colour_of
@@ -106,6 +107,21 @@ def test_a_dead_time_shifts_the_torque_by_parts_of_a_sample(delay: float) -> Non
     for n in range(30):
         assert late[n] == u[max(n - whole, 0)]
         assert early[n] == u[n] if delay == 0.0 else early[n] == u[max(n - whole - 1, 0)]
+
+
+def test_a_torque_that_acts_early_by_part_of_a_sample_is_a_later_one_that_is_read_ahead() -> None:
+    likelihood, p = drivetrain_likelihood(size=60)
+    early, late = p.copy(), p.copy()
+    early[DRIVETRAIN.index(LEAD.name)] = 2.25 * H
+    late[DRIVETRAIN.index("effects.input_delay.delay")] = 0.75 * H
+    u = likelihood.signals.u
+    signals = replace(likelihood.signals, u=np.append(u[3:], [u[-1]] * 3))
+    ahead = replace(likelihood, signals=signals, _gains={})
+    assert likelihood.innovations(early, Q)[0] == pytest.approx(ahead.innovations(late, Q)[0], abs=1e-12)
+    assert np.max(np.abs(likelihood.innovations(early, Q)[0] - ahead.innovations(p, Q)[0])) > 1e-6
+    start, part = np.zeros(8), slice(0, 50)
+    runs = [Simulation(DRIVETRAIN, q, one.signals).run(start, part) for q, one in ((early, likelihood), (late, ahead))]
+    assert runs[0] == pytest.approx(runs[1], abs=1e-12)
 
 
 def test_a_limit_cuts_the_torque_before_it_is_delayed() -> None:

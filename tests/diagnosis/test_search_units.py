@@ -602,6 +602,15 @@ def test_effects_that_share_a_parameter_fit_it_once() -> None:
     assert (left[lower["angle"]], left[upper["angle"]], left[upper["stiffness"]]) == (-1e12, 1.0, 77.0)
 
 
+def test_what_a_log_does_is_no_law_and_both_stops_are_one() -> None:
+    bank = {effect.label: effect for effect in DRIVETRAIN.bank}
+    stops = tuple(bank[f"{side}_end_stop@load"] for side in ("lower", "upper"))
+    assert candidate(0.0, 0.0).laws == 0
+    assert candidate(0.0, 0.0, LATE_LOAD, EARLY_TORQUE).laws == 0
+    assert candidate(0.0, 0.0, *stops).laws == 1
+    assert candidate(0.0, 0.0, stops[1], LATE_LOAD, bank["gravity_load@load"], bank["load_torque@load"]).laws == 3
+
+
 def test_a_request_that_never_changes_has_no_limit_of_its_rate() -> None:
     scene = Scene(0.01, 1.0, np.ones(5), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, 0.0, 0.0)
     for effect in (one for one in DRIVETRAIN.bank if one.name == "rate_limit" or one.name.endswith("end_stop")):

@@ -7,7 +7,7 @@ meet, and whatever else there is, the exact, event-located plant itself runs.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -56,8 +56,7 @@ class Simulation:
         rows, place = in_time(self.signals.runs, begin, self.signals.size)
         first_row = int(rows[0])
         if first_row not in self._acting:
-            u = self.aligned.u if self.history else self.aligned.meant
-            self._acting[first_row] = self._requests_of(u[rows])
+            self._acting[first_row] = self._requests_of(self.aligned.u[rows])
         acting, asked = self._acting[first_row]
         whole, _ = self._dead_time
         known, rows_asked = 0 if self.history else place, end - begin
@@ -73,8 +72,9 @@ class Simulation:
 
     @cached_property
     def aligned(self) -> Signals:
-        """The signals as they were, from how the log has them."""
-        return self.signals.aligned(self.plant, self.p)
+        """The signals as they were, from how the log has them; an FMU takes one request a sample."""
+        found = self.signals.aligned(self.plant, self.p)
+        return found if self.history else replace(found, u=found.meant, late=0.0)
 
     @cached_property
     def _acting(self) -> dict[int, tuple[Array, Array]]:
@@ -90,8 +90,7 @@ class Simulation:
     @cached_property
     def _dead_time(self) -> tuple[int, float]:
         """Whole samples of it, and what is left [s]."""
-        delay, h = self.plant.value(self.p, self.plant.drive.delay), self.signals.h
-        delay += self.aligned.late if self.history else 0.0
+        delay, h = self.plant.value(self.p, self.plant.drive.delay) + self.aligned.late, self.signals.h
         whole = int(np.floor(delay / h + 1e-9))
         return whole, max(delay - whole * h, 0.0)
 

@@ -95,6 +95,7 @@ def _flanks() -> tuple[Any, Any]:
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
+    from orchestrator.plants.sample import reached
     from orchestrator.shared.numba_cache import UNCOUNTED
 
     source, whole = compiled("equations"), _whole()
@@ -107,7 +108,7 @@ def _flanks() -> tuple[Any, Any]:
 
     @njit(error_model="numpy", **UNCOUNTED)
     def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
-        way = abs(x[3]) * h + 0.75 * h * h * abs(rate[3])
+        way = reached(x[3], rate[3], h)
         if abs(x[2] - p[stops[0]]) < way or abs(x[2] - p[stops[1]]) < way:
             return True
         if p[alpha_at] == 0.0:
@@ -115,7 +116,7 @@ def _flanks() -> tuple[Any, Any]:
         full = whole(x, 0.0)
         slope = twist_slope(full, p)
         depth = abs(twist(full, p)) - p[alpha_at]
-        way = abs(x[1] * slope - x[3]) * h + 0.75 * h * h * abs(rate[1] * slope - rate[3])
+        way = reached(x[1] * slope - x[3], rate[1] * slope - rate[3], h)
         return -way < depth < way + SETTING_IN * math.exp(p[onset_at])
 
     return flanks, meets

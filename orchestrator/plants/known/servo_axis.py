@@ -34,6 +34,7 @@ def stage() -> CompiledEquations:
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
+    from orchestrator.plants.sample import reached
     from orchestrator.shared.numba_cache import UNCOUNTED, kept
 
     source = compiled("servo_axis")
@@ -55,7 +56,7 @@ def stage() -> CompiledEquations:
 
     @njit(error_model="numpy", **UNCOUNTED)
     def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
-        way = abs(x[1]) * h + 0.75 * h * h * abs(rate[1])
+        way = reached(x[1], rate[1], h)
         return abs(x[0] - p[stops[0]]) < way or abs(x[0] - p[stops[1]]) < way
 
     @kept(error_model="numpy", **UNCOUNTED)
