@@ -60,6 +60,30 @@ def breakaway(coulomb: float, sliding: float, static: float) -> float:
     return coulomb + max(sliding, static)
 
 
+def unloaded_m(p: Parameters) -> float:
+    """Return the motor's breakaway torque [N.m] without what depends on the shaft's torque and the position.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    return breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
+
+
+def unloaded_l(p: Parameters) -> float:
+    """Return the load's breakaway torque [N.m] without what depends on the shaft's torque and the position.
+
+    Args:
+        p: parameters, in the order of the FMU's table.
+
+    Returns:
+        The torque.
+    """
+    return breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
+
+
 def has_friction_m(p: Parameters) -> bool:
     """Tell whether the motor has dry friction.
 
@@ -95,7 +119,7 @@ def capacity_m(x: State, contact: int, p: Parameters) -> float:
     Returns:
         The torque.
     """
-    level = breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
+    level = unloaded_m(p)
     if p[P_LOADED_M] == 0.0 and p[P_WAVY_M] == 0.0:
         return level
     return dependent_friction(
@@ -114,7 +138,7 @@ def capacity_l(x: State, contact: int, p: Parameters) -> float:
     Returns:
         The torque.
     """
-    level = breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
+    level = unloaded_l(p)
     if p[P_LOADED_L] == 0.0 and p[P_WAVY_L] == 0.0:
         return level
     return dependent_friction(
@@ -159,7 +183,7 @@ def rest_m(p: Parameters) -> float:
     Returns:
         The torque.
     """
-    return breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M]) + p[P_LOADED_M]
+    return unloaded_m(p) + p[P_LOADED_M]
 
 
 def rest_l(p: Parameters) -> float:
@@ -171,7 +195,7 @@ def rest_l(p: Parameters) -> float:
     Returns:
         The torque.
     """
-    return breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L]) + p[P_LOADED_L]
+    return unloaded_l(p) + p[P_LOADED_L]
 
 
 def builds_up_m(p: Parameters) -> bool:
@@ -183,8 +207,7 @@ def builds_up_m(p: Parameters) -> bool:
     Returns:
         True when it does.
     """
-    fixed = breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
-    return p[P_PRESLIDING_M] > 0.0 and fixed > 0.0 and not is_rigid(p)
+    return p[P_PRESLIDING_M] > 0.0 and unloaded_m(p) > 0.0 and not is_rigid(p)
 
 
 def builds_up_l(p: Parameters) -> bool:
@@ -196,8 +219,7 @@ def builds_up_l(p: Parameters) -> bool:
     Returns:
         True when it does.
     """
-    fixed = breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
-    return p[P_PRESLIDING_L] > 0.0 and fixed > 0.0 and not is_rigid(p)
+    return p[P_PRESLIDING_L] > 0.0 and unloaded_l(p) > 0.0 and not is_rigid(p)
 
 
 def leaving_speed(distance: float, falls: bool, stribeck_speed: float) -> float:
