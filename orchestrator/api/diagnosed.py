@@ -4,7 +4,7 @@ import csv
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -26,6 +26,7 @@ from orchestrator.diagnosis.verdict.told import told
 from orchestrator.errors import OutputError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
+from orchestrator.shared.cores import both
 from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound, ValidatedFound
 from orchestrator.shared.trust import Trust
 
@@ -217,14 +218,14 @@ class DiagnosisResult(Result):
         """Write the corrected FMU, its model file ``corrected.toml``, ``diagnose.csv`` and the figures."""
         from orchestrator.diagnosis.figures import draw_workings
 
-        fmu = self.build(folder)
+        draw = partial(draw_workings, folder, self.diagnosis, self.evidence, self.misfit[0].unit)
+        _, fmu = both(draw, partial(self.build, folder))
         if "_simulated" not in self.__dict__:  # else it would be built again
             self.__dict__["_simulated"] = self._co_simulated(fmu)
         self.write_csv(folder / "diagnose.csv")
         if self.model is not None:
             (folder / "corrected.toml").write_text(corrected_model(self.model, self.diagnosis), encoding="utf-8")
         self.plot(folder / "diagnose_signals.png")
-        draw_workings(folder, self.diagnosis, self.evidence, self.misfit[0].unit)
 
 
 def _signals(found: Validation) -> dict[str, ValidatedFound]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from orchestrator.diagnosis.verdict.gain import far_off
 from orchestrator.diagnosis.verdict.judgement import Proof
 from orchestrator.diagnosis.verdict.remainder import structured
 from orchestrator.plants.effects import Effect
-from orchestrator.shared.cores import spread
+from orchestrator.shared.cores import both, spread
 
 Array = NDArray[np.float64]
 
@@ -80,10 +81,8 @@ def what_stands(
         rival = horizons(likelihood, likelihood.nominal, plain.q, whole.held_out)
     withdrawn: dict[str, str] = {}
     while best.effects:
-        efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, best.effects)
-        final = reported(likelihood, efficient, whole, best.effects, ladder(levels, best.effects, efficient.q))
-        final = as_allowed(likelihood, search.model, final, whole)
-        final = replace(final, fit=honest(likelihood, final.fit, best.effects, whole))
+        refitted, shortened = partial(_refitted, search, whole, best), partial(_shorter, search, base, best)
+        (efficient, final), shorter = both(refitted, shortened)
         after = horizons(likelihood, final.fit.p, plain.q, whole.held_out)
         odd = search.odd(best.effects, final.fit.p, scene_of(likelihood, best.fit))
         weak = odd or next(
@@ -96,7 +95,7 @@ def what_stands(
             torque.decides(verdict.proven, verdict.good) or outweighs_one_run(best.effects, before, after)
         ):
             harm = ()  # one run, which adds up every disturbance
-        fewer = search.reduced(best, scene_of(likelihood, best.fit), out) if len(best.effects) > 1 else base
+        fewer = shorter if out is best.effects[-1] else search.reduced(best, scene_of(likelihood, best.fit), out)
         if weak is None:
             harm = harm or _larger_misfit(likelihood, bases, final.fit, whole)
         if weak is None and not harm and fewer.effects:
@@ -113,6 +112,22 @@ def what_stands(
         best = fewer
     final = replace(sized_base, fit=honest(likelihood, sized_base.fit, (), whole))
     return Standing(base, plain, sized_base, final, Proof(before, before), withdrawn)
+
+
+def _refitted(search: Search, whole: Parts, best: Candidate) -> tuple[Fit, Sized]:
+    """Return the fit of a model to all that may be looked at, and as it is reported, with honest intervals."""
+    likelihood, effects = search.likelihood, best.effects
+    efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, effects)
+    final = reported(likelihood, efficient, whole, effects, ladder(likelihood.settings.levels, effects, efficient.q))
+    final = as_allowed(likelihood, search.model, final, whole)
+    return efficient, replace(final, fit=honest(likelihood, final.fit, effects, whole))
+
+
+def _shorter(search: Search, base: Candidate, best: Candidate) -> Candidate:
+    """Return a model without its last effect."""
+    if len(best.effects) == 1:
+        return base
+    return search.reduced(best, scene_of(search.likelihood, best.fit), best.effects[-1])
 
 
 def outweighs_one_run(effects: Sequence[Effect], before: Horizons, after: Horizons) -> bool:

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from threading import Semaphore, Thread
-from typing import TypeVar
+from typing import Any, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -66,8 +66,28 @@ def spread(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     for helper in helpers:
         helper.start()
     work()
-    for helper in helpers:
-        helper.join()
+    if helpers:
+        _SPARE.release()  # what this thread waits for may spread its own
+        for helper in helpers:
+            helper.join()
+        _SPARE.acquire()
     if errors:
         raise errors[0]
     return [results[place] for place in range(len(items))]
+
+
+def both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
+    """Return the results of two functions, called at once where a core is idle.
+
+    Args:
+        first, second: spend their time outside the interpreter's lock.
+
+    Returns:
+        Both results.
+
+    Raises:
+        BaseException: the first that one of them has raised.
+    """
+    calls: tuple[Callable[[], Any], ...] = (first, second)
+    one, other = spread(lambda call: call(), calls)
+    return one, other

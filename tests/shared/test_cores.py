@@ -6,7 +6,7 @@ import time
 import pytest
 
 from orchestrator.shared import cores
-from orchestrator.shared.cores import spread
+from orchestrator.shared.cores import both, spread
 
 
 def test_results_come_in_order_of_their_items() -> None:
@@ -52,3 +52,25 @@ def test_after_an_error_nothing_is_begun() -> None:
     with pytest.raises(ValueError, match="one"):
         spread(fails, range(50))
     assert len(begun) < 10
+
+
+def test_a_thread_that_waits_gives_its_core_to_what_it_waits_for(monkeypatch) -> None:
+    monkeypatch.setattr(cores, "_SPARE", threading.Semaphore(1))
+    begun, at_once, alone = threading.Barrier(2), threading.Barrier(2), threading.Event()
+
+    def ends() -> None:
+        begun.wait(timeout=10.0)
+
+    def spreads() -> None:
+        begun.wait(timeout=10.0)
+        alone.wait(timeout=0.2)  # until the other has ended and waits
+        spread(lambda n: at_once.wait(timeout=10.0), range(2))  # breaks where one thread must do both
+
+    both(ends, spreads)
+    both(spreads, ends)
+    assert cores._SPARE.acquire(blocking=False)
+    assert not cores._SPARE.acquire(blocking=False)
+
+
+def test_two_functions_give_two_results() -> None:
+    assert both(lambda: "one", lambda: 2) == ("one", 2)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.reference import Reference, Start
 from orchestrator.diagnosis.fit.riccati import riccati
-from orchestrator.diagnosis.fit.signals import Signals
+from orchestrator.diagnosis.fit.signals import Signals, later
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.plants.description import STATES, Plant
 from orchestrator.plants.predictor import follower_of, predictor_of
@@ -225,7 +225,7 @@ class RecordLikelihood:
         Returns:
             torque (n,) in the first part of each sample, torque (n,) in the rest, length of the first part [s].
         """
-        h, stop = self.signals.h, len(u)
+        h = self.signals.h
         limit, delay = p[self._limit], float(p[self._delay]) + more
         if limit < self.settings.likelihood.unlimited:
             u = np.clip(u, -limit, limit)
@@ -233,9 +233,7 @@ class RecordLikelihood:
         if delay <= 0.0:
             return u, u, 0.0
         whole = math.floor(delay / h)
-        late = u[np.maximum(np.arange(stop) - whole, 0)]
-        early = u[np.maximum(np.arange(stop) - whole - 1, 0)]
-        return early, late, delay - whole * h
+        return later(u, whole + 1), later(u, whole), delay - whole * h
 
     def substeps(self, p: Array) -> tuple[int, int]:
         """Return Runge-Kutta steps of a sample, and of one in which friction may turn round or teeth meet.

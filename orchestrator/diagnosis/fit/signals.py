@@ -83,16 +83,21 @@ class Signals:
         if lead == 0.0 and late == 0.0:
             return self
         whole = math.ceil(lead / self.h - 1e-9)
-        u = self._each(self.u, lambda asked: asked[np.minimum(np.arange(asked.size) + whole, asked.size - 1)])
-        return replace(self, u=u, y=self._earlier_load(late / self.h), late=max(whole * self.h - lead, 0.0))
+        if whole not in self._read_ahead:
+            self._read_ahead[whole] = self._each(self.u, lambda asked: later(asked, -whole))
+        u, y = self._read_ahead[whole], self._earlier_load(late / self.h)
+        return replace(self, u=u, y=y, late=max(whole * self.h - lead, 0.0))
 
     @cached_property
     def meant(self) -> Array:
         """Return the requests (n,) for a slave that takes one a sample: the mean of what acts in each."""
         share = self.late / self.h
-        return self._each(
-            self.u, lambda asked: asked + share * (asked[np.maximum(np.arange(asked.size) - 1, 0)] - asked)
-        )
+        return self._each(self.u, lambda asked: asked + share * (later(asked, 1) - asked))
+
+    @cached_property
+    def _read_ahead(self) -> dict[int, Array]:
+        """Requests (n,) by the number of whole samples that they are read ahead."""
+        return {}
 
     def _each(self, values: Array, function: Callable[[Array], Array]) -> Array:
         """Return ``function`` of the values (n,) of each record in time, in their places."""
@@ -136,6 +141,29 @@ class Signals:
         )
         load = angle + rest * one + 0.5 * rest**2 * two
         return np.ascontiguousarray(np.column_stack([self.y[:, 0], load]))
+
+
+def later(values: Array, samples: int) -> Array:
+    """Return values (n,) as they come ``samples`` later, the first or the last one where none is known.
+
+    Args:
+        values: (n,) in time.
+        samples: below zero, they come earlier.
+
+    Returns:
+        The values (n,).
+
+    Example:
+        >>> later(np.array([1.0, 2.0, 3.0]), 1).tolist(), later(np.array([1.0, 2.0, 3.0]), -1).tolist()
+        ([1.0, 1.0, 2.0], [2.0, 3.0, 3.0])
+    """
+    out, moved = np.empty(values.size), min(abs(samples), values.size)
+    kept = values.size - moved
+    if samples < 0:
+        out[:kept], out[kept:] = values[moved:], values[-1:]
+    else:
+        out[:moved], out[moved:] = values[:1], values[:kept]
+    return out
 
 
 def signals_of(record: Record, tau: float, settings: LikelihoodSettings, most_noise: Array | None = None) -> Signals:

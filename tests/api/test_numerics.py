@@ -1,0 +1,16 @@
+"""Fits use one thread of linear algebra, and give the others back."""
+
+from threadpoolctl import threadpool_info
+
+from orchestrator.api.numerics import fitting
+
+
+def _threads() -> list[int]:
+    return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
+
+
+def test_fits_use_one_thread_of_linear_algebra() -> None:
+    before = _threads()
+    with fitting("a record"):
+        assert set(_threads()) == {1}
+    assert _threads() == before
