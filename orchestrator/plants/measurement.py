@@ -6,7 +6,9 @@ from pyfmu_sources.drivetrain_parameters import Parameter
 LEAD = Parameter("measurement.lead", "s", 0.0, 0.0, 1.0, "Time by which torques act before their stamp")
 SHIFT = Parameter("measurement.shift", "s", 0.0, -1.0, 1.0, "Time by which the load's angle is stamped later")
 
-SAMPLES = (0.12, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0)  # of a shift, that are tried
+# Of a shift, that are tried. A load that is late by a hundredth of a sample looks like damping that has gone over from
+# the load to the motor, where the shaft is stiff.
+SAMPLES = (0.005, 0.012, 0.03, 0.06, 0.12, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 5.0, 8.0)
 LIKELY = 3.0  # samples: standard deviation of a shift before a record has been seen
 LARGEST = 12.0  # samples
 
