@@ -224,7 +224,10 @@ class VerdictSettings(Settings, frozen=True):
     ] = 4.0
     hardly: Annotated[
         float,
-        share("of the missing log-likelihood: with less explained skill counts as beside pulses, with as little none"),
+        share(
+            "of the missing log-likelihood: with less explained skill counts as beside pulses, and without skill "
+            "nothing is named where a signal predicts as much of what is left"
+        ),
     ] = 0.1
     proven: Annotated[
         float, share("share of the squared held-out error that effects remove to stand by themselves")

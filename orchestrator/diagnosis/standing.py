@@ -13,6 +13,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.sizes import Sized, sized, with_model_error
 from orchestrator.diagnosis.proof.by_record import by_record
 from orchestrator.diagnosis.proof.horizons import Horizons, horizons
+from orchestrator.diagnosis.proof.likelihoods import held_out_gain
 from orchestrator.diagnosis.proof.misfit import held_out_misfit
 from orchestrator.diagnosis.proof.reported import as_allowed, reported
 from orchestrator.diagnosis.proof.torque import torque_proof
@@ -181,8 +182,9 @@ def _harm_over_fewer(
 
     That one is taken as the search fitted it, and fitted again to all that may be looked at: a small effect must not
     pass because its model is fitted to more of the record. All start from the filter of the final model.
-    A few long runs that disagree say nothing against an effect with which many short ones are surely better, nor does
-    the one over the whole part where many predictions are surely better, and half of the long ones' error is gone.
+    A few long runs that disagree say nothing against an effect with which many short ones are surely better. Nor does
+    the one over the whole part where many predictions are surely better and half of the long ones' error is gone, or
+    where the held-out part is likelier.
     """
     after = horizons(likelihood, final.p, final.q, whole.held_out)
     shown = likelihood.settings.search.shown
@@ -190,21 +192,24 @@ def _harm_over_fewer(
     def shows(before: Horizons) -> bool:
         return bool(after.surely_better_than(before)) and after.skill_over(before) > shown
 
-    def harm(p: Array) -> tuple[str, ...]:
-        before = horizons(likelihood, p, final.q, whole.held_out)
+    def likelier(other: Fit) -> bool:
+        return held_out_gain(likelihood, final, other, whole) > likelihood.settings.search.least_decided
+
+    def harm(other: Fit) -> tuple[str, ...]:
+        before = horizons(likelihood, other.p, final.q, whole.held_out)
         undecided = after.undecided_over(before) if after.surely_better_than(before) else ()
-        found = after.harm_over(before, replace(noise, before=p))
+        found = after.harm_over(before, replace(noise, before=other.p))
         found = tuple(label for label in found if label not in undecided)
-        if found == after.labels[-1:] and (outweighs_one_run(last, before, after) or shows(before)):
+        if found == after.labels[-1:] and (outweighs_one_run(last, before, after) or shows(before) or likelier(other)):
             return ()
         return found
 
-    found = harm(fewer.fit.p)
+    found = harm(fewer.fit)
     if found:
         return found
     again = annealed(likelihood, fewer.fit.p, fewer.fit.q, fewer.fit.free, whole, fewer.effects)
     levels = ladder(likelihood.settings.levels, fewer.effects, again.q)
-    return harm(reported(likelihood, again, whole, fewer.effects, levels).fit.p)
+    return harm(reported(likelihood, again, whole, fewer.effects, levels).fit)
 
 
 def _larger_misfit(likelihood: RecordLikelihood, bases: Sequence[Array], final: Fit, whole: Parts) -> tuple[str, ...]:

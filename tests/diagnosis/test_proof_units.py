@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis import proof
+from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.proof.free_run import _steps, free_run
+from orchestrator.diagnosis.proof.likelihoods import held_out_gain
 from orchestrator.diagnosis.proof.misfit import held_out_misfit, running, segments
 from orchestrator.diagnosis.proof.simulation import simulate
 from orchestrator.plants.predictor import MOST_STEPS, coarse_steps, runs_coarsely, waves_of
@@ -280,3 +282,22 @@ def test_each_angle_counts_by_its_own_noise(side: float) -> None:
             moved = run.start.copy()
             moved[place] += step
             assert cost(moved) > (1.0 - 1e-3) * least
+
+
+def test_data_that_no_fit_has_seen_are_likelier_with_what_is_there() -> None:
+    likelihood, p = axis_likelihood()
+    parts = Parts(slice(10, 60), slice(60, 80), slice(80, 120))
+
+    def at(q: float, **values: float) -> Fit:
+        moved = p.copy()
+        for name, value in values.items():
+            moved[AXIS.index(name)] = value
+        return Fit(moved, q, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
+
+    right = at(1e-3)
+    wrong = at(1e-3, b=3.0 * AXIS.value(p, "b"))
+    assert held_out_gain(likelihood, right, wrong, parts) > 6.0
+    assert held_out_gain(likelihood, wrong, right, parts) == pytest.approx(
+        -held_out_gain(likelihood, right, wrong, parts)
+    )
+    assert held_out_gain(likelihood, right, right, parts) == 0.0

@@ -1,5 +1,7 @@
 """Standard errors under a colour, sizes on which fits disagree, harm by chance, and signals that a log has shifted."""
 
+import math
+import math
 from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
@@ -135,13 +137,14 @@ def test_a_few_runs_that_disagree_decide_nothing() -> None:
     assert with_runs(1.4).undecided_over(with_runs(1.0)) == ()  # one run has no scatter
 
 
-@pytest.mark.parametrize(("better", "disagree", "removed", "harm"), [
-    (("one sample",), ("2 s",), 0.4, ("whole part",)), (("one sample",), ("2 s",), 0.6, ()),
-    (("500 ms",), ("2 s",), 0.4, ()), ((), ("2 s",), 0.6, ("2 s", "whole part")),
-    (("one sample",), (), 0.6, ("2 s", "whole part")),
+@pytest.mark.parametrize(("better", "disagree", "removed", "likelier", "harm"), [
+    (("one sample",), ("2 s",), 0.4, 5.0, ("whole part",)), (("one sample",), ("2 s",), 0.6, 5.0, ()),
+    (("500 ms",), ("2 s",), 0.4, 5.0, ()), ((), ("2 s",), 0.6, 7.0, ("2 s", "whole part")),
+    (("one sample",), (), 0.6, 7.0, ("2 s", "whole part")), (("one sample",), ("2 s",), 0.4, 7.0, ()),
+    (("one sample",), ("2 s",), 0.4, math.nan, ("whole part",)),
 ])  # fmt: skip
 def test_long_runs_that_disagree_are_no_harm_beside_many_that_are_better(
-    monkeypatch, better, disagree, removed, harm
+    monkeypatch, better, disagree, removed, likelier, harm
 ) -> None:
     likelihood, p = axis_likelihood()
     final = Fit(p, 1e-3, np.zeros((1, 1)), (), np.zeros((0, 0)), 0.0, 0.0)
@@ -165,6 +168,7 @@ def test_long_runs_that_disagree_are_no_harm_beside_many_that_are_better(
     monkeypatch.setattr("orchestrator.diagnosis.standing.horizons", lambda *_: Errors())
     monkeypatch.setattr("orchestrator.diagnosis.standing.annealed", lambda *_: final)
     monkeypatch.setattr("orchestrator.diagnosis.standing.reported", lambda *_: SimpleNamespace(fit=final))
+    monkeypatch.setattr("orchestrator.diagnosis.standing.held_out_gain", lambda *_: likelier)
     noise = TorqueNoise(likelihood, final, np.zeros(1), p)
     last = [next(effect for effect in likelihood.plant.bank if effect.label == "gravity_load@load")]
     assert _harm_over_fewer(likelihood, final, fewer, Parts(*(slice(10, 100),) * 3), noise, last) == harm
@@ -279,7 +283,8 @@ def test_what_explains_next_to_nothing_is_outweighed_by_skill_at_every_horizon_o
     idle = Proof(base, base)
     for left, proof, unknown in (
         (hardly, late, True), (hardly, even, False), (replace(hardly, explained=0.2), late, False),
-        (replace(hardly, predictable=()), late, False), (replace(hardly, predictable=()), idle, True),
+        (replace(hardly, predictable=()), late, False), (replace(hardly, predictable=()), idle, False),
+        (replace(hardly, predictable=(Predictable("shaft", "twist", 4.0, 0.3),)), idle, True),
         (Remainder(100.0, 0.2, 1.0, ()), idle, False),
     ):  # fmt: skip
         assert is_unknown(left, True, proof, True, False, SETTINGS.verdict) is unknown

@@ -64,7 +64,10 @@ def is_unknown(
         return left.growth > settings.grown
     if proven or settled:
         return False
-    if named and max(left.explained, proof.skill) < settings.hardly:
+    follows = max(
+        (entry.share for entry in left.predictable), default=0.0
+    )  # of what is left, some signal, if not surely
+    if named and max(left.explained, proof.skill) < settings.hardly < follows:
         return True
     no_noise = structured(left, settings) or (far_off and not named)
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
