@@ -1,7 +1,6 @@
 """Standard errors under a colour, sizes on which fits disagree, harm by chance, and signals that a log has shifted."""
 
 import math
-import math
 from copy import copy
 from dataclasses import replace
 from types import SimpleNamespace
