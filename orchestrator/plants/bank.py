@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.plants.effects import LEAST_CYCLES, Effect, Scene, Start
-from pyfmu_sources.drivetrain_parameters import Parameter
+from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 
 Array = NDArray[np.float64]
 
@@ -179,6 +179,11 @@ def _load_torque(scene: Scene) -> float:
     return 0.01 * scene.torque * scene.ratio
 
 
+def _driving(scene: Scene) -> dict[str, tuple[float, float]]:
+    """Return which way a constant torque acts: one that holds back what goes one way is dry friction."""
+    return {"torque": (-BIG if scene.way > 0.0 else 0.0, BIG if scene.way < 0.0 else 0.0)} if scene.way else {}
+
+
 def directional_friction(site: str) -> Effect:
     """Return the row of viscous friction that differs by direction.
 
@@ -276,6 +281,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     _eccentricity(),
     Effect(
         "load_torque", "load", group("load_torque", "torque"), "torque", _load_torque, amplitudes=("torque",),
+        bounds=_driving,
     ),
     Effect(
         "gravity_load", "load", group("gravity_load", "amplitude", "phase"), "amplitude", _load_torque,

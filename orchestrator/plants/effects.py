@@ -56,6 +56,7 @@ class Scene:
         lowest, highest: angles [rad] between which the load moves.
         cycles: name of a periodic effect -> cycles per revolution at the peaks of its frequency scan.
         angles: (n,) of the load [rad], sample by sample; empty: not known.
+        way: 1 or -1: the motor turns that way only; 0: it turns back.
     """
 
     h: float
@@ -72,6 +73,7 @@ class Scene:
     highest: float
     cycles: dict[str, tuple[float, ...]] = field(default_factory=dict)
     angles: Array = field(default_factory=lambda: np.empty(0))
+    way: float = 0.0
 
     @property
     def middle(self) -> float:

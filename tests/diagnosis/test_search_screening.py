@@ -191,3 +191,23 @@ def test_sizes_of_a_model_that_runs_away_are_no_warning() -> None:
     states[::2] = -np.inf
     likelihood.innovations = lambda p, q: (np.zeros((300, 2)), states)
     assert not np.isfinite(scene_of(likelihood, model).twist)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_constant_torque_that_holds_back_what_goes_one_way_is_left_to_dry_friction(sign: float) -> None:
+    """The plant takes a load's torque from what accelerates: one of the other sign than the way drives."""
+    likelihood, p = axis_likelihood(**{"effects.load_torque.torque": sign * 0.5})
+    without = p.copy()
+    without[AXIS.index("effects.load_torque.torque")] = 0.0
+    model = fit(likelihood, without, 1e-2, (), PARTS)
+    scene = scene_of(likelihood, model)
+    screen = Screen(likelihood, model, PARTS)
+    assert scene.way == 0.0
+    found = {way: screen.guesses(PLAIN, replace(scene, way=way)) for way in (0.0, 1.0, -1.0)}
+    assert found[-sign] == found[0.0]
+    assert found[0.0][0].values["torque"] == pytest.approx(sign * 0.5, rel=0.2)
+    assert found[sign] == ()
+    assert PLAIN.bounds(scene) == {}
+    low, high = PLAIN.bounds(replace(scene, way=-sign))["torque"]
+    assert low < sign * 0.5 < high
+    assert 0.0 in (low, high)

@@ -161,7 +161,8 @@ def test_a_motor_that_hardly_turns_back_turns_one_way(sign: float, back: float, 
     signals = replace(search.likelihood.signals, y=np.column_stack([sign * angle, 0.0 * angle]))
     search.likelihood = replace(search.likelihood, signals=signals)
     assert search.one_way is alone
-    assert ("load_torque@load" in labels(search.eligible(BASE))) is not alone
+    assert search.likelihood.signals.way(slice(10, 160), search.settings.one_way) == (sign if alone else 0.0)
+    assert ("directional_friction@motor" in labels(search.eligible(BASE))) is not alone
     assert search.not_tried(FRICTION) == (("load_torque@load",) if alone else ())
     assert search.not_tried(STRIBECK) == ()
 

@@ -69,6 +69,25 @@ class Signals:
         moves = [self.y[rows][ahead:, 0] - self.y[rows][:-ahead, 0] for rows in self.stretches(slice(0, self.size))]
         return max((float(np.max(np.abs(move))) for move in moves if move.size), default=0.0) / ahead
 
+    def way(self, part: slice, most: float) -> float:
+        """Return which way the motor turns in a part: 1 or -1, or 0 where it turns back.
+
+        Args:
+            part: of the samples.
+            most: share of its travel that it may go back and still turn one way.
+
+        Returns:
+            The way.
+        """
+        back = {1.0: 0.0, -1.0: 0.0}
+        for rows in self.stretches(part):
+            angle = self.y[rows, 0]
+            for way, most_yet in back.items():
+                farthest = float(np.max(np.maximum.accumulate(way * angle) - way * angle))
+                back[way] = max(most_yet, farthest / max(float(np.ptp(angle)), 1e-300))
+        way = min(back, key=back.__getitem__)
+        return way if back[way] < most else 0.0
+
     def aligned(self, plant: Plant, p: Array) -> "Signals":
         """Return the signals as they were, from how the log has them: what is early put later, what is late earlier.
 

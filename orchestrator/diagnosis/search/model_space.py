@@ -18,9 +18,10 @@ from orchestrator.records.model_file import Model
 
 Array = NDArray[np.float64]
 
-# In one direction dry friction and a constant torque are the same, and so are viscous friction and its difference
-# between the directions: what machines have is tried, and what is not tried stands beside its name.
-ALIKE_ONE_WAY = {"load_torque": ("coulomb_friction",), "directional_friction": ()}
+# In one direction dry friction and a constant torque that holds back are the same, and so are viscous friction and its
+# difference between the directions: what machines have is tried, and what is not tried stands beside its name.
+ALIKE_ONE_WAY = {"load_torque": ("coulomb_friction",)}
+TWO_WAYS = ("directional_friction",)
 
 
 @dataclass
@@ -68,7 +69,7 @@ class ModelSpace:
             if self.as_given and changes_the_torque(effect):
                 continue
             blind = effect.both_encoders and self.likelihood.signals.channels < 2
-            alike = one_way and effect.name in ALIKE_ONE_WAY
+            alike = one_way and effect.name in TWO_WAYS
             alike = alike or (timed and is_of_torques_time(self.plant, effect))  # early or late, never both
             if effect.label not in present | replaced and not blind and not alike:
                 yield effect
@@ -88,13 +89,7 @@ class ModelSpace:
     @property
     def one_way(self) -> bool:
         """Tell whether the motor turns in one direction only, in all that may be looked at."""
-        signals, ways = self.likelihood.signals, [0.0, 0.0]
-        for rows in signals.stretches(self.parts.seen):
-            angle = signals.y[rows, 0]
-            for n, s in enumerate((1.0, -1.0)):
-                back = float(np.max(np.maximum.accumulate(s * angle) - s * angle))
-                ways[n] = max(ways[n], back / max(float(np.ptp(angle)), 1e-300))
-        return min(ways) < self.settings.one_way
+        return bool(self.likelihood.signals.way(self.parts.seen, self.settings.one_way))
 
     @property
     def refitted(self) -> list[int]:

@@ -27,14 +27,16 @@ def scene_of(likelihood: RecordLikelihood, model: Fit) -> Scene:
     speeds = rms(x[:, first.speed]), rms(x[:, last.speed])
     angles = x[:, last.angle].copy()
     reach = float(np.min(angles)), float(np.max(angles))
+    way = signals.way(slice(likelihood.settings.likelihood.head, likelihood.stop), likelihood.settings.search.one_way)
     if plant.shaft is None:
         inertia = plant.value(p, first.inertia)
         return Scene(
-            signals.h, signals.torque, signals.u, *speeds, 1.0, inertia, 1.0, 1.0, turns, *reach, angles=angles
-        )
+            signals.h, signals.torque, signals.u, *speeds, 1.0, inertia, 1.0, 1.0, turns, *reach,
+            angles=angles, way=way,
+        )  # fmt: skip
     twist = float(np.quantile(np.abs(plant.twist(p, x)), likelihood.settings.search.twist_quantile))
     inertia, stiffness = (plant.value(likelihood.nominal, name) for name in (last.inertia, plant.shaft.stiffness))
     return Scene(
         signals.h, signals.torque, signals.u, *speeds, twist, inertia, stiffness, plant.ratio(p), turns, *reach,
-        angles=angles,
+        angles=angles, way=way,
     )  # fmt: skip

@@ -106,8 +106,9 @@ class Screen:
             amplitude = unit * float(np.hypot(*size))
             found = {effect.amplitudes[0]: amplitude, effect.phase: float(np.arctan2(size[1], size[0]))}
         else:
-            minimum = self._plant.entry(effect.places(self._plant)[effect.size]).minimum
-            size = np.maximum(size, 0.0) if minimum >= 0.0 else size
+            entry = self._plant.entry(effect.places(self._plant)[effect.size])
+            low, high = effect.bounds(scene).get(effect.size, (entry.minimum, entry.maximum))
+            size = np.minimum(size, 0.0) if high <= 0.0 else np.maximum(size, 0.0) if low >= 0.0 else size
             found = {name: unit * float(s) for name, s in zip(effect.amplitudes, size, strict=True)}
         left = self._residual + columns @ size
         gain = 0.5 * float(self._residual @ self._residual - left @ left)
