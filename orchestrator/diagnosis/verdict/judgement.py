@@ -64,10 +64,8 @@ def is_unknown(
         return left.growth > settings.grown
     if proven or settled:
         return False
-    follows = max(
-        (entry.share for entry in left.predictable), default=0.0
-    )  # of what is left, some signal, if not surely
-    if named and max(left.explained, proof.skill) < settings.hardly < follows:
+    repeated = max((entry.share for entry in left.predictable), default=0.0)  # of what is left, surely or not
+    if named and max(left.explained, proof.skill) < settings.hardly < repeated:
         return True
     no_noise = structured(left, settings) or (far_off and not named)
     return left.growth > settings.grown or (left.explained < settings.least_explained and no_noise)
