@@ -134,6 +134,9 @@ def test_a_few_runs_that_disagree_decide_nothing() -> None:
     assert with_runs(1.4, 1.3, 1.5).undecided_over(before) == ()
     assert with_runs(0.5, 0.4, 0.6).undecided_over(before) == ("whole part",)  # better is no harm either
     assert with_runs(1.4).undecided_over(with_runs(1.0)) == ()  # one run has no scatter
+    for lost in (np.inf, np.nan):  # a run that has run away decides
+        assert with_runs(1.4, lost, 0.9).undecided_over(before) == ()
+        assert before.undecided_over(with_runs(1.4, lost, 0.9)) == ()
 
 
 @pytest.mark.parametrize(("better", "disagree", "removed", "likelier", "harm"), [

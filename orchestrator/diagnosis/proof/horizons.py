@@ -98,14 +98,14 @@ class Horizons:
             other: of the other model, over the same part.
 
         Returns:
-            Their labels; one run has no scatter, and its horizon is not among them.
+            Their labels; one run has no scatter, and one that has run away decides: their horizons are not among them.
         """
         found = []
         for label, mine, theirs in zip(self.labels[len(self.squares) :], self.runs, other.runs, strict=True):
             pairs = list(zip(mine, theirs, strict=True))
             m = self.noise.size
             change = np.array([np.sum((a.rms[:m] ** 2 - b.rms[:m] ** 2) / self.noise**2) for (a, _), (b, _) in pairs])
-            if len(pairs) > 1:
+            if len(pairs) > 1 and np.all(np.isfinite(change)):
                 mean, error = _mean_of(change)
                 if mean <= self.settings.sure * error:
                     found.append(label)
