@@ -5,6 +5,8 @@ from collections.abc import Callable, Sequence
 from threading import Semaphore, Thread
 from typing import Any, TypeVar
 
+import numpy as np
+
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -54,9 +56,12 @@ def spread(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
             except BaseException as error:
                 errors.append(error)
 
+    silenced = np.geterr()  # which threads do not inherit
+
     def help_out() -> None:
         try:
-            work()
+            with np.errstate(**silenced):
+                work()
         finally:
             _SPARE.release()
 

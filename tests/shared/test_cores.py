@@ -3,6 +3,7 @@
 import threading
 import time
 
+import numpy as np
 import pytest
 
 from orchestrator.shared import cores
@@ -74,3 +75,15 @@ def test_a_thread_that_waits_gives_its_core_to_what_it_waits_for(monkeypatch) ->
 
 def test_two_functions_give_two_results() -> None:
     assert both(lambda: "one", lambda: 2) == ("one", 2)
+
+
+def test_what_numpy_is_to_be_silent_about_holds_in_every_thread(monkeypatch) -> None:
+    monkeypatch.setattr(cores, "_SPARE", threading.Semaphore(1))
+    both_run = threading.Barrier(2)
+
+    def silent(n: int) -> str:
+        both_run.wait(timeout=10.0)
+        return np.geterr()["over"]
+
+    with np.errstate(over="ignore"):
+        assert spread(silent, range(2)) == ["ignore", "ignore"]
