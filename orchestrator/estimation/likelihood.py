@@ -20,6 +20,7 @@ from orchestrator.estimation.innovations import Array, Innovations, NoiseLevels,
 from orchestrator.estimation.problem import IMPULSE, OFFSET, SCALE, STATE_NAMES, GapProblem
 from orchestrator.estimation.protocol import TimeLimitError
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
+from orchestrator.shared.inference.inverse import pseudo_inverse
 from pyfmu_sources.drivetrain_parameters import NAMES
 
 JUMP = 100.0
@@ -343,4 +344,4 @@ def inverse(information: Array) -> Array:
     """
     diagonal = np.sqrt(np.maximum(np.diag(information), 1e-300))
     scaled = information / np.outer(diagonal, diagonal)
-    return np.linalg.pinv(scaled, hermitian=True) / np.outer(diagonal, diagonal)
+    return pseudo_inverse(scaled, hermitian=True) / np.outer(diagonal, diagonal)

@@ -119,7 +119,7 @@ def _limits(scene: Scene) -> tuple[float, ...]:
 
 
 def _delays(scene: Scene) -> tuple[float, ...]:
-    return tuple(scene.h * f for f in (0.04, 0.12, 0.3, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0))
+    return tuple(scene.h * f for f in (0.01, 0.02, 0.04, 0.12, 0.3, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0))
 
 
 def _rates(scene: Scene) -> tuple[float, ...]:
@@ -294,6 +294,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
         lambda s: {"frequency": _frequencies(s), "damping_ratio": (0.03,), "inertia": _parts_of_the_load(s)},
         scales=lambda s: {"frequency": 0.5, "damping_ratio": 0.01},
         bounds=lambda s: {"frequency": _band(s), "damping_ratio": (0.0, 1.0)},
+        priors=lambda s: {"damping_ratio": (0.03, 0.03)},  # of metal: where a record does not tell it, it is not zero
         # Below its resonance the added inertia moves with the load, so the re-fitted J_l already holds it.
         taken_from={"inertia": "J_l"}, tries=3, memory=True,
     ),

@@ -57,3 +57,18 @@ def test_a_fit_with_derivatives_kept_up_ends_where_others_do(monkeypatch) -> Non
 
 def replace_fit(settings, **changes):  # type: ignore[no-untyped-def]
     return msgspec.structs.replace(settings, fit=msgspec.structs.replace(settings.fit, **changes))
+
+
+def test_a_fit_ends_where_products_of_derivatives_are_beyond_numbers(monkeypatch) -> None:
+    """Derivatives are numbers, their products are infinite: a decomposition of those need not end."""
+    likelihood, _ = axis_likelihood(J=1.3, b=1.5)
+    free = free_of(likelihood)
+
+    def steep(*args):  # type: ignore[no-untyped-def]
+        slope = taken(*args)
+        return replace(slope, columns=1e200 * slope.columns)
+
+    monkeypatch.setattr("orchestrator.diagnosis.fit.fitting.taken", steep)
+    found = fit(likelihood, likelihood.nominal, Q, free, PARTS)
+    assert np.array_equal(found.p, likelihood.nominal)
+    assert np.isfinite(found.fitted)

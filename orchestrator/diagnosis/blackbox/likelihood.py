@@ -12,6 +12,7 @@ from orchestrator.diagnosis.blackbox.parts import BoxParts, Rows
 from orchestrator.diagnosis.blackbox.problem import BoxProblem
 from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import Ladder
+from orchestrator.shared.inference.inverse import pseudo_inverse
 
 Array = NDArray[np.float64]
 
@@ -248,7 +249,7 @@ class BoxLikelihood:
         count = len(self.mean)
         N[range(count), range(count)] += 1.0 / self.sd**2
         scale = np.sqrt(np.maximum(np.diag(N), 1e-300))
-        return np.asarray(np.linalg.pinv(N / scale / scale[:, None], rcond=1e-13) / scale / scale[:, None])
+        return np.asarray(pseudo_inverse(N / scale / scale[:, None], rcond=1e-13) / scale / scale[:, None])
 
 
 def _names(model: BoxModel) -> list[str]:

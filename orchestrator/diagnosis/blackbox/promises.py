@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.blackbox.bank import BoxEffect
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
+from orchestrator.shared.inference.inverse import pseudo_inverse
 
 Array = NDArray[np.float64]
 
@@ -156,5 +157,5 @@ def _regressed(along: Array, D: Array) -> tuple[float, Array]:
     N = D.T @ D
     scale = np.sqrt(np.maximum(np.diag(N), 1e-300))
     g = along / scale
-    found = g if len(g) == 1 else np.linalg.pinv(N / scale / scale[:, None], rcond=1e-8) @ g
+    found = g if len(g) == 1 else pseudo_inverse(N / scale / scale[:, None], rcond=1e-8) @ g
     return float(found @ g), found / scale

@@ -10,6 +10,7 @@ from orchestrator.diagnosis.blackbox.likelihood import BoxFit
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.promises import Known
 from orchestrator.diagnosis.blackbox.screening import Pair
+from orchestrator.shared.inference.inverse import pseudo_inverse
 
 
 @dataclass(frozen=True)
@@ -118,5 +119,5 @@ def made_up_for(fitter: Fitter, fit: BoxFit, effect: BoxEffect) -> BoxModel:
     N[range(count), range(count)] += 1.0 / fitter.sd**2
     g[:count] -= (model.p - fitter.mean) / fitter.sd**2
     scale = 1.0 / np.sqrt(np.maximum(np.diag(N), 1e-300))
-    change = scale * (np.linalg.pinv(N * scale * scale[:, None], rcond=1e-12, hermitian=True) @ (scale * g))
+    change = scale * (pseudo_inverse(N * scale * scale[:, None], rcond=1e-12, hermitian=True) @ (scale * g))
     return model.moved(fitter.bounded(model.vector + change))

@@ -12,6 +12,7 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.colour import ORDERS, WHITE, Colour, colour_of
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
+from orchestrator.shared.inference.inverse import pseudo_inverse
 from orchestrator.shared.inference.normal import NORMAL_95
 
 Array = NDArray[np.float64]
@@ -171,13 +172,13 @@ def fit(
         slope = taken(likelihood, p, q, free, z, rows) if slope is None else slope.moved(p, z, free)
         held = near = slope
         J = colour.white(near.columns, inner).reshape(residual.size, len(free))
-        if not np.all(np.isfinite(J)):
-            return None
         pull = np.array([(p[f.place] - f.prior[0]) / f.prior[1] if f.prior else 0.0 for f in free])
         weight = np.array([f.scale / f.prior[1] if f.prior else 0.0 for f in free])
         hessian, gradient = J.T @ J + np.diag(weight**2), J.T @ residual + weight * pull
+        if not np.all(np.isfinite(hessian)):  # a decomposition of it need not end
+            return None
         seen[-1] = replace(
-            seen[-1], covariance=np.asarray(np.linalg.pinv(hessian) * np.outer(scales, scales)), slope=near
+            seen[-1], covariance=np.asarray(pseudo_inverse(hessian) * np.outer(scales, scales)), slope=near
         )
 
         def moved(step: Array) -> tuple[Point, float]:

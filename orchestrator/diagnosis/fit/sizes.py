@@ -20,6 +20,7 @@ from orchestrator.diagnosis.fit.slope import taken
 from orchestrator.diagnosis.fit.spread import widened, with_tolerances
 from orchestrator.plants.effects import Effect
 from orchestrator.shared.inference.colour import colour_of
+from orchestrator.shared.inference.inverse import pseudo_inverse
 from orchestrator.shared.inference.long_run import long_run_covariance
 from orchestrator.shared.inference.normal import of_many
 
@@ -153,13 +154,13 @@ def _with_robust_errors(likelihood: RecordLikelihood, white: Fit, part: slice, b
     prior = np.diag([(entry.scale / entry.prior[1]) ** 2 if entry.prior else 0.0 for entry in white.free])
     squares = np.einsum("nck,ncj->nkj", J, J)
     information = np.sum(squares, axis=0) + prior
-    bread = np.linalg.pinv(information)
+    bread = pseudo_inverse(information)
     covariance = bread @ (long_run_covariance(scores) + prior) @ bread
     stretch = np.ones(len(scales))
     if blocks:
         groups = np.array_split(np.arange(len(scores)), blocks)
         changes = [
-            np.linalg.pinv(information - np.sum(squares[rows], axis=0)) @ np.sum(scores[rows], axis=0)
+            pseudo_inverse(information - np.sum(squares[rows], axis=0)) @ np.sum(scores[rows], axis=0)
             for rows in groups
         ]
         jackknife = (blocks - 1.0) / blocks * np.sum(np.square(changes), axis=0)

@@ -20,6 +20,7 @@ from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.plants.description import Plant
 from orchestrator.shared.inference.colour import colour_of
+from orchestrator.shared.inference.inverse import pseudo_inverse
 from orchestrator.shared.inference.long_run import long_run_covariance
 
 Array = NDArray[np.float64]
@@ -186,11 +187,11 @@ def _filtered(likelihood: RecordLikelihood, rows: slice) -> tuple[Array, Array, 
 
 def _covariance(J: Array, missing: Array, blocks: int) -> Array:
     """Return the covariance of scaled parameters, whatever the colour; as wide as blocks left out ask for."""
-    bread = np.linalg.pinv(J.T @ J)
+    bread = pseudo_inverse(J.T @ J)
     scores = J * missing[:, None]
     covariance = bread @ long_run_covariance(scores) @ bread
     groups = np.array_split(np.arange(len(scores)), blocks)
-    changes = [np.linalg.pinv(J.T @ J - J[rows].T @ J[rows]) @ scores[rows].sum(axis=0) for rows in groups]
+    changes = [pseudo_inverse(J.T @ J - J[rows].T @ J[rows]) @ scores[rows].sum(axis=0) for rows in groups]
     spread = (blocks - 1.0) / blocks * np.sum(np.square(changes), axis=0)
     stretch = np.sqrt(np.maximum(spread / np.maximum(np.diag(covariance), 1e-300), 1.0))
     return np.asarray(covariance * np.outer(stretch, stretch))

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.plants.learned import AWAY, EDGE, JUMP, KNOTS
+from orchestrator.shared.inference.inverse import pseudo_inverse
 
 Array = NDArray[np.float64]
 
@@ -141,11 +142,11 @@ def shortened(knots: Array, values: Array, covariance: Array, jumps: bool, terms
     if jumps:
         basis["sign(s)"] = np.append(np.zeros_like(knots), 1.0)
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    weight = np.linalg.pinv(covariance / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+    weight = pseudo_inverse(covariance / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
 
     def fitted(chosen: tuple[str, ...]) -> tuple[float, Short]:
         columns = np.column_stack([basis[name] for name in chosen])
-        spread = np.linalg.pinv(columns.T @ weight @ columns, hermitian=True)
+        spread = pseudo_inverse(columns.T @ weight @ columns, hermitian=True)
         there = columns @ (spread @ (columns.T @ (weight @ values)))
         off = float((values - there) @ weight @ (values - there))
         return off, Short(chosen, there, columns @ spread @ columns.T)

@@ -12,6 +12,7 @@ from orchestrator.diagnosis.proof.curves import Short, shortened
 from orchestrator.diagnosis.search.candidate import annealed, best_settled
 from orchestrator.plants.effects import Effect
 from orchestrator.plants.learned import CYCLE_L, CYCLE_M, Argument, names, rubbing
+from orchestrator.shared.inference.inverse import pseudo_inverse
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def with_terms(wide: RecordLikelihood, effect: Effect, full: Fit, short: Short) 
     places = [wide.plant.index(name) for name in effect.parameters.values()]
     rest = [row for row, entry in enumerate(full.free) if entry.place not in places]
     rows, p = rows_of(full, places), full.p.copy()
-    answer = full.covariance[np.ix_(rest, rows)] @ np.linalg.pinv(full.covariance[np.ix_(rows, rows)], hermitian=True)
+    answer = full.covariance[np.ix_(rest, rows)] @ pseudo_inverse(full.covariance[np.ix_(rows, rows)], hermitian=True)
     change = answer @ (short.values - p[places])
     for place, value in zip(places, short.values, strict=True):
         p[place] = max(value, wide.plant.entry(place).minimum)  # no friction drives

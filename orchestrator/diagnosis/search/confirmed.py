@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
+from orchestrator.shared.inference.inverse import pseudo_inverse
 from orchestrator.shared.inference.long_run import long_run_covariance
 
 Array = NDArray[np.float64]
@@ -50,7 +51,7 @@ def share_of(likelihood: RecordLikelihood, model: Fit, before: Fit, part: slice)
         return None
     left = own
     for _ in range(2):  # the noise is what is left at the share itself
-        weighed = change @ np.linalg.pinv(left.T @ left / len(left))
+        weighed = change @ pseudo_inverse(left.T @ left / len(left))
         information = float(np.sum(weighed * change))
         value = float(np.sum(weighed * other)) / information
         left = other - value * change

@@ -11,6 +11,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model, ModelParameter
 from orchestrator.records.plausibility import SMOOTHING_TIME, check_plausible, lagged
 from orchestrator.records.record import Record
+from orchestrator.shared.inference.inverse import pseudo_inverse
 
 Array = NDArray[np.float64]
 
@@ -188,6 +189,6 @@ def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]
         scaled = table / scale
         solution, *_ = np.linalg.lstsq(scaled, target, rcond=None)
         spread = float(np.std(target - scaled @ solution))
-        inverse = np.linalg.pinv(scaled.T @ scaled)
+        inverse = pseudo_inverse(scaled.T @ scaled)
         found.append((name, 3.0 * spread * math.sqrt(max(float(inverse[0, 0]), 0.0)) / float(scale[0]), unit))
     return found

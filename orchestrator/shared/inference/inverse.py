@@ -1,0 +1,32 @@
+"""Inverses of matrices that may be singular, or no matrix of numbers at all."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def pseudo_inverse(matrix: Array, **how: Any) -> Array:
+    """Return the pseudo-inverse of a matrix.
+
+    A singular value decomposition of a matrix with infinities in it need not end: it is not begun.
+
+    Args:
+        matrix: (n, m).
+        how: options of ``numpy.linalg.pinv``.
+
+    Returns:
+        (m, n).
+
+    Raises:
+        numpy.linalg.LinAlgError: the matrix is not finite.
+
+    Example:
+        >>> pseudo_inverse(np.diag([2.0, 0.0])).tolist()
+        [[0.5, 0.0], [0.0, 0.0]]
+    """
+    if not np.all(np.isfinite(matrix)):
+        raise np.linalg.LinAlgError("a matrix that is to be inverted is not finite")
+    return np.asarray(np.linalg.pinv(matrix, **how))
