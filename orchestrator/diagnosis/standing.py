@@ -239,7 +239,7 @@ def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: flo
     place = effect.places(likelihood.plant)[effect.size]
     if abs(float(final.p[place])) >= likelihood.settings.search.least_errors * final.standard_error(place):
         return False
-    without = horizons(likelihood, search.without(final.p, effect), q, whole.held_out)
+    without = horizons(likelihood, search.without(final.p, effect), q, whole.held_out, long=False)
     return not after.surely_better_than(without) or bool(without.surely_better_than(after))
 
 

@@ -9,6 +9,7 @@ import pytest
 from orchestrator.diagnosis import proof
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.proof.free_run import _steps, free_run
+from orchestrator.diagnosis.proof.horizons import horizons
 from orchestrator.diagnosis.proof.likelihoods import held_out_gain
 from orchestrator.diagnosis.proof.misfit import held_out_misfit, running, segments
 from orchestrator.diagnosis.proof.simulation import simulate
@@ -301,3 +302,19 @@ def test_data_that_no_fit_has_seen_are_likelier_with_what_is_there() -> None:
         -held_out_gain(likelihood, right, wrong, parts)
     )
     assert held_out_gain(likelihood, right, right, parts) == 0.0
+
+
+def test_predictions_from_many_starts_are_the_same_without_the_long_runs() -> None:
+    likelihood, p = axis_likelihood()
+    other = p.copy()
+    other[AXIS.index("b")] *= 3.0
+    part = slice(80, 200)
+    full, lost = (horizons(likelihood, at, 1e-3, part) for at in (p, other))
+    near = horizons(likelihood, other, 1e-3, part, long=False)
+    many = len(full.squares)
+    assert full.labels[-1] == "whole part"
+    assert near.labels == full.labels[:many]
+    assert np.array_equal(near.errors, lost.errors[:many])
+    assert near.runs == ()
+    assert full.surely_better_than(near) == full.surely_better_than(lost) != ()
+    assert near.surely_better_than(full) == ()

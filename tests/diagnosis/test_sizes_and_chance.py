@@ -245,7 +245,7 @@ def test_a_size_that_may_be_zero_stands_where_predictions_miss_it(monkeypatch, d
         def surely_better_than(self, other: "Errors") -> tuple[str, ...]:
             return self.better
 
-    monkeypatch.setattr("orchestrator.diagnosis.standing.horizons", lambda *_: Errors(lost))
+    monkeypatch.setattr("orchestrator.diagnosis.standing.horizons", lambda *_, long: Errors(lost))
     found = _is_weak(search_of(likelihood), effect, final, Errors(kept), 1e-3, Parts(*(slice(10, 100),) * 3))
     assert found is weak
 

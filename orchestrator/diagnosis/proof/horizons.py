@@ -87,7 +87,8 @@ class Horizons:
             Their labels.
         """
         settings = self.settings
-        less = np.any(~(other.errors <= self.errors * (1.0 + settings.larger)), axis=1)
+        many = len(self.squares)
+        less = np.any(~(other.errors[:many] <= self.errors[:many] * (1.0 + settings.larger)), axis=1)
         changes = zip(self.labels, less, self._changes_over(other), strict=False)
         return tuple(label for label, enough, (mean, spread) in changes if enough and mean < -settings.sure * spread)
 
@@ -213,7 +214,7 @@ def _mean_of(change: Array) -> tuple[float, float]:
     return mean, float(np.sqrt(long_run_covariance((change - mean)[:, None])[0, 0]) / change.size)
 
 
-def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> Horizons:
+def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice, long: bool = True) -> Horizons:
     """Return the prediction errors of a model on a part of a record.
 
     Args:
@@ -221,6 +222,7 @@ def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> H
         p: parameters of the model.
         q: process noise of the filter that estimates the states.
         part: the samples.
+        long: False: of many starts alone, without the runs over seconds and the whole part, which cost most.
 
     Returns:
         The errors.
@@ -240,6 +242,8 @@ def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice) -> H
     labels = [f"{1e3 * span:g} ms" if span else "one sample" for span in spans]
     errors, plain = ([np.sqrt(np.mean(one, axis=0)) for one in each] for each in (squares, moved))
     none = np.full(m, np.nan)
+    if not long:
+        return Horizons(tuple(labels), np.array(errors), np.array(plain), none, signals.noise, squares, (), settings)
 
     def closest(rows: slice) -> tuple[FreeRun, slice]:
         return free_run(plant, p, states[rows.start], signals, rows, proof.free_run), rows
