@@ -187,10 +187,12 @@ def test_a_run_that_does_not_come_close_is_sought_over_growing_parts() -> None:
     """A stick-slip start: the whole run has a flat cost far from its minimum."""
     likelihood, p = axis_likelihood(200, effects__coulomb_friction__motor__torque=3.0)
     signals, guess = likelihood.signals, np.array([5.0, -40.0, 0, 0, 0, 0, 0, 0])
-    alone = msgspec.structs.replace(FREE_RUN, iterations=2)
+    alone = msgspec.structs.replace(FREE_RUN, iterations=3)
     grown = free_run(AXIS, p, guess, signals, slice(0, 200), alone)
     once = free_run(AXIS, p, guess, signals, slice(0, 200), msgspec.structs.replace(alone, close=1e9))
     assert grown.rms[0] < 0.7 * once.rms[0]
+    lost = msgspec.structs.replace(alone, lost=1e-3)  # it follows not even the first of them: no more is sought
+    assert np.array_equal(free_run(AXIS, p, guess, signals, slice(0, 200), lost).rms, once.rms)
     worse = msgspec.structs.replace(alone, growing=(0.05,), close=1.0)
     kept = free_run(AXIS, p, guess, signals, slice(0, 200), worse)
     assert kept.rms[0] <= once.rms[0] * (1.0 + 1e-9)

@@ -45,7 +45,8 @@ def free_run(
     """Return the free run whose initial state lies closest to the measurement.
 
     Where impacts make the end of a run depend on its start in no simple way, a run that has not come close is sought
-    again over growing parts of its length; not where it answers to its start as a linear system does.
+    again over growing parts of its length; not where it answers to its start as a linear system does, nor where it
+    follows not even the first of them.
 
     Args:
         plant: the plant.
@@ -67,12 +68,22 @@ def free_run(
     start, run = guess, first
     for share in settings.growing:
         length = max(round(share * (end - begin)), settings.least_samples)
-        run = _closest(model, start, slice(begin, begin + length), settings)
+        opening = slice(begin, begin + length)
+        run = _closest(model, start, opening, settings)
+        measured = model.aligned.y[opening, : signals.channels]
+        if share == settings.growing[0] and _is_lost(run, measured, signals.noise, settings):
+            return first
         start = run.start
     if len(run.outputs) < len(first.outputs):
         run = _closest(model, start, part, settings)
     cost, other = (float(np.sum((r.rms / signals.noise) ** 2)) for r in (first, run))
     return run if other < cost else first
+
+
+def _is_lost(run: FreeRun, measured: Array, noise: Array, settings: FreeRunSettings) -> bool:
+    """Tell whether a run over the beginning of a part is far off: a model that does not follow there does nowhere."""
+    far = settings.lost * np.std(measured, axis=0) + settings.close * noise  # a machine may be at rest there
+    return bool(np.all(run.rms > far))
 
 
 def _teeth_may_part(plant: Plant, p: Array) -> bool:

@@ -23,6 +23,10 @@ class FreeRunSettings(Settings, frozen=True):
         0.5,
         1.0,
     )
+    lost: Annotated[
+        float,
+        setting("rms over the first, as a share of the motion there, beyond which no more is sought", gt=0),
+    ] = 0.3
     least_samples: Annotated[int, setting("samples of such a share at least", ge=2)] = 10
     nudge: Annotated[float, setting("step of a derivative, as a share of a state's typical size", gt=0)] = 0.1
     relative_size: Annotated[float, setting("typical size of speeds and torques, relative to themselves", gt=0)] = 0.01
