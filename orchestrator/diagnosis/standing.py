@@ -117,11 +117,17 @@ def what_stands(
 
 def _refitted(search: Search, whole: Parts, best: Candidate) -> tuple[Fit, Sized]:
     """Return the fit of a model to all that may be looked at, and as it is reported, with honest intervals."""
-    likelihood, effects = search.likelihood, best.effects
-    efficient = annealed(likelihood, best.fit.p, best.fit.q, best.fit.free, whole, effects)
-    final = reported(likelihood, efficient, whole, effects, ladder(likelihood.settings.levels, effects, efficient.q))
+    likelihood = search.likelihood
+    efficient, final = _fitted_again(likelihood, best, whole)
     final = as_allowed(likelihood, search.model, final, whole)
-    return efficient, replace(final, fit=honest(likelihood, final.fit, effects, whole))
+    return efficient, replace(final, fit=honest(likelihood, final.fit, best.effects, whole))
+
+
+def _fitted_again(likelihood: RecordLikelihood, model: Candidate, whole: Parts) -> tuple[Fit, Sized]:
+    """Return the fit of a model to all that may be looked at, and its sizes as they are reported."""
+    again = annealed(likelihood, model.fit.p, model.fit.q, model.fit.free, whole, model.effects)
+    levels = ladder(likelihood.settings.levels, model.effects, again.q)
+    return again, reported(likelihood, again, whole, model.effects, levels)
 
 
 def _shorter(search: Search, base: Candidate, best: Candidate) -> Candidate:
@@ -207,9 +213,8 @@ def _harm_over_fewer(
     found = harm(fewer.fit)
     if found:
         return found
-    again = annealed(likelihood, fewer.fit.p, fewer.fit.q, fewer.fit.free, whole, fewer.effects)
-    levels = ladder(likelihood.settings.levels, fewer.effects, again.q)
-    return harm(reported(likelihood, again, whole, fewer.effects, levels).fit)
+    _, again = _fitted_again(likelihood, fewer, whole)
+    return harm(again.fit)
 
 
 def _larger_misfit(likelihood: RecordLikelihood, bases: Sequence[Array], final: Fit, whole: Parts) -> tuple[str, ...]:

@@ -181,7 +181,9 @@ def _load_torque(scene: Scene) -> float:
 
 def _driving(scene: Scene) -> dict[str, tuple[float, float]]:
     """Return which way a constant torque acts: one that holds back what goes one way is dry friction."""
-    return {"torque": (-BIG if scene.way > 0.0 else 0.0, BIG if scene.way < 0.0 else 0.0)} if scene.way else {}
+    if not scene.way:
+        return {}
+    return {"torque": (-BIG, 0.0) if scene.way > 0.0 else (0.0, BIG)}
 
 
 def directional_friction(site: str) -> Effect:

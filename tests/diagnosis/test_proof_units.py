@@ -299,11 +299,11 @@ def test_data_that_no_fit_has_seen_are_likelier_with_what_is_there() -> None:
 
     right = at(1e-3)
     wrong = at(1e-3, b=3.0 * AXIS.value(p, "b"))
-    assert held_out_gain(likelihood, right, wrong, parts) > 6.0
-    assert held_out_gain(likelihood, wrong, right, parts) == pytest.approx(
-        -held_out_gain(likelihood, right, wrong, parts)
-    )
+    gain = held_out_gain(likelihood, right, wrong, parts)
+    assert gain > 6.0
+    assert held_out_gain(likelihood, wrong, right, parts) == pytest.approx(-gain)
     assert held_out_gain(likelihood, right, right, parts) == 0.0
+    assert held_out_gain(likelihood, right, wrong, replace(parts, held_out=slice(80, 240))) > 1.5 * gain
 
 
 def test_predictions_from_many_starts_are_the_same_without_the_long_runs() -> None:

@@ -5,9 +5,11 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from orchestrator.diagnosis.fit.fitting import Parts, fit
 from orchestrator.diagnosis.fit.response import ErrorResponse
+from orchestrator.diagnosis.proof.simulation import simulate
 from orchestrator.diagnosis.search.periodic import (
     _gain_table,
     _peaks,
@@ -18,6 +20,9 @@ from orchestrator.diagnosis.search.periodic import (
 )
 from orchestrator.diagnosis.search.scene import scene_of
 from orchestrator.diagnosis.search.screening import Screen
+from orchestrator.diagnosis.search.search import Search
+from orchestrator.plants.measurement import LATE_LOAD
+from orchestrator.records.model_file import default_model
 from orchestrator.shared.inference.colour import colour_of
 from tests.support.short_records import AXIS, SETTINGS, axis_likelihood, drivetrain_likelihood
 from tests.support.small_search import search_of
@@ -211,3 +216,45 @@ def test_a_constant_torque_that_holds_back_what_goes_one_way_is_left_to_dry_fric
     low, high = PLAIN.bounds(replace(scene, way=-sign))["torque"]
     assert low < sign * 0.5 < high
     assert 0.0 in (low, high)
+
+
+@pytest.mark.parametrize("late", [0.03, -0.03])
+def test_a_load_that_is_late_by_hundredths_of_a_sample_promises_a_gain(late: float) -> None:
+    likelihood, p = drivetrain_likelihood(240)
+    y, h = likelihood.signals.y.copy(), likelihood.signals.h
+    y[:, 1] = CubicSpline(np.arange(240), y[:, 1])(np.arange(240) - late)
+    likelihood = replace(likelihood, signals=replace(likelihood.signals, y=y))
+    model = fit(likelihood, p, 1e-4, (), PARTS)
+    found = Screen(likelihood, model, PARTS).guesses(LATE_LOAD, scene_of(likelihood, model))
+    assert found[0].gain > 3.0
+    assert found[0].values["shift"] == pytest.approx(late * h, rel=1.0)
+
+
+@pytest.mark.parametrize(("bias", "way"), [(0.0, 0.0), (30.0, 1.0), (-30.0, -1.0)])
+def test_a_scene_knows_which_way_a_machine_goes(bias: float, way: float) -> None:
+    likelihood, p = axis_likelihood(bias=bias)
+    assert scene_of(likelihood, fit(likelihood, p, 1e-2, (), PARTS)).way == way
+
+
+def test_a_drive_that_is_late_by_a_hundredth_of_a_sample_promises_a_gain() -> None:
+    likelihood, p = axis_likelihood(noise=1e-6)
+    late = p.copy()
+    late[AXIS.index("effects.input_delay.delay")] = 0.015 * likelihood.signals.h
+    y = simulate(AXIS, late, np.zeros(8), likelihood.signals, slice(0, 240))
+    y[:, 0] += 1e-6 * np.random.default_rng(7).standard_normal(240)
+    likelihood = replace(likelihood, signals=replace(likelihood.signals, y=y))
+    model = fit(likelihood, p, 1e-4, (), PARTS)
+    found = Screen(likelihood, model, PARTS).guesses(BANK["input_delay@actuator"], scene_of(likelihood, model))
+    assert found[0].gain > 3.0
+    assert found[0].values["delay"] <= 0.02 * likelihood.signals.h
+
+
+def test_a_damping_that_a_record_does_not_tell_is_that_of_metal() -> None:
+    likelihood, p = drivetrain_likelihood(240)
+    search = Search(likelihood, default_model(), PARTS, most=4)
+    resonance = next(effect for effect in likelihood.plant.bank if effect.name == "extra_resonance")
+    place = resonance.places(likelihood.plant)["damping_ratio"]
+    p[place] = 0.2
+    scene = scene_of(likelihood, fit(likelihood, p, 1e-2, (), PARTS))
+    damping = next(entry for entry in search.free((resonance,), scene) if entry.place == place)
+    assert fit(likelihood, p, 1e-2, (damping,), PARTS).p[place] == pytest.approx(0.03, abs=1e-3)

@@ -57,14 +57,14 @@ def test_after_an_error_nothing_is_begun() -> None:
 
 def test_a_thread_that_waits_gives_its_core_to_what_it_waits_for(monkeypatch) -> None:
     monkeypatch.setattr(cores, "_SPARE", threading.Semaphore(1))
-    begun, at_once, alone = threading.Barrier(2), threading.Barrier(2), threading.Event()
+    begun, at_once = threading.Barrier(2), threading.Barrier(2)
 
     def ends() -> None:
         begun.wait(timeout=10.0)
 
     def spreads() -> None:
         begun.wait(timeout=10.0)
-        alone.wait(timeout=0.2)  # until the other has ended and waits
+        time.sleep(0.2)  # until the other has ended and waits
         spread(lambda n: at_once.wait(timeout=10.0), range(2))  # breaks where one thread must do both
 
     both(ends, spreads)

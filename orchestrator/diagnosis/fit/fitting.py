@@ -175,7 +175,7 @@ def fit(
         pull = np.array([(p[f.place] - f.prior[0]) / f.prior[1] if f.prior else 0.0 for f in free])
         weight = np.array([f.scale / f.prior[1] if f.prior else 0.0 for f in free])
         hessian, gradient = J.T @ J + np.diag(weight**2), J.T @ residual + weight * pull
-        if not np.all(np.isfinite(hessian)):  # a decomposition of it need not end
+        if not np.all(np.isfinite(hessian)):  # the model runs away
             return None
         seen[-1] = replace(
             seen[-1], covariance=np.asarray(pseudo_inverse(hessian) * np.outer(scales, scales)), slope=near

@@ -108,7 +108,7 @@ class Screen:
         else:
             entry = self._plant.entry(effect.places(self._plant)[effect.size])
             low, high = effect.bounds(scene).get(effect.size, (entry.minimum, entry.maximum))
-            size = np.minimum(size, 0.0) if high <= 0.0 else np.maximum(size, 0.0) if low >= 0.0 else size
+            size = np.clip(size, 0.0 if low >= 0.0 else -np.inf, 0.0 if high <= 0.0 else np.inf)
             found = {name: unit * float(s) for name, s in zip(effect.amplitudes, size, strict=True)}
         left = self._residual + columns @ size
         gain = 0.5 * float(self._residual @ self._residual - left @ left)
