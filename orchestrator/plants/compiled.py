@@ -21,11 +21,14 @@ import numba
 
 import pyfmu_sources
 from orchestrator.shared.cache import cache_directory
-from orchestrator.shared.numba_cache import UNCOUNTED, kept
+from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
 from orchestrator.shared.output import write_text
 
 INLINED = ("rates", "elastic_torque", "motor_torque", "load_torque")
 """Functions whose call costs more than their body: every stage of every step makes it."""
+
+FORMULAS = ("axis_equations", "effects", "equations")
+"""Modules of the plants' own equations, which every stage of every step runs."""
 
 LISTING = ("attachment", "backlash_estimator", "dead_time", "linear_mode", "riccati")
 """Modules whose functions make lists: references to those are counted, there and in modules that call them."""
@@ -74,7 +77,8 @@ def compiled(name: str) -> ModuleType:
 
 def _options(name: str) -> dict[str, Any]:
     """Return the further options with which numba compiles a module's functions."""
-    return {} if _closure(name) & set(LISTING) else UNCOUNTED
+    formulas = ALGEBRA if name in FORMULAS else {}
+    return formulas if _closure(name) & set(LISTING) else {**formulas, **UNCOUNTED}
 
 
 @cache

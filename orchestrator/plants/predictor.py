@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
 from orchestrator.plants.sample import is_usual, parameters_of, sample_of
-from orchestrator.shared.numba_cache import UNCOUNTED, kept
+from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ MOST_STEPS = 1000  # of a free run in a sample: with values that ask for more a 
 WAVE = 0.05  # of a wave's period: the farthest that a Runge-Kutta step of a free run goes
 
 
-@njit(error_model="numpy", **UNCOUNTED)
+@njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
 def _corrected(x: Any, g: Array, a: float, b: float) -> Any:
     """Return the state corrected by the innovations ``a`` (motor) and ``b`` (load)."""
     return (
@@ -43,7 +43,7 @@ def _corrected(x: Any, g: Array, a: float, b: float) -> Any:
     )
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", **ALGEBRA)
 def _root(P: Array) -> Array:
     """Return the lower Cholesky factor of a covariance; directions that are known exactly get a column of zeros."""
     k = P.shape[0]
@@ -86,7 +86,7 @@ def _predictor(plant: Plant, usual: bool) -> Any:
     prepared, sample = sample_of(plant)
     parameters = parameters_of(plant, usual)
 
-    @kept(error_model="numpy", nogil=True)
+    @kept(error_model="numpy", nogil=True, **ALGEBRA)
     def predict(
         y: Array, early: Array, late: Array, first: float, p: Any, h: float, substeps: Any, gains: Array, offsets: Any,
         start: Any, innovations: Array, states: Array,
@@ -126,7 +126,7 @@ def _coarse_runner(plant: Plant, usual: bool) -> Any:
     prepared, sample = sample_of(plant)
     parameters = parameters_of(plant, usual)
 
-    @kept(error_model="numpy", nogil=True)
+    @kept(error_model="numpy", nogil=True, **ALGEBRA)
     def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, substeps: Any, out: Array) -> None:
         x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7])
         values = parameters(p)
@@ -224,7 +224,7 @@ def follower_of(plant: Plant) -> Any:
     prepared, sample = sample_of(plant)
     followers = np.array(plant.followers, dtype=np.int64).reshape(-1, 2)
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", **ALGEBRA)
     def moved(x: Any, places: Any, by: Array) -> Any:
         wide = np.zeros(8)
         for j in range(by.size):
@@ -236,7 +236,7 @@ def follower_of(plant: Plant) -> Any:
             x[6] + wide[6], x[7],
         )  # fmt: skip
 
-    @kept(error_model="numpy", nogil=True)
+    @kept(error_model="numpy", nogil=True, **ALGEBRA)
     def follow(
         y: Array, early: Array, late: Array, first: float, p: Any, h: float, substeps: Any, offsets: Any, start: Any,
         places: Any, measured: Any, P: Array, Q: Array, R: Array, gains: Array, roots: Array,

@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from orchestrator.plants.description import CompiledEquations, Plant
-from orchestrator.shared.numba_cache import UNCOUNTED
+from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
 NEAR = 1.5  # distances of presliding per sample below which friction counts as turning round
 LAGGED = 4  # place of the drive's torque in the state
 CALM = 0.02  # distances of presliding per sample below which it hardly changes
 
 
-@njit(error_model="numpy", **UNCOUNTED)
+@njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
 def _turned(bristle: float, speed: float, level: float, rest: float, varies: bool, distance: float, h: float) -> Any:
     """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre).
 
@@ -41,14 +41,14 @@ def _turned(bristle: float, speed: float, level: float, rest: float, varies: boo
     return settled + off * left, (settled + off * mean) / reach
 
 
-@njit(error_model="numpy", **UNCOUNTED)
+@njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
 def _near_rest(speed: float, acceleration: float, distance: float, h: float) -> Any:
     """Whether dry friction may turn round within ``h``, so far that steps must be short."""
     way, change = abs(speed) * h, 1.5 * h * h * abs(acceleration)
     return way < change + NEAR * distance and way + change > CALM * distance
 
 
-@njit(error_model="numpy", **UNCOUNTED)
+@njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
 def reached(speed: float, acceleration: float, h: float) -> float:
     """Return how far [rad] a part may come within ``h``, half again of what its acceleration adds if it stays.
 
@@ -63,7 +63,7 @@ def reached(speed: float, acceleration: float, h: float) -> float:
     return abs(speed) * h + 0.75 * h * h * abs(acceleration)
 
 
-@njit(error_model="numpy", **UNCOUNTED)
+@njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
 def _along(x: Any, rate: Any, h: float) -> Any:
     """Return the state after a straight step; the last entry is the memory of the shaft's hysteresis here."""
     return (
@@ -78,7 +78,7 @@ def _along(x: Any, rate: Any, h: float) -> Any:
     )
 
 
-@njit(error_model="numpy", **UNCOUNTED)
+@njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
 def _step_of(span: float, steps: int, h: float, lag: float) -> Any:
     """Return how a ``span`` [s] of a sample is run: number of steps, their length, and what they keep of the torque.
 
@@ -102,7 +102,7 @@ def _step_of(span: float, steps: int, h: float, lag: float) -> Any:
     return count, step, mean - 0.5 * slope, mean, mean + 0.5 * slope, left
 
 
-@njit(error_model="numpy", **UNCOUNTED)
+@njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
 def _with_torque(x: Any, torque: float) -> Any:
     """Return the state with another torque of the drive."""
     return (x[0], x[1], x[2], x[3], torque, x[5], x[6], x[7])
@@ -134,17 +134,17 @@ def completed(equations: CompiledEquations) -> CompiledEquations:
     """
     friction = equations.friction
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", **ALGEBRA)
     def rest(p: Any) -> Any:
         at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
         sliding = friction((0.0, 1e6, 0.0, 1e6, 0.0, 0.0, 0.0, 0.0), p)
         return (max(at_rest[0], sliding[0]), max(at_rest[1], sliding[1])), (False, False)
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def flanks(p: Any) -> bool:
         return False
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def meets(x: Any, rates: Any, p: Any, h: float) -> bool:
         return False
 
@@ -168,7 +168,7 @@ def sample_of(plant: Plant) -> Sample:
     friction, stage, (at_m, at_l), rest_of, flanks, meets = completed(plant.stage())
     at_lag = plant.index(plant.drive.lag)
 
-    @njit(error_model="numpy", forceinline=True)
+    @njit(error_model="numpy", forceinline=True, **ALGEBRA)
     def advanced(x: Any, signs: Any, p: Any, torque: float, way: Any) -> Any:
         _, step, begin, middle, end, left = way
         off = x[LAGGED] - torque
@@ -179,7 +179,7 @@ def sample_of(plant: Plant) -> Sample:
         new = _along(_along(_along(_along(x, k1, step / 6.0), k2, step / 3.0), k3, step / 3.0), k4, step / 6.0)
         return _with_torque(new, torque + off * left)
 
-    @njit(error_model="numpy")
+    @njit(error_model="numpy", **ALGEBRA)
     def prepared(p: Any, first: float, h: float, substeps: Any) -> Any:
         rest, varies = rest_of(p)
         reach = (math.exp(p[at_m]), math.exp(p[at_l]))
@@ -188,7 +188,7 @@ def sample_of(plant: Plant) -> Sample:
         turning = (_step_of(first, substeps[1], h, lag), _step_of(h - first, substeps[1], h, lag))
         return rest, varies, meeting, reach, h, usual, turning
 
-    @njit(error_model="numpy", forceinline=True)
+    @njit(error_model="numpy", forceinline=True, **ALGEBRA)
     def sample(x: Any, memory: Any, p: Any, common: Any, torques: Any) -> Any:
         rest, varies, meeting, reach, h, ways, turning = common
         bristle_m, bristle_l, sign_m, sign_l = memory
@@ -233,7 +233,7 @@ def parameters_of(plant: Plant, usual: bool) -> Any:
     fixed = {plant.index(name) for name in plant.seldom} if usual else set()
     entries = (repr(float(plant.entry(n).default)) if n in fixed else f"p[{n}]" for n in range(len(plant.names)))
     # A tuple of a hundred entries, some of them constants, has no other form that the compiler knows.
-    return njit(error_model="numpy", forceinline=True)(eval(f"lambda p: ({', '.join(entries)},)"))
+    return njit(error_model="numpy", forceinline=True, **ALGEBRA)(eval(f"lambda p: ({', '.join(entries)},)"))
 
 
 def is_usual(plant: Plant, p: Any) -> bool:

@@ -30,6 +30,12 @@ UNCOUNTED: dict[str, Any] = {"_nrt": False}
 Counted at each call of each small function, they take several times as long as the equations of a plant.
 """
 
+ALGEBRA: dict[str, Any] = {"fastmath": {"arcp": True, "nsz": True}}
+"""Option of equations that run in every stage of every step: a quotient by what a run holds fixed is a product.
+
+Zeros have no sign there. It takes a quarter less time, and the last digit is rounded differently.
+"""
+
 _DIGEST = hashlib.sha256().digest_size
 FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6), "big"))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.plants import compiled as module
-from orchestrator.shared.numba_cache import UNCOUNTED
+from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
 
 @pytest.mark.parametrize("damage", [b"", b"raise SystemExit\n", b"\xff\xfe"])
@@ -23,5 +23,5 @@ def test_references_are_counted_where_a_module_makes_lists_or_calls_one_that_doe
     listing = {path.stem for path in module._SOURCES.glob("*.py") if "list[" in path.read_text(encoding="utf-8")}
     adapters = {name for name in listing if name.endswith(("_slave", "_base", "_state"))}
     assert set(module.LISTING) == listing - adapters
-    assert module._options("equations") == UNCOUNTED
+    assert module._options("equations") == {**ALGEBRA, **UNCOUNTED}
     assert module._options("linear_mode") == module._options("drivetrain") == {}

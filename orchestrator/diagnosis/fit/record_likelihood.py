@@ -27,6 +27,7 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.plants.description import STATES, Plant
 from orchestrator.plants.predictor import follower_of, predictor_of
 from orchestrator.shared.inference.colour import Colour, colour_of
+from orchestrator.shared.numba_cache import kept
 
 Array = NDArray[np.float64]
 
@@ -174,12 +175,14 @@ class RecordLikelihood:
         signals = self.signals.aligned(self.plant, p)
         offsets, predict = [p[place] for place in self._offsets] + [0.0, 0.0], predictor_of(self.plant, p)
         for rows, u, start in self._records(signals, n, self._reference(p)):
-            errors, corrected = np.empty((len(u), 2)), np.empty((len(u), STATES))
+            one = isinstance(rows, slice)  # else rows of one record lie apart
+            errors, corrected = (raw, states) if one else (np.empty((len(u), 2)), np.empty((len(u), STATES)))
             predict(
                 signals.y[rows], *self.delivered(p, u, signals.late), p, signals.h, self.substeps(p), gains[rows],
                 (offsets[0], offsets[1]), start, errors, corrected,
             )  # fmt: skip
-            raw[rows], states[rows] = errors, corrected
+            if not one:
+                raw[rows], states[rows] = errors, corrected
         for run in signals.runs[1:]:
             raw[run.rows[run.rows < n][: self.settings.likelihood.settled]] = 0.0  # they only settle the state
         return raw, states
@@ -195,12 +198,7 @@ class RecordLikelihood:
             The innovations.
         """
         raw, _ = self.innovations(p, q)
-        roots = self.gains(q, p).roots[: self.stop]
-        with np.errstate(over="ignore", invalid="ignore"):  # of an unstable predictor; the caller sees that
-            first = roots[:, 0, 0] * raw[:, 0]
-            if self.signals.channels == 1:
-                return np.asarray(first[:, None])
-            return np.column_stack([first, roots[:, 1, 0] * raw[:, 0] + roots[:, 1, 1] * raw[:, 1]])
+        return np.asarray(_scaled(raw, self.gains(q, p).roots))
 
     def _records(
         self, signals: Signals, stop: int, reference: Reference | None
@@ -350,6 +348,20 @@ class RecordLikelihood:
         for place, followed in plant.followers:
             full[:, place] = full[:, followed]
         return Gains(full, roots)
+
+
+@kept(error_model="numpy", nogil=True)
+def _scaled(raw: Array, roots: Array) -> Array:
+    """Return innovations (n, channels), each sample (n, 2) scaled by its lower triangular root."""
+    channels = roots.shape[1]
+    out = np.empty((raw.shape[0], channels))
+    for n in range(raw.shape[0]):
+        for row in range(channels):
+            total = 0.0
+            for column in range(row + 1):
+                total += roots[n, row, column] * raw[n, column]
+            out[n, row] = total
+    return out
 
 
 def measurement_matrix(plant: Plant, channels: int) -> Array:

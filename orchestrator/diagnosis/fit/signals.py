@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from orchestrator.shared.inference.noise import lagged_rms, residual_noise
 Array = NDArray[np.float64]
 
 
+KEPT = 4  # readings of the load's angles
 SMOOTHED = 9  # samples of the cubic that gives the motion within a sample
 
 
@@ -98,14 +99,27 @@ class Signals:
         Returns:
             A copy, or these signals.
         """
-        lead, late = (plant.value(p, name) if name in plant.names else 0.0 for name in (LEAD.name, SHIFT.name))
-        if lead == 0.0 and late == 0.0:
+        late = plant.value(p, SHIFT.name) if SHIFT.name in plant.names else 0.0
+        acting = self.acting(plant, p)
+        return acting if late == 0.0 else replace(acting, y=self._earlier_load(late / self.h))
+
+    def acting(self, plant: Plant, p: Array) -> "Signals":
+        """Return the signals with requests as they acted, and angles as the log has them.
+
+        Args:
+            plant: the plant.
+            p: its parameters, those of the log among them.
+
+        Returns:
+            A copy, or these signals.
+        """
+        lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
+        if lead == 0.0:
             return self
         whole = math.ceil(lead / self.h - 1e-9)
         if whole not in self._read_ahead:
             self._read_ahead[whole] = self._each(self.u, lambda asked: later(asked, -whole))
-        u, y = self._read_ahead[whole], self._earlier_load(late / self.h)
-        return replace(self, u=u, y=y, late=max(whole * self.h - lead, 0.0))
+        return replace(self, u=self._read_ahead[whole], late=max(whole * self.h - lead, 0.0))
 
     @cached_property
     def meant(self) -> Array:
@@ -138,14 +152,17 @@ class Signals:
 
         return self._each(self.y[:, 1], lambda y: derived(y, 1)), self._each(self.y[:, 1], lambda y: derived(y, 2))
 
-    def _earlier_load(self, samples: float) -> Array:
+    @cached_property
+    def _earlier_load(self) -> Callable[[float], Array]:
+        """Angles (n, 2) by the samples that the load's are read later; most runs of a fit change another parameter."""
+        return lru_cache(KEPT)(self._with_earlier_load)
+
+    def _with_earlier_load(self, samples: float) -> Array:
         """Return the angles (n, 2), the load's read ``samples`` later.
 
         Whole samples are moved; the rest follows a smoothed motion, so that the noise of a sample stays as it is. What
         is read beyond the record's ends goes on as the motion does there.
         """
-        if samples == 0.0:
-            return self.y
         whole = round(samples)
 
         def inside(size: int) -> NDArray[np.int64]:

@@ -90,7 +90,10 @@ def taken(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Free]
         moved[entry.place] += step
         points.append(moved)
         steps.append(step / entry.scale)
-    columns = np.empty((*z[rows].shape, len(free)))
-    for n, there in enumerate(spread(lambda point: until.whitened(point, q)[rows], points)):
-        columns[:, :, n] = (there - z[rows]) / steps[n]
+    columns, here = np.empty((*z[rows].shape, len(free))), z[rows]
+
+    def fill(n: int) -> None:
+        columns[:, :, n] = (until.whitened(points[n], q)[rows] - here) / steps[n]
+
+    spread(fill, range(len(free)))
     return Slope(p, q, z, rows, columns)

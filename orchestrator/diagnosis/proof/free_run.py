@@ -70,7 +70,7 @@ def free_run(
         length = max(round(share * (end - begin)), settings.least_samples)
         opening = slice(begin, begin + length)
         run = _closest(model, start, opening, settings)
-        measured = model.aligned.y[opening, : signals.channels]
+        measured = model.measured[opening, : signals.channels]
         if share == settings.growing[0] and _is_lost(run, measured, signals.noise, settings):
             return first
         start = run.start
@@ -95,7 +95,7 @@ def _closest(model: Simulation, guess: Array, part: slice, settings: FreeRunSett
     """Return the free run at which a descent from the ``guess`` of its initial state ends (damped Gauss-Newton)."""
     plant, signals = model.plant, model.signals
     m = signals.channels
-    measured, scale = model.aligned.y[part, :m], signals.noise
+    measured, scale = model.measured[part, :m], signals.noise
     free = moving(plant, model.p)
 
     def outputs(start: Array) -> Array:

@@ -304,7 +304,7 @@ def _starts(stretches: Sequence[slice], reach: int, count: int) -> list[int]:
 
 def _predicted(model: Simulation, states: Array, starts: Sequence[int], reach: int) -> tuple[Array, Array]:
     """Return squared errors (starts, channels) of runs over ``reach`` samples, and of a motion on at constant speed."""
-    signals, y = model.signals, model.aligned.y
+    signals, y = model.signals, model.measured
     bodies = model.plant.bodies[: signals.channels]
     angles, speeds = [body.angle for body in bodies], [body.speed for body in bodies]
     ran, moved = [], []

@@ -56,7 +56,7 @@ class Simulation:
         rows, place = in_time(self.signals.runs, begin, self.signals.size)
         first_row = int(rows[0])
         if first_row not in self._acting:
-            self._acting[first_row] = self._requests_of(self.aligned.u[rows])
+            self._acting[first_row] = self._requests_of(self._requests.u[rows])
         acting, asked = self._acting[first_row]
         whole, _ = self._dead_time
         known, rows_asked = 0 if self.history else place, end - begin
@@ -71,9 +71,14 @@ class Simulation:
         return out
 
     @cached_property
-    def aligned(self) -> Signals:
-        """The signals as they were, from how the log has them; an FMU takes one request a sample."""
-        found = self.signals.aligned(self.plant, self.p)
+    def measured(self) -> Array:
+        """The angles (n, 2) as they were, from how the log has them."""
+        return self.signals.aligned(self.plant, self.p).y
+
+    @cached_property
+    def _requests(self) -> Signals:
+        """The signals with requests as they acted; an FMU takes one a sample."""
+        found = self.signals.acting(self.plant, self.p)
         return found if self.history else replace(found, u=found.meant, late=0.0)
 
     @cached_property
@@ -90,7 +95,7 @@ class Simulation:
     @cached_property
     def _dead_time(self) -> tuple[int, float]:
         """Whole samples of it, and what is left [s]."""
-        delay, h = self.plant.value(self.p, self.plant.drive.delay) + self.aligned.late, self.signals.h
+        delay, h = self.plant.value(self.p, self.plant.drive.delay) + self._requests.late, self.signals.h
         whole = int(np.floor(delay / h + 1e-9))
         return whole, max(delay - whole * h, 0.0)
 

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fit.fitting import Fit
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.proof.free_run import start_answers
+from orchestrator.diagnosis.proof.free_run import FreeRun, start_answers
 from orchestrator.diagnosis.proof.horizons import Runs, sure_of_one
 from orchestrator.diagnosis.proof.simulation import simulate
 from orchestrator.diagnosis.verdict.where import missing_torque
+from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.colour import WHITE
 
 Array = NDArray[np.float64]
@@ -48,28 +49,30 @@ class TorqueNoise:
             theirs: of the other model, over the same samples.
         """
         settings = self.likelihood.settings.proof.horizons
-        changes = np.zeros((settings.draws, self.likelihood.signals.channels))
-        for (own, part), (other, _) in zip(mine, theirs, strict=True):
-            bases = []
-            for run, p in ((own, self.model.p), (other, self.before)):
-                answers = start_answers(
-                    self.likelihood.plant,
-                    p,
-                    run,
-                    self.likelihood.signals,
-                    part,
-                    self.likelihood.settings.proof.free_run,
-                )
-                basis, _ = np.linalg.qr(answers / self._scale(len(run.outputs))[:, None])
-                bases.append(basis if np.all(np.isfinite(basis)) else np.zeros_like(basis))
-            for draw in range(settings.draws):
+        pairs = [(own, other, part) for (own, part), (other, _) in zip(mine, theirs, strict=True)]
+        bases = [
+            (self._basis(self.model.p, own, part), self._basis(self.before, other, part)) for own, other, part in pairs
+        ]
+
+        def changed(draw: int) -> Array:
+            total = np.zeros(self.likelihood.signals.channels)
+            for (own, other, part), (basis, basis_of_other) in zip(pairs, bases, strict=True):
                 drift = self.drift(own.start, own.outputs, part, draw)
-                errors = [
-                    self._left(basis, drift + own.outputs - run.outputs)
-                    for basis, run in zip(bases, (own, other), strict=True)
-                ]
-                changes[draw] += (np.mean(errors[0] ** 2, axis=0) - np.mean(errors[1] ** 2, axis=0)) / len(mine)
+                left = self._left(basis, drift)
+                left_of_other = self._left(basis_of_other, drift + own.outputs - other.outputs)
+                total += (np.mean(left**2, axis=0) - np.mean(left_of_other**2, axis=0)) / len(pairs)
+            return total
+
+        changes = np.array(spread(changed, range(settings.draws)))
         return np.asarray(np.mean(changes, axis=0) + sure_of_one(settings) * np.std(changes, axis=0))
+
+    def _basis(self, p: Array, run: FreeRun, part: slice) -> Array:
+        """Return an orthonormal basis (n * channels, places) of what a run's initial state can add to it."""
+        likelihood = self.likelihood
+        settings = likelihood.settings.proof.free_run
+        answers = start_answers(likelihood.plant, p, run, likelihood.signals, part, settings)
+        basis, _ = np.linalg.qr(answers / self._scale(len(run.outputs))[:, None])
+        return basis if np.all(np.isfinite(basis)) else np.zeros_like(basis)
 
     def drift(self, start: Array, outputs: Array, part: slice, draw: int) -> Array:
         """Return (n, channels): what one draw of the torque noise, and of the model's values, adds to a free run.

@@ -51,9 +51,9 @@ def _whole() -> Any:
     """
     from numba import njit
 
-    from orchestrator.shared.numba_cache import UNCOUNTED
+    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def whole(x: Any, u: float) -> Any:
         return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], 0.0, 0.0, 0.0, x[7], u)
 
@@ -65,14 +65,14 @@ def _dry() -> tuple[Any, Any]:
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
-    from orchestrator.shared.numba_cache import UNCOUNTED
+    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
     source, bristles, whole = compiled("equations"), compiled("bristles"), _whole()
     twist, contact_of, elastic, lever_arm = source.twist, source.contact_of, source.elastic_torque, source.lever_arm
     friction_m, friction_l, rest_m, rest_l = source.friction_m, source.friction_l, bristles.rest_m, bristles.rest_l
     alpha_at, loaded, wavy = dt.P_ALPHA, (dt.P_LOADED_M, dt.P_LOADED_L), (dt.P_WAVY_M, dt.P_WAVY_L)
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def friction(x: Any, p: Any) -> Any:
         full, shaft = whole(x, 0.0), 0.0
         if p[loaded[0]] + p[loaded[1]] > 0.0:
@@ -80,7 +80,7 @@ def _dry() -> tuple[Any, Any]:
             shaft = elastic(full, contact, p)
         return friction_m(full, shaft * lever_arm(full, p), p), friction_l(full, shaft, p)
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def rest(p: Any) -> Any:
         at_motor, at_load = rest_m(p), rest_l(p)
         levels = (at_motor if at_motor > 0.0 else abs(p[wavy[0]]), at_load if at_load > 0.0 else abs(p[wavy[1]]))
@@ -96,17 +96,17 @@ def _flanks() -> tuple[Any, Any]:
 
     from orchestrator.plants.compiled import compiled
     from orchestrator.plants.sample import reached
-    from orchestrator.shared.numba_cache import UNCOUNTED
+    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
     source, whole = compiled("equations"), _whole()
     twist, twist_slope = source.twist, source.twist_slope
     alpha_at, onset_at, stops, far = dt.P_ALPHA, dt.COUNT + 2, (dt.P_STOP_LOWER, dt.P_STOP_UPPER), dt.BIG
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def flanks(p: Any) -> Any:
         return p[alpha_at] > 0.0 or p[stops[0]] > -far or p[stops[1]] < far
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
         way = reached(x[3], rate[3], h)
         if abs(x[2] - p[stops[0]]) < way or abs(x[2] - p[stops[1]]) < way:
@@ -126,7 +126,7 @@ def _flanks() -> tuple[Any, Any]:
 def _stage() -> CompiledEquations:
     """Return the compiled equations, with the damping of teeth that meet growing with their penetration."""
     from orchestrator.plants.compiled import compiled
-    from orchestrator.shared.numba_cache import UNCOUNTED, kept
+    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
 
     source, whole = compiled("equations"), _whole()
     rates, twist, contact_of = source.rates, source.twist, source.contact_of
@@ -135,7 +135,7 @@ def _stage() -> CompiledEquations:
     damping_at, motor_at, load_at, onset_at = dt.P_C, dt.P_J_M, dt.P_J_L, dt.COUNT + 2
     friction, rest = _dry()
 
-    @kept(error_model="numpy", **UNCOUNTED)
+    @kept(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         full = whole(x, u)
         angle = twist(full, p)

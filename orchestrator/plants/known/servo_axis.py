@@ -35,31 +35,31 @@ def stage() -> CompiledEquations:
 
     from orchestrator.plants.compiled import compiled
     from orchestrator.plants.sample import reached
-    from orchestrator.shared.numba_cache import UNCOUNTED, kept
+    from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
 
     source = compiled("servo_axis")
     rates, level, breakaway = source.rates, source.friction, compiled("axis_equations").rest
     end, wavy, stops, far = ap.COUNT, ap.P_WAVY, (ap.P_STOP_LOWER, ap.P_STOP_UPPER), ap.BIG
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def friction(x: Any, p: Any) -> Any:
         return level((x[0], x[1], x[4], 0.0, 0.0), p), 0.0
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def rest(p: Any) -> Any:
         at_rest = breakaway(p)
         return (at_rest if at_rest > 0.0 else abs(p[wavy]), 0.0), (p[wavy] != 0.0, False)
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def flanks(p: Any) -> Any:
         return p[stops[0]] > -far or p[stops[1]] < far
 
-    @njit(error_model="numpy", **UNCOUNTED)
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
         way = reached(x[1], rate[1], h)
         return abs(x[0] - p[stops[0]]) < way or abs(x[0] - p[stops[1]]) < way
 
-    @kept(error_model="numpy", **UNCOUNTED)
+    @kept(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
         speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
