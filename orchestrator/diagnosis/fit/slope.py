@@ -36,7 +36,7 @@ class Slope:
         q: process noise, as a share of the drive's rms torque.
         z: (samples, channels) whitened innovations there.
         rows: samples of the derivative.
-        columns: (rows, channels, free parameters).
+        columns: (rows, channels, free parameters); those of one parameter lie together in memory.
         taken: it was taken there, not kept up from elsewhere.
     """
 
@@ -62,8 +62,10 @@ class Slope:
         length = float(step @ step)
         if length == 0.0:
             return self
-        missed = z[self.rows] - self.z[self.rows] - self.columns @ step
-        return Slope(p, self.q, z, self.rows, self.columns + missed[:, :, None] * (step / length), taken=False)
+        change = z[self.rows] - self.z[self.rows]
+        missed = change - (self.columns.reshape(-1, step.size) @ step).reshape(change.shape)
+        columns = self.columns.transpose(2, 0, 1) + (step / length)[:, None, None] * missed
+        return Slope(p, self.q, z, self.rows, columns.transpose(1, 2, 0), taken=False)
 
 
 def taken(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Free], z: Array, rows: slice) -> Slope:
@@ -90,10 +92,11 @@ def taken(likelihood: RecordLikelihood, p: Array, q: float, free: Sequence[Free]
         moved[entry.place] += step
         points.append(moved)
         steps.append(step / entry.scale)
-    columns, here = np.empty((*z[rows].shape, len(free))), z[rows]
+    here = z[rows]
+    columns = np.empty((len(free), *here.shape))
 
     def fill(n: int) -> None:
-        columns[:, :, n] = (until.whitened(points[n], q)[rows] - here) / steps[n]
+        columns[n] = (until.whitened(points[n], q)[rows] - here) / steps[n]
 
     spread(fill, range(len(free)))
-    return Slope(p, q, z, rows, columns)
+    return Slope(p, q, z, rows, columns.transpose(1, 2, 0))

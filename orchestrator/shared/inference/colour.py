@@ -60,9 +60,9 @@ class Colour:
         """
         begin = max(part.start - self.order, 0)
         given = z[begin : part.stop]
-        wide = np.ascontiguousarray(given if z.ndim == 3 else given[:, :, None])
-        out = _whitened(wide, self.lags, self.root, part.start - begin)
-        return out if z.ndim == 3 else out[:, :, 0]
+        series = np.ascontiguousarray(given.transpose(2, 0, 1) if z.ndim == 3 else given[None])
+        out = _whitened(series, self.lags, self.root, part.start - begin)
+        return out.transpose(1, 2, 0) if z.ndim == 3 else out[0]
 
     def adjoint(self, e: Array) -> Array:
         """Return the transpose of :meth:`white` applied to a whole series (n, channels).
@@ -135,16 +135,16 @@ def colour_of(z: Array, part: slice, most: int = ORDERS[-1]) -> Colour:
 
 @kept(nogil=True)
 def _whitened(given: Array, lags: Array, root: Array, first: int) -> Array:
-    """Return the scaled residuals of (n, channels, k) innovations from sample ``first`` on.
+    """Return the scaled residuals of k series of (n, channels) innovations from sample ``first`` on.
 
     Innermost loops go along time, over stretches that stay in the processor's cache.
     """
-    n, m, k = given.shape
-    out = np.empty((n - first, m, k))
+    k, n, m = given.shape
+    out = np.empty((k, n - first, m))
     turned, rows = np.empty((m, n)), np.empty((m, STRETCH))
     for j in range(k):
         for i in range(m):
-            turned[i] = given[:, i, j]
+            turned[i] = given[j, :, i]
         for begin in range(first, n, STRETCH):
             size = min(STRETCH, n - begin)
             for c in range(m):
@@ -162,7 +162,7 @@ def _whitened(given: Array, lags: Array, root: Array, first: int) -> Array:
                     total = 0.0
                     for i in range(m):
                         total += root[c, i] * rows[i, t]
-                    out[begin - first + t, c, j] = total
+                    out[j, begin - first + t, c] = total
     return out
 
 
