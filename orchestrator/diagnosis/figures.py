@@ -208,15 +208,15 @@ def _draw_law(axis: Axes, diagnosis: Diagnosis, effect: Effect, fit: Fit) -> Non
         axis.errorbar(centre, mean, spread, color=ORANGE, fmt="o", markersize=3.5, linewidth=0.8,
                       label="missing torque, mean and spread")  # fmt: skip
     metric = diagnosis.misfit[0].unit == "m"
-    axis.set_xlabel(label.replace("rad", "m") if metric else label)
+    axis.set_xlabel(label)
     axis.set_ylabel(f"{signal.replace('torque', 'force')} [N]" if metric else f"{signal} [N.m]")
 
 
 def _abscissa(effect: Effect, p: Array, diagnosis: Diagnosis, x: Array, time: Array) -> tuple[Array, str]:
-    plant = diagnosis.workings.plant
+    plant, unit = diagnosis.workings.plant, diagnosis.misfit[0].unit
     places, body = effect.places(plant), plant.body(effect.site)
     if effect.against == "speed":
-        return x[:, body.speed], f"{body.name} speed [rad/s]"
+        return x[:, body.speed], f"{body.name} speed [{unit}/s]"
     if "cycles_per_rev" in places:
         return np.mod(
             p[places["cycles_per_rev"]] * x[:, plant.bodies[0].angle], 2.0 * np.pi
@@ -224,7 +224,7 @@ def _abscissa(effect: Effect, p: Array, diagnosis: Diagnosis, x: Array, time: Ar
     if effect.against == "angle":
         return np.mod(x[:, body.angle], 2.0 * np.pi), "load angle [rad]"
     if effect.against == "position":
-        return x[:, body.angle], "load position [rad]"
+        return x[:, body.angle], f"load position [{unit}]"
     if effect.site == "shaft":
         return plant.twist(p, x), "twist [rad]"
     return time, "time [s]"
