@@ -18,7 +18,6 @@ from orchestrator.shared.inference.noise import lagged_rms, residual_noise
 Array = NDArray[np.float64]
 
 
-KEPT = 4  # readings of the load's angles
 SMOOTHED = 9  # samples of the cubic that gives the motion within a sample
 
 
@@ -155,7 +154,7 @@ class Signals:
     @cached_property
     def _earlier_load(self) -> Callable[[float], Array]:
         """Angles (n, 2) by the samples that the load's are read later; most runs of a fit change another parameter."""
-        return lru_cache(KEPT)(self._with_earlier_load)
+        return lru_cache(maxsize=4)(self._with_earlier_load)  # as many as fits run at once, and to spare
 
     def _with_earlier_load(self, samples: float) -> Array:
         """Return the angles (n, 2), the load's read ``samples`` later.
