@@ -14,7 +14,7 @@ from .axis_equations import (
     rest,
     slip_at_rest,
 )
-from .drivetrain_parameters import TINY
+from .drivetrain_parameters import BIG, TINY
 from .servo_axis_parameters import (
     P_B,
     P_BREAKAWAY,
@@ -42,27 +42,78 @@ from .servo_axis_parameters import (
     P_WAVY_N,
 )
 
+SHARE = 0.05  # of the time in which the fastest rate acts: a step
+AHEAD = 0.1  # of the time in which a sliding axis would stop: a step that comes no nearer to where friction falls
+THERE = 1e-14  # of the torque: a drive that is no farther from its request has come there
 
-def longest_step(x: State, mode: int, p: Parameters, h: float) -> float:
+
+def longest_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> float:
     """Return a step [s] that resolves all rates well (a Runge-Kutta step errs by its 5th power).
 
     Args:
         x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
         p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
         h: length of the step [s].
 
     Returns:
         The step, at most ``h``.
     """
     rate = (p[P_B] + abs(p[P_DIRECTION]) + 2.0 * p[P_DRAG] * abs(x[1])) / p[P_J]
-    if p[P_TAU] > 0.0:
-        rate = max(rate, 1.0 / p[P_TAU])
     if p[P_RIPPLE] != 0.0:
         rate = max(rate, p[P_RIPPLE_N] * (abs(x[1]) + sqrt(abs(p[P_RIPPLE]) / (p[P_RIPPLE_N] * p[P_J] + TINY))))
+    step = min(h, SHARE / (max(rate, further_rate(x, mode, p)) + TINY))
+    if p[P_TAU] > 0.0:
+        step = min(step, step_of_lag(x, p, u))
     if falls(p):
-        rate = max(rate, abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / (p[P_STRIBECK_SPEED] * p[P_J]))
-    return min(h, 0.05 / (max(rate, further_rate(x, mode, p)) + TINY))
+        step = min(step, step_of_fall(x, mode, p, u, T_l))
+    return step
+
+
+def step_of_lag(x: State, p: Parameters, u: float) -> float:
+    """Return a step [s] that resolves the drive's lag: one that has come close to its request asks for no short ones.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+
+    Returns:
+        The step.
+    """
+    if filtered(p):
+        return SHARE * p[P_TAU]
+    torque = abs(x[2]) + abs(u)
+    behind = abs(x[2] - u)
+    if behind <= THERE * torque:
+        return BIG
+    return 0.5 * SHARE * p[P_TAU] * (torque / behind) ** 0.2
+
+
+def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float) -> float:
+    """Return a step [s] that resolves friction that falls with speed: far above its speed it hardly does.
+
+    A long step may not come near that speed.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        The step.
+    """
+    steepest = abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / (p[P_STRIBECK_SPEED] * p[P_J])
+    short = SHARE / (steepest + TINY)
+    ratio = 0.5 * abs(x[1]) / p[P_STRIBECK_SPEED]
+    if mode == 0 or ratio < 1.0:
+        return short
+    ahead = AHEAD * abs(x[1]) / (abs(mode_rates(x, mode, p, u, T_l)[1]) + TINY)
+    return max(short, min(ahead, short / (2.0 * ratio * exp(-ratio * ratio) + TINY)))
 
 
 def further_rate(x: State, mode: int, p: Parameters) -> float:
@@ -111,6 +162,24 @@ def along(x: State, h: float, r: State) -> State:
     return (x[0] + h * r[0], x[1] + h * r[1], x[2] + h * r[2], x[3] + h * r[3], x[4] + h * r[4])
 
 
+def driven(x: State, after: State, p: Parameters, u: float, h: float) -> State:
+    """Return the state ``after`` with the drive's torque as it is then: ``u + (drive - u) exp(-h / tau)``.
+
+    Args:
+        x: state before.
+        after: state ``h`` later, its torque by a quadrature.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        h: time between both [s].
+
+    Returns:
+        The state; ``after`` as it is where the drive has no lag, or follows a request that is filtered.
+    """
+    if p[P_TAU] <= 0.0 or filtered(p):
+        return after
+    return (after[0], after[1], u + (x[2] - u) * exp(-h / p[P_TAU]), after[3], after[4])
+
+
 def smooth_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) -> State:
     """Return the state after one classical Runge-Kutta step in one direction of sliding.
 
@@ -126,17 +195,18 @@ def smooth_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: flo
         The state.
     """
     a = mode_rates(x, mode, p, u, T_l)
-    b = mode_rates(along(x, 0.5 * h, a), mode, p, u, T_l)
-    c = mode_rates(along(x, 0.5 * h, b), mode, p, u, T_l)
-    d = mode_rates(along(x, h, c), mode, p, u, T_l)
+    b = mode_rates(driven(x, along(x, 0.5 * h, a), p, u, 0.5 * h), mode, p, u, T_l)
+    c = mode_rates(driven(x, along(x, 0.5 * h, b), p, u, 0.5 * h), mode, p, u, T_l)
+    d = mode_rates(driven(x, along(x, h, c), p, u, h), mode, p, u, T_l)
     w = h / 6.0
-    return (
+    after = (
         x[0] + w * (a[0] + 2.0 * b[0] + 2.0 * c[0] + d[0]),
         x[1] + w * (a[1] + 2.0 * b[1] + 2.0 * c[1] + d[1]),
         x[2] + w * (a[2] + 2.0 * b[2] + 2.0 * c[2] + d[2]),
         x[3] + w * (a[3] + 2.0 * b[3] + 2.0 * c[3] + d[3]),
         x[4] + w * (a[4] + 2.0 * b[4] + 2.0 * c[4] + d[4]),
     )
+    return driven(x, after, p, u, h)
 
 
 def slowing_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float, least: float) -> float:

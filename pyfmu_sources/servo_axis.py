@@ -105,7 +105,7 @@ def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h:
         if pieces > most:
             nan = float("nan")
             return ((nan, nan, nan, nan, nan), mode)
-        step = min(longest_step(x, mode, p, h), h - elapsed)
+        step = min(longest_step(x, mode, p, u, T_l, h), h - elapsed)
         if dry and not bends and mode == 0:
             mode = slip_at_rest(x, p, u, T_l)
             if mode == 0:
