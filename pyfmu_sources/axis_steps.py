@@ -43,7 +43,7 @@ from .servo_axis_parameters import (
 )
 
 SHARE = 0.05  # of the time in which the fastest rate acts: a step
-AHEAD = 0.1  # of the time in which a sliding axis would stop: a step that comes no nearer to where friction falls
+AHEAD = 0.05  # of the time in which a sliding axis would stop: a step that comes no nearer to where friction falls
 THERE = 1e-14  # of the torque: a drive that is no farther from its request has come there
 
 
@@ -93,7 +93,7 @@ def step_of_lag(x: State, p: Parameters, u: float) -> float:
 
 
 def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float) -> float:
-    """Return a step [s] that resolves friction that falls with speed: far above its speed it hardly does.
+    """Return a step [s] that resolves friction that falls with speed: near rest and far above its speed it hardly does.
 
     A long step may not come near that speed.
 
@@ -107,12 +107,17 @@ def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float) -> fl
     Returns:
         The step.
     """
-    steepest = abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / (p[P_STRIBECK_SPEED] * p[P_J])
-    short = SHARE / (steepest + TINY)
-    ratio = 0.5 * abs(x[1]) / p[P_STRIBECK_SPEED]
-    if mode == 0 or ratio < 1.0:
-        return short
-    ahead = AHEAD * abs(x[1]) / (abs(mode_rates(x, mode, p, u, T_l)[1]) + TINY)
+    fall = abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / p[P_J]
+    short = SHARE * p[P_STRIBECK_SPEED] / (fall + TINY)
+    speed = abs(x[1])
+    acceleration = abs(mode_rates(x, mode, p, u, T_l)[1])
+    # Near rest friction is flat: it falls by no more than twice the speed that is reached, over the square of its own.
+    reached = 0.5 * short * p[P_STRIBECK_SPEED]
+    near = 2.0 * reached / (speed + sqrt(speed * speed + 4.0 * acceleration * reached) + TINY * TINY)
+    ratio = 0.5 * speed / p[P_STRIBECK_SPEED]
+    if ratio < 1.0:
+        return max(short, near)
+    ahead = AHEAD * speed / (acceleration + TINY)
     return max(short, min(ahead, short / (2.0 * ratio * exp(-ratio * ratio) + TINY)))
 
 

@@ -87,6 +87,10 @@ def _friction(site: str) -> tuple[Effect, Effect]:
     def priors(scene: Scene) -> dict[str, tuple[float, float]]:
         return {"presliding": build_up(scene)}
 
+    def bounds(scene: Scene) -> dict[str, tuple[float, float]]:
+        # Crossed in a moment, a lower speed is no more told by any record, and takes the shortest steps of all.
+        return {"stribeck_speed": (0.002 * rms(scene), math.inf)}
+
     names = (f"{site}.coulomb", f"{site}.breakaway", f"{site}.stribeck_speed")
     coulomb = Effect(
         "coulomb_friction", site, group("coulomb_friction", f"{site}.torque"), "torque", unit, start,
@@ -96,7 +100,8 @@ def _friction(site: str) -> tuple[Effect, Effect]:
     )  # fmt: skip
     stribeck = Effect(
         "stribeck_friction", site, group("stribeck_friction", *names), "coulomb", unit,
-        refine=refine, plausible=falls, scales=lambda s: {"stribeck_speed": 0.02 * rms(s), "presliding": 0.2},
+        refine=refine, plausible=falls, bounds=bounds,
+        scales=lambda s: {"stribeck_speed": 0.02 * rms(s), "presliding": 0.2},
         family=f"dry friction of the {site}", needs=f"coulomb_friction@{site}", nuisances=nuisances, priors=priors,
         leaves=0.04, against="speed",
     )  # fmt: skip

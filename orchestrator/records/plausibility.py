@@ -97,7 +97,7 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> 
         ),
     )
     for factor, text, cure in suspects:
-        if abs(math.log(relative / factor)) < 0.2:
+        if abs(math.log(relative / factor)) < min(0.2, abs(math.log(relative))):  # nearer to that than to what is right
             raise RecordError(
                 f"{record.source}: {text} (theta_m/theta_l is {ratio / relative:.4g}, i is {ratio:g}): {cure}"
             )
