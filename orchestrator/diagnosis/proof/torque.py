@@ -65,10 +65,46 @@ def torque_proof(likelihood: RecordLikelihood, base: Fit, final: Fit, parts: Par
     if moved[3].size < likelihood.settings.inverse.least_rows * len(final.free):
         return TorqueProof()
     without, left = (lacking_torque(plant, moved, one.p) for one in (best, final))
-    change = left**2 - without**2
-    mean, chance = change.mean(), np.sqrt(long_run_covariance((change - change.mean())[:, None])[0, 0]) / change.size
     return TorqueProof(
         removed=max(1.0 - float(left @ left) / float(without @ without), 0.0),
         explained=share_explained(left, moved[3]),
-        sure=bool(mean < -likelihood.settings.proof.horizons.sure * chance),
+        sure=surely_smaller(left**2, without**2, likelihood.settings.proof.horizons.sure),
     )
+
+
+def surely_smaller(squares: Array, others: Array, sure: float) -> bool:
+    """Tell whether squared errors are smaller than others beyond chance: their mean difference, or their ratio.
+
+    What a model lacks may be slow: of a swing or two the mean difference is no surer than either, however small one of
+    them is. Their ratio has an F distribution then, with the degrees of freedom that the scatter of each mean leaves
+    (Satterthwaite, Biometrics Bulletin 2(6), 1946).
+
+    Args:
+        squares: (n,) squared errors in time.
+        others: (n,) of another model.
+        sure: standard deviations of chance.
+
+    Returns:
+        True when they are.
+
+    Example:
+        >>> swing = np.repeat([0.0, 0.1, 9.0, 0.1], 50)
+        >>> surely_smaller(0.01 * swing[::-1], swing, 2.0), surely_smaller(0.5 * swing[::-1], swing, 2.0)
+        (True, False)
+    """
+    from scipy.stats import f, norm  # takes a second to import
+
+    mean, error = _mean_of(squares - others)
+    if mean < -sure * error:
+        return True
+    (own, own_error), (other, other_error) = _mean_of(squares), _mean_of(others)
+    if min(own, other, own_error, other_error) <= 0.0:
+        return False
+    freedoms = [2.0 * (m / e) ** 2 for m, e in ((other, other_error), (own, own_error))]
+    return bool(f.sf(other / own, *freedoms) < norm.sf(sure))
+
+
+def _mean_of(values: Array) -> tuple[float, float]:
+    """Return the mean of values in time, and its standard error."""
+    mean = float(np.mean(values))
+    return mean, float(np.sqrt(long_run_covariance((values - mean)[:, None])[0, 0]) / values.size)
