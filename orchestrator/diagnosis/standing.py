@@ -234,7 +234,7 @@ def _larger_misfit(likelihood: RecordLikelihood, bases: Sequence[Array], final: 
 
 
 def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: float, whole: Parts) -> bool:
-    """Tell whether an effect may be nothing: its size may be zero, and held-out predictions do not miss it.
+    """Tell whether an effect may be nothing: its size may be zero, and of a wave, held-out predictions do not miss it.
 
     Free runs hardly see a torque that changes sign within a short way, whatever its size: what they leave open of it
     counts for nothing where predictions get worse, at some horizon and at none better, with nothing changed but that
@@ -244,6 +244,8 @@ def _is_weak(search: Search, effect: Effect, final: Fit, after: Horizons, q: flo
     place = effect.places(likelihood.plant)[effect.size]
     if abs(float(final.p[place])) >= likelihood.settings.search.least_errors * final.standard_error(place):
         return False
+    if not effect.phase:
+        return True
     without = horizons(likelihood, search.without(final.p, effect), q, whole.held_out, long=False)
     return not after.surely_better_than(without) or bool(without.surely_better_than(after))
 

@@ -149,18 +149,22 @@ def test_an_effect_that_takes_half_of_the_torque_error_stands_beside_a_rest(monk
 
 
 @pytest.mark.parametrize(
-    ("deviations", "kept", "lost", "weak"),
+    ("law", "deviations", "kept", "lost", "weak"),
     [
-        (3.0, (), (), False),  # far from zero: nothing else is asked
-        (1.0, (), (), True),  # held-out predictions do not miss it
-        (1.0, ("50 ms",), (), False),
-        (1.0, ("50 ms",), ("500 ms",), True),  # better at one horizon, worse at another
+        ("torque_ripple@motor", 3.0, (), (), False),  # far from zero: nothing else is asked
+        ("torque_ripple@motor", 1.0, (), (), True),  # held-out predictions do not miss it
+        ("torque_ripple@motor", 1.0, ("50 ms",), (), False),
+        ("torque_ripple@motor", 1.0, ("50 ms",), ("500 ms",), True),  # better at one horizon, worse at another
+        ("load_torque@load", 3.0, (), (), False),
+        ("load_torque@load", 1.0, ("50 ms",), (), True),  # free runs see it as it is
     ],
 )
-def test_a_size_that_may_be_zero_stands_where_predictions_miss_it(monkeypatch, deviations, kept, lost, weak) -> None:
+def test_a_wave_whose_size_may_be_zero_stands_where_predictions_miss_it(
+    monkeypatch, law, deviations, kept, lost, weak
+) -> None:
     likelihood, p = axis_likelihood()
-    effect = next(e for e in likelihood.plant.bank if e.label == "load_torque@load")
-    place = effect.places(likelihood.plant)["torque"]
+    effect = next(e for e in likelihood.plant.bank if e.label == law)
+    place = effect.places(likelihood.plant)[effect.size]
     p = p.copy()
     p[place] = 0.01 * deviations
     covariance, free = np.diag([1e-4]), (Free(place, 0.01, -1.0, 1.0),)
