@@ -18,7 +18,7 @@ from orchestrator.diagnosis.proof.misfit import running
 from orchestrator.diagnosis.proof.settings import HorizonSettings
 from orchestrator.diagnosis.proof.simulation import Simulation
 from orchestrator.shared.cores import spread
-from orchestrator.shared.inference.long_run import long_run_covariance
+from orchestrator.shared.inference.long_run import mean_of
 from orchestrator.shared.inference.normal import of_many
 from orchestrator.shared.results.diagnose import HorizonFound
 
@@ -107,7 +107,7 @@ class Horizons:
             m = self.noise.size
             change = np.array([np.sum((a.rms[:m] ** 2 - b.rms[:m] ** 2) / self.noise**2) for (a, _), (b, _) in pairs])
             if len(pairs) > 1 and np.all(np.isfinite(change)):
-                mean, error = _mean_of(change)
+                mean, error = mean_of(change)
                 if mean <= self.settings.sure * error:
                     found.append(label)
         return tuple(found)
@@ -119,7 +119,7 @@ class Horizons:
                 yield (-np.inf if np.all(np.isfinite(own)) else np.inf), 0.0
                 continue
             change = np.sum((own - before) / self.noise**2, axis=1)
-            yield _mean_of(change)
+            yield mean_of(change)
 
     @property
     def long(self) -> int:
@@ -206,12 +206,6 @@ def sure_of_one(settings: HorizonSettings) -> float:
         One of them exceeds it by chance as rarely as a single one would exceed ``sure``.
     """
     return of_many(settings.sure, len(settings.spans) + 3)  # beside a sample, a few seconds and the whole part
-
-
-def _mean_of(change: Array) -> tuple[float, float]:
-    """Return the mean of what neighbours in time have in common, and its standard error."""
-    mean = float(np.mean(change))
-    return mean, float(np.sqrt(long_run_covariance((change - mean)[:, None])[0, 0]) / change.size)
 
 
 def horizons(likelihood: RecordLikelihood, p: Array, q: float, part: slice, long: bool = True) -> Horizons:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.fit.fitting import Fit, Parts
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.torque_fit import lacking_torque, motion, share_explained, torque_fit
-from orchestrator.shared.inference.long_run import long_run_covariance
+from orchestrator.shared.inference.long_run import mean_of
 
 Array = NDArray[np.float64]
 
@@ -94,17 +94,11 @@ def surely_smaller(squares: Array, others: Array, sure: float) -> bool:
     """
     from scipy.stats import f, norm  # takes a second to import
 
-    mean, error = _mean_of(squares - others)
+    mean, error = mean_of(squares - others)
     if mean < -sure * error:
         return True
-    (own, own_error), (other, other_error) = _mean_of(squares), _mean_of(others)
+    (own, own_error), (other, other_error) = mean_of(squares), mean_of(others)
     if min(own, other, own_error, other_error) <= 0.0:
         return False
     freedoms = [2.0 * (m / e) ** 2 for m, e in ((other, other_error), (own, own_error))]
     return bool(f.sf(other / own, *freedoms) < norm.sf(sure))
-
-
-def _mean_of(values: Array) -> tuple[float, float]:
-    """Return the mean of values in time, and its standard error."""
-    mean = float(np.mean(values))
-    return mean, float(np.sqrt(long_run_covariance((values - mean)[:, None])[0, 0]) / values.size)

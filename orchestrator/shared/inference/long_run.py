@@ -28,6 +28,19 @@ def long_run_covariance(terms: Array) -> Array:
     return np.asarray(total * n / max(n - terms.shape[1], 1))
 
 
+def mean_of(values: Array) -> tuple[float, float]:
+    """Return the mean of values in time and its standard error, neighbours having much in common.
+
+    Args:
+        values: (n,).
+
+    Returns:
+        Both.
+    """
+    mean = float(np.mean(values))
+    return mean, float(np.sqrt(long_run_covariance((values - mean)[:, None])[0, 0]) / values.size)
+
+
 def _width(terms: Array) -> int:
     """Return the number of lags that matter, every column in units of its own size."""
     squares = np.maximum(np.sum(terms[:-1] ** 2, axis=0), 1e-300)
