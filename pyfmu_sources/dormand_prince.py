@@ -10,8 +10,9 @@ from .bristles import builds_up_l, builds_up_m, turned_signs
 from .drivetrain_parameters import BIG, P_FILTER, P_RATE, P_TAU
 from .equations import Mode, Parameters, State, rates
 
-RELATIVE_TOLERANCE = 1e-12
-ABSOLUTE_TOLERANCE = 1e-14
+RELATIVE_TOLERANCE = 1e-11
+ABSOLUTE_TOLERANCE = 1e-13
+SLOW = 0.01  # of the drive's lag: its torque is smooth within a shorter step
 
 
 def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
@@ -106,32 +107,34 @@ def combine(a: float, k: State, b: float, m: State) -> State:
     )
 
 
-def follows_held(p: Parameters) -> bool:
-    """Tell whether the drive's torque follows the request itself, which is held; not a filtered or limited one.
+def is_quick(p: Parameters, h: float) -> bool:
+    """Tell whether a drive moves within a step, and follows the request itself: not a filtered or limited one.
 
     Args:
         p: parameters, in the order of the FMU's table.
+        h: length of the step [s].
 
     Returns:
         True when it does.
     """
-    return p[P_FILTER] <= 0.0 and p[P_RATE] >= BIG
+    return h > SLOW * p[P_TAU] and p[P_FILTER] <= 0.0 and p[P_RATE] >= BIG
 
 
-def driven(x: State, after: State, p: Parameters, u: float, h: float) -> State:
-    """Return the state ``after`` with the drive's torque as it is then: ``u + (T_m - u) exp(-h / tau)``.
+def driven(x: State, after: State, quick: bool, p: Parameters, u: float, h: float) -> State:
+    """Return the state ``after`` with the torque of a quick drive as it is then: ``u + (T_m - u) exp(-h / tau)``.
 
     Args:
         x: state before.
         after: state ``h`` later, its torque by a quadrature.
+        quick: the drive is.
         p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         h: time between both [s].
 
     Returns:
-        The state; ``after`` as it is where the drive follows something else.
+        The state; ``after`` as it is where the drive is not quick.
     """
-    if not follows_held(p):
+    if not quick:
         return after
     torque = u + (x[4] - u) * exp(-h / p[P_TAU])
     return (
@@ -167,26 +170,27 @@ def runge_kutta(
     Returns:
         The three; an error below 1 is within the tolerance.
     """
-    k2 = mode_rates(driven(x, ahead(x, h / 5.0, k1), p, u, h / 5.0), mode, p, u, T_l)
+    quick = is_quick(p, h)
+    k2 = mode_rates(driven(x, ahead(x, h / 5.0, k1), quick, p, u, h / 5.0), mode, p, u, T_l)
     at3 = ahead(x, h, combine(3.0 / 40.0, k1, 9.0 / 40.0, k2))
-    k3 = mode_rates(driven(x, at3, p, u, 0.3 * h), mode, p, u, T_l)
+    k3 = mode_rates(driven(x, at3, quick, p, u, 0.3 * h), mode, p, u, T_l)
     sum4 = ahead(combine(44.0 / 45.0, k1, -56.0 / 15.0, k2), 32.0 / 9.0, k3)
-    k4 = mode_rates(driven(x, ahead(x, h, sum4), p, u, 0.8 * h), mode, p, u, T_l)
+    k4 = mode_rates(driven(x, ahead(x, h, sum4), quick, p, u, 0.8 * h), mode, p, u, T_l)
     sum5 = combine(19372.0 / 6561.0, k1, -25360.0 / 2187.0, k2)
     sum5 = ahead(ahead(sum5, 64448.0 / 6561.0, k3), -212.0 / 729.0, k4)
-    k5 = mode_rates(driven(x, ahead(x, h, sum5), p, u, 8.0 / 9.0 * h), mode, p, u, T_l)
+    k5 = mode_rates(driven(x, ahead(x, h, sum5), quick, p, u, 8.0 / 9.0 * h), mode, p, u, T_l)
     sum6 = combine(9017.0 / 3168.0, k1, -355.0 / 33.0, k2)
     sum6 = ahead(ahead(ahead(sum6, 46732.0 / 5247.0, k3), 49.0 / 176.0, k4), -5103.0 / 18656.0, k5)
-    k6 = mode_rates(driven(x, ahead(x, h, sum6), p, u, h), mode, p, u, T_l)
+    k6 = mode_rates(driven(x, ahead(x, h, sum6), quick, p, u, h), mode, p, u, T_l)
     sum7 = combine(35.0 / 384.0, k1, 500.0 / 1113.0, k3)
     sum7 = ahead(ahead(ahead(sum7, 125.0 / 192.0, k4), -2187.0 / 6784.0, k5), 11.0 / 84.0, k6)
-    after = driven(x, ahead(x, h, sum7), p, u, h)
+    after = driven(x, ahead(x, h, sum7), quick, p, u, h)
     k7 = mode_rates(after, mode, p, u, T_l)
     wrong = combine(71.0 / 57600.0, k1, -71.0 / 16695.0, k3)
     wrong = ahead(ahead(ahead(wrong, 71.0 / 1920.0, k4), -17253.0 / 339200.0, k5), 22.0 / 525.0, k6)
     wrong = ahead(wrong, -1.0 / 40.0, k7)
     square = 0.0
-    known = 4 if follows_held(p) else -1
+    known = 4 if quick else -1
     for n in range(12):
         if n != known:
             scale = ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * max(abs(x[n]), abs(after[n]))
