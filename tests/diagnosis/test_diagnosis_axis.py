@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from orchestrator.building.build import ensure_built
 from orchestrator.checking.check import check_fmu
 from orchestrator.cli import main
 from orchestrator.diagnosis.diagnose import diagnose, evidence_of
+from orchestrator.diagnosis.figures import _abscissa
 from orchestrator.diagnosis.verdict.evidence import evidence
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
@@ -20,6 +22,7 @@ from orchestrator.records.model_file import read_model
 from pyfmu_sources import servo_axis as axis
 from pyfmu_sources import servo_axis_parameters as ap
 from tests.support import axis_record, emps
+from tests.support.short_records import AXIS
 
 MODEL = Path(__file__).resolve().parents[2] / "docs" / "examples" / "emps.toml"
 
@@ -135,6 +138,19 @@ def test_emps_lacks_dry_friction_first(emps_results: dict) -> None:
 
 
 @pytest.mark.slow(shares="emps_results")
+@pytest.mark.parametrize("unit", ["rad", "m"])
+def test_figures_give_positions_in_the_unit_of_the_axis_and_phases_in_radians(unit: str) -> None:
+    x, p = np.zeros((3, 8)), np.array(AXIS.extended([entry.default for entry in AXIS.table]))
+    workings, misfit = SimpleNamespace(plant=AXIS), [SimpleNamespace(unit=unit)]
+    found = {
+        effect.name: _abscissa(effect, p, SimpleNamespace(workings=workings, misfit=misfit), x, np.zeros(3))[1]
+        for effect in AXIS.bank
+    }
+    assert found["coulomb_friction"] == f"motor speed [{unit}/s]"
+    assert found["torque_ripple"] == "phase of the cycle [rad]"
+    assert found["lower_end_stop"] == f"load position [{unit}]"
+
+
 def test_figures_of_emps_are_those_of_an_independent_inverse_and_free_run(emps_results: dict) -> None:
     found = emps_effects(emps_results)
     values = {name: entry["value"] for name, entry in emps_results["parameters"].items()}

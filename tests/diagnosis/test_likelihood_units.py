@@ -168,6 +168,12 @@ def test_signals_that_a_log_has_not_shifted_are_the_same() -> None:
     moved = both.signals.aligned(DRIVETRAIN, late)
     assert np.array_equal(moved.u, both.signals.u)
     assert np.allclose(moved.y[:-1, 1], both.signals.y[1:, 1])
+    other = late.copy()
+    other[DRIVETRAIN.index(LEAD.name)] = 0.5 * H
+    assert both.signals.aligned(DRIVETRAIN, other).y is moved.y  # read once for all models that agree on it
+    acting = both.signals.acting(DRIVETRAIN, other)
+    assert acting.y is both.signals.y
+    assert np.array_equal(acting.u, both.signals.aligned(DRIVETRAIN, other).u)
     short, _ = drivetrain_likelihood(size=5)
     late[DRIVETRAIN.index(SHIFT.name)] = 0.5 * H
     assert np.isfinite(short.signals.aligned(DRIVETRAIN, late).y).all()  # its cubic takes all there are

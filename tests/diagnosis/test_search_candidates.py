@@ -187,6 +187,9 @@ def test_free_parameters_of_a_model() -> None:
     ripple = search.free((BANK["torque_ripple@motor"],), scene)
     low = next(entry for entry in ripple if AXIS.names[entry.place].endswith("cycles_per_rev"))
     assert low.minimum == pytest.approx(0.7 / scene.turns)
+    slow = search.free((STRIBECK,), scene)
+    least = next(entry for entry in slow if AXIS.names[entry.place].endswith("stribeck_speed"))
+    assert least.minimum == pytest.approx(0.002 * scene.speed_m)
     assert search.refitted == [AXIS.index("J"), AXIS.index("b")]
     p = likelihood.nominal.copy()
     p[AXIS.index("effects.load_torque.torque")] = 3.0
