@@ -89,7 +89,7 @@ def _friction(site: str) -> tuple[Effect, Effect]:
 
     def bounds(scene: Scene) -> dict[str, tuple[float, float]]:
         # Crossed in a moment, a lower speed is no more told by any record, and takes the shortest steps of all.
-        return {"stribeck_speed": (0.002 * rms(scene), math.inf)}
+        return {"stribeck_speed": (0.005 * rms(scene), math.inf)}
 
     names = (f"{site}.coulomb", f"{site}.breakaway", f"{site}.stribeck_speed")
     coulomb = Effect(
