@@ -156,6 +156,9 @@ class SearchSettings(Settings, frozen=True):
     least_damping: Annotated[
         float, share("least damping ratio of a resonance: steel that is welded rings with some thousandths")
     ] = 5e-4
+    most_coefficient: Annotated[
+        float, share("largest friction over the torque that is transmitted: with more no machine turns")
+    ] = 0.9
     at_bound: Annotated[
         float, setting("times the fewest cycles that are looked for: a wave with fewer lies at its bound", ge=1)
     ] = 1.02

@@ -72,6 +72,7 @@ def test_knots_lie_where_samples_are() -> None:
     assert np.all(np.diff(knots) > 0.0)
     assert np.diff(knots)[KNOTS // 2] < 0.2 * np.diff(knots)[0]
     assert knots_of(np.zeros(100)) is None
+    assert knots_of(np.array([0.0, 1.0, np.inf])) is None
 
 
 def test_two_knots_of_a_speed_lie_where_friction_turns_round() -> None:

@@ -114,3 +114,12 @@ def test_a_stop_that_is_touched_as_a_record_begins_alone_is_none(angles: tuple[f
     places = stop.places(DRIVETRAIN)
     p[places["angle"]], p[places["stiffness"]] = -0.9, 20.0
     assert ("never again" in implausible(DRIVETRAIN, stop, p, scene, SEARCH)) is refused
+
+
+@pytest.mark.parametrize(("coefficient", "refused"), [(0.3, False), (1.0, True)])
+def test_friction_that_takes_all_that_is_transmitted_is_none(coefficient: float, refused: bool) -> None:
+    law = next(effect for effect in DRIVETRAIN.bank if effect.label == "load_dependent_friction@motor")
+    scene = Scene(0.01, 1.0, np.ones(3), 1.0, 1.0, 0.1, 1.0, 1.0, 4.0, 4.0, -1.0, 1.0)
+    p = DRIVETRAIN.extended([entry.default for entry in DRIVETRAIN.table])
+    p[law.places(DRIVETRAIN)["coefficient"]] = coefficient
+    assert ("holds itself" in implausible(DRIVETRAIN, law, p, scene, SEARCH)) is refused

@@ -20,8 +20,10 @@ def knots_of(values: Array, jump: bool = False) -> Array | None:
         jump: the law may jump where the values change sign: two of the knots lie close together there.
 
     Returns:
-        Knots, rising; None: the values have no range.
+        Knots, rising; None: the values have no range, or run away.
     """
+    if not np.all(np.isfinite(values)):
+        return None
     low, high = np.quantile(values, [EDGE, 1.0 - EDGE])
     jump = jump and low < 0.0 < high
     count = KNOTS - 2 if jump else KNOTS

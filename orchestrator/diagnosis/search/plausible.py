@@ -48,6 +48,8 @@ def implausible(plant: Plant, effect: Effect, p: Array, scene: Scene, settings: 
             return f"{effect.name} ({effect.site}) with a damping ratio of {value:.3g} has no peak: no resonance"
         if short == "damping_ratio" and value < settings.least_damping:
             return f"{effect.name} ({effect.site}) with a damping ratio of {value:.3g} would never come to rest"
+        if short == "coefficient" and unit == "1" and value > settings.most_coefficient:
+            return f"{what} would take all that the shaft transmits: a gear that holds itself, no friction"
         if short == "limit":
             if value < settings.least_limit * float(np.max(np.abs(scene.u))):
                 return f"{what} would leave no torque: `u` may not be what drives the machine"

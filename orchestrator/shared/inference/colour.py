@@ -97,6 +97,7 @@ class Colour:
 WHITE = Colour(np.zeros((0, 1, 1)), np.eye(1))  # of one channel
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of a model that runs away: no colour is found
 def colour_of(z: Array, part: slice, most: int = ORDERS[-1]) -> Colour:
     """Return the autoregression of a part of the innovations (n, channels).
 
