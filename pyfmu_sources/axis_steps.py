@@ -68,7 +68,7 @@ def longest_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: fl
     if p[P_TAU] > 0.0:
         step = min(step, step_of_lag(x, p, u))
     if falls(p):
-        step = min(step, step_of_fall(x, mode, p, u, T_l))
+        step = step_of_fall(x, mode, p, u, T_l, step)
     return step
 
 
@@ -92,7 +92,7 @@ def step_of_lag(x: State, p: Parameters, u: float) -> float:
     return 0.5 * SHARE * p[P_TAU] * (torque / behind) ** 0.2
 
 
-def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float) -> float:
+def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float, most: float) -> float:
     """Return a step [s] that resolves friction that falls with speed: near rest and far above its speed it hardly does.
 
     A long step may not come near that speed.
@@ -103,12 +103,15 @@ def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float) -> fl
         p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
+        most: step that everything else allows [s].
 
     Returns:
-        The step.
+        The step, at most ``most``.
     """
     fall = abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / p[P_J]
     short = SHARE * p[P_STRIBECK_SPEED] / (fall + TINY)
+    if short >= most:
+        return most
     speed = abs(x[1])
     acceleration = abs(mode_rates(x, mode, p, u, T_l)[1])
     # Near rest friction is flat: it falls by no more than twice the speed that is reached, over the square of its own.
@@ -116,9 +119,9 @@ def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float) -> fl
     near = 2.0 * reached / (speed + sqrt(speed * speed + 4.0 * acceleration * reached) + TINY * TINY)
     ratio = 0.5 * speed / p[P_STRIBECK_SPEED]
     if ratio < 1.0:
-        return max(short, near)
+        return min(most, max(short, near))
     ahead = AHEAD * speed / (acceleration + TINY)
-    return max(short, min(ahead, short / (2.0 * ratio * exp(-ratio * ratio) + TINY)))
+    return min(most, max(short, min(ahead, short / (2.0 * ratio * exp(-ratio * ratio) + TINY))))
 
 
 def further_rate(x: State, mode: int, p: Parameters) -> float:
@@ -254,8 +257,7 @@ def held(x: State, p: Parameters, u: float, T_l: float, h: float) -> State:
     """
     if filtered(p):
         return smooth_step((x[0], 0.0, x[2], x[3], x[4]), 0, p, u, T_l, h)
-    share = 1.0 - exp(-h / p[P_TAU]) if p[P_TAU] > 0.0 else 0.0
-    return (x[0], 0.0, x[2] + share * (u - x[2]), x[3], x[4])
+    return driven(x, (x[0], 0.0, x[2], x[3], x[4]), p, u, h)
 
 
 def breaking_time(x: State, p: Parameters, u: float, T_l: float, h: float) -> float:

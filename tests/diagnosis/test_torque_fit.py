@@ -5,6 +5,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from orchestrator.diagnosis.diagnose import DEFAULT_SETTINGS
 from orchestrator.diagnosis.fit.fitting import Fit, Parts, fit
@@ -14,7 +15,7 @@ from orchestrator.diagnosis.fit.slope import Free
 from orchestrator.diagnosis.fit.together import at_one_rate, series
 from orchestrator.diagnosis.fit.torque_fit import torque_fit
 from orchestrator.diagnosis.proof.reported import _between, reported
-from orchestrator.diagnosis.proof.torque import TorqueProof, torque_proof
+from orchestrator.diagnosis.proof.torque import TorqueProof, surely_smaller, torque_proof
 from orchestrator.plants.effects import Effect
 from orchestrator.records.record import Record
 from tests.support.robot_joint import DRY, INERTIA, VISCOUS, joint_record, resting_record
@@ -188,3 +189,16 @@ def test_only_an_axis_without_lag_or_delay_is_asked(joint) -> None:
     two, p = drivetrain_likelihood(size=240)
     own = replace(found, p=p, free=(Free(0, 0.1, 0.0, 1e3),))
     assert torque_fit(two, own, slice(10, 200)) is None
+
+
+@pytest.mark.parametrize(("pole", "other"), [(0.0, 0.97), (0.9, 0.9)])
+def test_errors_of_one_size_are_rarely_told_apart_and_a_twentieth_surely(pole: float, other: float) -> None:
+    """However few the independent samples of either are."""
+    rng = np.random.default_rng(7)
+
+    def squares(of: float) -> np.ndarray:
+        return lfilter([np.sqrt(1.0 - of * of)], [1.0, -of], rng.standard_normal(2000))[500:] ** 2
+
+    alike = [surely_smaller(squares(pole), squares(other), 2.0) for _ in range(200)]
+    assert np.mean(alike) < 0.12
+    assert all(surely_smaller(0.05 * squares(pole), squares(other), 2.0) for _ in range(20))

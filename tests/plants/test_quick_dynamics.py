@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pyfmu_sources import drivetrain, servo_axis, servo_axis_parameters
+from pyfmu_sources import drivetrain, servo_axis, servo_axis_parameters, smooth_mode
 from pyfmu_sources.drivetrain_parameters import NAMES, parameters, with_values
 
 
@@ -89,3 +89,42 @@ def test_friction_that_falls_at_any_speed_slows_an_axis_as_its_equation_says(str
     assert truth.t[-1] < 0.16
     assert x[1] == 0.0
     assert x[0] == pytest.approx(truth.y[0, -1], rel=1e-6)
+
+
+def counted(monkeypatch, module, name) -> list[int]:
+    """Count from now on how often a module calls a function."""
+    calls, function = [0], getattr(module, name)
+
+    def call(*given):
+        calls[0] += 1
+        return function(*given)
+
+    monkeypatch.setattr(module, name, call)
+    return calls
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"tau": 1e-6, "effects.coulomb_friction.motor.torque": 0.05},
+        {"effects.stribeck_friction.motor.breakaway": 0.1, "effects.stribeck_friction.motor.stribeck_speed": 4e-4},
+    ],
+)
+def test_an_axis_takes_short_steps_only_while_they_are_needed(monkeypatch, values):
+    """A step follows the lag while the torque is behind, and falling friction while the speed is near its own."""
+    steps, p = counted(monkeypatch, servo_axis, "smooth_step"), axis({"J": 0.0023, "b": 0.046} | values)
+    x, mode = servo_axis.start(0.0, 0.5, 0.0, p), 1
+    for n in range(25):
+        x, mode = servo_axis.advance(x, mode, p, 0.3 * math.sin(0.35 * n + 0.3), 0.0, 8e-3)
+    assert np.isfinite(x).all()
+    assert steps[0] < 25 * 250
+
+
+def test_a_quick_drive_asks_a_drivetrain_for_no_short_steps(monkeypatch):
+    steps = counted(monkeypatch, smooth_mode, "runge_kutta")
+    p = with_values(parameters(tau=1e-6), {"effects.gravity_load.amplitude": 0.5})
+    x = drivetrain.consistent_start((0.0,) * 12, p)
+    mode, table = drivetrain.initial_mode(x, p), drivetrain.prepare(p, 1.2e-3)
+    for n in range(40):
+        x, mode = drivetrain.advance(x, mode, p, 0.6 * math.sin(0.1 * n), 0.0, 1.2e-3, table)
+    assert steps[0] < 40 * 60
