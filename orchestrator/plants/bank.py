@@ -1,25 +1,21 @@
-"""The bank of effects: one row each, with what a fit needs to start from and how large the effect may be.
+"""The effects that the drivetrain may lack, one row each.
 
-A new effect needs its term in ``pyfmu_sources/effects.py`` (and the equations that call it), its parameters in the
-plant's table, and one row here; ``docs/diagnosis.md`` walks through an example.
+An effect is added in three places: its law in :mod:`pyfmu_sources.effects` (and where the equations call it), its
+parameters in the plant's table, and one row here; ``docs/diagnosis.md`` walks through an example.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from orchestrator.plants.effects import LEAST_CYCLES, Effect, Scene, Start
+from orchestrator.plants.effects import Effect, SignalScales, rms
+from orchestrator.plants.measurement import longest_time, times
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 
-Array = NDArray[np.float64]
-
-# Of the predictor alone: logarithm [rad] of the distance over which dry friction builds up, or of the penetration over
+# Of the analysis alone: logarithm [rad] of the distance over which dry friction builds up, or of the penetration over
 # which the damping of teeth in contact does.
 PRESLIDING = Parameter("presliding", "1", math.log(1e-5), math.log(1e-9), 0.0, "Logarithm of a build-up distance")
-
 
 # Shorter distances [rad] than an encoder sees are left out of the FMU, where they would only cost time.
 SHORTEST = 1e-7
@@ -30,7 +26,7 @@ def built_up(stated: float, fitted: float) -> float:
 
     Args:
         stated: distance in the model's own parameters [rad]; 0: none.
-        fitted: logarithm of the distance that the predictor has.
+        fitted: logarithm of the distance that the analysis has.
 
     Returns:
         The distance; 0.0: none.
@@ -46,6 +42,7 @@ def group(effect: str, *names: str) -> dict[str, str]:
 
     Args:
         effect: its name.
+        names: of the parameters behind ``effects.EFFECT.``.
 
     Returns:
         The names.
@@ -53,294 +50,220 @@ def group(effect: str, *names: str) -> dict[str, str]:
     return {name.rpartition(".")[2]: f"effects.{effect}.{name}" for name in names}
 
 
-def _speed(scene: Scene, site: str) -> float:
-    return scene.speed_l if site == "load" else scene.speed_m
+def _largest_torque(scales: SignalScales, site: str) -> float:
+    return float(np.abs(scales.requests).max()) * (1.0 if site == "motor" else scales.ratio)
 
 
-def _build_up(scene: Scene, site: str) -> tuple[float, float]:
-    return float(np.log(0.04 * scene.h * _speed(scene, site))), 2.0
+def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
+    """Return the rows of Coulomb's, Stribeck's and load-dependent friction at a body."""
 
+    def small(scales: SignalScales) -> float:
+        return 0.01 * scales.torque_at(site)
 
-def _friction(site: str) -> tuple[Effect, Effect]:
-    def unit(scene: Scene) -> float:
-        return 0.01 * scene.torque * (scene.ratio if site == "load" else 1.0)
+    def widths(scales: SignalScales, count: int) -> tuple[float, ...]:
+        return tuple(math.log(scales.resolutions[site] * 4.0**n) for n in range(count))
 
-    def rms(scene: Scene) -> float:
-        return _speed(scene, site)
+    def speeds(scales: SignalScales) -> tuple[float, ...]:
+        return tuple(share * scales.rms_speed(site) for share in (0.05, 0.15, 0.4))
 
-    def build_up(scene: Scene) -> tuple[float, float]:
-        return _build_up(scene, site)
-
-    def start(scene: Scene) -> Start:
-        return {"presliding": (build_up(scene)[0],)}
-
-    def refine(values: dict[str, float], scene: Scene) -> tuple[dict[str, float], ...]:
-        level = values["torque"]
-        common = {"coulomb": 0.9 * level, "breakaway": 1.7 * level, "presliding": values["presliding"]}
-        return tuple(common | {"stribeck_speed": f * rms(scene)} for f in (0.04, 0.25))
-
-    def falls(values: dict[str, float]) -> bool:
-        return values["breakaway"] > 1.02 * values["coulomb"] > 0.0
-
-    nuisances = {"presliding": f"presliding.{site}"}
-
-    def priors(scene: Scene) -> dict[str, tuple[float, float]]:
-        return {"presliding": build_up(scene)}
-
-    def bounds(scene: Scene) -> dict[str, tuple[float, float]]:
-        # Crossed in a moment, a lower speed is no more told by any record, and takes the shortest steps of all.
-        return {"stribeck_speed": (0.005 * rms(scene), math.inf)}
-
-    names = (f"{site}.coulomb", f"{site}.breakaway", f"{site}.stribeck_speed")
+    scanned = {"presliding": f"presliding.{site}"}
     coulomb = Effect(
-        "coulomb_friction", site, group("coulomb_friction", f"{site}.torque"), "torque", unit, start,
-        amplitudes=("torque",), scales=lambda s: {"presliding": 0.2},
-        family=f"dry friction of the {site}", nuisances=nuisances, priors=priors, leaves=0.04,
-        against="speed",
+        "coulomb_friction", site, "friction", group("coulomb_friction", f"{site}.torque"), "torque",
+        lambda s: {"torque": small(s)}, lambda s: {"presliding": widths(s, 3)}, ("torque",), signed=False,
+        scanned=scanned, possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed",
     )  # fmt: skip
     stribeck = Effect(
-        "stribeck_friction", site, group("stribeck_friction", *names), "coulomb", unit,
-        refine=refine, plausible=falls, bounds=bounds,
-        scales=lambda s: {"stribeck_speed": 0.02 * rms(s), "presliding": 0.2},
-        family=f"dry friction of the {site}", needs=f"coulomb_friction@{site}", nuisances=nuisances, priors=priors,
-        leaves=0.04, against="speed",
+        "stribeck_friction", site, "friction",
+        group("stribeck_friction", f"{site}.coulomb", f"{site}.breakaway", f"{site}.stribeck_speed"), "breakaway",
+        lambda s: {"coulomb": small(s), "breakaway": small(s), "stribeck_speed": 0.05 * s.rms_speed(site)},
+        lambda s: {"stribeck_speed": speeds(s), "presliding": widths(s, 2)}, ("coulomb", "breakaway"), signed=False,
+        bounds=lambda s: {"stribeck_speed": (0.005 * s.rms_speed(site), math.inf)}, scanned=scanned,
+        possible=lambda v, s: 1.02 * v["coulomb"] < v["breakaway"] < 1.5 * _largest_torque(s, site)
+        and v["stribeck_speed"] > 0.01 * s.rms_speed(site),
+        contains="coulomb_friction", against="speed",
     )  # fmt: skip
-    return coulomb, stribeck
+    loaded = Effect(
+        "load_dependent_friction", site, "friction", group("load_dependent_friction", f"{site}.coefficient"),
+        "coefficient", lambda s: {"coefficient": 0.01}, lambda s: {"presliding": widths(s, 3)[1:2]}, ("coefficient",),
+        signed=False, bounds=lambda s: {"coefficient": (0.0, 0.9)}, scanned=scanned,
+        possible=lambda v, s: v["coefficient"] < 0.5, against="speed",
+    )  # fmt: skip
+    return coulomb, stribeck, loaded
 
 
-def _fractions(scene: Scene) -> tuple[float, ...]:
-    return tuple(float(scene.twist * f) for f in (0.001, 0.003, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3, 0.6, 0.9))
-
-
-def _onset(scene: Scene) -> tuple[float, float]:
-    return float(np.log(0.03 * scene.twist)), 2.0
-
-
-def _limits(scene: Scene) -> tuple[float, ...]:
-    asked = np.abs(scene.u)
-    shares = (0.3, 0.5, 0.7, 0.8, 0.88, 0.93, 0.96, 0.98, 0.99, 0.995, 0.998)
-    near_largest = (0.8, 0.84, 0.88, 0.91, 0.94, 0.97, 0.99)
-    return tuple(float(v) for v in np.quantile(asked, shares)) + tuple(f * float(asked.max()) for f in near_largest)
-
-
-def _delays(scene: Scene) -> tuple[float, ...]:
-    return tuple(scene.h * f for f in (0.01, 0.02, 0.04, 0.12, 0.3, 0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0))
-
-
-def _rates(scene: Scene) -> tuple[float, ...]:
-    asked = np.abs(np.diff(scene.u)) / scene.h
-    changes = asked[asked > 0.0]
-    shares = (0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.995)
-    return tuple(float(v) for v in np.quantile(changes, shares)) if changes.size else ()
-
-
-def _frequencies(scene: Scene) -> tuple[float, ...]:
-    top = 0.8 * np.pi / scene.h
-    return tuple(float(f) for f in np.geomspace(min(8.0, top / 8), min(250.0, top), 48))
-
-
-def _band(scene: Scene) -> tuple[float, float]:
-    return 0.5 * _frequencies(scene)[0], 1.2 * _frequencies(scene)[-1]
-
-
-def _parts_of_the_load(scene: Scene) -> tuple[float, ...]:
-    return tuple(f * scene.inertia for f in (3e-4, 1.2e-3, 5e-3, 0.02, 0.08))
-
-
-def _periodic_at(site: str) -> str:
-    return f"periodic, {site}"
-
-
-def _periodic(
-    name: str, site: str, unit: Callable[[Scene], float], tolerance: float = 0.0, leaves: float = 0.01
-) -> Effect:
+def _directional_friction(site: str) -> Effect:
     return Effect(
-        name, site, group(name, "amplitude", "cycles_per_rev", "phase"), "amplitude", unit,
-        lambda scene: {"cycles_per_rev": scene.cycles.get(name, ())}, amplitudes=("amplitude",), phase="phase",
-        scales=lambda scene: {"cycles_per_rev": 0.01 / max(scene.turns, 1e-9), "phase": 0.05},
-        bounds=lambda scene: {"cycles_per_rev": (LEAST_CYCLES / max(scene.turns, 1e-9), 1e9)},
-        family=_periodic_at(site), tolerance={f"effects.{name}.amplitude": tolerance}, leaves=leaves,
+        "directional_friction", site, "speed", group("directional_friction", f"{site}.difference"), "difference",
+        lambda s: {"difference": 0.01 * s.torque_at(site) / s.rms_speed(site)}, amplitudes=("difference",),
+        against="speed",
     )  # fmt: skip
 
 
-def _eccentricity() -> Effect:
-    """Return the row of an eccentric gear, whose lever arm follows its ratio, or an encoder's, whose arm does not."""
-    wave = _periodic("gear_eccentricity", "shaft", lambda s: 0.003 * s.twist, tolerance=8e-3, leaves=0.04)
-    return replace(
-        wave,
-        parameters=wave.parameters | group(wave.name, "lever_arm"),
-        starts=lambda s: wave.starts(s) | {"lever_arm": (0.5,)},
-        scales=lambda s: wave.scales(s) | {"lever_arm": 0.3},
-        priors=lambda s: {"lever_arm": (0.5, 0.5)},
-        shape=("lever_arm",),
-    )
-
-
-def _torque(scene: Scene) -> float:
-    return 0.01 * scene.torque
-
-
-def _load_torque(scene: Scene) -> float:
-    return 0.01 * scene.torque * scene.ratio
-
-
-def _driving(scene: Scene) -> dict[str, tuple[float, float]]:
-    """Return which way a constant torque acts: one that holds back what goes one way is dry friction."""
-    if not scene.way:
-        return {}
-    return {"torque": (-BIG, 0.0) if scene.way > 0.0 else (0.0, BIG)}
-
-
-def directional_friction(site: str) -> Effect:
-    """Return the row of viscous friction that differs by direction.
-
-    Args:
-        site: "motor" or "load".
-
-    Returns:
-        The effect.
-    """
-    at_load = site == "load"
-
-    def unit(scene: Scene) -> float:
-        speed = scene.speed_l if at_load else scene.speed_m
-        return 0.01 * scene.torque * (scene.ratio if at_load else 1.0) / max(speed, 1e-12)
-
+def _timing(name: str, parameter: str) -> Effect:
     return Effect(
-        "directional_friction", site, group("directional_friction", f"{site}.difference"), "difference", unit,
-        amplitudes=("difference",), leaves=0.04, against="speed",
+        name, "actuator", "timing", group(name, parameter), parameter, lambda s: {parameter: 0.3 * s.step},
+        lambda s: {parameter: times(s)}, bounds=lambda s: {parameter: (0.0, longest_time(s))},
+        possible=lambda v, s: 0.15 * s.step < v[parameter] < 0.95 * longest_time(s), takes_drive=True,
+    )  # fmt: skip
+
+
+def _largest_request(scales: SignalScales) -> float:
+    return float(np.abs(scales.requests).max())
+
+
+def _limits(scales: SignalScales) -> tuple[float, ...]:
+    return tuple(float(q) for q in np.quantile(np.abs(scales.requests), (0.995, 0.98, 0.95, 0.9, 0.8, 0.65)))
+
+
+def _middle_request(scales: SignalScales) -> float:
+    return float(np.quantile(np.abs(scales.requests), 0.6))
+
+
+def _changes(scales: SignalScales) -> np.ndarray:
+    rates = np.abs(np.diff(scales.requests)) / scales.step
+    return rates[rates > 0.0]
+
+
+def _rates(scales: SignalScales) -> tuple[float, ...]:
+    changes = _changes(scales)
+    shares = (0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98)
+    return tuple(float(q) for q in np.quantile(changes, shares)) if changes.size else ()
+
+
+def _small_twist(scales: SignalScales) -> float:
+    return 0.02 * scales.typical_twist
+
+
+def _gaps(scales: SignalScales) -> tuple[float, ...]:
+    if not scales.twist.size:
+        return tuple(float(f * scales.typical_twist) for f in np.geomspace(0.1, 10.0, 10))
+    return tuple(float(q) for q in np.quantile(np.abs(scales.twist), (0.03, 0.1, 0.2, 0.35, 0.5, 0.7)))
+
+
+def _is_gap(values: Mapping[str, float], scales: SignalScales) -> bool:
+    return not scales.twist.size or values["alpha"] < 0.95 * float(np.abs(scales.twist).max())
+
+
+def _wave(name: str, site: str, small: str) -> Effect:
+    """Return the row of a wave over the motor's angle; ``small`` says what its amplitude is measured by."""
+
+    def least(scales: SignalScales) -> float:
+        return max(4.0 / scales.turns, 0.5)
+
+    sizes = {"torque": lambda s: 0.01 * s.torque, "twist": _small_twist}
+    return Effect(
+        name, site, "wave", group(name, "amplitude", "cycles_per_rev", "phase"), "amplitude",
+        lambda s: {"amplitude": sizes[small](s), "cycles_per_rev": 0.02 / s.turns}, amplitudes=("amplitude",),
+        phase="phase", bounds=lambda s: {"cycles_per_rev": (least(s), math.inf)},
+        possible=lambda v, s: v["cycles_per_rev"] > 1.03 * least(s), wave_site="motor", angular=True,
     )  # fmt: skip
 
 
 def _end_stop(side: str) -> Effect:
-    """Return the row of the end stop on one side: where it stands, how stiff it is and what it dissipates."""
+    """Return the row of the end stop on one side: where it stands and how stiff it is; its damping is that of metal."""
 
-    def travel(scene: Scene) -> float:
-        return max(scene.highest - scene.lowest, 1e-12)
+    def angles(scales: SignalScales) -> tuple[float, ...]:
+        x = scales.angles["load"]
+        travel = float(np.ptp(x)) + 1e-12
+        end, inwards = (float(x.max()), -travel) if side == "upper" else (float(x.min()), travel)
+        return tuple(end + share * inwards for share in (0.0005, 0.002, 0.006, 0.02, 0.06, 0.15))
 
-    def angles(scene: Scene) -> tuple[float, ...]:
-        end, inwards = (scene.highest, -travel(scene)) if side == "upper" else (scene.lowest, travel(scene))
-        return tuple(end + f * inwards for f in (0.0005, 0.002, 0.006, 0.02, 0.06, 0.15))
+    def stiffness(scales: SignalScales) -> float:
+        return scales.torque_at("load") / (float(np.ptp(scales.angles["load"])) + 1e-12)
 
-    def stiffness(scene: Scene) -> tuple[float, ...]:
-        return tuple(f * scene.torque * scene.ratio / travel(scene) for f in (3.0, 30.0, 300.0))
-
-    names = {"angle": side, "stiffness": "stiffness", "dissipation": "dissipation"}
-    return Effect(
-        f"{side}_end_stop", "load", {short: f"effects.end_stop.{name}" for short, name in names.items()},
-        "angle", lambda s: 1e-4 * travel(s),
-        lambda s: {"angle": angles(s), "stiffness": stiffness(s), "dissipation": (0.1,)},
-        scales=lambda s: {"stiffness": 0.1 * stiffness(s)[1], "dissipation": 0.1}, tries=3,
-        tolerance={"effects.end_stop.stiffness": 0.01}, leaves=0.06, against="position",
-        shared=("stiffness", "dissipation"),
-    )  # fmt: skip
-
-
-def _load_dependent(site: str) -> Effect:
-    def build_up(scene: Scene) -> tuple[float, float]:
-        # Its distance is that at 1 N.m, what is seen is that at the torque which the shaft carries.
-        carried = scene.torque * (scene.ratio if site == "load" else 1.0)
-        distance, width = _build_up(scene, site)
-        return distance - float(np.log(max(carried, 1e-9))), width
+    def is_touched(values: Mapping[str, float], scales: SignalScales) -> bool:
+        x = scales.angles["load"]
+        inside = values["angle"] < x.max() if side == "upper" else values["angle"] > x.min()
+        return bool(inside) and values["stiffness"] > 0.0
 
     return Effect(
-        "load_dependent_friction", site, group("load_dependent_friction", f"{site}.coefficient"), "coefficient",
-        lambda scene: 0.01, lambda scene: {"presliding": (build_up(scene)[0],)}, amplitudes=("coefficient",),
-        scales=lambda scene: {"presliding": 0.2}, family=f"dry friction of the {site}",
-        nuisances={"presliding": f"presliding.{site}"}, priors=lambda scene: {"presliding": build_up(scene)},
-        tolerance={f"effects.load_dependent_friction.{site}.coefficient": 0.01}, leaves=0.04, against="speed",
+        f"{side}_end_stop", "load", "position",
+        {"angle": f"effects.end_stop.{side}", "stiffness": "effects.end_stop.stiffness"}, "stiffness",
+        lambda s: {"angle": 1e-3 * float(np.ptp(s.angles["load"])), "stiffness": stiffness(s)},
+        lambda s: {"angle": angles(s)}, ("stiffness",), signed=False, possible=is_touched, against="position",
     )  # fmt: skip
 
 
 DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
-        "backlash", "shaft", {"alpha": "alpha"}, "alpha", lambda s: 0.003 * s.twist,
-        lambda s: {"alpha": _fractions(s), "onset": (_onset(s)[0],)}, family="weak shaft at small torque",
-        scales=lambda s: {"onset": 0.2}, nuisances={"onset": "contact.onset"}, priors=lambda s: {"onset": _onset(s)},
-        tolerance={"alpha": 2e-3, "k": 5e-4, "J_m": 4e-4, "J_l": 4e-4, "tau": 3e-4, "c": 0.01, "b_m": 3e-3,
-                   "b_l": 6e-3}, least_noise=9e-4, leaves=0.025,
+        "backlash", "shaft", "gap", {"alpha": "alpha"}, "alpha", lambda s: {"alpha": _small_twist(s)},
+        lambda s: {"alpha": _gaps(s)}, possible=_is_gap,
     ),
-    *_friction("motor"),
-    *_friction("load"),
-    _load_dependent("motor"),
-    _load_dependent("load"),
+    *_dry_friction("motor"),
+    *_dry_friction("load"),
     _end_stop("lower"),
     _end_stop("upper"),
+    _timing("input_delay", "delay"),
+    _timing("drive_filter", "time_constant"),
     Effect(
-        "input_delay", "actuator", group("input_delay", "delay"), "delay", lambda s: 0.02 * s.h,
-        lambda s: {"delay": _delays(s)}, family="late drive",
+        "torque_saturation", "actuator", "limit", group("torque_saturation", "limit"), "limit",
+        lambda s: {"limit": 0.02 * _largest_request(s)}, lambda s: {"limit": _limits(s)},
+        bounds=lambda s: {"limit": (_middle_request(s), BIG)},
+        possible=lambda v, s: _middle_request(s) < v["limit"] < 0.999 * _largest_request(s), takes_drive=True,
     ),
     Effect(
-        "torque_saturation", "actuator", group("torque_saturation", "limit"), "limit",
-        lambda s: 0.003 * float(np.max(np.abs(s.u))), lambda s: {"limit": _limits(s)},
+        "rate_limit", "actuator", "timing", group("rate_limit", "rate"), "rate",
+        lambda s: {"rate": 0.02 * float(np.max(np.abs(np.diff(s.requests)))) / s.step}, lambda s: {"rate": _rates(s)},
+        bounds=lambda s: {"rate": (1e-3 * float(np.max(_changes(s), initial=1.0)), BIG)},
+        possible=lambda v, s: v["rate"] < 0.999 * float(np.max(_changes(s), initial=0.0)), takes_drive=True,
     ),
     Effect(
-        "rate_limit", "actuator", group("rate_limit", "rate"), "rate",
-        lambda s: 0.003 * float(np.max(np.abs(np.diff(s.u)))) / s.h, lambda s: {"rate": _rates(s)}, family="late drive",
+        "hardening_stiffness", "shaft", "gap", group("hardening_stiffness", "cubic", "sharpness"), "cubic",
+        lambda s: {"cubic": 0.05 * s.stiffness / s.typical_twist**2, "sharpness": 0.3},
+        lambda s: {"sharpness": (0.0, 0.6, 1.2)}, ("cubic",), signed=False,
+        bounds=lambda s: {"sharpness": (0.0, 5.0)}, priors=lambda s: {"sharpness": (0.6, 0.6)},
+    ),
+    _wave("torque_ripple", "motor", "torque"),
+    _wave("gear_eccentricity", "shaft", "twist"),
+    Effect(
+        "load_torque", "load", "constant", group("load_torque", "torque"), "torque",
+        lambda s: {"torque": 0.01 * s.torque_at("load")}, amplitudes=("torque",),
     ),
     Effect(
-        "hardening_stiffness", "shaft", group("hardening_stiffness", "cubic", "sharpness"), "cubic",
-        lambda s: 0.02 * s.stiffness / s.twist**2, lambda s: {"sharpness": (0.6,)}, amplitudes=("cubic",),
-        scales=lambda s: {"sharpness": 0.3}, priors=lambda s: {"sharpness": (0.6, 0.6)}, shape=("sharpness",),
-        family="weak shaft at small torque", leaves=0.03,
-    ),
-    _periodic("torque_ripple", "motor", _torque),
-    _eccentricity(),
-    Effect(
-        "load_torque", "load", group("load_torque", "torque"), "torque", _load_torque, amplitudes=("torque",),
-        bounds=_driving,
+        "gravity_load", "load", "position", group("gravity_load", "amplitude", "phase"), "amplitude",
+        lambda s: {"amplitude": 0.01 * s.torque_at("load")}, amplitudes=("amplitude",), phase="phase", angular=True,
+        possible=lambda v, s: float(np.ptp(s.angles["load"])) > 0.5, against="angle",
     ),
     Effect(
-        "gravity_load", "load", group("gravity_load", "amplitude", "phase"), "amplitude", _load_torque,
-        amplitudes=("amplitude",), phase="phase", scales=lambda s: {"phase": 0.05}, angular=True,
-        against="angle", family=_periodic_at("motor"),  # a ripple of one cycle a turn of the load
+        "extra_resonance", "load", "resonance",
+        group("extra_resonance", "inertia", "frequency", "damping_ratio"), "inertia",
+        lambda s: {"inertia": 0.02 * s.inertia, "frequency": 0.5, "damping_ratio": 0.01},
+        lambda s: {"frequency": tuple(2.0 * np.pi * f for f in np.geomspace(s.cutoff / 12, 0.8 * s.cutoff, 20)),
+                   "damping_ratio": (0.03,)},
+        ("inertia",), signed=False, bounds=lambda s: {"frequency": (0.1, 2.0 * np.pi * s.cutoff),
+                                                      "damping_ratio": (0.0, 1.0)},
+        priors=lambda s: {"damping_ratio": (0.03, 0.03)}, memory=True,
     ),
     Effect(
-        "extra_resonance", "load", group("extra_resonance", "inertia", "frequency", "damping_ratio"), "inertia",
-        lambda s: 0.01 * s.inertia,
-        lambda s: {"frequency": _frequencies(s), "damping_ratio": (0.03,), "inertia": _parts_of_the_load(s)},
-        scales=lambda s: {"frequency": 0.5, "damping_ratio": 0.01},
-        bounds=lambda s: {"frequency": _band(s), "damping_ratio": (0.0, 1.0)},
-        priors=lambda s: {"damping_ratio": (0.03, 0.03)},  # of metal: where a record does not tell it, it is not zero
-        # Below its resonance the added inertia moves with the load, so the re-fitted J_l already holds it.
-        taken_from={"inertia": "J_l"}, tries=3, memory=True,
+        "quadratic_drag", "load", "speed", group("quadratic_drag", "coefficient"), "coefficient",
+        lambda s: {"coefficient": 0.01 * s.torque_at("load") / s.rms_speed("load") ** 2},
+        amplitudes=("coefficient",), signed=False, against="speed",
     ),
     Effect(
-        "quadratic_drag", "load", group("quadratic_drag", "coefficient"), "coefficient",
-        lambda s: 0.01 * s.torque * s.ratio / s.speed_l**2, amplitudes=("coefficient",),
-        against="speed",
+        "sensor_offset", "motor", "constant", group("sensor_offset", "motor.offset"), "offset",
+        lambda s: {"offset": _small_twist(s) * s.ratio}, amplitudes=("offset",), both_encoders=True,
     ),
     Effect(
-        "sensor_offset", "motor", group("sensor_offset", "motor.offset"), "offset",
-        lambda s: 0.003 * s.twist * s.ratio, amplitudes=("offset",),
-        family="offset between the encoders", both_encoders=True,
+        "sensor_offset", "load", "constant", group("sensor_offset", "load.offset"), "offset",
+        lambda s: {"offset": _small_twist(s)}, amplitudes=("offset",), both_encoders=True,
+    ),
+    _directional_friction("motor"),
+    _directional_friction("load"),
+    Effect(
+        "spring_load", "load", "position", group("spring_load", "stiffness", "angle"), "stiffness",
+        lambda s: {"stiffness": 0.01 * s.torque_at("load") / rms(s.angles["load"] - s.angles["load"].mean()),
+                   "angle": 0.05},
+        lambda s: {"angle": (float(s.angles["load"].mean()),)}, ("stiffness",), signed=False, against="position",
     ),
     Effect(
-        "sensor_offset", "load", group("sensor_offset", "load.offset"), "offset", lambda s: 0.003 * s.twist,
-        amplitudes=("offset",),
-        family="offset between the encoders", both_encoders=True,
+        "varying_inertia", "load", "position", group("varying_inertia", "amplitude", "phase"), "amplitude",
+        lambda s: {"amplitude": 0.02 * s.inertia}, amplitudes=("amplitude",), phase="phase", angular=True,
+        possible=lambda v, s: float(np.ptp(s.angles["load"])) > 0.5,
     ),
     Effect(
-        "drive_filter", "actuator", group("drive_filter", "time_constant"), "time_constant", lambda s: 0.02 * s.h,
-        lambda s: {"time_constant": _delays(s)}, family="late drive",
-    ),
-    directional_friction("motor"),
-    directional_friction("load"),
-    Effect(
-        "spring_load", "load", group("spring_load", "stiffness", "angle"), "stiffness",
-        lambda s: 0.01 * s.torque * s.ratio**2 / (2.0 * np.pi * max(s.turns, 1e-9)), lambda s: {"angle": (0.0,)},
-        amplitudes=("stiffness",), scales=lambda s: {"angle": 0.05}, against="position",
-    ),
-    Effect(
-        "varying_inertia", "load", group("varying_inertia", "amplitude", "phase"), "amplitude",
-        lambda s: 0.01 * s.inertia, amplitudes=("amplitude",), phase="phase", scales=lambda s: {"phase": 0.05},
-        angular=True,
-    ),
-    Effect(
-        "shaft_hysteresis", "shaft", group("shaft_hysteresis", "torque", "twist"), "torque",
-        lambda s: 0.01 * s.torque * s.ratio, lambda s: {"twist": tuple(f * s.twist for f in (0.1, 0.3, 1.0, 2.0))},
-        amplitudes=("torque",), scales=lambda s: {"twist": 0.02 * s.twist},
-        bounds=lambda s: {"twist": (0.02 * s.twist, 5.0 * s.twist)}, family="weak shaft at small torque",
-        memory=True,
+        "shaft_hysteresis", "shaft", "gap", group("shaft_hysteresis", "torque", "twist"), "torque",
+        lambda s: {"torque": 0.01 * s.torque_at("load"), "twist": 0.05 * s.typical_twist},
+        lambda s: {"twist": tuple(f * s.typical_twist for f in (0.1, 0.4, 1.2))}, ("torque",), signed=False,
+        bounds=lambda s: {"twist": (0.02 * s.typical_twist, 5.0 * s.typical_twist)}, memory=True,
     ),
 )  # fmt: skip

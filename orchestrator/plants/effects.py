@@ -1,8 +1,8 @@
-"""What an effect is to a diagnosis: its parameters, what a fit starts from, how large it may be."""
+"""One row of a bank of effects: its parameters in the plant's table, where a search starts, which values a machine can have."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -12,204 +12,170 @@ from numpy.typing import NDArray
 from pyfmu_sources.drivetrain_parameters import Parameter
 
 Array = NDArray[np.float64]
-LEAST_CYCLES = 0.7  # of a wave in the travel: what comes round less than that is told from no spring
+Starts = Mapping[str, tuple[float, ...]]
+Bounds = Mapping[str, tuple[float, float]]
 
 
-class Places(Protocol):
+class ParameterTable(Protocol):
     """What an effect asks of the plant that it belongs to."""
 
     def index(self, name: str) -> int:
-        """Return the place of a parameter in the predictor's tuple.
-
-        Args:
-            name: in the plant's table.
-
-        Returns:
-            The place, from 0.
-        """
+        """Return the place of a parameter in the plant's tuple."""
 
     def entry(self, place: int) -> Parameter:
-        """Return what is known of the parameter at a place.
-
-        Args:
-            place: in the predictor's tuple.
-
-        Returns:
-            Name, default, bounds and unit.
-        """
+        """Return the table row of the parameter at a place."""
 
 
-@dataclass(frozen=True)
-class Scene:
-    """What starting values depend on: typical sizes of the record's signals.
+@dataclass(frozen=True, eq=False)
+class SignalScales:
+    """Typical sizes of a record's signals, on which starts and small changes depend.
 
     Attributes:
-        h: sample time [s].
+        step: sample time of the analysis [s].
+        cutoff: highest frequency of the balances [Hz].
+        requests: (n,) requested torque [N.m].
         torque: rms of the drive's torque [N.m].
-        u: (n,) requested torque [N.m].
-        speed_m, speed_l: rms speeds [rad/s].
-        twist: largest twist of the fitted model [rad].
-        inertia: of the load [kg.m2].
-        stiffness: of the shaft [N.m/rad].
-        ratio: gear ratio.
-        turns: travel of the motor in revolutions.
-        lowest, highest: angles [rad] between which the load moves.
-        cycles: name of a periodic effect -> cycles per revolution at the peaks of its frequency scan.
-        angles: (n,) of the load [rad], sample by sample; empty: not known.
-        way: 1 or -1: the motor turns that way only; 0: it turns back.
+        angles: site -> (n,) angle of the body [rad].
+        speeds: site -> (n,) its speed [rad/s].
+        resolutions: site -> shortest distance [rad] that its encoder shows.
+        acceleration: rms of the load's acceleration [rad/s2].
+        inertia: of the load, or of the only body [kg.m2].
+        stiffness: of the shaft [N.m/rad]; 0: there is none.
+        ratio: of the gear.
+        twist: (n,) measured twist of the shaft [rad]; empty: it is not measured, or there is no shaft.
+        angular: positions are angles, not metres.
     """
 
-    h: float
+    step: float
+    cutoff: float
+    requests: Array
     torque: float
-    u: Array
-    speed_m: float
-    speed_l: float
-    twist: float
+    angles: Mapping[str, Array]
+    speeds: Mapping[str, Array]
+    resolutions: Mapping[str, float]
+    acceleration: float
     inertia: float
     stiffness: float
     ratio: float
-    turns: float
-    lowest: float
-    highest: float
-    cycles: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    angles: Array = field(default_factory=lambda: np.empty(0))
-    way: float = 0.0
+    twist: Array
+    angular: bool = True
+
+    def rms_speed(self, site: str) -> float:
+        """Return the rms speed [rad/s] of a body.
+
+        Args:
+            site: of the body.
+
+        Returns:
+            The speed.
+        """
+        return rms(self.speeds[site])
+
+    def torque_at(self, site: str) -> float:
+        """Return the rms of the drive's torque as a body behind the gear feels it [N.m].
+
+        Args:
+            site: of the body.
+
+        Returns:
+            The torque.
+        """
+        return self.torque * (1.0 if site == "motor" else self.ratio)
 
     @property
-    def middle(self) -> float:
-        """Return the angle of the load in the middle of its travel [rad]."""
-        return 0.5 * (self.lowest + self.highest)
+    def turns(self) -> float:
+        """Return the travel of the motor in revolutions."""
+        return float(np.ptp(self.angles["motor"])) / (2.0 * np.pi) + 1e-12
+
+    @property
+    def typical_twist(self) -> float:
+        """Return the rms of the twist [rad]; of what the torque winds up where the twist is not measured."""
+        if self.twist.size:
+            return rms(self.twist)
+        return self.torque_at("load") / self.stiffness if self.stiffness > 0.0 else 1.0
 
 
-Start = dict[str, tuple[float, ...]]
+def rms(values: Array) -> float:
+    """Return the root of the mean square, never zero.
+
+    Args:
+        values: any shape.
+
+    Returns:
+        The root.
+    """
+    return float(np.sqrt(np.mean(values * values))) + 1e-300
+
+
+def _any_values(values: Mapping[str, float], scales: SignalScales) -> bool:
+    del values, scales
+    return True
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One row of the bank.
+    """One row of a bank.
 
     Attributes:
-        name: of the effect, as in the report.
+        name: of the effect.
         site: part of the machine at which it acts.
+        kind: what sort of law it is; effects of one kind may stand for each other.
         parameters: short name -> name in the plant's table.
-        size: the parameter whose zero (or ``off``) value switches the effect off.
-        unit_of_size: scene -> a small amount of ``size``, used for differences and as the scale of the fit.
-        starts: scene -> values to try of every parameter that is not found by regression (all combinations).
-        amplitudes: short names of parameters in which the response is linear, found by regression.
+        size: the parameter whose zero (or default) switches the effect off.
+        scales: signal scales -> short name -> a small change of each parameter.
+        starts: signal scales -> short name -> values to try, in all combinations.
+        amplitudes: short names of parameters in which the torque balance is linear, found by regression.
         phase: short name of a phase; amplitude and phase are then found together from sine and cosine.
-        scales: scene -> scale of the other parameters.
-        family: effects with the same family look alike when the experiment is poor.
-        needs: label of an effect that this one contains; it is tried only when that one pays, from
-        refine: (values of that one, scene) -> starting values.
-        plausible: values -> False when the fit has left what the effect means.
-        bounds: scene -> short name -> (least, largest), narrower than the table's.
-        nuisances: parameters of the predictor alone that are fitted with the effect, and not reported as its own.
-        priors: scene -> short name -> (mean, standard deviation).
-        shape: parameters by which laws of this kind differ; each has a prior, which speaks where a record does not.
-        angular: True if it makes sense for an angle only, not for a position in metres.
-        both_encoders: True if it can be seen only with an encoder on either side.
-        leaves: share of what the effect gains that its law, not being exact, may leave for other effects to gain.
-        least_noise: level of process noise, as a share of the drive's torque, below which no model with this effect is
-            trusted: impacts amplify what their law leaves out, and a predictor that is hardly corrected goes astray.
-        taken_from: short name -> parameter of the plant that holds as much already, if it has been re-fitted: it is
-            lowered by as much when the effect is put into a model.
-        tries: how many starts, of different values of the first parameter in ``starts``, are fitted in full.
-        tolerance: name in the plant's table -> share of its value to which laws of this kind, of which none is exact,
-            leave the parameter undefined (standard deviation; measured on records made with other laws).
-        against: quantity against which its law is drawn: "speed", "angle" of the load within a turn, its
-            "position" over all turns; "": that of its site.
-        shared: parameters that another effect may need: they stay as they are when this one is taken out.
-        memory: it has a state of its own that no encoder shows: a stretch of a record cannot be begun in its middle.
+        signed: amplitudes may have either sign.
+        bounds: signal scales -> short name -> (least, largest), narrower than the table's.
+        priors: signal scales -> short name -> (mean, standard deviation).
+        scanned: short name -> name in the plant's table: what is tried at its starts and neither fitted nor reported.
+        possible: (values by short name, signal scales) -> whether a machine can have them, and the record can show it.
+        contains: name of the simpler effect at the same site that it stands for.
+        both_encoders: it can be seen only with an encoder on either side.
+        angular: it makes sense for an angle only, not for a position in metres.
+        wave_site: body over whose angle it repeats; "": it does not.
+        takes_drive: it takes torque away from the drive.
+        memory: it has a state of its own that no encoder shows.
         measurement: it is no physics of the machine but a property of its log.
+        against: quantity against which its law is drawn: "speed", "angle" within a turn, or "position"; "": none.
     """
 
     name: str
     site: str
+    kind: str
     parameters: dict[str, str]
     size: str
-    unit_of_size: Callable[[Scene], float]
-    starts: Callable[[Scene], Start] = lambda scene: {}
+    scales: Callable[[SignalScales], Mapping[str, float]]
+    starts: Callable[[SignalScales], Starts] = lambda scales: {}
     amplitudes: tuple[str, ...] = ()
     phase: str = ""
-    scales: Callable[[Scene], dict[str, float]] = lambda scene: {}
-    family: str = ""
-    needs: str = ""
-    refine: Callable[[dict[str, float], Scene], tuple[dict[str, float], ...]] = lambda values, scene: ()
-    plausible: Callable[[dict[str, float]], bool] = lambda values: True
-    bounds: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
+    signed: bool = True
+    bounds: Callable[[SignalScales], Bounds] = lambda scales: {}
+    priors: Callable[[SignalScales], Bounds] = lambda scales: {}
+    scanned: dict[str, str] = field(default_factory=dict)
+    possible: Callable[[Mapping[str, float], SignalScales], bool] = _any_values
+    contains: str = ""
     both_encoders: bool = False
     angular: bool = False
-    nuisances: dict[str, str] = field(default_factory=dict)
-    priors: Callable[[Scene], dict[str, tuple[float, float]]] = lambda scene: {}
-    shape: tuple[str, ...] = ()
-    leaves: float = 0.01
-    least_noise: float = 0.0
-    taken_from: dict[str, str] = field(default_factory=dict)
-    tries: int = 1
-    tolerance: dict[str, float] = field(default_factory=dict)
-    against: str = ""
-    shared: tuple[str, ...] = ()
+    wave_site: str = ""
+    takes_drive: bool = False
     memory: bool = False
     measurement: bool = False
+    against: str = ""
 
     @property
     def label(self) -> str:
-        """Return name and site, unique in the bank."""
+        """Return name and site, unique in a bank."""
         return f"{self.name}@{self.site}"
 
-    def put(self, plant: Places, p: Array, values: Mapping[str, float], refitted: Collection[int]) -> Array:
-        """Return parameters ``p`` of a model without the effect with ``values`` of it put in, within their bounds.
-
-        ``refitted`` are the places of the plant's own parameters that have been fitted without the effect.
-
-        Args:
-            plant: to which the effect belongs.
-            p: the predictor's parameters, (n,).
-            values: by short name.
-            refitted: places of the plant's own parameters that have been fitted without the effect.
-
-        Returns:
-            A copy of ``p``.
-        """
-        moved = p.copy()
-        for short, place in self.places(plant).items():
-            if short in values:
-                entry = plant.entry(place)
-                moved[place] = min(max(values[short], entry.minimum), entry.maximum)
-                if self._holder(plant, short) in refitted:
-                    moved[self._holder(plant, short)] -= moved[place]
-        return moved
-
-    def taken_out(self, plant: Places, p: Array, default: Array, refitted: Collection[int]) -> Array:
-        """Return parameters ``p`` with the effect switched off, its parameters but shared ones at their ``default``.
-
-        Args:
-            plant: to which the effect belongs.
-            p: the predictor's parameters, (n,).
-            default: the predictor's defaults, (n,).
-            refitted: places of the plant's own parameters that have been fitted without the effect.
-
-        Returns:
-            A copy of ``p``.
-        """
-        moved = p.copy()
-        for short, place in self.places(plant).items():
-            if self._holder(plant, short) in refitted:
-                moved[self._holder(plant, short)] += moved[place]
-            if short not in self.shared:
-                moved[place] = default[place]
-        return moved
-
-    def _holder(self, plant: Places, short: str) -> int:
-        return plant.index(self.taken_from[short]) if short in self.taken_from else -1
-
-    def places(self, plant: Places) -> dict[str, int]:
-        """Return the place of each parameter in the predictor's tuple, by short name, nuisances last.
+    def places(self, plant: ParameterTable) -> dict[str, int]:
+        """Return the place of each parameter in the plant's tuple by short name, scanned ones last.
 
         Args:
             plant: to which the effect belongs.
 
         Returns:
-            The places, from 0.
+            The places.
         """
-        return {short: plant.index(name) for short, name in (self.parameters | self.nuisances).items()}
+        return {short: plant.index(name) for short, name in (self.parameters | self.scanned).items()}

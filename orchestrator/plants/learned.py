@@ -158,8 +158,8 @@ def rubbing(plant: Plant, argument: Argument) -> Effect | None:
     """
     if argument.kind not in (MOTOR_SPEED, LOAD_SPEED):
         return None
-    alike = (one for one in plant.bank if one.label == f"coulomb_friction@{argument.site}" and one.nuisances)
-    return next((one for one in alike if set(one.nuisances.values()) <= set(plant.names)), None)
+    alike = (one for one in plant.bank if one.label == f"coulomb_friction@{argument.site}" and one.scanned)
+    return next((one for one in alike if set(one.scanned.values()) <= set(plant.names)), None)
 
 
 def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:

@@ -1,0 +1,1 @@
+"""What a record gives to an analysis: signals at one rate and band, and a test part that no analysis sees."""

@@ -1,0 +1,1 @@
+"""Whitening, fits and cross-validation of any model."""

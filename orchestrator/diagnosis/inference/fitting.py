@@ -1,0 +1,197 @@
+"""Damped least squares on whitened residuals, and the score of a fitted model on blocks left out.
+
+With the derivatives J at the fit, leaving block B out moves the values by ``-(N - N_B)^-1 (g - g_B)``, N being ``J'J`` and
+g ``J'r``: all blocks cost one set of normal equations each (blocked cross-validation, Roberts et al., 2017). Two models
+are compared by the paired difference over blocks and its standard error.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.inference.problem import Coordinate, FitProblem
+from orchestrator.diagnosis.model.interface import ModelPoint
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedModel:
+    """A fitted model.
+
+    Attributes:
+        point: its values.
+        coordinates: what was fitted.
+        residual: (rows,) whitened.
+        jacobian: (rows, coordinates).
+        cost: squared residuals and prior.
+        covariance: (coordinates, coordinates) of white residuals.
+        block_errors: (blocks,) squared error of each block, predicted from the others.
+        block_shifts: (blocks, coordinates) how the values move when a block is left out.
+    """
+
+    point: ModelPoint
+    coordinates: tuple[Coordinate, ...]
+    residual: Array
+    jacobian: Array
+    cost: float
+    covariance: Array
+    block_errors: Array
+    block_shifts: Array
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Return the effects of the model, in the order in which they came."""
+        return tuple(self.point.effects)
+
+    @property
+    def score(self) -> float:
+        """Return the squared error over all blocks, each predicted from the others."""
+        return float(self.block_errors.sum())
+
+    @property
+    def jackknife(self) -> Array:
+        """Return the covariance (coordinates, coordinates) of the values by what blocks differ by."""
+        count = len(self.block_errors)
+        off = self.block_shifts - self.block_shifts.mean(axis=0)
+        return np.asarray((count - 1) / count * off.T @ off)
+
+
+def fit_model(problem: FitProblem, point: ModelPoint, iterations: int = 0) -> FittedModel:
+    """Fit a model by Gauss and Newton's steps, damped where a step does not help.
+
+    Args:
+        problem: records, whitening, prior.
+        point: where to start.
+        iterations: steps at most; 0: as the settings say.
+
+    Returns:
+        The fitted model.
+    """
+    coordinates = problem.coordinates(point)
+    (residual,) = problem.whitened([point])
+    prior, slopes = problem.prior(point, coordinates)
+    cost, damping = float(residual @ residual + prior @ prior), 1e-6
+    jacobian = problem.jacobian(point, coordinates, residual)
+    for _ in range(iterations or problem.settings.iterations):
+        normal, gradient = jacobian.T @ jacobian + np.diag(slopes**2), jacobian.T @ residual + slopes * prior
+        step = None
+        for _ in range(4):
+            step = _damped_step(problem, point, coordinates, normal, gradient, damping)
+            if step[2] < cost:
+                break
+            damping = max(30.0 * damping, 1e-3)
+        assert step is not None
+        if step[2] >= cost:
+            break
+        gain = cost - step[2]
+        point, residual, cost = step
+        prior, slopes = problem.prior(point, coordinates)
+        damping /= 10.0
+        jacobian = problem.jacobian(point, coordinates, residual)
+        if gain < 1e-3 * cost and gain < 0.5:
+            break
+    return _scored(problem, point, coordinates, residual, jacobian, cost)
+
+
+def _damped_step(
+    problem: FitProblem, point: ModelPoint, coordinates: Sequence[Coordinate], normal: Array, gradient: Array,
+    damping: float,
+) -> tuple[ModelPoint, Array, float]:  # fmt: skip
+    diagonal = np.diag(normal)
+    step = -np.linalg.lstsq(normal + np.diag(damping * diagonal + 1e-12), gradient, rcond=None)[0]
+    moved = problem.moved(point, coordinates, step)
+    (residual,) = problem.whitened([moved])
+    prior, _ = problem.prior(moved, coordinates)
+    cost = float(residual @ residual + prior @ prior)
+    return moved, residual, cost if np.isfinite(cost) else np.inf
+
+
+def _scored(
+    problem: FitProblem, point: ModelPoint, coordinates: Sequence[Coordinate], residual: Array, jacobian: Array,
+    cost: float,
+) -> FittedModel:  # fmt: skip
+    prior, slopes = problem.prior(point, coordinates)
+    count, width = problem.block_count, len(coordinates)
+    normals, gradients, squares = np.empty((count, width, width)), np.empty((count, width)), np.empty(count)
+    for block in range(count):
+        rows = problem.blocks == block
+        part = jacobian[rows]
+        normals[block], gradients[block] = part.T @ part, part.T @ residual[rows]
+        squares[block] = residual[rows] @ residual[rows]
+    normal = normals.sum(axis=0) + np.diag(slopes**2)
+    gradient = gradients.sum(axis=0) + slopes * prior
+    # What a record begins with belongs to its first block alone, and stays.
+    moving = [n for n, one in enumerate(coordinates) if not (isinstance(one, int) and problem.parameters[one].local)]
+    errors, shifts = np.empty(count), np.zeros((count, width))
+    for block in range(count):
+        inner = (normal - normals[block])[np.ix_(moving, moving)]
+        ridge = 1e-10 * np.diag(np.diag(inner) + 1e-30)
+        shifts[block, moving] = -np.linalg.lstsq(inner + ridge, (gradient - gradients[block])[moving], rcond=1e-12)[0]
+        shift = shifts[block]
+        errors[block] = squares[block] + 2.0 * shift @ gradients[block] + shift @ normals[block] @ shift
+    return FittedModel(
+        point, tuple(coordinates), residual, jacobian, cost, np.linalg.pinv(normal, hermitian=True),
+        np.maximum(errors, 1e-12 * squares.sum()), shifts,
+    )  # fmt: skip
+
+
+def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
+    """Return the problem with the prior weighed by how much more blocks differ than white residuals do.
+
+    Args:
+        problem: of the fit.
+        fitted: a model.
+
+    Returns:
+        A copy with another overdispersion.
+    """
+    places = [
+        n for n, one in enumerate(fitted.coordinates) if isinstance(one, int) and not problem.parameters[one].local
+    ]
+    count = len(fitted.block_errors)
+    variance = (count - 1) / count * np.sum((fitted.block_shifts - fitted.block_shifts.mean(axis=0)) ** 2, axis=0)
+    normal = fitted.jacobian.T @ fitted.jacobian
+    white = np.diag(np.linalg.pinv(normal + 1e-9 * np.eye(len(normal)), hermitian=True))
+    seen = [n for n in places if white[n] < problem.parameters[fitted.coordinates[n]].spread ** 2]  # type: ignore[index]
+    if not seen:
+        return problem
+    found = float(np.median(variance[seen] / white[seen]))
+    return replace(problem, overdispersion=float(np.clip(found, 1.0, problem.settings.most_overdispersion)))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How much better one model predicts blocks left out than another.
+
+    Attributes:
+        gain: share of the squared error that it takes away.
+        t: paired gain over its standard error: the larger of the mean log ratio, in which blocks count alike, and the
+            pooled ratio, in which they count by their error.
+    """
+
+    gain: float
+    t: float
+
+
+def compare(before: FittedModel, after: FittedModel) -> Comparison:
+    """Compare two models of one problem, block by block.
+
+    Args:
+        before: the model without.
+        after: the model with.
+
+    Returns:
+        The gain of ``after``.
+    """
+    a, b = before.block_errors, after.block_errors
+    count = len(a)
+    logs = np.log(a / b)
+    even = logs.mean() / (logs.std(ddof=1) / np.sqrt(count) + 1e-9)
+    ratio = a.sum() / b.sum()
+    influence = (a - ratio * b) / b.mean() / ratio
+    pooled = np.log(ratio) / (influence.std(ddof=1) / np.sqrt(count) + 1e-9)
+    t = max(even, pooled) if ratio > 1.0 else min(even, pooled)
+    return Comparison(float(1.0 - b.sum() / a.sum()), float(t))

@@ -1,0 +1,252 @@
+"""Records of one machine beside one model: whitened residuals, their derivatives, the prior, blocks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.inference.whitening import Whitening, band_only, estimate_whitening
+from orchestrator.diagnosis.model.interface import (
+    CandidateEffect,
+    ModelPoint,
+    ResidualModel,
+    UncertainParameter,
+    Values,
+)
+from orchestrator.diagnosis.settings import FitSettings
+
+Array = NDArray[np.float64]
+Coordinate = int | tuple[str, int]
+"""Place of an uncertain parameter, or label of an effect and place of one of its values."""
+
+SMALL_SHARE = 1e-2  # of a parameter, for its derivative
+FARTHEST = 1e-3  # of its nominal value, below which no parameter falls
+
+
+@dataclass(frozen=True, eq=False)
+class FitProblem:
+    """Records beside a model that they share.
+
+    Attributes:
+        models: one for each record; they share effects and all parameters but local ones.
+        whitenings: one for each record.
+        settings: of fits.
+        overdispersion: by how much blocks differ more than white residuals do, as a factor on variances: the prior
+            counts for as much more.
+    """
+
+    models: tuple[ResidualModel, ...]
+    whitenings: tuple[Whitening, ...]
+    settings: FitSettings
+    overdispersion: float = 1.0
+
+    @cached_property
+    def shared(self) -> tuple[UncertainParameter, ...]:
+        """Parameters that all records share."""
+        return tuple(entry for entry in self.models[0].parameters if not entry.local)
+
+    @cached_property
+    def parameters(self) -> tuple[UncertainParameter, ...]:
+        """All parameters: shared ones, then the local ones of each record."""
+        return (*self.shared, *(entry for model in self.models for entry in model.parameters if entry.local))
+
+    @property
+    def effects(self) -> dict[str, CandidateEffect]:
+        """Return the effects by label."""
+        return dict(self.models[0].effects)
+
+    @property
+    def start(self) -> ModelPoint:
+        """Return the nominal point: no effect, local parameters zero."""
+        return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in self.parameters))
+
+    @cached_property
+    def blocks(self) -> NDArray[np.int64]:
+        """(rows,) block of each whitened residual: contiguous in time, none reaches over two records."""
+        counts = [whitening.rows.size for whitening in self.whitenings]
+        wanted = min(self.settings.blocks, max(sum(counts) // self.settings.rows_per_block, 4))
+        each = [max(round(wanted * count / sum(counts)), 1) for count in counts]
+        found, first = [], 0
+        for whitening, count, number in zip(self.whitenings, counts, each, strict=True):
+            found.append(np.tile(first + np.arange(count) * number // count, len(whitening.active)))
+            first += number
+        return np.concatenate(found)
+
+    @property
+    def block_count(self) -> int:
+        """Return the number of blocks."""
+        return int(self.blocks[-1]) + 1
+
+    def record_points(self, point: ModelPoint) -> list[ModelPoint]:
+        """Return what each record's model sees of a point.
+
+        Args:
+            point: with the local parameters of all records.
+
+        Returns:
+            One point for each record.
+        """
+        place, found = len(self.shared), []
+        for model in self.models:
+            count = sum(entry.local for entry in model.parameters)
+            local = point.parameters[place : place + count]
+            found.append(ModelPoint((*point.parameters[: len(self.shared)], *local), point.effects))
+            place += count
+        return found
+
+    def whitened(self, points: Sequence[ModelPoint]) -> list[Array]:
+        """Return the whitened residuals (rows,) of all records at each of some points.
+
+        Args:
+            points: values of the model.
+
+        Returns:
+            One vector for each.
+        """
+        seen = [self.record_points(point) for point in points]
+        parts = [
+            [whitening.apply(found) for found in model.residuals([of_records[n] for of_records in seen])]
+            for n, (model, whitening) in enumerate(zip(self.models, self.whitenings, strict=True))
+        ]
+        return [np.concatenate(of_records) for of_records in zip(*parts, strict=True)]
+
+    def reweighted(self, point: ModelPoint) -> "FitProblem":
+        """Return the problem with the whitening that the residuals at a point ask for.
+
+        Args:
+            point: values of the model.
+
+        Returns:
+            A copy.
+        """
+        seen = self.record_points(point)
+        found = tuple(
+            estimate_whitening(model, model.residuals([one])[0], self.settings)
+            for model, one in zip(self.models, seen, strict=True)
+        )
+        return replace(self, whitenings=found)
+
+    # --- coordinates ---------------------------------------------------------------------------------------
+
+    def coordinates(self, point: ModelPoint) -> list[Coordinate]:
+        """Return what a fit moves: every parameter, and the values of effects that are not scanned.
+
+        Args:
+            point: with the effects of the model.
+
+        Returns:
+            The coordinates, parameters first.
+        """
+        effects = self.models[0].effects
+        return [*range(len(self.parameters)), *((label, n) for label in point.effects for n in effects[label].fitted)]
+
+    def moved(self, point: ModelPoint, coordinates: Sequence[Coordinate], steps: Array) -> ModelPoint:
+        """Return a point moved by steps: shares of parameters, scales of effects' values; bounds are kept.
+
+        Args:
+            point: to move.
+            coordinates: what moves.
+            steps: (coordinates,) how far.
+
+        Returns:
+            The new point.
+        """
+        parameters = list(point.parameters)
+        effects = {label: list(values) for label, values in point.effects.items()}
+        for coordinate, step in zip(coordinates, steps, strict=True):
+            if isinstance(coordinate, int):
+                entry = self.parameters[coordinate]
+                moved = parameters[coordinate] + float(step) * entry.nominal
+                least = FARTHEST * entry.nominal
+                parameters[coordinate] = moved if entry.local else max(moved, least) if least > 0 else min(moved, least)
+            else:
+                label, place = coordinate
+                effect = self.models[0].effects[label]
+                value = effects[label][place] + float(step) * effect.scales[place]
+                effects[label][place] = effect.bounded(place, value)
+        return ModelPoint(tuple(parameters), {label: tuple(values) for label, values in effects.items()})
+
+    def jacobian(self, point: ModelPoint, coordinates: Sequence[Coordinate], residual: Array) -> Array:
+        """Return the derivatives (rows, coordinates) of the whitened residuals by differences.
+
+        Args:
+            point: where.
+            coordinates: by which.
+            residual: (rows,) at the point.
+
+        Returns:
+            The derivatives, by shares of parameters and scales of values.
+        """
+        steps = [SMALL_SHARE if isinstance(one, int) else 1.0 for one in coordinates]
+        points = [self.moved(point, [one], np.array([s])) for one, s in zip(coordinates, steps, strict=True)]
+        columns = self.whitened(points)
+        return np.column_stack([(found - residual) / s for found, s in zip(columns, steps, strict=True)])
+
+    def prior(self, point: ModelPoint, coordinates: Sequence[Coordinate]) -> tuple[Array, Array]:
+        """Return the prior's residuals (coordinates,) and their derivatives, each by its own coordinate.
+
+        Args:
+            point: where.
+            coordinates: of the fit.
+
+        Returns:
+            Values over standard deviations, and slopes; zero where there is no prior.
+        """
+        values, slopes = np.zeros(len(coordinates)), np.zeros(len(coordinates))
+        for n, coordinate in enumerate(coordinates):
+            if isinstance(coordinate, int):
+                values[n], slopes[n] = prior_of(self.parameters[coordinate], point.parameters[coordinate])
+            else:
+                label, place = coordinate
+                effect = self.models[0].effects[label]
+                if place in effect.prior:
+                    mean, deviation = effect.prior[place]
+                    values[n] = (point.effects[label][place] - mean) / deviation
+                    slopes[n] = effect.scales[place] / deviation
+        weight = np.sqrt(self.overdispersion)
+        return values * weight, slopes * weight
+
+    def is_possible(self, label: str, values: Values) -> bool:
+        """Tell whether a machine can have an effect of such values, and one of the records can show it.
+
+        Args:
+            label: of the effect.
+            values: of it.
+
+        Returns:
+            False for sizes that no machine has, or that act nowhere.
+        """
+        return any(model.is_possible(label, values) for model in self.models)
+
+
+def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:
+    """Return a parameter's distance from its nominal value in standard deviations, and its slope by a share of it.
+
+    Args:
+        entry: the parameter.
+        value: of it.
+
+    Returns:
+        Distance and slope.
+    """
+    if entry.local:
+        return value / entry.nominal, 1.0
+    deviation = float(np.log1p(entry.spread))
+    ratio = value / entry.nominal
+    return float(np.log(ratio)) / deviation, 1.0 / ratio / deviation
+
+
+def fit_problem(models: Sequence[ResidualModel], settings: FitSettings) -> FitProblem:
+    """Return the problem of some records, whitened by what the nominal model leaves.
+
+    Args:
+        models: one for each record.
+        settings: of fits.
+
+    Returns:
+        The problem.
+    """
+    problem = FitProblem(tuple(models), tuple(band_only(model, settings) for model in models), settings)
+    return problem.reweighted(problem.start)

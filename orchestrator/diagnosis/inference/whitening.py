@@ -1,0 +1,214 @@
+"""Whitening of residuals in the frequency domain.
+
+Residuals of a model that lacks nothing have the spectrum
+
+    S(f) = G(f) diag(r) G(f)* + B(f) diag(q) B(f)*
+
+with encoders' noise ``r`` through ``G`` and unknown torques ``q`` through ``B``. Both levels are those with the largest
+likelihood (Whittle, 1953). The weights are the inverse Cholesky factor of S at each frequency, cut off at the band's end.
+With q small a whitened residual is the misfit of a free run, with q large that of a regression of torque on motion.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+from scipy.signal import csd, welch
+
+from orchestrator.diagnosis.model.interface import ResidualModel
+from orchestrator.diagnosis.settings import FitSettings
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+RIDGE = 1e-12  # of the diagonal of a spectral matrix: encoders that move as one leave it singular
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """Weights of one record's residuals, and the rows that are kept of what they give.
+
+    Attributes:
+        weights: (f, channels, channels) lower triangular.
+        rows: (m,) rows that are kept, about independent of each other.
+        taper: (n,) how the record fades in and out.
+        active: (channels, m) weights of the kept rows.
+        length: of the Fourier transforms.
+    """
+
+    weights: Complex
+    rows: NDArray[np.int64]
+    taper: Array
+    active: Array
+    length: int
+
+    @property
+    def size(self) -> int:
+        """Return the number of kept rows, of all channels."""
+        return self.active.size
+
+    def apply(self, residuals: Array) -> Array:
+        """Return whitened residuals (channels * m,) of residuals (channels, n).
+
+        Args:
+            residuals: of the record.
+
+        Returns:
+            Of each channel in turn, at the kept rows.
+        """
+        return np.asarray((self.series(residuals)[:, self.rows] * self.active).ravel())
+
+    def series(self, residuals: Array) -> Array:
+        """Return whitened residuals (channels, n) at every row.
+
+        Args:
+            residuals: (channels, n) of the record.
+
+        Returns:
+            The whitened ones.
+        """
+        spectra = rfft(residuals * self.taper, self.length, axis=1)
+        weighted = np.stack(
+            [
+                sum(self.weights[:, row, column] * spectra[column] for column in range(row + 1))
+                for row in range(len(residuals))
+            ]
+        )
+        return np.asarray(irfft(weighted, self.length, axis=1)[:, : residuals.shape[1]])
+
+    def back_filter(self, whitened: Array, channel: int) -> Array:
+        """Return (n,) the gradient of half the squared whitened residuals by the residuals of a channel.
+
+        Args:
+            whitened: (channels * m,) as :meth:`apply` gives them.
+            channel: of the residuals.
+
+        Returns:
+            The gradient at every row.
+        """
+        count = len(self.active)
+        spread = np.zeros((count, self.length))
+        spread[:, self.rows] = whitened.reshape(count, -1) * self.active
+        spectra = rfft(spread, axis=1)
+        total = sum(spectra[row] * np.conj(self.weights[:, row, channel]) for row in range(channel, count))
+        return np.asarray(irfft(total, self.length)[: self.taper.size] * self.taper)
+
+
+def kept_rows(model: ResidualModel, settings: FitSettings) -> NDArray[np.int64]:
+    """Return rows (m,) so far apart that whitened residuals there are about independent, without the record's edges.
+
+    Args:
+        model: beside the record.
+        settings: of fits.
+
+    Returns:
+        The rows.
+    """
+    highest = max(model.cutoffs)
+    apart = max(int(0.45 / (model.step * highest)), 1)
+    edge = int(settings.edge / (model.step * highest)) + 3
+    return np.arange(edge, model.size - edge, apart)
+
+
+def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
+    """Return weights that only cut off each channel at its band's end.
+
+    Args:
+        model: beside the record.
+        settings: of fits.
+
+    Returns:
+        The weights.
+    """
+    length = next_fast_len(2 * model.size)
+    frequencies = rfftfreq(length, model.step)
+    count = len(model.cutoffs)
+    weights = np.zeros((frequencies.size, count, count), dtype=complex)
+    for n, cutoff in enumerate(model.cutoffs):
+        weights[:, n, n] = frequencies < cutoff
+    rows = kept_rows(model, settings)
+    return Whitening(weights, rows, _taper(model), model.active[:, rows], length)
+
+
+def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings) -> Whitening:
+    """Return the weights that residuals of a model ask for.
+
+    Args:
+        model: beside the record.
+        residuals: (channels, n) of the model.
+        settings: of fits.
+
+    Returns:
+        The weights.
+    """
+    plain = band_only(model, settings)
+    segment = min(model.size // 4, 1024)
+    frequencies = welch(residuals[0], 1.0 / model.step, nperseg=segment, detrend=False)[0]
+    measured = np.empty((frequencies.size, len(residuals), len(residuals)), dtype=complex)
+    for row, left in enumerate(residuals):
+        for column, right in enumerate(residuals):  # scipy's cross-spectrum conjugates its first signal
+            measured[:, row, column] = csd(right, left, 1.0 / model.step, nperseg=segment, detrend=False)[1]
+    inside = np.array([(frequencies > 0) & (frequencies < max(c, 3 * frequencies[1])) for c in model.cutoffs])
+    levels = _most_likely_levels(model, frequencies, measured, inside, settings)
+    fine = rfftfreq(plain.length, model.step)
+    matrix = spectral_matrix(model, fine, *levels)
+    within = np.array([fine < cutoff for cutoff in model.cutoffs])
+    both = within[:, None, :] & within[None, :, :] | np.eye(len(within), dtype=bool)[:, :, None]
+    factor = np.linalg.inv(np.linalg.cholesky(matrix * both.transpose(2, 0, 1)))
+    scale = within / np.sqrt(np.array(model.cutoffs))[:, None]
+    return Whitening(factor * scale.T[:, :, None], plain.rows, plain.taper, plain.active, plain.length)
+
+
+def spectral_matrix(model: ResidualModel, frequencies: Array, measurement: Array, process: Array) -> Complex:
+    """Return the spectral matrix (f, channels, channels) of noise at some levels.
+
+    Args:
+        model: beside the record.
+        frequencies: (f,) [Hz].
+        measurement: (m,) levels of the encoders' noise.
+        process: (k,) levels of unknown torques.
+
+    Returns:
+        The matrix, Hermitian and positive.
+    """
+    sources = model.noise_sources(frequencies)
+    return _matrix(sources.measurement, measurement) + _matrix(sources.process, process, RIDGE)
+
+
+def _matrix(transfer: Complex, levels: Array, ridge: float = 0.0) -> Complex:
+    found = np.einsum("fcm,m,fdm->fcd", transfer, levels, np.conj(transfer))
+    if ridge:
+        count = found.shape[1]
+        found = found + ridge * np.trace(found, axis1=1, axis2=2).real[:, None, None] * np.eye(count) / count
+    return np.asarray(found)
+
+
+def _most_likely_levels(
+    model: ResidualModel, frequencies: Array, measured: Complex, inside: NDArray[np.bool_], settings: FitSettings
+) -> tuple[Array, Array]:
+    """Return levels of both kinds of noise by Whittle's likelihood over the band that all channels share."""
+    sources = model.noise_sources(frequencies)
+    power = np.array([np.mean(measured[inside[n], n, n].real) for n in range(len(inside))])
+    shared = inside.all(axis=0)
+    through = np.abs(sources.process[shared]) ** 2
+    reach = np.array([np.mean(np.diagonal(through, axis1=1, axis2=2)[:, min(n, through.shape[1] - 1)])
+                      for n in range(sources.process.shape[2])])  # fmt: skip
+    scale = np.array([power[min(n, power.size - 1)] for n in range(reach.size)]) / np.maximum(reach, 1e-300)
+    best = (np.inf, sources.levels, scale)
+    for share in settings.measurement_levels:
+        at_encoders = _matrix(sources.measurement[shared], share * sources.levels)
+        for part in settings.process_levels:
+            process = np.maximum(part * scale, sources.floors)
+            matrix = at_encoders + _matrix(sources.process[shared], process, RIDGE)
+            sign, determinant = np.linalg.slogdet(matrix)
+            cost = float(np.sum(determinant + np.einsum("fcd,fdc->f", np.linalg.inv(matrix), measured[shared]).real))
+            if np.all(sign.real > 0) and cost < best[0]:
+                best = (cost, share * sources.levels, process)
+    return best[1], best[2]
+
+
+def _taper(model: ResidualModel) -> Array:
+    rows = np.arange(model.size)
+    share = np.clip((rows - 3) / max(model.edges * model.size, 4), 0.0, 1.0)
+    rise = 0.5 - 0.5 * np.cos(np.pi * share)
+    return np.asarray(rise * rise[::-1])

@@ -1,0 +1,107 @@
+"""What a drive makes of its request, under the triangle average of the torque balances."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import shift as shift_samples
+from scipy.signal import lfilter
+
+from orchestrator.diagnosis.data.signals import triangle_average
+from orchestrator.plants.description import Plant
+from orchestrator.plants.measurement import LEAD
+
+Array = NDArray[np.float64]
+SHORT_LAG = 0.3  # of a sample: a lag below it is a delay as long, which no triangle average tells from it
+
+
+def delivered_torque(plant: Plant, p: Array, requests: Array, step: float, held: bool) -> Array:
+    """Return the drive's torque (n,) [N.m] under the triangle average: behind limit, rate, lags and dead time.
+
+    Args:
+        plant: names of the drive's parameters.
+        p: parameters of the analysis.
+        requests: (n,) requested torque [N.m].
+        step: sample time [s].
+        held: requests are constant over each sample; else smooth.
+
+    Returns:
+        The torque, without what it was at the first row.
+    """
+    drive = plant.drive
+    limit = plant.value(p, drive.limit)
+    requests = np.clip(requests, -limit, limit)
+    rate = plant.value(p, drive.rate) if drive.rate else np.inf
+    if rate < np.max(np.abs(np.diff(requests))) / step:
+        requests, _ = plant.followed(
+            np.where(np.arange(p.size) == plant.index(drive.second_lag), 0.0, p), requests, step
+        )
+    lag = plant.value(p, drive.lag)
+    if lag > SHORT_LAG * step:
+        torque = lagged_hold(requests, lag, step) if held else triangle_average(lagged(requests, lag, step))
+    else:
+        torque = held_average(requests) if held else triangle_average(requests)
+    if drive.second_lag and (second := plant.value(p, drive.second_lag)) > 0.0:
+        torque = lagged(torque, second, step)
+    late = plant.value(p, drive.delay) - plant.value(p, LEAD.name) + (lag if lag <= SHORT_LAG * step else 0.0)
+    return shifted(torque, late / step)
+
+
+def held_average(requests: Array) -> Array:
+    """Return the triangle average (n,) of requests that are held over each sample: exactly half the sum of two.
+
+    Args:
+        requests: (n,).
+
+    Returns:
+        The averages.
+    """
+    return np.concatenate([requests[:1], 0.5 * (requests[1:] + requests[:-1])])
+
+
+def lagged_hold(requests: Array, lag: float, step: float) -> Array:
+    """Return the triangle average (n,), exactly, of a first-order lag behind held requests; it is at rest at first.
+
+    Args:
+        requests: (n,).
+        lag: time constant [s].
+        step: sample time [s].
+
+    Returns:
+        The averages.
+    """
+    ratio = step / lag
+    decay = np.exp(-ratio)
+    state = lfilter([0.0, 1.0 - decay], [1.0, -decay], requests)
+    before, after = (ratio - 1.0 + decay) / ratio**2, (1.0 - decay * (1.0 + ratio)) / ratio**2
+    rising = 0.5 * requests + (state - requests) * before
+    falling = 0.5 * requests + (state - requests) * after
+    return np.concatenate([state[:1], falling[:-1] + rising[1:]])
+
+
+def lagged(values: Array, lag: float, step: float) -> Array:
+    """Return a first-order lag (n,) of a signal that goes straight between its samples, settled at first.
+
+    Args:
+        values: (n,).
+        lag: time constant [s].
+        step: sample time [s].
+
+    Returns:
+        The lagged signal.
+    """
+    ratio = step / lag
+    decay = np.exp(-ratio)
+    now, before = 1.0 - (1.0 - decay) / ratio, (1.0 - decay) / ratio - decay
+    return np.asarray(lfilter([now, before], [1.0, -decay], values, zi=[values[0] * (1.0 - now)])[0])
+
+
+def shifted(values: Array, samples: float) -> Array:
+    """Return a signal (n,) that is later by some ``samples``, interpolated by cubic splines.
+
+    Args:
+        values: (n,).
+        samples: not necessarily whole.
+
+    Returns:
+        The shifted signal; its ends are held.
+    """
+    return values if samples == 0.0 else np.asarray(shift_samples(values, samples, order=3, mode="nearest"))

@@ -1,0 +1,218 @@
+"""The narrow interface between any model and the analysis: what is fitted, which effects may be missing, residuals, noise."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Values = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class UncertainParameter:
+    """A parameter that is fitted with every model.
+
+    Attributes:
+        name: of the parameter.
+        nominal: value before the record; the fit moves in shares of it.
+        spread: how far it may be off, as a share: the prior is log-normal with standard deviation ``log(1 + spread)``.
+        unit: of the value.
+        local: it belongs to one record alone, may have any value, and ``nominal`` is only its scale; the prior is normal
+            about zero.
+    """
+
+    name: str
+    nominal: float
+    spread: float
+    unit: str = ""
+    local: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class WaveScan:
+    """Where the cycles of a wave are looked for: all at once, by the residual's inner products with them.
+
+    Attributes:
+        phase: (n,) signal over which the wave repeats.
+        channel: of the residual in which it acts.
+        coordinate: place of the cycles in the effect's values.
+        cycles: grid of cycles for each unit of ``phase``.
+    """
+
+    phase: Array
+    channel: int
+    coordinate: int
+    cycles: Array
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateEffect:
+    """An effect that a model may lack, as the analysis sees it.
+
+    Attributes:
+        label: ``name@site``.
+        kind: what sort of law it is: effects of one kind stand for each other ("friction", "timing", "limit", "wave",
+            "constant", "position", "speed", "gap", "resonance", "memory").
+        values: names of its values.
+        scales: a small change of each.
+        starts: values to try; those at ``amplitudes`` are found by regression.
+        amplitudes: places of values in which the residual is linear; empty: the effect is tried at each start as it is.
+        fitted: places of the values that a fit moves.
+        sizes: places of values whose zero is no effect.
+        lower, upper: bounds of each value.
+        positive: places of amplitudes that must be positive.
+        prior: place -> (mean, standard deviation).
+        wave: how its cycles are looked for; None: it repeats with nothing.
+        contains: labels of simpler effects that it stands for, which leave a model that it enters.
+        excludes: labels that it is not tried beside.
+        takes_drive: it takes torque away from the drive.
+        of_log: a property of the log, not of the machine.
+    """
+
+    label: str
+    kind: str
+    values: tuple[str, ...]
+    scales: Values
+    starts: tuple[Values, ...]
+    amplitudes: tuple[int, ...] = ()
+    fitted: tuple[int, ...] = ()
+    sizes: tuple[int, ...] = (0,)
+    lower: Values = ()
+    upper: Values = ()
+    positive: tuple[int, ...] = ()
+    prior: Mapping[int, tuple[float, float]] = field(default_factory=dict)
+    wave: WaveScan | None = None
+    contains: tuple[str, ...] = ()
+    excludes: tuple[str, ...] = ()
+    takes_drive: bool = False
+    of_log: bool = False
+
+    @property
+    def name(self) -> str:
+        """Return the name without the site."""
+        return self.label.partition("@")[0]
+
+    @property
+    def site(self) -> str:
+        """Return the part of the machine at which it acts."""
+        return self.label.partition("@")[2]
+
+    def bounded(self, place: int, value: float) -> float:
+        """Return a value within its bounds.
+
+        Args:
+            place: of the value.
+            value: to bound.
+
+        Returns:
+            The bounded value.
+        """
+        low = self.lower[place] if self.lower else -np.inf
+        high = self.upper[place] if self.upper else np.inf
+        return min(max(value, low), high)
+
+
+@dataclass(frozen=True)
+class ModelPoint:
+    """Values of a model: of its uncertain parameters, in order, and of each effect that it has."""
+
+    parameters: Values
+    effects: Mapping[str, Values] = field(default_factory=dict)
+
+    def with_effect(self, label: str, values: Values) -> "ModelPoint":
+        """Return the point with an effect added or moved.
+
+        Args:
+            label: of the effect.
+            values: of it.
+
+        Returns:
+            The new point.
+        """
+        return ModelPoint(self.parameters, {**self.effects, label: values})
+
+    def without_effects(self, labels: Sequence[str]) -> "ModelPoint":
+        """Return the point without some effects.
+
+        Args:
+            labels: of the effects.
+
+        Returns:
+            The new point.
+        """
+        return ModelPoint(self.parameters, {name: v for name, v in self.effects.items() if name not in labels})
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseSources:
+    """White sources of noise and how residuals answer to them, at some frequencies.
+
+    Attributes:
+        measurement: (f, channels, m) transfer from each encoder's or output's noise to the residuals.
+        levels: (m,) one-sided spectral densities of these, as read off the record.
+        process: (f, channels, k) transfer from unknown torques or inputs to the residuals.
+        floors: (k,) least spectral densities of these.
+    """
+
+    measurement: Array
+    levels: Array
+    process: Array
+    floors: Array
+
+
+class ResidualModel(Protocol):
+    """A model beside one record.
+
+    Attributes:
+        channels: names of the residuals.
+        step: sample time [s] of the residuals.
+        size: rows of them.
+        cutoffs: (channels,) highest frequency [Hz] at which each residual says something.
+        parameters: uncertain parameters; local ones last.
+        effects: by label, in the order in which they are tried.
+        active: (channels, n) weights between zero and one: rows at zero say nothing.
+        edges: share of the rows over which the record fades in and out before it is whitened.
+    """
+
+    channels: tuple[str, ...]
+    step: float
+    size: int
+    cutoffs: tuple[float, ...]
+    parameters: tuple[UncertainParameter, ...]
+    effects: Mapping[str, CandidateEffect]
+    active: Array
+    edges: float
+
+    def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
+        """Return the residuals (channels, n) at each of some points.
+
+        Args:
+            points: values of the model.
+
+        Returns:
+            One array for each.
+        """
+
+    def noise_sources(self, frequencies: Array) -> NoiseSources:
+        """Return what makes noise in the residuals.
+
+        Args:
+            frequencies: (f,) [Hz].
+
+        Returns:
+            The sources, at the nominal values.
+        """
+
+    def is_possible(self, label: str, values: Values) -> bool:
+        """Tell whether a machine can have an effect of such values, and the record can show it.
+
+        Args:
+            label: of the effect.
+            values: of it.
+
+        Returns:
+            False for sizes that no machine has, or that act nowhere in the record.
+        """

@@ -1,0 +1,120 @@
+"""The rows of a plant's bank as effects that the analysis can fit."""
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
+from orchestrator.plants.description import Plant
+from orchestrator.plants.effects import Effect, SignalScales
+from orchestrator.records.model_file import Model
+
+MOST_CYCLES = 40.0  # a revolution: teeth and poles of drives lie below
+SINE, COSINE = "sine", "cosine"
+
+
+def candidate_effects(model: Model, scales: SignalScales, channels: Sequence[str]) -> dict[str, CandidateEffect]:
+    """Return the effects that a model may lack, by label.
+
+    Args:
+        model: whose plant has the bank; what it sets itself is no candidate.
+        scales: of the record.
+        channels: names of the bodies with an encoder.
+
+    Returns:
+        The effects.
+    """
+    plant = model.plant
+    found = {}
+    for row in plant.bank:
+        place = row.places(plant)[row.size]
+        given = place < len(plant.table) and model.values[place] != plant.entry(place).default
+        if given or (row.angular and not scales.angular) or (row.both_encoders and len(channels) < 2):
+            continue
+        found[row.label] = _candidate(plant, row, scales, channels)
+    return found
+
+
+def _candidate(plant: Plant, row: Effect, scales: SignalScales, channels: Sequence[str]) -> CandidateEffect:
+    names = _coordinates(row)
+    steps, starts = dict(row.scales(scales)), row.starts(scales)
+    amplitudes = row.amplitudes
+    if row.phase:
+        size = steps[row.size]
+        steps |= {SINE: size, COSINE: size}
+        amplitudes = (SINE, COSINE)
+    lists = [starts.get(name, (_default(plant, row, name),)) for name in names]
+    wave = _wave_scan(row, scales, channels, names) if "cycles_per_rev" in names else None
+    bounds, priors = _bounds(plant, row, scales, names), row.priors(scales)
+    fitted = tuple(n for n, name in enumerate(names) if name not in row.scanned and name in steps)
+    at = {name: n for n, name in enumerate(names)}
+    sizes = amplitudes or (row.size,)
+    timing = tuple(other.label for other in plant.bank if other.kind == "timing" and other.label != row.label)
+    simpler = f"{row.contains}@{row.site}" if row.contains else ""
+    grown = tuple(other.label for other in plant.bank if other.contains == row.name and other.site == row.site)
+    return CandidateEffect(
+        label=row.label, kind=row.kind, values=names, scales=tuple(steps.get(name, 1.0) for name in names),
+        starts=tuple(itertools.product(*lists)), amplitudes=tuple(at[name] for name in amplitudes), fitted=fitted,
+        sizes=tuple(at[name] for name in sizes), lower=tuple(low for low, _ in bounds),
+        upper=tuple(high for _, high in bounds),
+        positive=() if row.signed or row.phase else tuple(at[name] for name in amplitudes),
+        prior={at[name]: prior for name, prior in priors.items()}, wave=wave, contains=(simpler,) if simpler else (),
+        excludes=(timing if row.kind == "timing" and not row.both_encoders else ()) + grown,
+        takes_drive=row.takes_drive, of_log=row.measurement,
+    )  # fmt: skip
+
+
+def _coordinates(row: Effect) -> tuple[str, ...]:
+    """Return the names of an effect's values: amplitude and phase become sine and cosine."""
+    names = [name for name in row.parameters if not (row.phase and name in (row.size, row.phase))]
+    return (*((SINE, COSINE) if row.phase else ()), *names, *row.scanned)
+
+
+def _default(plant: Plant, row: Effect, name: str) -> float:
+    if name in (SINE, COSINE) or name in row.amplitudes:
+        return 0.0
+    return plant.entry(row.places(plant)[name]).default
+
+
+def _bounds(plant: Plant, row: Effect, scales: SignalScales, names: Sequence[str]) -> list[tuple[float, float]]:
+    narrower, places = row.bounds(scales), row.places(plant)
+    found = []
+    for name in names:
+        if name in (SINE, COSINE):
+            found.append((-math.inf, math.inf))
+            continue
+        entry = plant.entry(places[name])
+        low, high = narrower.get(name, (entry.minimum, entry.maximum))
+        found.append((max(low, entry.minimum), min(high, entry.maximum)))
+    return found
+
+
+def _wave_scan(row: Effect, scales: SignalScales, channels: Sequence[str], names: Sequence[str]) -> WaveScan:
+    """Return where cycles are looked for: so close that no line lies between, up to what the samples follow."""
+    phase = scales.angles[row.wave_site]
+    spacing = max(0.35 / scales.turns, 0.01)
+    least = max(4.0 / scales.turns, 0.5)
+    channel = channels.index(row.site) if row.site in channels else len(channels) - 1
+    return WaveScan(phase, channel, list(names).index("cycles_per_rev"), np.arange(least, MOST_CYCLES, spacing))
+
+
+def effect_parameters(plant: Plant, effect: CandidateEffect, values: Values) -> Mapping[str, float]:
+    """Return an effect's values by name in the plant's table.
+
+    Args:
+        plant: of the effect.
+        effect: as the analysis sees it.
+        values: of it.
+
+    Returns:
+        Name -> value; sine and cosine as amplitude and phase.
+    """
+    row = next(row for row in plant.bank if row.label == effect.label)
+    given = dict(zip(effect.values, values, strict=True))
+    if row.phase:
+        sine, cosine = given.pop(SINE), given.pop(COSINE)
+        given |= {row.size: math.hypot(sine, cosine), row.phase: math.atan2(cosine, sine)}
+    full = row.parameters | row.scanned
+    return {full[short]: value for short, value in given.items()}

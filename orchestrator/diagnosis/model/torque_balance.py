@@ -1,0 +1,269 @@
+"""Torque balances of a plant along a measured motion: residuals without any simulation.
+
+At each body, the torque that its measured acceleration needs is compared with the torque that acts on it:
+
+    motor   r_m = T - J_m (a_m - f_m)          load   r_l = -J_l (a_l - f_l)
+
+``T`` is the drive's torque, ``a`` the measured acceleration and ``f`` the acceleration that the plant's own equations give
+at the measured angles and speeds without ``T`` (Gautier and Khalil's inverse dynamic model). All terms stand under the
+triangle average of :mod:`orchestrator.diagnosis.data.signals`.
+
+Residuals are scaled by ``sqrt(J0 / J)``, half-way between a regression of torque on motion, which is right where a
+controller holds the path, and one of motion on torque, which is right where the motion is free: either alone explains a
+record by an inertia of zero or of infinity. The load's balance has no measured torque in it and counts as an acceleration.
+An effect that takes torque away from the drive is charged for it: no torque at all would explain best.
+"""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.data.signals import (
+    Signals,
+    first_derivative,
+    second_derivative,
+    second_difference_gain,
+    smooth,
+    triangle_average,
+)
+from orchestrator.diagnosis.model.balance_kernel import acceleration_kernel, slide_bristle
+from orchestrator.diagnosis.model.drive import delivered_torque, shifted
+from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, NoiseSources, UncertainParameter, Values
+from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters
+from orchestrator.diagnosis.settings import BalanceSettings
+from orchestrator.plants.description import Plant
+from orchestrator.plants.effects import SignalScales, rms
+from orchestrator.plants.measurement import SHIFT
+from orchestrator.records.model_file import Model
+
+Array = NDArray[np.float64]
+INITIAL_TORQUE = "initial torque"
+_POOL = ThreadPoolExecutor(2)
+
+
+class TorqueBalance:
+    """A plant of ours beside one record: a :class:`ResidualModel`.
+
+    Args:
+        model: nominal values and how far each may be off.
+        signals: of the record; with as many angles as the plant has bodies.
+        settings: of the balances.
+    """
+
+    def __init__(self, model: Model, signals: Signals, settings: BalanceSettings) -> None:
+        plant = model.plant
+        self.plant, self.signals, self.settings = plant, signals, settings
+        self.nominal = plant.extended(model.values)
+        self.step, self.size, self.cutoffs = signals.step, signals.size, signals.cutoffs
+        self.channels = tuple(body.name for body in plant.bodies)
+        self.edges = settings.fade if len(plant.bodies) > 1 else 0.3 * settings.fade
+        self.inertias = tuple(plant.index(body.inertia) for body in plant.bodies)
+        top = 3.0 * max(signals.cutoffs)
+        self._angles = [smooth(angle, self.step, min(0.3 / self.step, top)) for angle in signals.angles]
+        self._speeds = [first_derivative(angle, self.step) for angle in self._angles]
+        self._accelerations = [second_derivative(angle, self.step) for angle in signals.angles]
+        self._bristles: dict[tuple[int, float], Array] = {}
+        self._torques: dict[tuple[float, ...], Array] = {}
+        self._drive = tuple(
+            plant.index(name)
+            for name in (*vars(plant.drive).values(), "measurement.lead")
+            if isinstance(name, str) and name
+        )
+        self.parameters = self._uncertain(model)
+        self._places = [plant.index(entry.name) for entry in self.parameters if not entry.local]
+        self.active = np.array([self._active(speed) for speed in self._speeds])
+        self.effects: Mapping[str, CandidateEffect] = candidate_effects(model, self.scales, self.channels)
+
+    def _uncertain(self, model: Model) -> tuple[UncertainParameter, ...]:
+        known = tuple(
+            UncertainParameter(entry.name, entry.value, entry.uncertainty / abs(entry.value), entry.unit)
+            for entry in model.uncertain
+            if entry.value != 0.0
+        )
+        lag = self.plant.value(self.nominal, self.plant.drive.lag)
+        if lag <= 3.0 * self.step:
+            return known
+        return (*known, UncertainParameter(INITIAL_TORQUE, rms(self.signals.torque), 1.0, "N.m", local=True))
+
+    def _active(self, speed: Array) -> Array:
+        """Return the rows (n,) at which a body moves: at rest dry friction takes whatever is left there."""
+        slow = smooth(speed, self.step, min(0.3 / self.step, max(self.cutoffs)))
+        moving = np.abs(slow) > self.settings.at_rest * rms(slow)
+        return (moving & self.signals.measured).astype(float)
+
+    @cached_property
+    def scales(self) -> SignalScales:
+        """Typical sizes of the record's signals."""
+        plant, signals = self.plant, self.signals
+        sites = [body.name for body in plant.bodies]
+        last = len(sites) - 1
+        ratio = plant.ratio(self.nominal)
+        resolutions = [
+            max(6.0 * noise, 2e-5 * float(np.ptp(angle)))
+            for noise, angle in zip(signals.noise, self._angles, strict=True)
+        ]
+
+        def by_site(values: Sequence[Array]) -> dict[str, Array]:
+            return {"load": values[last], "motor": values[0]} | dict(zip(sites, values, strict=True))
+
+        twist = self._angles[0] / ratio - self._angles[1] if last else np.empty(0)
+        return SignalScales(
+            step=self.step, cutoff=max(self.cutoffs), requests=signals.torque, torque=rms(signals.torque),
+            angles=by_site(self._angles), speeds=by_site(self._speeds),
+            resolutions={"load": resolutions[last], "motor": resolutions[0]},
+            acceleration=rms(triangle_average(self._accelerations[last])), inertia=float(self.nominal[self.inertias[-1]]),
+            stiffness=plant.value(self.nominal, plant.shaft.stiffness) if plant.shaft else 0.0, ratio=ratio, twist=twist,
+        )  # fmt: skip
+
+    # --- residuals -----------------------------------------------------------------------------------------
+
+    def values_at(self, point: ModelPoint) -> Array:
+        """Return the plant's parameters (n,) at a point.
+
+        Args:
+            point: values of the model.
+
+        Returns:
+            The parameters of the analysis.
+        """
+        p = self.nominal.copy()
+        p[self._places] = point.parameters[: len(self._places)]
+        for label, values in point.effects.items():
+            for name, value in effect_parameters(self.plant, self.effects[label], values).items():
+                p[self.plant.index(name)] = value
+        return p
+
+    def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
+        """Return the residuals (channels, n) [N.m] at each of some points; see :class:`ResidualModel`."""
+        if len(points) < 4:
+            return [self.residual(point) for point in points]
+        return list(_POOL.map(self.residual, points))
+
+    def residual(self, point: ModelPoint) -> Array:
+        """Return the residuals (channels, n) [N.m] at a point.
+
+        Args:
+            point: values of the model.
+
+        Returns:
+            The residuals, scaled as the head of the module says.
+        """
+        p = self.values_at(point)
+        scale = np.array([self.nominal[place] / p[place] for place in self.inertias])
+        scale[0] = np.sqrt(scale[0])
+        charge = 1.0
+        if any(self.effects[label].takes_drive for label in point.effects):
+            charge = rms(self._torque(self.nominal)) / rms(self._torque(p))
+        return np.asarray(self.balance(p, self._initial(point)) * (scale * charge)[:, None])
+
+    def _initial(self, point: ModelPoint) -> float:
+        return point.parameters[-1] if len(point.parameters) > len(self._places) else 0.0
+
+    def balance(self, p: Array, initial: float = 0.0) -> Array:
+        """Return the torques (channels, n) [N.m] that are missing at each body.
+
+        Args:
+            p: parameters of the analysis.
+            initial: torque of the drive at the first row [N.m].
+
+        Returns:
+            The torques.
+        """
+        plant, step = self.plant, self.step
+        angles, speeds, accelerations = self._motion(p)
+        motion = np.column_stack([angles[0], speeds[0], angles[-1], speeds[-1]])
+        signs = self._directions(p)
+        found = np.empty((self.size, 2))
+        acceleration_kernel(plant, p)(motion, signs, p, step, self._hidden_states_move(p), found)
+        missing = np.array(
+            [p[place] * (triangle_average(found[:, n]) - accelerations[n]) for n, place in enumerate(self.inertias)]
+        )
+        missing[0] += self._torque(p)
+        if initial:
+            missing[0] += initial * np.exp(-step * np.arange(self.size) / plant.value(p, plant.drive.lag))
+        return missing
+
+    def _motion(self, p: Array) -> tuple[list[Array], list[Array], list[Array]]:
+        """Return angles, speeds and accelerations of the bodies, from how the log has them."""
+        offsets = [plant_offset for plant_offset in (p[self.plant.index(name)] for name in self.plant.offsets)]
+        angles = [angle - offset for angle, offset in zip(self._angles, offsets, strict=False)]
+        speeds, accelerations = list(self._speeds), list(self._accelerations)
+        late = self.plant.value(p, SHIFT.name) if SHIFT.name in self.plant.names else 0.0
+        if late and len(angles) > 1:
+            for values in (angles, speeds, accelerations):
+                values[1] = shifted(values[1], -late / self.step)
+        return angles, speeds, accelerations
+
+    def _directions(self, p: Array) -> Array:
+        """Return the directions (n, 2) of dry friction, which build up over the distances in ``p``."""
+        signs = np.zeros((self.size, 2))
+        places = self.plant.stage().presliding
+        for n, angle in enumerate(self._angles):
+            key = (n, float(p[places[n]]))
+            if key not in self._bristles:
+                if len(self._bristles) > self.settings.most_kept:
+                    self._bristles.clear()
+                steps, bristle = np.diff(angle, prepend=angle[0]), np.empty(self.size)
+                slide_bristle(steps, float(np.exp(key[1])), bristle)
+                self._bristles[key] = bristle
+            signs[:, n] = self._bristles[key]
+        return signs
+
+    def _torque(self, p: Array) -> Array:
+        """Return the drive's torque (n,), kept for the parameters of the drive that were asked for lately."""
+        key = tuple(float(p[place]) for place in self._drive)
+        if key not in self._torques:
+            if len(self._torques) > self.settings.most_kept:
+                self._torques.clear()
+            self._torques[key] = delivered_torque(self.plant, p, self.signals.torque, self.step, self.signals.held)
+        return self._torques[key]
+
+    def _hidden_states_move(self, p: Array) -> bool:
+        sizes = [effect.places(self.plant)[effect.size] for effect in self.plant.bank if effect.memory]
+        return bool(np.any(p[sizes] != 0.0)) if sizes else False
+
+    # --- noise ---------------------------------------------------------------------------------------------
+
+    def noise_sources(self, frequencies: Array) -> NoiseSources:
+        """Return encoders' noise through the linear plant, and torques at the bodies; see :class:`ResidualModel`."""
+        s = 2j * np.pi * frequencies
+        gain = second_difference_gain(frequencies, self.step)
+        plant, count = self.plant, len(self.channels)
+        jacobian = plant.jacobian(self.nominal)
+        row = {place: n for n, place in enumerate(plant.states)}
+        measured = np.zeros((frequencies.size, count, count), dtype=complex)
+        for r, body in enumerate(plant.bodies):
+            inertia = self.nominal[self.inertias[r]]
+            for c, other in enumerate(plant.bodies):
+                rate = jacobian[row[body.speed], row[other.angle]] + s * jacobian[row[body.speed], row[other.speed]]
+                measured[:, r, c] = inertia * (rate + (gain if r == c else 0.0))
+        process = np.broadcast_to(np.eye(count, dtype=complex), (frequencies.size, count, count))
+        least = self.settings.torque_floor * rms(self._torque(self.nominal)) ** 2
+        floors = [
+            least / cutoff * (self.plant.ratio(self.nominal) ** 2 if n else 1.0)
+            for n, cutoff in enumerate(self.cutoffs)
+        ]
+        return NoiseSources(measured, self._encoder_levels(), process, np.array(floors))
+
+    def _encoder_levels(self) -> Array:
+        """Return each encoder's noise (one-sided density), read where second differences are highest in frequency."""
+        from scipy.signal import welch
+
+        levels = []
+        for angle in self.signals.angles:
+            frequencies, power = welch(
+                np.diff(angle, 2) / self.step**2, 1.0 / self.step, nperseg=min(self.size // 4, 1024), detrend=False
+            )
+            top = frequencies > 0.6 * frequencies[-1]
+            levels.append(np.median(power[top] / second_difference_gain(frequencies[top], self.step) ** 2))
+        return np.array(levels)
+
+    def is_possible(self, label: str, values: Values) -> bool:
+        """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
+        row = next(row for row in self.plant.bank if row.label == label)
+        named = effect_parameters(self.plant, self.effects[label], values)
+        short = {name: named[full] for name, full in row.parameters.items()}
+        return row.possible(short, self.scales)

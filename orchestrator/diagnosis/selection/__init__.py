@@ -1,0 +1,1 @@
+"""Which effects a model lacks: screening, search, equivalence, grades, and what remains."""

@@ -1,0 +1,138 @@
+"""Screening: what an effect would gain, by adding its columns to the derivatives of a fitted model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.inference.fitting import FittedModel
+from orchestrator.diagnosis.inference.problem import FitProblem
+from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, Values
+from orchestrator.diagnosis.settings import SelectionSettings
+
+Array = NDArray[np.float64]
+WHOLE = 0.25  # of an effect tried as it is: below this share of it in the fit, its gain counts by that share
+
+
+@dataclass(frozen=True)
+class ScreenedEffect:
+    """The best start of an effect, and the squared error that it is expected to take."""
+
+    gain: float
+    label: str
+    values: Values
+
+
+class Screening:
+    """What a fitted model's own values can explain, taken out of its residuals and of any further column.
+
+    Args:
+        problem: of the fit.
+        fitted: the model.
+        settings: of the search.
+    """
+
+    def __init__(self, problem: FitProblem, fitted: FittedModel, settings: SelectionSettings) -> None:
+        self.problem, self.fitted, self.settings = problem, fitted, settings
+        prior, slopes = problem.prior(fitted.point, fitted.coordinates)
+        whole = np.vstack([fitted.jacobian, np.diag(slopes)])
+        self.basis, _ = np.linalg.qr(whole / (np.linalg.norm(whole, axis=0) + 1e-300))
+        self.padding = np.zeros(len(prior))
+        residual = np.concatenate([fitted.residual, prior])
+        self.unexplained = residual - self.basis @ (self.basis.T @ residual)
+
+    def screen(self, effects: Sequence[CandidateEffect]) -> list[ScreenedEffect]:
+        """Return the best start of each effect, the most promising effect first.
+
+        Args:
+            effects: to be screened.
+
+        Returns:
+            Those that may gain anything.
+        """
+        trials = [(effect, values) for effect in effects for values in self._starts(effect)]
+        changes = self._changes(trials)
+        best: dict[str, ScreenedEffect] = {}
+        for (effect, values), columns in zip(trials, changes, strict=True):
+            found = self._gain(effect, values, columns)
+            if found is not None and (effect.label not in best or found.gain > best[effect.label].gain):
+                best[effect.label] = found
+        return sorted(best.values(), key=lambda one: -one.gain)
+
+    def _starts(self, effect: CandidateEffect) -> Sequence[Values]:
+        if effect.wave is None:
+            return effect.starts
+        cycles = self._wave_peaks(effect)
+        place = effect.wave.coordinate
+        return [(*values[:place], n, *values[place + 1 :]) for values in effect.starts[:1] for n in cycles]
+
+    def _wave_peaks(self, effect: CandidateEffect) -> list[float]:
+        """Return cycles at which the residual holds a wave, by its inner products with all of them at once."""
+        total, rows, wave = 0.0, 0, effect.wave
+        assert wave is not None
+        for model, whitening in zip(self.problem.models, self.problem.whitenings, strict=True):
+            own = model.effects[effect.label].wave
+            assert own is not None
+            gradient = whitening.back_filter(self.fitted.residual[rows : rows + whitening.size], own.channel)
+            rows += whitening.size
+            thin = slice(None, None, max(1, gradient.size // 4000))
+            total = total + np.exp(1j * np.outer(wave.cycles, own.phase[thin])) @ gradient[thin]
+        power = np.abs(total)
+        if power.size == 0:
+            return []
+        peaks = [n for n in range(power.size) if power[n] == power[max(0, n - 2) : n + 3].max()]
+        return [float(wave.cycles[n]) for n in sorted(peaks, key=lambda n: -power[n])[: self.settings.peaks]]
+
+    def _changes(self, trials: Sequence[tuple[CandidateEffect, Values]]) -> list[Array]:
+        """Return the columns (rows, k) of each trial: of each amplitude, or of the effect as it is."""
+        points, counts = [], []
+        for effect, values in trials:
+            moved = [self._with_amplitude(effect, values, place) for place in effect.amplitudes] or [values]
+            points += [self.fitted.point.with_effect(effect.label, one) for one in moved]
+            counts.append(len(moved))
+        found = self.problem.whitened(points)
+        columns, first = [], 0
+        for count in counts:
+            columns.append(np.column_stack([one - self.fitted.residual for one in found[first : first + count]]))
+            first += count
+        return columns
+
+    @staticmethod
+    def _with_amplitude(effect: CandidateEffect, values: Values, place: int) -> Values:
+        return (*values[:place], effect.scales[place], *values[place + 1 :])
+
+    def _gain(self, effect: CandidateEffect, values: Values, columns: Array) -> ScreenedEffect | None:
+        padded = np.vstack([columns, np.zeros((self.padding.size, columns.shape[1]))])
+        padded -= self.basis @ (self.basis.T @ padded)
+        share = np.linalg.lstsq(padded, -self.unexplained, rcond=1e-8)[0]
+        if not np.all(np.isfinite(share)):
+            return None
+        left = self.unexplained + padded @ share
+        gain = float(self.unexplained @ self.unexplained - left @ left)
+        if not effect.amplitudes:
+            return ScreenedEffect(
+                gain * (1.0 if share[0] >= WHOLE else max(float(share[0]), 0.0)), effect.label, values
+            )
+        start = list(values)
+        for place, part in zip(effect.amplitudes, share, strict=True):
+            positive = place in effect.positive
+            start[place] = effect.bounded(
+                place, (max(float(part), 0.0) if positive else float(part)) * effect.scales[place]
+            )
+        if effect.positive and all(start[place] <= 0.0 for place in effect.positive):
+            return None
+        return ScreenedEffect(gain, effect.label, tuple(start))
+
+
+def screened_point(fitted: FittedModel, screened: ScreenedEffect) -> ModelPoint:
+    """Return the point from which a model with a screened effect is fitted.
+
+    Args:
+        fitted: the model without.
+        screened: the effect.
+
+    Returns:
+        The point.
+    """
+    return fitted.point.with_effect(screened.label, screened.values)

@@ -1,0 +1,228 @@
+"""The search: forward by the cross-validated score with one look-ahead, then backward.
+
+In each step every effect is screened, the most promising are fitted in full, and the best is taken if it gains more than
+the settings ask for. Effects that are not told apart from it, block by block, are its family; of those of its kind the one
+with the fewest values enters. Then each earlier effect that no longer pays is taken out.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from orchestrator.diagnosis.inference.fitting import Comparison, FittedModel, compare, fit_model, weigh_prior
+from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
+from orchestrator.diagnosis.model.interface import CandidateEffect
+from orchestrator.diagnosis.selection.screening import Screening, screened_point
+from orchestrator.diagnosis.settings import SelectionSettings
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class TriedEffect:
+    """An effect that was fitted on top of a model."""
+
+    label: str
+    comparison: Comparison
+    fitted: FittedModel
+
+
+@dataclass(frozen=True, eq=False)
+class SearchStep:
+    """One step: the model before, what was tried on top of it, and what was taken ("": nothing).
+
+    Attributes:
+        before: the model.
+        tried: the effects, by gain.
+        taken: label of the effect that entered.
+        family: labels of those that are not told from it.
+    """
+
+    before: FittedModel
+    tried: tuple[TriedEffect, ...]
+    taken: str = ""
+    family: tuple[str, ...] = ()
+
+    @property
+    def entry(self) -> TriedEffect | None:
+        """Return the effect that was taken."""
+        return next((one for one in self.tried if one.label == self.taken), None)
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """What the search ended with.
+
+    Attributes:
+        problem: with the whitening and the prior's weight of the final model.
+        base: the model with re-fitted parameters alone, as the problem of its own time had it.
+        final: the final model.
+        steps: of the search.
+        refused: labels that entered once and did not pay in the end.
+        complete: False when time ran out.
+    """
+
+    problem: FitProblem
+    base: FittedModel
+    final: FittedModel
+    steps: tuple[SearchStep, ...] = ()
+    refused: frozenset[str] = field(default_factory=frozenset)
+    complete: bool = True
+
+
+def search_effects(
+    problem: FitProblem,
+    settings: SelectionSettings,
+    progress: Progress = lambda what: None,
+    out_of_time: Callable[[], bool] = lambda: False,
+) -> SearchResult:
+    """Search for the effects that a model lacks.
+
+    Args:
+        problem: of the records.
+        settings: of the search.
+        progress: called with what was fitted.
+        out_of_time: whether the search must end with what it has.
+
+    Returns:
+        The final model and the way to it.
+    """
+    base, problem = fit_base(problem)
+    search = _Search(settings, progress, out_of_time)
+    return search.run(SearchResult(problem, base, base))
+
+
+def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
+    """Return the model with re-fitted parameters, and the problem whitened by what it leaves.
+
+    Args:
+        problem: whitened by the nominal model.
+
+    Returns:
+        Model and problem.
+    """
+    fitted = fit_model(problem, problem.start)
+    for _ in range(2):
+        problem, fitted = settle(problem, fitted)
+    return fitted, problem
+
+
+def settle(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, FittedModel]:
+    """Return the problem with the whitening and the prior's weight that a model asks for, and the model fitted in it.
+
+    Args:
+        problem: of the fit.
+        fitted: the model.
+
+    Returns:
+        Problem and model.
+    """
+    problem = weigh_prior(problem.reweighted(fitted.point), fitted)
+    return problem, fit_model(problem, fitted.point)
+
+
+@dataclass(frozen=True)
+class _Search:
+    settings: SelectionSettings
+    progress: Progress
+    out_of_time: Callable[[], bool]
+
+    def run(self, found: SearchResult) -> SearchResult:
+        """Go forward and backward until nothing more pays."""
+        most = self.settings.most_effects
+        for number in range(most + 3 if most else 0):
+            if len(found.final.labels) >= most:
+                break
+            if self.out_of_time():
+                return replace(found, complete=False)
+            step = self._step(found, number == 0)
+            found = replace(found, steps=(*found.steps, step))
+            if step.entry is None:
+                break
+            pruned = self._pruned(found.problem, step.entry.fitted)
+            gone = set(step.entry.fitted.labels) - set(pruned.labels)
+            problem, final = settle(found.problem, pruned)
+            found = replace(found, problem=problem, final=final, refused=found.refused | gone)
+        return found
+
+    def _step(self, found: SearchResult, first: bool) -> SearchStep:
+        problem, model = found.problem, found.final
+        tried = self._tried(problem, model, found.refused, self.settings.refined)
+        fair = [one for one in tried if self._pays(problem, model, one)]
+        if not fair:
+            return SearchStep(model, tuple(tried))
+        best = fair[0]
+        if first and len(fair) > 1 and best.comparison.gain < self.settings.certain_alone:
+            best = self._best_with_second(problem, fair[: self.settings.look_ahead], found.refused) or best
+        family = [one for one in fair if one is best or self._is_alike(best, one)]
+        kind = problem.effects[best.label].kind
+        same = [one for one in family if problem.effects[one.label].kind == kind]
+        chosen = min(same, key=lambda one: (len(problem.effects[one.label].fitted), -one.comparison.gain))
+        return SearchStep(model, tuple(tried), chosen.label, tuple(one.label for one in family if one is not chosen))
+
+    def _tried(self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int) -> list[TriedEffect]:
+        screening = Screening(problem, model, self.settings)
+        tried = []
+        for screened in screening.screen(self._candidates(problem, model, refused))[:count]:
+            fitted = fit_model(problem, screened_point(model, screened))
+            tried.append(TriedEffect(screened.label, compare(model, fitted), fitted))
+            self.progress(" + ".join((*model.labels, screened.label)))
+        return sorted(tried, key=lambda one: -one.comparison.gain)
+
+    @staticmethod
+    def _candidates(problem: FitProblem, model: FittedModel, refused: frozenset[str]) -> Sequence[CandidateEffect]:
+        has = set(model.labels)
+        return [
+            effect for label, effect in problem.effects.items()
+            if label not in has and label not in refused and not has.intersection(effect.excludes)
+        ]  # fmt: skip
+
+    def _pays(self, problem: FitProblem, model: FittedModel, tried: TriedEffect) -> bool:
+        """Tell whether an effect gains enough, is possible, and pushes no parameter out of the model file."""
+        values = tried.fitted.point.effects[tried.label]
+        if not (self._gains(tried.comparison) and problem.is_possible(tried.label, values)):
+            return False
+        before, after = farthest_parameter(problem, model), farthest_parameter(problem, tried.fitted)
+        return after < max(self.settings.prior_deviations, before + 1.0)
+
+    def _gains(self, comparison: Comparison) -> bool:
+        return comparison.t >= self.settings.least_t and comparison.gain >= self.settings.least_gain
+
+    def _best_with_second(
+        self, problem: FitProblem, fair: Sequence[TriedEffect], refused: frozenset[str]
+    ) -> TriedEffect | None:
+        """Return the effect whose model, with the best second one, has the least score."""
+        scores = []
+        for one in fair:
+            second = self._tried(problem, one.fitted, refused, self.settings.look_ahead)
+            pays = [two.fitted.score for two in second if self._pays(problem, one.fitted, two)]
+            scores.append(min([one.fitted.score, *pays]))
+        return fair[int(np.argmin(scores))]
+
+    def _is_alike(self, best: TriedEffect, other: TriedEffect) -> bool:
+        near = compare(other.fitted, best.fitted).t < self.settings.family_t
+        return near and other.comparison.gain > self.settings.family_gain * best.comparison.gain
+
+    def _pruned(self, problem: FitProblem, model: FittedModel) -> FittedModel:
+        """Return the model without earlier effects that no longer pay, or that the last one stands for."""
+        for label in model.labels[:-1]:
+            simpler = any(label in problem.effects[other].contains for other in model.labels)
+            without = fit_model(problem, model.point.without_effects([label]), 3)
+            if simpler or not self._gains(compare(without, model)):
+                model = without
+        return model
+
+
+def farthest_parameter(problem: FitProblem, model: FittedModel) -> float:
+    """Return how far the parameter lies that is farthest from the model file, in its standard deviations.
+
+    Args:
+        problem: of the fit.
+        model: fitted.
+
+    Returns:
+        The distance; 0.0 where every parameter is known.
+    """
+    pairs = zip(problem.shared, model.point.parameters, strict=False)
+    return max((abs(prior_of(entry, value)[0]) for entry, value in pairs), default=0.0)
