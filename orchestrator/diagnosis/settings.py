@@ -105,6 +105,7 @@ class GradeSettings(Settings, frozen=True):
 class DiagnosisSettings(Settings, frozen=True):
     """All settings of a diagnosis."""
 
+    disabled: Annotated[tuple[str, ...], note("names of rules that are off, for an ablation")] = ()
     test_share: Annotated[float, share("last part of the record that only the report sees", le=0.5)] = 0.15
     band: BandSettings = BandSettings()
     balance: BalanceSettings = BalanceSettings()

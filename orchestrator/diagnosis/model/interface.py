@@ -216,3 +216,26 @@ class ResidualModel(Protocol):
         Returns:
             False for sizes that no machine has, or that act nowhere in the record.
         """
+
+    def driving(self, point: ModelPoint) -> Array:
+        """Return (channels, n) the signals that residuals are compared with: torques that drive the bodies, or outputs.
+
+        Args:
+            point: values of the model.
+
+        Returns:
+            The signals.
+        """
+
+    def inertia_shares(self) -> Mapping[str, float]:
+        """Return name of each inertia -> its share of the whole; empty: the model has none that a record must show."""
+
+    def without_priors(self, spread: float) -> "ResidualModel":
+        """Return the model as a plain regression of torque on motion, each parameter unknown within a factor.
+
+        Args:
+            spread: of every parameter, as a share.
+
+        Returns:
+            A copy.
+        """

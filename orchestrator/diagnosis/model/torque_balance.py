@@ -16,6 +16,8 @@ An effect that takes torque away from the drive is charged for it: no torque at 
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -55,7 +57,7 @@ class TorqueBalance:
 
     def __init__(self, model: Model, signals: Signals, settings: BalanceSettings) -> None:
         plant = model.plant
-        self.plant, self.signals, self.settings = plant, signals, settings
+        self.plant, self.signals, self.settings, self.scaled = plant, signals, settings, True
         self.nominal = plant.extended(model.values)
         self.step, self.size, self.cutoffs = signals.step, signals.size, signals.cutoffs
         self.channels = tuple(body.name for body in plant.bodies)
@@ -152,6 +154,8 @@ class TorqueBalance:
             The residuals, scaled as the head of the module says.
         """
         p = self.values_at(point)
+        if not self.scaled:
+            return self.balance(p, self._initial(point))
         scale = np.array([self.nominal[place] / p[place] for place in self.inertias])
         scale[0] = np.sqrt(scale[0])
         charge = 1.0
@@ -224,6 +228,27 @@ class TorqueBalance:
     def _hidden_states_move(self, p: Array) -> bool:
         sizes = [effect.places(self.plant)[effect.size] for effect in self.plant.bank if effect.memory]
         return bool(np.any(p[sizes] != 0.0)) if sizes else False
+
+    def driving(self, point: ModelPoint) -> Array:
+        """Return the drive's torque, and the torque that the load's acceleration needs; see :class:`ResidualModel`."""
+        p = self.values_at(point)
+        further = [p[n] * a for n, a in list(zip(self.inertias, self._accelerations, strict=True))[1:]]
+        return np.array([self._torque(p), *further])
+
+    def inertia_shares(self) -> Mapping[str, float]:
+        """Return each inertia's share as the motor feels it; see :class:`ResidualModel`."""
+        felt = [
+            self.nominal[place] / (self.plant.ratio(self.nominal) ** 2 if body.geared else 1.0)
+            for place, body in zip(self.inertias, self.plant.bodies, strict=True)
+        ]
+        return {body.inertia: float(value / sum(felt)) for body, value in zip(self.plant.bodies, felt, strict=True)}
+
+    def without_priors(self, spread: float) -> "TorqueBalance":
+        """Return plain balances with every parameter unknown; see :class:`ResidualModel`."""
+        other = copy(self)
+        other.scaled = False
+        other.parameters = tuple(entry if entry.local else replace(entry, spread=spread) for entry in self.parameters)
+        return other
 
     # --- noise ---------------------------------------------------------------------------------------------
 

@@ -69,15 +69,15 @@ class Screening:
 
     def _wave_peaks(self, effect: CandidateEffect) -> list[float]:
         """Return cycles at which the residual holds a wave, by its inner products with all of them at once."""
-        total, rows, wave = 0.0, 0, effect.wave
+        rows, wave = 0, effect.wave
         assert wave is not None
+        total = np.zeros(wave.cycles.size, dtype=complex)
         for model, whitening in zip(self.problem.models, self.problem.whitenings, strict=True):
-            own = model.effects[effect.label].wave
-            assert own is not None
-            gradient = whitening.back_filter(self.fitted.residual[rows : rows + whitening.size], own.channel)
+            phase = model.effects[effect.label].wave
+            assert phase is not None
+            gradient = whitening.back_filter(self.fitted.residual[rows : rows + whitening.size], phase.channel)
             rows += whitening.size
-            thin = slice(None, None, max(1, gradient.size // 4000))
-            total = total + np.exp(1j * np.outer(wave.cycles, own.phase[thin])) @ gradient[thin]
+            total += products_with_waves(gradient, phase.phase, wave.cycles)
         power = np.abs(total)
         if power.size == 0:
             return []
@@ -123,6 +123,31 @@ class Screening:
         if effect.positive and all(start[place] <= 0.0 for place in effect.positive):
             return None
         return ScreenedEffect(gain, effect.label, tuple(start))
+
+
+def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[np.complex128]:
+    """Return the inner products (k,) of values with ``exp(i c phase)``, of all cycles c at once.
+
+    Values are gathered in bins of the phase, a thirty-second of the shortest wave wide; a Fourier transform does the rest.
+
+    Args:
+        values: (n,).
+        phase: (n,) over which waves repeat.
+        cycles: (k,) evenly spaced multiples of a spacing, from any first one on.
+
+    Returns:
+        The products.
+    """
+    if cycles.size < 2:
+        return np.exp(1j * np.outer(cycles, phase)) @ values
+    spacing = float(cycles[1] - cycles[0])
+    count = int(np.ceil(32.0 * (cycles[-1] + spacing) / spacing))
+    width = 2.0 * np.pi / (spacing * count)
+    place = np.floor((phase - phase.min()) / width).astype(int)
+    shift = np.exp(1j * cycles[0] * (phase - phase.min()))  # the grid begins at its first cycles, not at none
+    bins = np.zeros(count, dtype=complex)
+    np.add.at(bins, place % count, values * shift)
+    return np.asarray(np.fft.ifft(bins)[: cycles.size] * count)
 
 
 def screened_point(fitted: FittedModel, screened: ScreenedEffect) -> ModelPoint:
