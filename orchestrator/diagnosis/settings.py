@@ -102,6 +102,19 @@ class GradeSettings(Settings, frozen=True):
     ] = 0.35
 
 
+class ReportSettings(Settings, frozen=True):
+    """What is reported: free runs over the test part, what is left, laws learned from it."""
+
+    runs: Annotated[int, setting("free runs that the test part is divided into", ge=1)] = 2
+    least_rows: Annotated[int, setting("rows of a free run at least", ge=10)] = 40
+    worse: Annotated[float, share("by which chance may make the misfit of test data larger")] = 0.05
+    of_noise: Annotated[float, share("and share of the encoder's noise")] = 0.1
+    start_steps: Annotated[int, setting("Gauss-Newton steps to the initial state of a free run", ge=1)] = 12
+    close: Annotated[float, setting("rms in noise deviations up to which a run is close", ge=1)] = 1.3
+    lost: Annotated[float, setting("rms as a share of the motion from which a run follows nothing", gt=0)] = 0.3
+    law_gain: Annotated[float, share("of what is left that a learned law takes on blocks left out")] = 0.2
+
+
 class DiagnosisSettings(Settings, frozen=True):
     """All settings of a diagnosis."""
 
@@ -112,3 +125,4 @@ class DiagnosisSettings(Settings, frozen=True):
     fit: FitSettings = FitSettings()
     selection: SelectionSettings = SelectionSettings()
     grades: GradeSettings = GradeSettings()
+    report: ReportSettings = ReportSettings()

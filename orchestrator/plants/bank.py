@@ -135,13 +135,13 @@ def _small_twist(scales: SignalScales) -> float:
 
 
 def _gaps(scales: SignalScales) -> tuple[float, ...]:
-    if not scales.twist.size:
-        return tuple(float(f * scales.typical_twist) for f in np.geomspace(0.1, 10.0, 10))
+    if not scales.twist_is_measured:
+        return tuple(float(f * scales.typical_twist) for f in np.geomspace(0.3, 15.0, 14))
     return tuple(float(q) for q in np.quantile(np.abs(scales.twist), (0.03, 0.1, 0.2, 0.35, 0.5, 0.7)))
 
 
 def _is_gap(values: Mapping[str, float], scales: SignalScales) -> bool:
-    return not scales.twist.size or values["alpha"] < 0.95 * float(np.abs(scales.twist).max())
+    return not scales.twist_is_measured or values["alpha"] < 0.95 * float(np.abs(scales.twist).max())
 
 
 def _wave(name: str, site: str, small: str) -> Effect:

@@ -42,7 +42,8 @@ class SignalScales:
         inertia: of the load, or of the only body [kg.m2].
         stiffness: of the shaft [N.m/rad]; 0: there is none.
         ratio: of the gear.
-        twist: (n,) measured twist of the shaft [rad]; empty: it is not measured, or there is no shaft.
+        twist: (n,) twist of the shaft [rad]; empty: there is no shaft.
+        twist_is_measured: by an encoder on either side; else it is that of the nominal model.
         angular: positions are angles, not metres.
     """
 
@@ -58,6 +59,7 @@ class SignalScales:
     stiffness: float
     ratio: float
     twist: Array
+    twist_is_measured: bool = True
     angular: bool = True
 
     def rms_speed(self, site: str) -> float:
@@ -89,10 +91,8 @@ class SignalScales:
 
     @property
     def typical_twist(self) -> float:
-        """Return the rms of the twist [rad]; of what the torque winds up where the twist is not measured."""
-        if self.twist.size:
-            return rms(self.twist)
-        return self.torque_at("load") / self.stiffness if self.stiffness > 0.0 else 1.0
+        """Return the rms of the twist [rad]; 1.0 where there is no shaft."""
+        return rms(self.twist) if self.twist.size else 1.0
 
 
 def rms(values: Array) -> float:

@@ -97,3 +97,73 @@ def _kernel(plant: Plant, usual: bool) -> Any:
                 )
 
     return fill
+
+
+def hidden_load_kernel(plant: Plant, p: Array) -> Any:
+    """Return ``fill(motor, width, p, step, substeps, bristle, motion, signs, out)``, compiled: the load is not measured.
+
+    The second body, its dry friction and the other hidden states are integrated along the motor's measured angle and speed
+    ``motor`` (n, 2), from rest without twist. ``width`` [rad] is that of the load's friction, ``bristle`` (n,) the
+    direction of the motor's; ``motion`` (n, 2), the load's
+    angle and speed, ``signs`` (n,) of its friction and ``out`` (n,), the motor's acceleration, are filled.
+
+    Args:
+        plant: of two bodies.
+        p: parameters that it is to be called with.
+
+    Returns:
+        The function.
+    """
+    return _hidden_load_kernel(plant, is_usual(plant, p))
+
+
+@cache
+def _hidden_load_kernel(plant: Plant, usual: bool) -> Any:
+    rates, parameters = plant.stage().rates, parameters_of(plant, usual)
+    ratio_at = plant.index(plant.shaft.ratio) if plant.shaft else -1
+
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
+    def rate_at(angle: float, speed: float, y: Any, signs: Any, p: Any) -> Any:
+        return rates((angle, speed, y[0], y[1], 0.0, y[2], y[3], y[4]), signs, p, 0.0)
+
+    @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
+    def moved(y: Any, rate: Any, h: float) -> Any:
+        return y[0] + h * rate[2], y[1] + h * rate[3], y[2] + h * rate[5], y[3] + h * rate[6], y[4] + h * rate[7]
+
+    @kept(error_model="numpy", nogil=True, **ALGEBRA)
+    def fill(
+        motor: Array, width: float, p: Any, step: float, substeps: int, bristle: Array, motion: Array, signs: Array,
+        out: Array,
+    ) -> None:  # fmt: skip
+        values = parameters(p)
+        at_load = motor[0, 0] / values[ratio_at]
+        y = (at_load, 0.0, at_load, 0.0, 0.0)
+        h, sign = step / substeps, 0.0
+        for n in range(motor.shape[0]):
+            motion[n, 0], motion[n, 1], signs[n] = y[0], y[1], sign
+            out[n] = rate_at(motor[n, 0], motor[n, 1], y, (bristle[n], sign), values)[1]
+            if n + 1 == motor.shape[0]:
+                break
+            bend = 0.5 * step * (motor[n + 1, 1] - motor[n, 1])
+            for part in range(substeps):
+                begin = y[0]
+                at = (part / substeps, (part + 0.5) / substeps, (part + 1.0) / substeps)
+                angles = (
+                    motor[n, 0] + at[0] * (motor[n + 1, 0] - motor[n, 0]) - at[0] * (1.0 - at[0]) * bend,
+                    motor[n, 0] + at[1] * (motor[n + 1, 0] - motor[n, 0]) - at[1] * (1.0 - at[1]) * bend,
+                    motor[n, 0] + at[2] * (motor[n + 1, 0] - motor[n, 0]) - at[2] * (1.0 - at[2]) * bend,
+                )
+                speeds = (
+                    motor[n, 1] + at[0] * (motor[n + 1, 1] - motor[n, 1]),
+                    motor[n, 1] + at[1] * (motor[n + 1, 1] - motor[n, 1]),
+                    motor[n, 1] + at[2] * (motor[n + 1, 1] - motor[n, 1]),
+                )
+                direction = (bristle[n], sign)
+                k1 = rate_at(angles[0], speeds[0], y, direction, values)
+                k2 = rate_at(angles[1], speeds[1], moved(y, k1, 0.5 * h), direction, values)
+                k3 = rate_at(angles[1], speeds[1], moved(y, k2, 0.5 * h), direction, values)
+                k4 = rate_at(angles[2], speeds[2], moved(y, k3, h), direction, values)
+                y = moved(moved(moved(moved(y, k1, h / 6.0), k2, h / 3.0), k3, h / 3.0), k4, h / 6.0)
+                sign = min(1.0, max(-1.0, sign + (y[0] - begin) / width))
+
+    return fill

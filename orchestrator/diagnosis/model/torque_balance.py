@@ -31,7 +31,7 @@ from orchestrator.diagnosis.data.signals import (
     smooth,
     triangle_average,
 )
-from orchestrator.diagnosis.model.balance_kernel import acceleration_kernel, slide_bristle
+from orchestrator.diagnosis.model.balance_kernel import acceleration_kernel, hidden_load_kernel, slide_bristle
 from orchestrator.diagnosis.model.drive import delivered_torque, shifted
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, NoiseSources, UncertainParameter, Values
 from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters
@@ -60,9 +60,10 @@ class TorqueBalance:
         self.plant, self.signals, self.settings, self.scaled = plant, signals, settings, True
         self.nominal = plant.extended(model.values)
         self.step, self.size, self.cutoffs = signals.step, signals.size, signals.cutoffs
-        self.channels = tuple(body.name for body in plant.bodies)
-        self.edges = settings.fade if len(plant.bodies) > 1 else 0.3 * settings.fade
-        self.inertias = tuple(plant.index(body.inertia) for body in plant.bodies)
+        self.channels = tuple(body.name for body in plant.bodies[: len(signals.angles)])
+        self.edges = settings.fade if len(self.channels) > 1 else 0.3 * settings.fade
+        self.hides_load = len(plant.bodies) > len(self.channels)
+        self.inertias = tuple(plant.index(body.inertia) for body in plant.bodies[: len(self.channels)])
         top = 3.0 * max(signals.cutoffs)
         self._angles = [smooth(angle, self.step, min(0.3 / self.step, top)) for angle in signals.angles]
         self._speeds = [first_derivative(angle, self.step) for angle in self._angles]
@@ -77,6 +78,7 @@ class TorqueBalance:
         self.parameters = self._uncertain(model)
         self._places = [plant.index(entry.name) for entry in self.parameters if not entry.local]
         self.active = np.array([self._active(speed) for speed in self._speeds])
+        self._hidden = self._hidden_load(self.nominal)[0] if self.hides_load else np.empty((0, 2))
         self.effects: Mapping[str, CandidateEffect] = candidate_effects(model, self.scales, self.channels)
 
     def _uncertain(self, model: Model) -> tuple[UncertainParameter, ...]:
@@ -100,24 +102,25 @@ class TorqueBalance:
     def scales(self) -> SignalScales:
         """Typical sizes of the record's signals."""
         plant, signals = self.plant, self.signals
-        sites = [body.name for body in plant.bodies]
-        last = len(sites) - 1
         ratio = plant.ratio(self.nominal)
+        angles, speeds, accelerations = list(self._angles), list(self._speeds), list(self._accelerations)
         resolutions = [
-            max(6.0 * noise, 2e-5 * float(np.ptp(angle)))
-            for noise, angle in zip(signals.noise, self._angles, strict=True)
+            max(6.0 * noise, 2e-5 * float(np.ptp(angle))) for noise, angle in zip(signals.noise, angles, strict=True)
         ]
-
-        def by_site(values: Sequence[Array]) -> dict[str, Array]:
-            return {"load": values[last], "motor": values[0]} | dict(zip(sites, values, strict=True))
-
-        twist = self._angles[0] / ratio - self._angles[1] if last else np.empty(0)
+        if self.hides_load:
+            angles.append(self._hidden[:, 0])
+            speeds.append(self._hidden[:, 1])
+            accelerations.append(first_derivative(self._hidden[:, 1], self.step))
+            resolutions.append(resolutions[0] / ratio)
+        twist = angles[0] / ratio - angles[1] if len(angles) > 1 else np.empty(0)
         return SignalScales(
             step=self.step, cutoff=max(self.cutoffs), requests=signals.torque, torque=rms(signals.torque),
-            angles=by_site(self._angles), speeds=by_site(self._speeds),
-            resolutions={"load": resolutions[last], "motor": resolutions[0]},
-            acceleration=rms(triangle_average(self._accelerations[last])), inertia=float(self.nominal[self.inertias[-1]]),
+            angles={"motor": angles[0], "load": angles[-1]}, speeds={"motor": speeds[0], "load": speeds[-1]},
+            resolutions={"motor": resolutions[0], "load": resolutions[-1]},
+            acceleration=rms(triangle_average(accelerations[-1])),
+            inertia=plant.value(self.nominal, plant.bodies[-1].inertia),
             stiffness=plant.value(self.nominal, plant.shaft.stiffness) if plant.shaft else 0.0, ratio=ratio, twist=twist,
+            twist_is_measured=not self.hides_load,
         )  # fmt: skip
 
     # --- residuals -----------------------------------------------------------------------------------------
@@ -178,10 +181,12 @@ class TorqueBalance:
         """
         plant, step = self.plant, self.step
         angles, speeds, accelerations = self._motion(p)
-        motion = np.column_stack([angles[0], speeds[0], angles[-1], speeds[-1]])
-        signs = self._directions(p)
         found = np.empty((self.size, 2))
-        acceleration_kernel(plant, p)(motion, signs, p, step, self._hidden_states_move(p), found)
+        if self.hides_load:
+            found[:, 0] = self._hidden_load(p)[1]
+        else:
+            motion = np.column_stack([angles[0], speeds[0], angles[-1], speeds[-1]])
+            acceleration_kernel(plant, p)(motion, self._directions(p), p, step, self._hidden_states_move(p), found)
         missing = np.array(
             [p[place] * (triangle_average(found[:, n]) - accelerations[n]) for n, place in enumerate(self.inertias)]
         )
@@ -189,6 +194,17 @@ class TorqueBalance:
         if initial:
             missing[0] += initial * np.exp(-step * np.arange(self.size) / plant.value(p, plant.drive.lag))
         return missing
+
+    def _hidden_load(self, p: Array) -> tuple[Array, Array]:
+        """Return angle and speed (n, 2) of a load that no encoder shows, and the motor's acceleration (n,)."""
+        (angle, *_), (speed, *_), _ = self._motion(p)
+        motion, signs, acceleration = np.empty((self.size, 2)), np.empty(self.size), np.empty(self.size)
+        width = float(np.exp(p[self.plant.stage().presliding[1]]))
+        substeps = max(2, self.plant.substeps(p, self.step))
+        fill = hidden_load_kernel(self.plant, p)
+        bristle = np.ascontiguousarray(self._directions(p)[:, 0])
+        fill(np.column_stack([angle, speed]), width, p, self.step, substeps, bristle, motion, signs, acceleration)
+        return motion, acceleration
 
     def _motion(self, p: Array) -> tuple[list[Array], list[Array], list[Array]]:
         """Return angles, speeds and accelerations of the bodies, from how the log has them."""
@@ -239,7 +255,7 @@ class TorqueBalance:
         """Return each inertia's share as the motor feels it; see :class:`ResidualModel`."""
         felt = [
             self.nominal[place] / (self.plant.ratio(self.nominal) ** 2 if body.geared else 1.0)
-            for place, body in zip(self.inertias, self.plant.bodies, strict=True)
+            for place, body in ((self.plant.index(body.inertia), body) for body in self.plant.bodies)
         ]
         return {body.inertia: float(value / sum(felt)) for body, value in zip(self.plant.bodies, felt, strict=True)}
 
@@ -259,12 +275,16 @@ class TorqueBalance:
         plant, count = self.plant, len(self.channels)
         jacobian = plant.jacobian(self.nominal)
         row = {place: n for n, place in enumerate(plant.states)}
-        measured = np.zeros((frequencies.size, count, count), dtype=complex)
+        bodies = len(plant.bodies)
+        measured = np.zeros((frequencies.size, bodies, bodies), dtype=complex)
         for r, body in enumerate(plant.bodies):
-            inertia = self.nominal[self.inertias[r]]
+            inertia = plant.value(self.nominal, body.inertia)
             for c, other in enumerate(plant.bodies):
                 rate = jacobian[row[body.speed], row[other.angle]] + s * jacobian[row[body.speed], row[other.speed]]
                 measured[:, r, c] = inertia * (rate + (gain if r == c else 0.0))
+        if self.hides_load:  # which follows the motor's angle
+            through = measured[:, 0, 1] * measured[:, 1, 0] / np.where(measured[:, 1, 1] == 0.0, 1.0, measured[:, 1, 1])
+            measured = (measured[:, 0, 0] - through)[:, None, None]
         process = np.broadcast_to(np.eye(count, dtype=complex), (frequencies.size, count, count))
         least = self.settings.torque_floor * rms(self._torque(self.nominal)) ** 2
         floors = [

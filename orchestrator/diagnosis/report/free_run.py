@@ -11,15 +11,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.signals import Signals
-from orchestrator.diagnosis.proof.settings import FreeRunSettings
-from orchestrator.diagnosis.proof.simulation import Simulation
+from orchestrator.diagnosis.report.run_signals import RunSignals
+from orchestrator.diagnosis.report.simulation import Simulation
+from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import moving
 from orchestrator.shared.cores import spread
 from orchestrator.shared.inference.damped_fit import Damping, Linearised, damped_fit
 
 Array = NDArray[np.float64]
+
+DAMPING = 1e-6  # of the first step: a good guess needs hardly any
+TRIES = 6  # dampings tried in a step
+ENOUGH = 1e-4  # relative gain below which a start has converged
+FADE = 1e-10  # share of the trace added to the diagonal: unseen states stay put
+STRAIGHT = 0.01  # by which the first step may miss what derivatives foretell: a linear run has one best start
+GROWING = (0.1, 0.25, 0.5, 1.0)  # shares of the run over which a start is sought again
+LEAST_SAMPLES = 10  # of such a share
+NUDGE = 0.1  # step of a derivative, as a share of a state's typical size
+RELATIVE_SIZE = 0.01  # typical size of speeds and torques, relative to themselves
+LEAST_SPEED = 1e-3  # typical size of a speed at rest [rad/s]
 
 
 @dataclass(frozen=True)
@@ -40,7 +51,7 @@ class FreeRun:
 
 
 def free_run(
-    plant: Plant, p: Array, guess: Array, signals: Signals, part: slice, settings: FreeRunSettings, history: bool = True
+    plant: Plant, p: Array, guess: Array, signals: RunSignals, part: slice, settings: ReportSettings, history: bool = True
 ) -> FreeRun:
     """Return the free run whose initial state lies closest to the measurement.
 
@@ -66,12 +77,12 @@ def free_run(
         return first
     begin, end, _ = part.indices(signals.size)
     start, run = guess, first
-    for share in settings.growing:
-        length = max(round(share * (end - begin)), settings.least_samples)
+    for share in GROWING:
+        length = max(round(share * (end - begin)), LEAST_SAMPLES)
         opening = slice(begin, begin + length)
         run = _closest(model, start, opening, settings)
         measured = model.measured[opening, : signals.channels]
-        if share == settings.growing[0] and _is_lost(run, measured, signals.noise, settings):
+        if share == GROWING[0] and _is_lost(run, measured, signals.noise, settings):
             return first
         start = run.start
     if len(run.outputs) < len(first.outputs):
@@ -80,7 +91,7 @@ def free_run(
     return run if other < cost else first
 
 
-def _is_lost(run: FreeRun, measured: Array, noise: Array, settings: FreeRunSettings) -> bool:
+def _is_lost(run: FreeRun, measured: Array, noise: Array, settings: ReportSettings) -> bool:
     """Tell whether a run over the beginning of a part is far off: a model that does not follow there does nowhere."""
     far = settings.lost * np.std(measured, axis=0) + settings.close * noise  # a machine may be at rest there
     return bool(np.all(run.rms > far))
@@ -91,7 +102,7 @@ def _teeth_may_part(plant: Plant, p: Array) -> bool:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a run that runs away is infinitely far off
-def _closest(model: Simulation, guess: Array, part: slice, settings: FreeRunSettings) -> FreeRun:
+def _closest(model: Simulation, guess: Array, part: slice, settings: ReportSettings) -> FreeRun:
     """Return the free run at which a descent from the ``guess`` of its initial state ends (damped Gauss-Newton)."""
     plant, signals = model.plant, model.signals
     m = signals.channels
@@ -126,36 +137,14 @@ def _closest(model: Simulation, guess: Array, part: slice, settings: FreeRunSett
         error = ((out - measured) / scale).ravel()
         return Linearised(J.T @ J, J.T @ error, cost(out), moved)
 
-    damping = Damping(settings.damping, 0.0, lambda H: settings.fade * float(np.trace(H)), settings.tries)
+    damping = Damping(DAMPING, 0.0, lambda H: FADE * float(np.trace(H)), TRIES)
     (start, out), _ = damped_fit(
-        (first, outputs(first)), linearise, damping, settings.iterations,
-        lambda gain, after: gain == 0.0 or gain < settings.enough * after,
+        (first, outputs(first)), linearise, damping, settings.start_steps,
+        lambda gain, after: gain == 0.0 or gain < ENOUGH * after,
     )  # fmt: skip
-    straight = bool(foretold) and abs(foretold[0] - 1.0) < settings.straight
+    straight = bool(foretold) and abs(foretold[0] - 1.0) < STRAIGHT
     error = np.sqrt(np.mean((out - measured) ** 2, axis=0))
     return FreeRun(out, start, error, straight)
-
-
-def start_answers(
-    plant: Plant, p: Array, run: FreeRun, signals: Signals, part: slice, settings: FreeRunSettings
-) -> Array:
-    """Return (n * channels, free places): how a free run's outputs answer to its initial state.
-
-    Args:
-        plant: the plant.
-        p: its parameters.
-        run: the free run.
-        signals: of the record.
-        part: the samples that it covers.
-        settings: of free runs.
-
-    Returns:
-        The derivatives, per unit of each place.
-    """
-    free, m = moving(plant, p), signals.channels
-    steps = _steps(plant, run.start, signals, free, settings)
-    model = Simulation(plant, p, signals)
-    return _answers(lambda start: model.run(start, part)[:, :m], run.start, run.outputs, free, steps, plant)
 
 
 def _answers(
@@ -182,12 +171,12 @@ def _followed(plant: Plant, start: Array) -> Array:
 
 
 def _steps(
-    plant: Plant, start: Array, signals: Signals, free: tuple[int, ...], settings: FreeRunSettings
+    plant: Plant, start: Array, signals: RunSignals, free: tuple[int, ...], settings: ReportSettings
 ) -> list[float]:  # fmt: skip
     """Return the steps of the derivatives by the free places of the state."""
-    share = settings.relative_size
+    share = RELATIVE_SIZE
     sizes = {plant.drive.torque: share * signals.torque}
     for channel, body in enumerate(plant.bodies):
         sizes[body.angle] = float(signals.noise[min(channel, signals.channels - 1)])
-        sizes[body.speed] = share * abs(start[body.speed]) + settings.least_speed
-    return [settings.nudge * float(sizes[place]) for place in free]
+        sizes[body.speed] = share * abs(start[body.speed]) + LEAST_SPEED
+    return [NUDGE * float(sizes[place]) for place in free]

@@ -7,14 +7,13 @@ meet, and whatever else there is, the exact, event-located plant itself runs.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.runs import in_time
-from orchestrator.diagnosis.fit.signals import Signals
+from orchestrator.diagnosis.report.run_signals import RunSignals
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import is_linear, linear_run_of
 from orchestrator.plants.predictor import FINER, coarse_runner_of, coarse_steps, runs_coarsely
@@ -39,7 +38,7 @@ class Simulation:
 
     plant: Plant
     p: Array
-    signals: Signals
+    signals: RunSignals
     history: bool = True
 
     def run(self, start: Array, part: slice) -> Array:
@@ -53,56 +52,43 @@ class Simulation:
             The angles [rad].
         """
         begin, end, _ = part.indices(self.signals.size)
-        rows, place = in_time(self.signals.runs, begin, self.signals.size)
-        first_row = int(rows[0])
-        if first_row not in self._acting:
-            self._acting[first_row] = self._requests_of(self._requests.u[rows])
-        acting, asked = self._acting[first_row]
+        acting, followed = self._requests
         whole, _ = self._dead_time
-        known, rows_asked = 0 if self.history else place, end - begin
-        late, early = (_requests(acting, place - back, rows_asked, known) for back in (whole, whole + 1))
+        known = 0 if self.history else begin
+        late, early = (_requests(acting, begin - back, end - begin, known) for back in (whole, whole + 1))
         out = np.empty((end - begin, 2))
         if self._kernel is not None:
             self._kernel(start, early, late, out)
         else:
-            self._run_exactly(start, float(asked[max(place - whole, 0)]), early, late, out)
+            self._run_exactly(start, float(followed[min(max(begin - whole, 0), self.signals.size - 1)]), early, late, out)
         for channel, name in enumerate(self.plant.offsets):
             out[:, channel] += self.p[self.plant.index(name)]
         return out
 
     @cached_property
     def measured(self) -> Array:
-        """The angles (n, 2) as they were, from how the log has them."""
-        return self.signals.aligned(self.plant, self.p).y
+        """The angles (n, channels) as they were, from how the log has them."""
+        return self.signals.aligned_angles(self.plant, self.p)
 
     @cached_property
-    def _requests(self) -> Signals:
-        """The signals with requests as they acted; an FMU takes one a sample."""
-        found = self.signals.acting(self.plant, self.p)
-        return found if self.history else replace(found, u=found.meant, late=0.0)
-
-    @cached_property
-    def _acting(self) -> dict[int, tuple[Array, Array]]:
-        """By the first row of each record: what is requested in each sample, and what is at its beginning."""
-        return {}
-
-    def _requests_of(self, u: Array) -> tuple[Array, Array]:
+    def _requests(self) -> tuple[Array, Array]:
+        """What is requested in each sample (n,), and what is at its beginning (n,)."""
         limit = self.p[self.plant.index(self.plant.drive.limit)]
-        u = np.clip(u, -limit, limit)
-        mean, followed = self.plant.followed(self.p, u, self.signals.h)
+        u = np.clip(self.signals.requests, -limit, limit)
+        mean, followed = self.plant.followed(self.p, u, self.signals.step)
         return (u if self._kernel is None else mean), followed
 
     @cached_property
     def _dead_time(self) -> tuple[int, float]:
         """Whole samples of it, and what is left [s]."""
-        delay, h = self.plant.value(self.p, self.plant.drive.delay) + self._requests.late, self.signals.h
+        delay, h = self.signals.lateness(self.plant, self.p), self.signals.step
         whole = int(np.floor(delay / h + 1e-9))
         return whole, max(delay - whole * h, 0.0)
 
     @cached_property
     def _kernel(self) -> Kernel | None:
         """What runs in the exact plant's place; None where nothing does."""
-        plant, p, h = self.plant, self.p, self.signals.h
+        plant, p, h = self.plant, self.p, self.signals.step
         _, first = self._dead_time
         if self.history and is_linear(plant, p):
             return linear_run_of(plant, p, first, h)
@@ -118,10 +104,10 @@ class Simulation:
         _, first = self._dead_time
         memory = (float(start[7]), asked) if self.history else (0.0, UNASKED)
         own = self.plant.own(self.p)
-        self.plant.runner()((*start[:7].tolist(), *memory), own, early, late, first, self.signals.h, out)
+        self.plant.runner()((*start[:7].tolist(), *memory), own, early, late, first, self.signals.step, out)
 
 
-def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice, history: bool = True) -> Array:
+def simulate(plant: Plant, p: Array, start: Array, signals: RunSignals, part: slice, history: bool = True) -> Array:
     """Return one run (n, 2) of a model over a part of a record.
 
     Args:
@@ -136,8 +122,8 @@ def simulate(plant: Plant, p: Array, start: Array, signals: Signals, part: slice
 
 
 def _requests(u: Array, begin: int, count: int, first: int) -> Array:
-    """Return the requests at ``count`` samples from ``begin`` on; there were none before ``first``."""
-    if begin >= first:
-        return u[begin : begin + count]
-    unknown = min(first - begin, count)
-    return np.concatenate([np.full(unknown, u[0] if first == 0 else 0.0), u[begin + unknown : begin + count]])
+    """Return the requests at ``count`` samples from ``begin`` on; there were none before ``first``, the last one stays."""
+    rows = np.arange(begin, begin + count)
+    found = u[np.clip(rows, 0, u.size - 1)]
+    found[rows < first] = u[0] if first == 0 else 0.0
+    return found

@@ -1,0 +1,1 @@
+"""What a diagnosis reports: sizes, free runs on test data, the corrected model, words and figures."""

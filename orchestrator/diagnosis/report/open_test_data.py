@@ -1,0 +1,16 @@
+"""The one place that reads test data."""
+
+from orchestrator.diagnosis.data.test_data import TestData
+from orchestrator.records.record import Record
+
+
+def open_test_data(data: TestData) -> list[tuple[Record, int]]:
+    """Return each record with the first row of its test part.
+
+    Args:
+        data: of the diagnosis.
+
+    Returns:
+        Records and rows.
+    """
+    return list(zip(data._records, data._first_rows, strict=True))

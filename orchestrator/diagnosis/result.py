@@ -1,0 +1,188 @@
+"""What a diagnosis says: plain immutable values."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.data.test_data import TestData
+from orchestrator.diagnosis.selection.grading import EffectEvidence, Grade, RecordEvidence
+from orchestrator.diagnosis.selection.remaining import Dependence
+from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+from orchestrator.shared.trust import Trust
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ValueEstimate:
+    """A value with its standard error, 95 % interval and unit."""
+
+    value: float
+    standard_error: float
+    interval: tuple[float, float]
+    unit: str
+
+
+@dataclass(frozen=True)
+class ParameterEstimate(ValueEstimate):
+    """The same of a parameter of the model, beside its nominal value."""
+
+    nominal: float
+
+
+@dataclass(frozen=True)
+class GradedEffect:
+    """An effect that the model lacks.
+
+    Attributes:
+        name, site: of the effect.
+        grade: certain, likely or possible.
+        lowered_by: names of the rules that lowered the grade.
+        parameters: estimate of each parameter, by short name.
+        evidence: gain, shares and family.
+        block_values: short name -> (blocks,) its value when each block in turn decides by its share.
+        motion_share: share of the motion's misfit on test data that goes with it; nan: it was not run.
+        of_log: a property of the log, not of the machine.
+    """
+
+    name: str
+    site: str
+    grade: Grade
+    lowered_by: tuple[str, ...]
+    parameters: Mapping[str, ValueEstimate]
+    evidence: EffectEvidence
+    block_values: Mapping[str, tuple[float, ...]]
+    motion_share: float = float("nan")
+    of_log: bool = False
+
+    @property
+    def label(self) -> str:
+        """Return name and site."""
+        return f"{self.name}@{self.site}"
+
+
+@dataclass(frozen=True)
+class SignalMisfit:
+    """Rms of free runs against the measurement of one signal.
+
+    Attributes:
+        signal, unit: what was measured.
+        noise: standard deviation of its noise.
+        nominal, parameters, final: rms of the model as given, re-fitted, and with its effects.
+    """
+
+    signal: str
+    unit: str
+    noise: float
+    nominal: float
+    parameters: float
+    final: float
+
+
+@dataclass(frozen=True)
+class TestMisfit:
+    """The misfit on test data of one record.
+
+    Attributes:
+        source: of the record.
+        rows: of its test part.
+        signals: misfit of each encoder.
+        torque: (nominal, parameters, final): share of the torque that each leaves; empty: not worked out.
+    """
+
+    __test__ = False
+
+    source: str
+    rows: int
+    signals: tuple[SignalMisfit, ...]
+    torque: tuple[float, ...] = ()
+
+    def is_worse(self, more: float, of_noise: float) -> bool:
+        """Tell whether the final model predicts the motion worse than re-fitted parameters do.
+
+        Args:
+            more: share by which chance may make a misfit larger.
+            of_noise: and share of the noise.
+
+        Returns:
+            True where the signals together get worse.
+        """
+        before, after = (
+            np.array([getattr(one, stage) / one.noise for one in self.signals]) for stage in ("parameters", "final")
+        )
+        if not np.all(np.isfinite(before)):
+            return False
+        return not float(np.sqrt(np.mean(after**2))) <= (1.0 + more) * float(np.sqrt(np.mean(before**2))) + of_noise
+
+
+@dataclass(frozen=True)
+class Workings:
+    """What figures and exports need of how a diagnosis was made.
+
+    Attributes:
+        records: as they were fitted.
+        test_data: which only the report opens.
+        search: problem, steps and models.
+        nominal, base, final: parameters of the plant (n,) of the three models.
+    """
+
+    records: tuple[Record, ...]
+    test_data: TestData = field(repr=False)
+    search: SearchResult = field(repr=False)
+    nominal: Array = field(repr=False)
+    base: Array = field(repr=False)
+    final: Array = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The outcome of a diagnosis; docs/diagnosis.md says what each word means.
+
+    Attributes:
+        verdict: "none" (the model explains the record), "parameters" (re-fitted, it does), "effects" (one at least is
+            likely) or "unknown" (something is missing, and nothing is likely).
+        effects: of the machine, surest first.
+        nuisances: of the log.
+        parameters: estimates by name.
+        left: share of the torque that no law explains, by body.
+        remaining: what that follows, strongest first.
+        law: the strongest, as a curve, where it may be used; None: there is none.
+        test: misfits on test data.
+        record: evidence of the whole record.
+        trust: how far the corrected model can be trusted.
+        notes: what to bear in mind, a sentence each.
+        settings: that were used.
+        model: that the record was compared with.
+        workings: how it was made.
+    """
+
+    verdict: str
+    effects: tuple[GradedEffect, ...]
+    nuisances: tuple[GradedEffect, ...]
+    parameters: Mapping[str, ParameterEstimate]
+    left: Mapping[str, float]
+    remaining: tuple[Dependence, ...]
+    law: Dependence | None
+    test: tuple[TestMisfit, ...]
+    record: RecordEvidence
+    trust: Trust
+    notes: tuple[str, ...]
+    settings: DiagnosisSettings
+    model: Model
+    workings: Workings = field(repr=False)
+
+    def graded(self, least: Grade) -> tuple[GradedEffect, ...]:
+        """Return the effects of the machine that are at least so sure.
+
+        Args:
+            least: grade.
+
+        Returns:
+            The effects.
+        """
+        return tuple(effect for effect in self.effects if effect.grade >= least)

@@ -1,0 +1,237 @@
+"""What a final model leaves, and which signals that follows: curves between knots, judged on blocks left out.
+
+A torque that depends on one signal is a sum of straight lines between knots. The values at the knots enter the balances
+linearly: they are found beside the model's own values by one set of normal equations, and judged by the score of every
+effect. The strongest of these dependences is the law that is learned where no effect of the bank explains the record.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.inference.fitting import Comparison
+from orchestrator.diagnosis.inference.problem import FitProblem
+from orchestrator.diagnosis.selection.search import SearchResult
+
+Array = NDArray[np.float64]
+KNOTS = 11
+EDGE = 0.005  # share of the rows beyond the first and the last knot
+RIDGE = 1e-9  # of the trace: knots that no row reaches stay where their neighbours are
+
+
+@dataclass(frozen=True, eq=False)
+class Argument:
+    """A signal that a torque may follow.
+
+    Attributes:
+        name: in words.
+        site: where the torque then acts.
+        unit: of the signal.
+        channel: of the balance that it enters.
+        values: (n,) of each record.
+        code: number of the argument in a learned law; 0: none has it.
+    """
+
+    name: str
+    site: str
+    unit: str
+    channel: int
+    values: tuple[Array, ...]
+    code: int = 0
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """What is left at a body follows a signal.
+
+    Attributes:
+        argument: in words.
+        site: where the torque acts.
+        argument_unit, unit: of knots and values.
+        knots, values: (k,) of the curve, a torque against the motion.
+        errors: (k,) standard errors of the values.
+        comparison: gain on blocks left out, and its paired error.
+        share: of what is left at the body that it explains.
+        formula: of at most two simple terms that run within the band; empty: none does.
+        changes: shares by which the model's own parameters move with it, by name.
+        code: number of the argument in a learned law.
+    """
+
+    argument: str
+    site: str
+    argument_unit: str
+    unit: str
+    knots: tuple[float, ...]
+    values: tuple[float, ...]
+    errors: tuple[float, ...]
+    comparison: Comparison
+    share: float
+    formula: str = ""
+    changes: Mapping[str, float] = field(default_factory=dict)
+    code: int = 0
+
+    @property
+    def words(self) -> str:
+        """Return the dependence as part of a sentence."""
+        text = f"{100.0 * self.share:.0f} % of it follows the {self.argument}"
+        return text + (f", like {self.formula} with s in {self.argument_unit}" if self.formula else "")
+
+
+def find_dependences(found: SearchResult, arguments: Sequence[Argument]) -> tuple[Dependence, ...]:
+    """Return what the final model leaves and which signals it follows, strongest first.
+
+    Args:
+        found: by the search.
+        arguments: signals to look at.
+
+    Returns:
+        Those that predict blocks left out surely better.
+    """
+    tried = [_fit_curve(found, argument) for argument in arguments]
+    kept = [one for one in tried if one is not None and one.comparison.t >= 2.5 and one.comparison.gain > 0.0]
+    return tuple(sorted(kept, key=lambda one: -one.comparison.gain))
+
+
+def knots_of(values: Array) -> Array | None:
+    """Return the knots of a curve: half-way between even steps and even shares of the values.
+
+    Args:
+        values: (n,) that the signal takes.
+
+    Returns:
+        Rising knots (k,); None: the values have no range.
+    """
+    shares = np.quantile(values, np.linspace(EDGE, 1.0 - EDGE, KNOTS))
+    knots = 0.5 * (shares + np.linspace(shares[0], shares[-1], KNOTS))
+    return knots if np.all(np.diff(knots) > 1e-9 * max(float(np.ptp(knots)), 1e-300)) else None
+
+
+def hats(knots: Array, values: Array) -> Array:
+    """Return (n, k) the share of each knot in a curve at some values; the last straight lines go on.
+
+    Args:
+        knots: (k,) rising.
+        values: (n,) of the signal.
+
+    Returns:
+        The shares.
+    """
+    place = np.clip(np.searchsorted(knots, values), 1, knots.size - 1)
+    share = (values - knots[place - 1]) / (knots[place] - knots[place - 1])
+    found = np.zeros((values.size, knots.size))
+    rows = np.arange(values.size)
+    found[rows, place - 1] = 1.0 - share
+    found[rows, place] = share
+    return found
+
+
+def _fit_curve(found: SearchResult, argument: Argument) -> Dependence | None:
+    problem, final = found.problem, found.final
+    knots = knots_of(np.concatenate(argument.values))
+    if knots is None:
+        return None
+    columns = _whitened_hats(problem, argument, knots)
+    own = [n for n, one in enumerate(final.coordinates) if isinstance(one, int)]
+    whole = np.column_stack([final.jacobian[:, own], columns])
+    prior, slopes = (part[own] for part in problem.prior(final.point, final.coordinates))
+    normal = whole.T @ whole
+    penalty = np.diag(np.concatenate([slopes**2, np.full(knots.size, RIDGE * np.trace(normal) / len(normal))]))
+    gradient = whole.T @ final.residual + np.concatenate([slopes * prior, np.zeros(knots.size)])
+    inverse = np.linalg.pinv(normal + penalty, hermitian=True)
+    step = -inverse @ gradient
+    errors, shifts = _block_errors(problem, final.residual, whole, normal + penalty, gradient)
+    base, _ = _block_errors(
+        problem, final.residual, whole[:, : len(own)], (normal + penalty)[: len(own), : len(own)], gradient[: len(own)]
+    )
+    values = step[len(own) :]
+    count = len(errors)
+    spread = (count - 1) / count * np.sum((shifts - shifts.mean(axis=0)) ** 2, axis=0)[len(own) :]
+    deviations = np.sqrt(np.maximum(np.diag(inverse)[len(own) :], spread))
+    changes = {problem.parameters[n].name: float(step[place]) for place, n in enumerate(own)}
+    left = final.residual + whole @ step
+    share = 1.0 - float(left @ left) / float(final.residual @ final.residual)
+    return Dependence(
+        argument.name, argument.site, argument.unit, "N.m", tuple(knots.tolist()), tuple(values.tolist()),
+        tuple(deviations.tolist()), _compared(base, errors), max(share, 0.0), formula_of(knots, values, deviations),
+        changes, argument.code,
+    )  # fmt: skip
+
+
+def _whitened_hats(problem: FitProblem, argument: Argument, knots: Array) -> Array:
+    """Return (rows, k) the whitened residuals of a unit torque against the motion at each knot."""
+    columns = []
+    for k in range(knots.size):
+        parts = []
+        for model, whitening, values in zip(problem.models, problem.whitenings, argument.values, strict=True):
+            torque = np.zeros((len(model.channels), model.size))
+            torque[argument.channel] = -hats(knots, values)[:, k]
+            parts.append(whitening.apply(torque))
+        columns.append(np.concatenate(parts))
+    return np.column_stack(columns)
+
+
+def _block_errors(
+    problem: FitProblem, residual: Array, columns: Array, normal: Array, gradient: Array
+) -> tuple[Array, Array]:
+    """Return (blocks,) squared errors of blocks left out after one linear step, and how the values move."""
+    errors, shifts = [], []
+    for block in range(problem.block_count):
+        rows = problem.blocks == block
+        part = columns[rows]
+        ridge = 1e-10 * np.diag(np.diag(normal))
+        step = -np.linalg.solve(normal - part.T @ part + ridge, gradient - part.T @ residual[rows])
+        left = residual[rows] + part @ step
+        errors.append(float(left @ left))
+        shifts.append(step)
+    return np.maximum(errors, 1e-300), np.array(shifts)
+
+
+def _compared(before: Array, after: Array) -> Comparison:
+    logs = np.log(before / after)
+    t = float(logs.mean() / (logs.std(ddof=1) / np.sqrt(len(logs)) + 1e-9))
+    return Comparison(float(1.0 - after.sum() / before.sum()), t)
+
+
+def simple_terms(s: Array) -> dict[str, Array]:
+    """Return the simple terms of a formula at some arguments, by their names.
+
+    Args:
+        s: (n,) arguments.
+
+    Returns:
+        Each term (n,).
+    """
+    return {
+        "1": np.ones_like(s), "s": s, "sign(s)": np.sign(s), "|s|": np.abs(s), "s |s|": s * np.abs(s), "s^2": s**2,
+        "s^3": s**3, "sin(s)": np.sin(s), "cos(s)": np.cos(s),
+    }  # fmt: skip
+
+
+def formula_of(knots: Array, values: Array, errors: Array, most: float = 1.5) -> str:
+    """Return the shortest sum of at most two simple terms that runs within the errors of a curve.
+
+    Args:
+        knots: (k,) arguments.
+        values: (k,) of the curve.
+        errors: (k,) standard errors of the values.
+        most: mean squared error in standard errors up to which a formula holds.
+
+    Returns:
+        The formula, s being the argument; empty: none does.
+    """
+    terms = simple_terms(knots)
+    weight = 1.0 / np.maximum(errors, 1e-3 * float(np.max(np.abs(values))))
+    for count in (1, 2):
+        fits = []
+        for chosen in itertools.combinations(terms, count):
+            columns = np.column_stack([terms[name] for name in chosen])
+            size, *_ = np.linalg.lstsq(columns * weight[:, None], values * weight, rcond=None)
+            left = float(np.mean(((values - columns @ size) * weight) ** 2))
+            fits.append((left, chosen, size))
+        left, chosen, size = min(fits, key=lambda entry: entry[0])
+        if left < most:
+            return " ".join(f"{value:+.4g} {name}" for value, name in zip(size, chosen, strict=True)).lstrip("+")
+    return ""
