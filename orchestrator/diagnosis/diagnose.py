@@ -1,202 +1,184 @@
-"""The diagnosis of one record: search, verdict, where, misfit."""
+"""The diagnosis of records of one machine, once through: data, model, search, grades, what is left, test data, verdict."""
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fit.fitting import Fit, Parts
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
-from orchestrator.diagnosis.fit.together import at_one_rate, series
-from orchestrator.diagnosis.judged import Pass
-from orchestrator.diagnosis.outcome import Diagnosis, LearnedLaw, Named, Workings
-from orchestrator.diagnosis.passes import Progress, passes
-from orchestrator.diagnosis.proof.by_record import by_record, repeats
-from orchestrator.diagnosis.proof.horizons import table
-from orchestrator.diagnosis.proof.learned import learned_law
-from orchestrator.diagnosis.proof.misfit import held_out_misfit
-from orchestrator.diagnosis.proof.righted import of_the_log
-from orchestrator.diagnosis.search.candidate import Candidate, ForwardStep
-from orchestrator.diagnosis.search.finer import finer_of
-from orchestrator.diagnosis.search.model_space import in_metres
+from orchestrator.diagnosis.data.admission import check_model, check_record, check_resolved
+from orchestrator.diagnosis.data.signals import prepare_signals
+from orchestrator.diagnosis.data.test_data import split_records
+from orchestrator.diagnosis.inference.problem import fit_problem
+from orchestrator.diagnosis.model.interface import Values
+from orchestrator.diagnosis.model.law_arguments import law_arguments
+from orchestrator.diagnosis.model.plant_effects import effect_parameters
+from orchestrator.diagnosis.model.torque_balance import TorqueBalance
+from orchestrator.diagnosis.report.drive_gain import find_drive_gain
+from orchestrator.diagnosis.report.estimates import (
+    block_values,
+    effect_estimates,
+    interval_width,
+    parameter_estimates,
+)
+from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
+from orchestrator.diagnosis.report.test_report import misfit_on_test_data, motion_shares
+from orchestrator.diagnosis.report.units import in_metres, unit_in
+from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, Workings
+from orchestrator.diagnosis.selection.grading import (
+    Grade,
+    RecordEvidence,
+    effect_evidence,
+    grade_effect,
+    record_evidence,
+    torque_shares,
+)
+from orchestrator.diagnosis.selection.remaining import Dependence, find_dependences
+from orchestrator.diagnosis.selection.search import SearchResult, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
-from orchestrator.diagnosis.standing import honest
-from orchestrator.diagnosis.verdict.admission import check_comparable, check_diagnosable, check_resolved
-from orchestrator.diagnosis.verdict.evidence import Evidence, evidence
-from orchestrator.diagnosis.verdict.gain import as_nuisance, far_off, gain_of
-from orchestrator.diagnosis.verdict.judgement import doubts
-from orchestrator.diagnosis.verdict.naming import METRIC, named
-from orchestrator.diagnosis.verdict.where import missing_torque, places
-from orchestrator.diagnosis.verdict.words import warnings_of
-from orchestrator.plants.description import Plant
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
-from orchestrator.shared.results.diagnose import ParameterFound
 
-Array = NDArray[np.float64]
+Progress = Callable[[str], None]
 DEFAULT_SETTINGS = DiagnosisSettings()
 
 
 def diagnose(
-    record: Record | Sequence[Record],
+    records: Record | Sequence[Record],
     model: Model,
-    progress: Progress = lambda done, expected, what: None,
     settings: DiagnosisSettings = DEFAULT_SETTINGS,
+    *,
+    test: Record | None = None,
+    search: bool = True,
+    time_limit: float | None = None,
+    progress: Progress = lambda what: None,
 ) -> Diagnosis:
-    """Compare a record with a model; name what is missing.
+    """Compare records of one machine with a model and name what it lacks.
 
     Args:
-        record: at least 200 samples; one encoder or two. Several of one machine share parameters and effects; each
-            has its own start and noise.
+        records: at least 200 rows each; one encoder or two.
         model: nominal values and how far each may be off.
-        progress: called with (fits done, expected, what was fitted).
         settings: every threshold.
+        test: a record that is test data as a whole; None: the last rows of each record are.
+        search: False: parameters are re-fitted and the model is judged as it stands.
+        time_limit: seconds after which the search ends with what it has; None: none.
+        progress: called with what was fitted.
 
     Returns:
-        The verdict, with all that it rests on.
+        Graded effects, the corrected model, and what is left.
 
     Raises:
-        ScenarioError: the model's backlash model cannot be diagnosed, or it is too fast for the record.
+        ScenarioError: the model has no torque balance, or is too fast for the record.
         RecordError: nothing moves, or nothing drives.
     """
-    plant = model.plant
-    check_diagnosable(model)
-    given = [record] if isinstance(record, Record) else list(record)
-    for one in given:
-        check_comparable(one, settings)
-    given = [one if len(plant.bodies) > 1 else one.without_load_encoder() for one in given]
-    nominal = plant.extended(model.values)
-    analyses = at_one_rate(given, plant, nominal, settings)
-    analysis, given = analyses[0], [one.record for one in analyses]
-    check_resolved(plant, nominal, given[0].step, model.source, settings)
-    lag = plant.value(nominal, plant.drive.lag)
-    signals, parts = series(given, lag, settings, [one.most_noise for one in analyses])
-    found = passes(model, signals, parts, nominal, settings, progress, finer_of(analyses, plant, nominal, settings))
-    units = METRIC if in_metres(model) else {}
-    position = units.get("rad", "rad")
-    found, chosen, law = _with_law(found, position)
-    likelihood, parts, search, best, unknown = found.likelihood, found.parts, found.search, found.best, found.unknown
-    base_fit, final = found.base, found.final
-    stages = _stages(nominal, base_fit, search.steps, best, chosen, unknown)
-    misfit = held_out_misfit(likelihood, chosen.q, stages, parts.held_out, position)
-    everything = _named(found, final if unknown else chosen, units)
-    effects = tuple(one for one, of_the_log in everything if not of_the_log)
-    nuisances = tuple(one for one, of_the_log in everything if of_the_log)
-    if unknown or effects or nuisances:
-        verdict = "unknown" if unknown else "effects" if effects else "parameters"
-    else:
-        verdict = _plain_verdict(likelihood, nominal, found.plain, parts)
-    gain = None if verdict in ("none", "unknown") else gain_of(model, chosen.p, settings.verdict)
-    untouched = replace(base_fit, p=nominal)
-    before = missing_torque(likelihood, untouched if verdict in ("none", "parameters") else base_fit)
-    where = places(before, signals.h, settings.places)
-    far = far_off(model, chosen.p, settings.verdict)
-    unnamed = replace(found.proof, final=found.proof.base) if unknown else found.proof
-    ends = (stages[0], stages[-1])
-    named_stages = ("parameters", "final")[: 1 if unknown or not best.effects else 2]
-    warnings = warnings_of(found, effects, signals.channels, len(plant.bodies))
-    return Diagnosis(
-        verdict=verdict,
-        effects=() if unknown else effects,
-        suspects=effects if unknown else (),
-        nuisances=nuisances if gain is None else (*nuisances, as_nuisance(gain)),
-        parameters=_parameters(plant, model, chosen),
-        where=tuple(replace(place, unit=units.get(place.unit, place.unit)) for place in where),
-        misfit=misfit,
-        remainder=found.left,
-        warnings=warnings,
-        corrected={name: float(chosen.p[plant.index(name)]) for name in _changed(plant, nominal, chosen.p)},
-        trust=doubts(verdict, found.left, found.floor_off, unnamed, far, misfit, warnings, settings.verdict),
-        horizons=table(named_stages, (found.proof.base, found.proof.final)[: len(named_stages)]),
-        analysis=analysis.found(),
-        settings=settings,
-        workings=Workings(likelihood, parts, base_fit, chosen, best, tuple(search.steps)),
-        records=by_record(likelihood, chosen.q, ends, parts.held_out, position),
-        repeats=repeats(likelihood.signals, plant.encoders, settings.proof),
-        learned=law,
-    )
+    whole = [records] if isinstance(records, Record) else list(records)
+    check_model(model)
+    for record in whole:
+        check_record(record)
+        check_resolved(model.plant, model, record)
+    fitted, test_data = split_records(whole, settings.test_share, test)
+    models = [balance_of(record, model, settings) for record in fitted]
+    until = np.inf if time_limit is None else time.monotonic() + time_limit
+    chosen = settings.selection if search else msgspec.structs.replace(settings.selection, most_effects=0)
+    problem = fit_problem(models, settings.fit)
+    found = search_effects(problem, chosen, progress, lambda: bool(time.monotonic() > until))
+    points = (found.problem.start, found.base.point, found.final.point)
+    nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
+    workings = Workings(fitted, test_data, found, tuple(models), nominal, base, final)
+    return _report(workings, model, settings)
 
 
-def _with_law(found: Pass, position: str) -> tuple[Pass, Fit, LearnedLaw | None]:
-    """Return the pass, the model that is told and the law of the rest; it is unknown where a law explains most of that.
-
-    What begins late, or comes by a clock, is no noise, even where what is known of noise cannot tell.
-    """
-    likelihood, final, parts = found.likelihood, found.final, found.parts
-    settings = likelihood.settings
-    learns = not (found.search.stopped or found.hopeless)
-    if not found.unknown:
-        misfit = held_out_misfit(likelihood, final.q, [("", final.p)], parts.held_out, "") if learns else ()
-        near = all(one.after <= settings.verdict.notable_misfit * one.noise for one in misfit)
-        log = {effect.label for effect in of_the_log(likelihood.plant)}
-        if near or not found.floor_off or any(effect.label not in log for effect in found.best.effects):
-            return found, final, None
-    plain = honest(likelihood, found.base, (), parts)
-    law = learned_law(likelihood, plain, parts, position) if learns else None
-    if found.unknown or (law is not None and law.shrinks >= settings.learned.surely):
-        return replace(found, unknown=True), plain, law
-    return found, final, None
-
-
-def evidence_of(diagnosis: Diagnosis) -> Evidence:
-    """Return what the final model of a diagnosis leaves that follows position or direction.
+def balance_of(record: Record, model: Model, settings: DiagnosisSettings) -> TorqueBalance:
+    """Return the torque balances of a model beside a record.
 
     Args:
-        diagnosis: of the record.
+        record: of the machine.
+        model: nominal values and how far each may be off.
+        settings: of the band and the balances.
 
     Returns:
-        The evidence.
+        The balances.
     """
-    w = diagnosis.workings
-    return evidence(w.likelihood, w.final, w.parts)
+    plant = model.plant
+    two = len(plant.bodies) > 1
+    inertia = None if two else plant.value(plant.extended(model.values), plant.bodies[0].inertia)
+    signals = prepare_signals(record, inertia, settings.band, two)
+    return TorqueBalance(model, signals, settings.balance, angular=not in_metres(model))
 
 
-def _named(found: Pass, final: Fit, units: Mapping[str, str]) -> list[tuple[Named, bool]]:
-    """Return the effects of a pass by name, and whether they are the log's."""
-    search, verdict = found.search, found.likelihood.settings.verdict
-    return [
-        (named(search.plant, one, final, search.steps, units, verdict, search.not_tried(one)), one.measurement)
-        for one in found.best.effects
-    ]
+def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Diagnosis:
+    """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
+    found = workings.search
+    record = record_evidence(found)
+    graded = tuple(_graded(workings, label, record, model, settings) for label in found.final.labels)
+    test = misfit_on_test_data(workings, model, settings)
+    shares = motion_shares(workings, model, test, [effect.label for effect in graded], settings)
+    graded = tuple(replace(effect, motion_share=shares[effect.label]) for effect in graded)
+    effects = tuple(sorted((one for one in graded if not one.of_log), key=lambda one: -one.grade))
+    parameters = parameter_estimates(found.problem, found.final, settings.report.level)
+    parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}
+    arguments = law_arguments(
+        workings.balances, found.problem.record_points(found.final.point), metric=in_metres(model)
+    )
+    remaining = find_dependences(found, arguments, settings.selection.least_t)
+    verdict = form_verdict(found, graded, remaining, record, settings)
+    trust = judge_trust(verdict, graded, record, test, parameters, model, settings)
+    left = torque_shares(found.problem, found.final.point)
+    return Diagnosis(
+        verdict=verdict, effects=effects, nuisances=_nuisances(found, graded, parameters, model, settings),
+        parameters=parameters, left=dict(zip(workings.balances[0].channels, map(float, left), strict=True)),
+        remaining=remaining, law=_law(verdict, remaining, settings), test=test, record=record, trust=trust,
+        notes=_notes(found, record), settings=settings, model=model, workings=workings,
+    )  # fmt: skip
 
 
-def _plain_verdict(likelihood: RecordLikelihood, nominal: Array, base: Fit, parts: Parts) -> str:
-    """Return "none" when the nominal values explain the record as well as re-fitted ones do, else "parameters"."""
-    part = parts.seen
-    z = likelihood.whitened(nominal, base.q)
-    gained = base.fitted - likelihood.log_likelihood(z, base.q, part, base.colour, nominal)
-    most = likelihood.settings.verdict.explained_by_nominal * len(base.free)
-    return "none" if gained < most else "parameters"
+def _graded(
+    workings: Workings, label: str, record: RecordEvidence, model: Model, settings: DiagnosisSettings
+) -> GradedEffect:
+    found, plant = workings.search, model.plant
+    effect = found.problem.effects[label]
+    row = next(row for row in plant.bank if row.label == label)
+
+    def named(values: Values) -> Mapping[str, float]:
+        full = effect_parameters(plant, effect, values)
+        return {short: full[name] for short, name in row.parameters.items()}
+
+    units = {short: unit_in(plant.entry(place).unit, model, short) for short, place in row.places(plant).items()}
+    evidence = effect_evidence(found, label)
+    grade, lowered = grade_effect(evidence, record, settings)
+    return GradedEffect(
+        row.name, row.site, grade, lowered,
+        effect_estimates(found.problem, found.final, label, named, units, settings.report.level), evidence,
+        block_values(found.problem, found.final, label, named), of_log=row.measurement,
+    )  # fmt: skip
 
 
-def _parameters(plant: Plant, model: Model, final: Fit) -> dict[str, ParameterFound]:
-    return {
-        u.name: ParameterFound(
-            nominal=u.value,
-            value=float(final.p[plant.index(u.name)]),
-            standard_error=final.standard_error(plant.index(u.name)),
-            interval=final.interval(plant.index(u.name)),
-            unit=METRIC.get(u.unit, u.unit) if in_metres(model) else u.unit,
-        )
-        for u in model.uncertain
-        if any(entry.place == plant.index(u.name) for entry in final.free)
-    }
+def _nuisances(
+    found: SearchResult, graded: Sequence[GradedEffect], parameters: Mapping[str, ParameterEstimate], model: Model,
+    settings: DiagnosisSettings,
+) -> tuple[Nuisance, ...]:  # fmt: skip
+    nuisances = [Nuisance(one.name, one.grade, one.parameters) for one in graded if one.of_log]
+    width = interval_width(found.problem, settings.report.level)
+    gain = find_drive_gain(model, {name: one.value for name, one in parameters.items()}, width)
+    if gain is not None:
+        nuisances.append(Nuisance("drive_gain", Grade.LIKELY, {"gain": gain}))
+    return tuple(nuisances)
 
 
-def _changed(plant: Plant, nominal: Array, p: Array) -> list[str]:
-    """Return the names of the plant's own parameters whose value differs from the nominal one."""
-    return [entry.name for n, entry in enumerate(plant.table) if p[n] != nominal[n]]
+def _law(verdict: str, remaining: Sequence[Dependence], settings: DiagnosisSettings) -> Dependence | None:
+    """Return the strongest dependence of what is left, where no effect is likely and it takes enough."""
+    if verdict != "unknown" or not remaining:
+        return None
+    best = remaining[0]
+    strong = best.comparison.t >= settings.grades.likely_t and best.comparison.gain >= settings.report.law_gain
+    return best if strong and best.code else None
 
 
-def _stages(
-    nominal: Array, base: Fit, steps: Sequence[ForwardStep], best: Candidate, chosen: Fit, unknown: bool
-) -> list[tuple[str, Array]]:
-    stages = [("nominal", nominal), ("parameters", base.p)]
-    if unknown or not best.effects:
-        return stages
-    for step in steps[1:]:
-        last = step.before.effects[-1].label if step.before.effects else best.effects[-1].label
-        if last != best.effects[-1].label and step.accepted:
-            stages.append((f"+ {step.before.effects[-1].label}", step.before.fit.p))
-    return [*stages, (f"+ {best.effects[-1].label}", chosen.p)]
+def _notes(found: SearchResult, record: RecordEvidence) -> tuple[str, ...]:
+    notes = []
+    if not found.complete:
+        notes.append("the time limit ended the search: effects that were not tried may be missing")
+    if record.inertia_error > record.inertia:
+        notes.append("the record does not show its inertia: it needs accelerations, or a torque in its true unit")
+    return tuple(notes)

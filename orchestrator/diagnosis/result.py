@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.test_data import TestData
+from orchestrator.diagnosis.model.torque_balance import TorqueBalance
 from orchestrator.diagnosis.selection.grading import EffectEvidence, Grade, RecordEvidence
 from orchestrator.diagnosis.selection.remaining import Dependence
 from orchestrator.diagnosis.selection.search import SearchResult
@@ -64,6 +65,15 @@ class GradedEffect:
     def label(self) -> str:
         """Return name and site."""
         return f"{self.name}@{self.site}"
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """A property of the log: a late encoder, an early torque, the gain of the drive."""
+
+    name: str
+    grade: Grade
+    parameters: Mapping[str, ValueEstimate]
 
 
 @dataclass(frozen=True)
@@ -128,12 +138,14 @@ class Workings:
         records: as they were fitted.
         test_data: which only the report opens.
         search: problem, steps and models.
+        balances: torque balances of each record.
         nominal, base, final: parameters of the plant (n,) of the three models.
     """
 
     records: tuple[Record, ...]
     test_data: TestData = field(repr=False)
     search: SearchResult = field(repr=False)
+    balances: tuple[TorqueBalance, ...] = field(repr=False)
     nominal: Array = field(repr=False)
     base: Array = field(repr=False)
     final: Array = field(repr=False)
@@ -163,7 +175,7 @@ class Diagnosis:
 
     verdict: str
     effects: tuple[GradedEffect, ...]
-    nuisances: tuple[GradedEffect, ...]
+    nuisances: tuple[Nuisance, ...]
     parameters: Mapping[str, ParameterEstimate]
     left: Mapping[str, float]
     remaining: tuple[Dependence, ...]

@@ -109,6 +109,7 @@ class ReportSettings(Settings, frozen=True):
     least_rows: Annotated[int, setting("rows of a free run at least", ge=10)] = 40
     worse: Annotated[float, share("by which chance may make the misfit of test data larger")] = 0.05
     of_noise: Annotated[float, share("and share of the encoder's noise")] = 0.1
+    level: Annotated[float, share("of reported intervals")] = 0.95
     start_steps: Annotated[int, setting("Gauss-Newton steps to the initial state of a free run", ge=1)] = 12
     close: Annotated[float, setting("rms in noise deviations up to which a run is close", ge=1)] = 1.3
     lost: Annotated[float, setting("rms as a share of the motion from which a run follows nothing", gt=0)] = 0.3

@@ -1,6 +1,6 @@
 """The narrow interface between any model and the analysis: what is fitted, which effects may be missing, residuals, noise."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -161,6 +161,28 @@ class NoiseSources:
     levels: Array
     process: Array
     floors: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LawArgument:
+    """A signal that a torque which no effect explains may follow.
+
+    Attributes:
+        name: in words.
+        site: where the torque then acts.
+        unit, torque_unit: of the signal and of the torque.
+        values: (n,) of each record.
+        respond: of each record: torque (n,) against the motion -> change (channels, n) of the residuals.
+        code: number of the argument in a learned law of an FMU; 0: none has it.
+    """
+
+    name: str
+    site: str
+    unit: str
+    torque_unit: str
+    values: tuple[Array, ...]
+    respond: tuple[Callable[[Array], Array], ...]
+    code: int = 0
 
 
 class ResidualModel(Protocol):

@@ -36,7 +36,6 @@ from orchestrator.diagnosis.model.drive import delivered_torque, shifted
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, NoiseSources, UncertainParameter, Values
 from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters
 from orchestrator.diagnosis.settings import BalanceSettings
-from orchestrator.plants.description import Plant
 from orchestrator.plants.effects import SignalScales, rms
 from orchestrator.plants.measurement import SHIFT
 from orchestrator.records.model_file import Model
@@ -53,11 +52,13 @@ class TorqueBalance:
         model: nominal values and how far each may be off.
         signals: of the record; with as many angles as the plant has bodies.
         settings: of the balances.
+        angular: positions are angles, not metres.
     """
 
-    def __init__(self, model: Model, signals: Signals, settings: BalanceSettings) -> None:
+    def __init__(self, model: Model, signals: Signals, settings: BalanceSettings, angular: bool = True) -> None:
         plant = model.plant
         self.plant, self.signals, self.settings, self.scaled = plant, signals, settings, True
+        self.angular = angular
         self.nominal = plant.extended(model.values)
         self.step, self.size, self.cutoffs = signals.step, signals.size, signals.cutoffs
         self.channels = tuple(body.name for body in plant.bodies[: len(signals.angles)])
@@ -120,7 +121,7 @@ class TorqueBalance:
             acceleration=rms(triangle_average(accelerations[-1])),
             inertia=plant.value(self.nominal, plant.bodies[-1].inertia),
             stiffness=plant.value(self.nominal, plant.shaft.stiffness) if plant.shaft else 0.0, ratio=ratio, twist=twist,
-            twist_is_measured=not self.hides_load,
+            twist_is_measured=not self.hides_load, angular=self.angular,
         )  # fmt: skip
 
     # --- residuals -----------------------------------------------------------------------------------------
@@ -141,6 +142,33 @@ class TorqueBalance:
                 p[self.plant.index(name)] = value
         return p
 
+    def physical_values(self, point: ModelPoint) -> Array:
+        """Return the plant's parameters (n,) at a point, distances over which friction builds up as the model has them.
+
+        Those of the analysis are what the encoder's noise asks for, and nothing of the machine.
+
+        Args:
+            point: values of the model.
+
+        Returns:
+            The parameters of a simulation.
+        """
+        p = self.values_at(point)
+        scanned = [self.plant.index(name) for row in self.plant.bank for name in row.scanned.values()]
+        p[scanned] = self.nominal[scanned]
+        return p
+
+    def drive_torque(self, p: Array) -> Array:
+        """Return the drive's torque (n,) [N.m] under the triangle average.
+
+        Args:
+            p: parameters of the analysis.
+
+        Returns:
+            The torque.
+        """
+        return self._torque(p)
+
     def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
         """Return the residuals (channels, n) [N.m] at each of some points; see :class:`ResidualModel`."""
         if len(points) < 4:
@@ -157,14 +185,25 @@ class TorqueBalance:
             The residuals, scaled as the head of the module says.
         """
         p = self.values_at(point)
+        return np.asarray(self.balance(p, self._initial(point)) * self.residual_scale(point)[:, None])
+
+    def residual_scale(self, point: ModelPoint) -> Array:
+        """Return (channels,) residual over missing torque, as the head of the module says.
+
+        Args:
+            point: values of the model.
+
+        Returns:
+            The factors; ones of plain balances.
+        """
         if not self.scaled:
-            return self.balance(p, self._initial(point))
+            return np.ones(len(self.channels))
+        p = self.values_at(point)
         scale = np.array([self.nominal[place] / p[place] for place in self.inertias])
         scale[0] = np.sqrt(scale[0])
-        charge = 1.0
         if any(self.effects[label].takes_drive for label in point.effects):
-            charge = rms(self._torque(self.nominal)) / rms(self._torque(p))
-        return np.asarray(self.balance(p, self._initial(point)) * (scale * charge)[:, None])
+            scale *= rms(self._torque(self.nominal)) / rms(self._torque(p))
+        return scale
 
     def _initial(self, point: ModelPoint) -> float:
         return point.parameters[-1] if len(point.parameters) > len(self._places) else 0.0

@@ -51,7 +51,13 @@ class FreeRun:
 
 
 def free_run(
-    plant: Plant, p: Array, guess: Array, signals: RunSignals, part: slice, settings: ReportSettings, history: bool = True
+    plant: Plant,
+    p: Array,
+    guess: Array,
+    signals: RunSignals,
+    part: slice,
+    settings: ReportSettings,
+    history: bool = True,
 ) -> FreeRun:
     """Return the free run whose initial state lies closest to the measurement.
 

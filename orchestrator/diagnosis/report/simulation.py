@@ -60,7 +60,9 @@ class Simulation:
         if self._kernel is not None:
             self._kernel(start, early, late, out)
         else:
-            self._run_exactly(start, float(followed[min(max(begin - whole, 0), self.signals.size - 1)]), early, late, out)
+            self._run_exactly(
+                start, float(followed[min(max(begin - whole, 0), self.signals.size - 1)]), early, late, out
+            )
         for channel, name in enumerate(self.plant.offsets):
             out[:, channel] += self.p[self.plant.index(name)]
         return out

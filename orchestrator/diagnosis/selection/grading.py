@@ -180,7 +180,9 @@ GRADE_RULES: tuple[GradeRule, ...] = (
 )  # fmt: skip
 
 
-def grade_effect(effect: EffectEvidence, record: RecordEvidence, settings: DiagnosisSettings) -> tuple[Grade, tuple[str, ...]]:
+def grade_effect(
+    effect: EffectEvidence, record: RecordEvidence, settings: DiagnosisSettings
+) -> tuple[Grade, tuple[str, ...]]:
     """Return the grade of an effect and the names of the rules that lowered it.
 
     Args:
@@ -335,4 +337,3 @@ def recorded_inertia(problem: FitProblem, fitted: FittedModel) -> tuple[float, f
     variance = (count - 1) / count * float(np.sum((off - off.mean()) ** 2))
     spread = max((entry.spread for entry in problem.shared if entry.name in shares), default=0.0)
     return total, float(np.sqrt(max(variance, float(weights @ free.covariance @ weights)))), spread
-

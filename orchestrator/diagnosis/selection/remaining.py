@@ -14,33 +14,13 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.inference.fitting import Comparison
 from orchestrator.diagnosis.inference.problem import FitProblem
+from orchestrator.diagnosis.model.interface import LawArgument
 from orchestrator.diagnosis.selection.search import SearchResult
 
 Array = NDArray[np.float64]
 KNOTS = 11
 EDGE = 0.005  # share of the rows beyond the first and the last knot
 RIDGE = 1e-9  # of the trace: knots that no row reaches stay where their neighbours are
-
-
-@dataclass(frozen=True, eq=False)
-class Argument:
-    """A signal that a torque may follow.
-
-    Attributes:
-        name: in words.
-        site: where the torque then acts.
-        unit: of the signal.
-        channel: of the balance that it enters.
-        values: (n,) of each record.
-        code: number of the argument in a learned law; 0: none has it.
-    """
-
-    name: str
-    site: str
-    unit: str
-    channel: int
-    values: tuple[Array, ...]
-    code: int = 0
 
 
 @dataclass(frozen=True)
@@ -80,18 +60,19 @@ class Dependence:
         return text + (f", like {self.formula} with s in {self.argument_unit}" if self.formula else "")
 
 
-def find_dependences(found: SearchResult, arguments: Sequence[Argument]) -> tuple[Dependence, ...]:
+def find_dependences(found: SearchResult, arguments: Sequence[LawArgument], least_t: float) -> tuple[Dependence, ...]:
     """Return what the final model leaves and which signals it follows, strongest first.
 
     Args:
         found: by the search.
         arguments: signals to look at.
+        least_t: paired errors by which a gain must differ from zero.
 
     Returns:
         Those that predict blocks left out surely better.
     """
     tried = [_fit_curve(found, argument) for argument in arguments]
-    kept = [one for one in tried if one is not None and one.comparison.t >= 2.5 and one.comparison.gain > 0.0]
+    kept = [one for one in tried if one is not None and one.comparison.t >= least_t and one.comparison.gain > 0.0]
     return tuple(sorted(kept, key=lambda one: -one.comparison.gain))
 
 
@@ -128,7 +109,7 @@ def hats(knots: Array, values: Array) -> Array:
     return found
 
 
-def _fit_curve(found: SearchResult, argument: Argument) -> Dependence | None:
+def _fit_curve(found: SearchResult, argument: LawArgument) -> Dependence | None:
     problem, final = found.problem, found.final
     knots = knots_of(np.concatenate(argument.values))
     if knots is None:
@@ -154,21 +135,20 @@ def _fit_curve(found: SearchResult, argument: Argument) -> Dependence | None:
     left = final.residual + whole @ step
     share = 1.0 - float(left @ left) / float(final.residual @ final.residual)
     return Dependence(
-        argument.name, argument.site, argument.unit, "N.m", tuple(knots.tolist()), tuple(values.tolist()),
+        argument.name, argument.site, argument.unit, argument.torque_unit, tuple(knots.tolist()), tuple(values.tolist()),
         tuple(deviations.tolist()), _compared(base, errors), max(share, 0.0), formula_of(knots, values, deviations),
         changes, argument.code,
     )  # fmt: skip
 
 
-def _whitened_hats(problem: FitProblem, argument: Argument, knots: Array) -> Array:
+def _whitened_hats(problem: FitProblem, argument: LawArgument, knots: Array) -> Array:
     """Return (rows, k) the whitened residuals of a unit torque against the motion at each knot."""
     columns = []
     for k in range(knots.size):
-        parts = []
-        for model, whitening, values in zip(problem.models, problem.whitenings, argument.values, strict=True):
-            torque = np.zeros((len(model.channels), model.size))
-            torque[argument.channel] = -hats(knots, values)[:, k]
-            parts.append(whitening.apply(torque))
+        parts = [
+            whitening.apply(respond(hats(knots, values)[:, k]))
+            for whitening, values, respond in zip(problem.whitenings, argument.values, argument.respond, strict=True)
+        ]
         columns.append(np.concatenate(parts))
     return np.column_stack(columns)
 

@@ -1,0 +1,104 @@
+"""The verdict of a diagnosis and how far its corrected model can be trusted, with the sentences that say why."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, TestMisfit
+from orchestrator.diagnosis.selection.grading import Grade, RecordEvidence
+from orchestrator.diagnosis.selection.remaining import Dependence
+from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.records.model_file import Model
+from orchestrator.shared.trust import Level, Reason, Trust, trust_of
+
+NOTABLE = 3.0  # times the noise: a misfit of free runs that an engineer sees
+
+
+def form_verdict(
+    found: SearchResult, effects: Sequence[GradedEffect], dependences: Sequence[Dependence], record: RecordEvidence,
+    settings: DiagnosisSettings,
+) -> str:  # fmt: skip
+    """Return the verdict.
+
+    Args:
+        found: by the search.
+        effects: of the machine and of the log, graded.
+        dependences: of what is left.
+        record: evidence of the whole record.
+        settings: thresholds.
+
+    Returns:
+        "effects": one at least is likely; "unknown": something is missing and nothing is likely; "none" or "parameters":
+        the model explains the record as given, or re-fitted.
+    """
+    if any(effect.grade >= Grade.LIKELY for effect in effects):
+        return "effects"
+    strong = any(
+        one.comparison.t >= settings.grades.likely_t and one.comparison.gain >= settings.report.law_gain
+        for one in dependences
+    )
+    if effects or strong or not found.complete or record.left > settings.grades.timing_left:
+        return "unknown"
+    problem = found.problem
+    nominal = fit_model(problem, problem.start, 0)
+    return "none" if _explains(found, nominal.cost) else "parameters"
+
+
+def _explains(found: SearchResult, cost: float) -> bool:
+    """Tell whether the nominal model explains the record as well as re-fitted parameters do: by two for each of them."""
+    return cost - found.final.cost < 2.0 * len(found.problem.shared)
+
+
+def judge_trust(
+    verdict: str, effects: Sequence[GradedEffect], record: RecordEvidence, test: Sequence[TestMisfit],
+    parameters: dict[str, ParameterEstimate], model: Model, settings: DiagnosisSettings,
+) -> Trust:  # fmt: skip
+    """Return how far the corrected model can be trusted.
+
+    Args:
+        verdict: of the diagnosis.
+        effects: graded.
+        record: evidence of the whole record.
+        test: misfits on test data.
+        parameters: estimates by name.
+        model: that the record was compared with.
+        settings: thresholds.
+
+    Returns:
+        Level and reasons.
+    """
+    red, amber = [], []
+    if verdict == "unknown":
+        red.append("something is missing in the model, and no effect of the library is likely")
+    if record.inertia_is_off(settings.selection.prior_deviations):
+        red.append(
+            f"the record by itself asks for {record.inertia:.2g} times the inertia of the model file: an inertia, a unit "
+            "or the torque's scale may be wrong"
+        )
+    for one in test:
+        if one.is_worse(settings.report.worse, settings.report.of_noise):
+            red.append(f"the final model predicts the test part of {one.source} worse than re-fitted parameters do")
+        for signal in one.signals:
+            if signal.final > NOTABLE * signal.noise:
+                amber.append(
+                    f"free runs on the test part of {one.source} miss {signal.signal} by {signal.final / signal.noise:.3g} "
+                    "times its noise"
+                )
+    if any(effect.grade is Grade.LIKELY for effect in effects):
+        amber.append("at least one effect is likely, not certain")
+    if record.left > 0.1:
+        amber.append(f"{100.0 * record.left:.0f} % of the torque's power is left unexplained")
+    for known in model.uncertain:
+        if known.name in parameters and _is_far(parameters[known.name], known.uncertainty):
+            amber.append(
+                f"`{known.name}` lies outside the range that the model file states: its value, or a unit, may be wrong"
+            )
+    return trust_of([*(Reason(Level.RED, text) for text in red), *(Reason(Level.AMBER, text) for text in amber)])
+
+
+def _is_far(estimate: ParameterEstimate, uncertainty: float) -> bool:
+    low, high = estimate.interval
+    nearest = float(np.clip(estimate.nominal, low, high))
+    return abs(nearest - estimate.nominal) > 2.0 * uncertainty
