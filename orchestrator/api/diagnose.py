@@ -6,21 +6,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, overload
 
-import msgspec
-
 from orchestrator.api.any_fmu import FmuDiagnosisResult, of_a_box
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.diagnosed import DiagnosisResult
-from orchestrator.api.law import asked_law
+from orchestrator.api.law import request_law
 from orchestrator.api.numerics import fitting
 from orchestrator.api.records import as_record
 from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.blackbox.settings import BoxSettings
-from orchestrator.diagnosis.diagnose import evidence_of
-from orchestrator.diagnosis.proof.other_record import torque_errors, unharmed
-from orchestrator.diagnosis.proof.other_record import validate as validated_on
+from orchestrator.diagnosis.data.admission import check_record
+from orchestrator.diagnosis.report.test_report import misfit_on_record
 from orchestrator.diagnosis.settings import DiagnosisSettings
-from orchestrator.diagnosis.verdict.admission import check_comparable
 from orchestrator.errors import ScenarioError
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import check_plausible
@@ -33,9 +29,11 @@ def diagnose(
     model: Model | Path | str | None = None,
     *,
     validate: Record | Path | str | None = None,
+    test: Record | Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
     with_law: bool = False,
+    time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
 ) -> DiagnosisResult:
     """Of a model of ours."""
@@ -60,12 +58,14 @@ def diagnose(
     map: Path | str | None = None,  # noqa: A002 - as on the command line
     *,
     validate: Record | Path | str | None = None,
+    test: Record | Path | str | None = None,
     settings: DiagnosisSettings | BoxSettings | Path | str | None = None,
     search: bool = True,
     with_law: bool = False,
+    time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
 ) -> DiagnosisResult | FmuDiagnosisResult:
-    """Find out which effects a model misses, and prove it on data that was not fitted.
+    """Find out which effects a model misses, with a grade for each, and test it on data that nothing was fitted to.
 
     Args:
         record: a measured record, or its path; one encoder or two, at least 200 rows. Or several of one machine, which
@@ -74,14 +74,16 @@ def diagnose(
             FMI 2.0 co-simulation FMU.
         map: with an FMU, the TOML file of columns, uncertain parameters and ports; it runs in a child process.
         validate: another record, or its path, on which the misfit is shown too.
+        test: a record, or its path, that is test data as a whole; None: the last part of each record is.
         settings: thresholds, or the path of a TOML file with those that differ from the default.
         search: False: the model is re-fitted and judged as it stands, no effect is looked for.
         with_law: where the verdict is "unknown" and a law is learned, the corrected FMU has it: off until its parameter
             ``effects.learned_law.on`` is 1. Where there is none, a warning says why.
-        progress: called with (fits done, expected, what was fitted); of an FMU the number expected is not known: 0.
+        time_limit: seconds after which the search ends with what it has; None: none.
+        progress: called with (fits done, 0, what was fitted).
 
     Returns:
-        Verdict, named effects with intervals, the misfit before and after, and the corrected model.
+        Verdict, graded effects with intervals, the misfit on test data, and the corrected model.
 
     Raises:
         RecordError: a record is wrong, nothing moves in it, or nothing drives.
@@ -109,27 +111,26 @@ def diagnose(
     if isinstance(settings, BoxSettings):
         raise ScenarioError("`settings` must be those of a diagnosis of a model of ours, but are of an FMU", "settings")
     chosen = chosen_settings(settings, DiagnosisSettings)
-    if not search:
-        none = msgspec.structs.replace(chosen.search, most_effects=0, most_in_a_repeat=0)
-        chosen = msgspec.structs.replace(chosen, search=none)
     records = [record] if isinstance(record, (Record, Path, str)) else list(record)
     if not records:
         raise ScenarioError("`record` must be at least one record, but is empty", "record")
-    measured, *more = (comparable_record(one, model, chosen) for one in records)
-    other = None if validate is None else comparable_record(validate, model, chosen)
-    begun = time.monotonic()
+    measured, *more = (comparable_record(one, model) for one in records)
+    other = None if validate is None else comparable_record(validate, model)
+    tested = None if test is None else comparable_record(test, model)
+    begun, fits = time.monotonic(), itertools.count(1)
     with fitting(f"{measured.source}: no model can be fitted to this record"):
-        found = diagnosing.diagnose([measured, *more], model, progress, chosen)
-        validated = None if other is None else validated_on(other, found)
-        if other is not None and validated is not None and unharmed(found, validated) is not found:
-            found = unharmed(found, validated)
-            validated = validated_on(other, found)
-        errors = torque_errors(measured, found)
-        evidence = evidence_of(found)
-    given = {"record": measured.source, "model": model.source, "validate": None if other is None else other.source}
+        found = diagnosing.diagnose(
+            [measured, *more], model, chosen, test=tested, search=search, time_limit=time_limit,
+            progress=lambda what: progress(next(fits), 0, what),
+        )  # fmt: skip
+        validated = None if other is None else misfit_on_record(found, other)
+    given = {
+        "record": measured.source, "model": model.source, "validate": None if other is None else other.source,
+        "test": None if tested is None else tested.source,
+    }  # fmt: skip
     seconds = time.monotonic() - begun
-    found, has_law = asked_law(found) if with_law else (found, False)
-    return DiagnosisResult(found, measured, validated, errors, evidence, seconds, given, model, tuple(more), has_law)
+    found, has_law = request_law(found) if with_law else (found, False)
+    return DiagnosisResult(found, measured, validated, seconds, given, tuple(more), has_law)
 
 
 def _of_a_box(
@@ -149,13 +150,12 @@ def _of_a_box(
     )
 
 
-def comparable_record(given: Record | Path | str, model: Model, settings: DiagnosisSettings, **reading: Any) -> Record:
+def comparable_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
     """Return a record that the model can be compared with.
 
     Args:
         given: a record or its path.
         model: the model.
-        settings: thresholds of the diagnosis.
         reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
 
     Returns:
@@ -165,6 +165,6 @@ def comparable_record(given: Record | Path | str, model: Model, settings: Diagno
         RecordError: it is wrong, too poor for a diagnosis, or cannot be of this machine.
     """
     record = as_record(given, model, **reading)
-    check_comparable(record, settings)
+    check_record(record)
     check_plausible(record, model)
     return record

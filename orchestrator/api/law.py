@@ -4,26 +4,26 @@ from dataclasses import replace
 
 import msgspec
 
-from orchestrator.diagnosis.outcome import Diagnosis
-from orchestrator.diagnosis.proof.exported import LawRun, refusal
+from orchestrator.diagnosis.report.law_export import LawRun, law_refusal
+from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.shared.results.diagnose import LawExportFound, LawRunFound, LearnedFound
 from pyfmu_sources.learned_plant import ON
 
 
-def asked_law(diagnosis: Diagnosis) -> tuple[Diagnosis, bool]:
+def request_law(diagnosis: Diagnosis) -> tuple[Diagnosis, bool]:
     """Return a diagnosis of which the law was asked for in the FMU, and whether the FMU can have it.
 
     Args:
         diagnosis: of the record.
 
     Returns:
-        The diagnosis, with a warning that says why not.
+        The diagnosis, with a note that says why not.
     """
-    why = refusal(diagnosis)
-    return (replace(diagnosis, warnings=(*diagnosis.warnings, why)), False) if why else (diagnosis, True)
+    why = law_refusal(diagnosis)
+    return (replace(diagnosis, notes=(*diagnosis.notes, why)), False) if why else (diagnosis, True)
 
 
-def law_told(diagnosis: Diagnosis, run: LawRun | None) -> str:
+def law_words(diagnosis: Diagnosis, run: LawRun | None) -> str:
     """Return in one sentence that the FMU has the law, and what it misses with it.
 
     Args:
@@ -36,9 +36,9 @@ def law_told(diagnosis: Diagnosis, run: LawRun | None) -> str:
     text = f"In the FMU: the corrected FMU has this law, off until its parameter `{ON}` is 1"
     if run is None:
         return text
-    unit = diagnosis.misfit[0].unit
+    unit = diagnosis.test[0].signals[0].unit
     missed = ", ".join(f"{name} by {rms:.4g} {unit}" for name, rms in run.misfit.items())
-    return f"{text}; with it on, held-out free runs miss {missed}"
+    return f"{text}; with it on, free runs on the test part miss {missed}"
 
 
 def law_found(law: LearnedFound | None, run: LawRun | None, unit: str) -> LearnedFound | None:

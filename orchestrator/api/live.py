@@ -1,7 +1,7 @@
 """What result files say for pages that simulate: the model, and from where on it runs beside the record."""
 
-from orchestrator.diagnosis.outcome import Diagnosis
-from orchestrator.diagnosis.proof.corrected import BeforeAfter, start_values
+from orchestrator.diagnosis.report.corrected import BeforeAfter, start_values
+from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.estimation.protocol import Estimate
 from orchestrator.records.record import Record
 from orchestrator.shared.results import LiveFound
@@ -14,18 +14,18 @@ STARTS = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T
 
 
 def corrected_live(diagnosis: Diagnosis, runs: BeforeAfter) -> LiveFound:
-    """Return the corrected model and the starts of its runs over the held-out part.
+    """Return the corrected model and the starts of its runs over the test part.
 
     Args:
         diagnosis: of the record.
-        runs: over its held-out part.
+        runs: over its test part.
 
     Returns:
         What a page needs to simulate it.
     """
-    w = diagnosis.workings
-    values = start_values(w.plant, w.final.p)
-    return LiveFound(w.plant.name, w.likelihood.signals.h, values, list(runs.rows), list(runs.starts))
+    plant = diagnosis.model.plant
+    values = start_values(plant, diagnosis.workings.final)
+    return LiveFound(plant.name, diagnosis.workings.records[0].step, values, list(runs.rows), list(runs.starts))
 
 
 def fitted_live(record: Record, fit: Estimate) -> LiveFound:

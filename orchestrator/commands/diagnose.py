@@ -5,8 +5,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.diagnose import comparable_record, diagnose
 from orchestrator.api.records import read_model
@@ -45,11 +43,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with an FMU: write a first map.toml from its units and causality, and stop",
     )
     parser.add_argument("--validate", type=Path, metavar="OTHER", help="a second record, to show the misfit on")
+    parser.add_argument("--test", type=Path, metavar="OTHER", help="a record that is test data, in place of the last rows")
     parser.add_argument(
         "--no-search", action="store_true", help="re-fit and judge the model as it stands (a corrected.toml)"
     )
     parser.add_argument(
-        "--time-limit", type=float, metavar="SECONDS", help="stop the search then; the verdict is unknown"
+        "--time-limit", type=float, metavar="SECONDS", help="end the search then, with what it has"
     )
     parser.add_argument(
         "--with-law",
@@ -77,22 +76,19 @@ def run(args: argparse.Namespace) -> int:
         raise ScenarioError("`map` and `draft_map` must come with an FMU, but none is given", "map", "draft_map")
     model = read_model(args.model)
     settings = chosen_settings(args.settings, DiagnosisSettings)
-    if args.time_limit is not None:
-        if not 0.0 < args.time_limit < 1e9:
-            raise ScenarioError(
-                f"`time_limit` must be positive and below 1e9 s, but is {args.time_limit:g}", "time_limit"
-            )
-        settings = replace(settings, search=replace(settings.search, time_limit=args.time_limit))
+    if args.time_limit is not None and not 0.0 < args.time_limit < 1e9:
+        raise ScenarioError(f"`time_limit` must be positive and below 1e9 s, but is {args.time_limit:g}", "time_limit")
     reading = reading_of(args)
-    records = [comparable_record(path, model, settings, **reading) for path in args.records]
-    other = None if args.validate is None else comparable_record(args.validate, model, settings, **reading)
-    files = {"record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}
+    records = [comparable_record(path, model, **reading) for path in args.records]
+    other = None if args.validate is None else comparable_record(args.validate, model, **reading)
+    tested = None if args.test is None else comparable_record(args.test, model, **reading)
+    files = {"test": args.test, "record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}
     given = {name: path and str(path) for name, path in files.items()}
     with staged(args.out) as folder:
         with _shown(sum(record.size for record in records)) as progress:
             found = diagnose(
-                records, model, validate=other, settings=settings, search=not args.no_search, with_law=args.with_law,
-                progress=progress,
+                records, model, validate=other, test=tested, settings=settings, search=not args.no_search,
+                with_law=args.with_law, time_limit=args.time_limit, progress=progress,
             )  # fmt: skip
         found.write(folder, args.out, given)
         fmu = args.out / found.fmu_name
@@ -118,7 +114,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
     if args.scenario is not None and (args.fmu is not None or args.scenario.suffix.lower() != ".toml"):
         raise ScenarioError("`scenario` must be a TOML file, without `fmu`, but is not", "scenario", "fmu")
     fmu = args.fmu if args.scenario is None else args.scenario
-    for name in ("model", "time_limit", "part", "resample", "rate"):
+    for name in ("model", "test", "time_limit", "part", "resample", "rate"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
     if args.no_search:
@@ -155,4 +151,4 @@ def _shown(rows: int) -> Iterator[Callable[[int, int, str], None]]:
     """Show stages with the time left on a terminal; yield the progress callback of a diagnosis."""
     with Stages() as stages:
         stages.begin("diagnosing", diagnosis_seconds(rows))
-        yield lambda done, expected, what: stages.at(f"fitted {what}", done / max(expected, 1))
+        yield lambda done, expected, what: stages.at(f"fitted {what}", min(done / 60.0, 0.95))

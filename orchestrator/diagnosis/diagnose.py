@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 
 from orchestrator.diagnosis.data.admission import check_model, check_record, check_resolved
-from orchestrator.diagnosis.data.signals import prepare_signals
 from orchestrator.diagnosis.data.test_data import split_records
 from orchestrator.diagnosis.inference.problem import fit_problem
 from orchestrator.diagnosis.model.interface import Values
 from orchestrator.diagnosis.model.law_arguments import law_arguments
 from orchestrator.diagnosis.model.plant_effects import effect_parameters
-from orchestrator.diagnosis.model.torque_balance import TorqueBalance
+from orchestrator.diagnosis.model.torque_balance import balance_of
+from orchestrator.diagnosis.model.units import in_metres, unit_in
 from orchestrator.diagnosis.report.drive_gain import find_drive_gain
 from orchestrator.diagnosis.report.estimates import (
     block_values,
@@ -24,7 +24,6 @@ from orchestrator.diagnosis.report.estimates import (
 )
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.test_report import misfit_on_test_data, motion_shares
-from orchestrator.diagnosis.report.units import in_metres, unit_in
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, Workings
 from orchestrator.diagnosis.selection.grading import (
     Grade,
@@ -87,24 +86,6 @@ def diagnose(
     nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
     workings = Workings(fitted, test_data, found, tuple(models), nominal, base, final)
     return _report(workings, model, settings)
-
-
-def balance_of(record: Record, model: Model, settings: DiagnosisSettings) -> TorqueBalance:
-    """Return the torque balances of a model beside a record.
-
-    Args:
-        record: of the machine.
-        model: nominal values and how far each may be off.
-        settings: of the band and the balances.
-
-    Returns:
-        The balances.
-    """
-    plant = model.plant
-    two = len(plant.bodies) > 1
-    inertia = None if two else plant.value(plant.extended(model.values), plant.bodies[0].inertia)
-    signals = prepare_signals(record, inertia, settings.band, two)
-    return TorqueBalance(model, signals, settings.balance, angular=not in_metres(model))
 
 
 def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Diagnosis:

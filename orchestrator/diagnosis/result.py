@@ -84,6 +84,7 @@ class SignalMisfit:
         signal, unit: what was measured.
         noise: standard deviation of its noise.
         nominal, parameters, final: rms of the model as given, re-fitted, and with its effects.
+        r_squared: of the final model's free runs.
     """
 
     signal: str
@@ -92,6 +93,7 @@ class SignalMisfit:
     nominal: float
     parameters: float
     final: float
+    r_squared: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import (
     Signals,
+    prepare_signals,
     first_derivative,
     second_derivative,
     second_difference_gain,
@@ -35,10 +36,12 @@ from orchestrator.diagnosis.model.balance_kernel import acceleration_kernel, hid
 from orchestrator.diagnosis.model.drive import delivered_torque, shifted
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, NoiseSources, UncertainParameter, Values
 from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters
-from orchestrator.diagnosis.settings import BalanceSettings
+from orchestrator.diagnosis.model.units import in_metres
+from orchestrator.diagnosis.settings import BalanceSettings, DiagnosisSettings
 from orchestrator.plants.effects import SignalScales, rms
 from orchestrator.plants.measurement import SHIFT
 from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
 
 Array = NDArray[np.float64]
 INITIAL_TORQUE = "initial torque"
@@ -351,3 +354,21 @@ class TorqueBalance:
         named = effect_parameters(self.plant, self.effects[label], values)
         short = {name: named[full] for name, full in row.parameters.items()}
         return row.possible(short, self.scales)
+
+
+def balance_of(record: Record, model: Model, settings: DiagnosisSettings) -> TorqueBalance:
+    """Return the torque balances of a model beside a record.
+
+    Args:
+        record: of the machine.
+        model: nominal values and how far each may be off.
+        settings: of the band and the balances.
+
+    Returns:
+        The balances.
+    """
+    plant = model.plant
+    two = len(plant.bodies) > 1
+    inertia = None if two else plant.value(plant.extended(model.values), plant.bodies[0].inertia)
+    signals = prepare_signals(record, inertia, settings.band, two)
+    return TorqueBalance(model, signals, settings.balance, angular=not in_metres(model))

@@ -92,8 +92,11 @@ def motion_misfit(
         The rms of each encoder.
     """
     rms = [run_misfit(plant, p, signals, first, settings) for p in models]
+    parts = run_parts(first, signals.size, settings)
+    variance = np.mean([np.var(signals.angles[part], axis=0) for part in parts], axis=0)
+    explained = 1.0 - rms[-1] ** 2 / np.maximum(variance, 1e-300)
     rows = tuple(
-        SignalMisfit(name, unit, float(signals.noise[n]), *(float(values[n]) for values in rms))
+        SignalMisfit(name, unit, float(signals.noise[n]), *(float(values[n]) for values in rms), float(explained[n]))
         for n, name in enumerate(plant.encoders[: signals.channels])
     )
     return TestMisfit(source, signals.size - first, rows)

@@ -1,21 +1,26 @@
 """How the models do on test data: the motion of free runs, and the torque that they leave."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.report.motion_misfit import motion_misfit, run_misfit
 from orchestrator.diagnosis.report.open_test_data import open_test_data
 from orchestrator.diagnosis.report.run_signals import RunSignals, run_signals
-from orchestrator.diagnosis.report.units import in_metres
-from orchestrator.diagnosis.result import TestMisfit, Workings
+from orchestrator.diagnosis.model.units import in_metres
+from orchestrator.diagnosis.result import Diagnosis, TestMisfit, Workings
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model
+from orchestrator.plants.effects import rms
 from orchestrator.records.record import Record
 
 Array = NDArray[np.float64]
+LEAST_TORQUE_ROWS = 200
 
 
 def test_signals(workings: Workings) -> list[tuple[Record, RunSignals, int]]:
@@ -27,11 +32,37 @@ def test_signals(workings: Workings) -> list[tuple[Record, RunSignals, int]]:
     Returns:
         One entry for each record.
     """
+    return [(record, _signals_of(workings, record), first) for record, first in open_test_data(workings.test_data)]
+
+
+def _signals_of(workings: Workings, record: Record) -> RunSignals:
     balance = workings.balances[0]
-    return [
-        (record, run_signals(record, len(balance.channels), 3.0 * max(balance.cutoffs)), first)
-        for record, first in open_test_data(workings.test_data)
-    ]
+    return run_signals(record, len(balance.channels), 3.0 * max(balance.cutoffs))
+
+
+def torque_left(
+    part: Record, workings: Workings, model: Model, settings: DiagnosisSettings
+) -> tuple[float, ...]:
+    """Return the share of the torque that each model leaves at the driven body: rms of the balance over that of the torque.
+
+    Args:
+        part: rows that nothing was fitted to.
+        workings: of the diagnosis.
+        model: nominal.
+        settings: of the band.
+
+    Returns:
+        (nominal, parameters, final); empty where the part is too short for the band.
+    """
+    if part.size < LEAST_TORQUE_ROWS:
+        return ()
+    balance = balance_of(part, model, settings)
+    inner = slice(balance.size // 20, -(balance.size // 20))
+    shares = []
+    for p in (workings.nominal, workings.base, workings.final):
+        missing = smooth(balance.balance(p)[0], balance.step, balance.cutoffs[0])[inner]
+        shares.append(rms(missing) / rms(balance.drive_torque(p)[inner]))
+    return tuple(shares)
 
 
 def misfit_on_test_data(workings: Workings, model: Model, settings: DiagnosisSettings) -> tuple[TestMisfit, ...]:
@@ -45,12 +76,31 @@ def misfit_on_test_data(workings: Workings, model: Model, settings: DiagnosisSet
     Returns:
         One for each record.
     """
-    models = (workings.nominal, workings.base, workings.final)
-    unit = "m" if in_metres(model) else "rad"
     return tuple(
-        motion_misfit(model.plant, models, signals, first, record.source, unit, settings.report)
-        for record, signals, first in test_signals(workings)
+        _misfit(workings, model, record, first, settings) for record, first in open_test_data(workings.test_data)
     )
+
+
+def _misfit(workings: Workings, model: Model, record: Record, first: int, settings: DiagnosisSettings) -> TestMisfit:
+    models = (workings.nominal, workings.base, workings.final)
+    unit, signals = "m" if in_metres(model) else "rad", _signals_of(workings, record)
+    found = motion_misfit(model.plant, models, signals, first, record.source, unit, settings.report)
+    part = record.part(first, record.size)
+    return replace(found, torque=torque_left(part, workings, model, settings))
+
+
+def misfit_on_record(diagnosis: Diagnosis, record: Record) -> TestMisfit:
+    """Return the misfit of a diagnosis's models on another record of the machine, and the torque that each leaves.
+
+    Args:
+        diagnosis: of the first record.
+        record: another one, all of it.
+
+    Returns:
+        Misfit and torque.
+    """
+    w, model, settings = diagnosis.workings, diagnosis.model, diagnosis.settings
+    return _misfit(w, model, record, 0, settings)
 
 
 def motion_shares(

@@ -3,7 +3,6 @@
 from typing import Any
 
 import msgspec
-from msgspec import UNSET, UnsetType
 
 from orchestrator.shared.results import Found, Interval, LiveFound, Sizes, TrustFound
 
@@ -27,95 +26,107 @@ class ParameterFound(msgspec.Struct, frozen=True):
     unit: str | None = None
 
 
+class ExplainedFound(msgspec.Struct, frozen=True):
+    """Shares that an effect explains: of the missing torque, and of the motion's misfit on test data."""
+
+    torque: float | None = None
+    motion: float | None = None
+
+
 class EffectFound(msgspec.Struct, frozen=True):
-    """A named effect: where it acts, its values, its gain, the runner-up, and what it cannot be told from."""
+    """An effect that the model lacks.
+
+    ``grade`` is certain, likely or possible; ``lowered_by`` names the rules that lowered it. ``gain`` is the share of the
+    squared error of blocks left out that it takes, ``t`` that gain over its standard error. ``family`` are effects that
+    this record does not tell from it, ``block_values`` what each block by itself says of a parameter.
+    """
 
     name: str
     site: str
+    grade: str
     parameters: dict[str, ValueFound]
-    score: float | None = None
-    runner_up: str | None = None
-    margin: float | None = None
+    explains: ExplainedFound = ExplainedFound()
+    gain: float | None = None
+    t: float | None = None
     family: tuple[str, ...] = ()
+    lowered_by: tuple[str, ...] = ()
+    block_values: dict[str, tuple[float | None, ...]] = {}
 
 
-class PlaceFound(msgspec.Struct, frozen=True):
-    """A place of the misfit: signal, regime, interval in ``unit`` and the share of the misfit that sits there."""
+class NuisanceFound(msgspec.Struct, frozen=True):
+    """A property of the log."""
 
-    signal: str
-    regime: str
-    interval: Interval
-    unit: str
-    share_of_misfit: float
+    name: str
+    grade: str
+    parameters: dict[str, ValueFound]
 
 
-class StageFound(msgspec.Struct, frozen=True):
-    """A model on the way to the final one, and its rms misfit."""
+class SignalMisfitFound(msgspec.Struct, frozen=True):
+    """Rms of free runs against one signal: of the model as given, re-fitted, and with its effects."""
 
-    model: str
-    rms: float | None
-
-
-class MisfitFound(msgspec.Struct, frozen=True):
-    """Rms of simulated minus measured of one signal, of the first and the last model and of each between them."""
-
-    before: float | None
-    after: float | None
+    nominal: float | None
+    parameters: float | None
+    final: float | None
     noise: float | None
     unit: str
-    stages: tuple[StageFound, ...] = ()
 
 
-class ValidatedFound(msgspec.Struct, frozen=True):
-    """The same on another record, with the R2 of one free run over all of it, by model, and a zero that has moved."""
+class TestFound(msgspec.Struct, frozen=True):
+    """Test data of one record: the misfit of each signal, and whether the final model does worse than re-fitted values.
 
-    before: float | None
-    after: float | None
-    noise: float | None
-    unit: str
-    r_squared: dict[str, float | None] = {}
-    moved_zero: float | None = 0.0
+    ``r_squared`` is of the final model's free runs; ``torque_left`` the share of torque that each of the three models leaves.
+    """
 
-
-class EvidenceFound(msgspec.Struct, frozen=True):
-    """What one of several records says of the common model."""
+    __test__ = False
 
     source: str
     rows: int
-    misfit: dict[str, MisfitFound]
+    misfit: dict[str, SignalMisfitFound]
+    worse: bool
+    r_squared: dict[str, float | None] = {}
+    torque_left: dict[str, float | None] = {}
 
 
-class FloorFound(msgspec.Struct, frozen=True):
-    """Records with the same input, and the rms by signal that they differ by."""
+class DependenceFound(msgspec.Struct, frozen=True):
+    """What is left follows a signal: its share, its gain on blocks left out with the paired error, and a formula."""
 
-    sources: tuple[str, ...]
-    floor: dict[str, float]
+    site: str
+    argument: str
+    share: float | None
+    gain: float | None
+    t: float | None
+    formula: str = ""
+
+
+class RemainingFound(msgspec.Struct, frozen=True):
+    """What no effect explains: the share of the torque's power that is left by body, and what it follows."""
+
+    torque: dict[str, float | None] = {}
+    follows: tuple[DependenceFound, ...] = ()
 
 
 class LawRunFound(msgspec.Struct, frozen=True):
-    """A free run of the corrected FMU with its law on: first row in the held-out part, and start values."""
+    """A free run of the corrected FMU with its law on: first row in the test part, and start values."""
 
     row: int
     starts: dict[str, float]
 
 
 class LawExportFound(msgspec.Struct, frozen=True):
-    """A learned law in the corrected FMU: the parameter that switches it, and what the FMU misses with it on.
-
-    ``misfit`` is the rms by signal in ``unit`` over the held-out part.
-    """
+    """A learned law in the corrected FMU: the parameter that switches it, and what the FMU misses with it on."""
 
     parameter: str
     misfit: dict[str, float | None]
     unit: str
-    largest_difference_from_predictor: float | None
+    largest_difference_from_compiled: float | None
     runs: tuple[LawRunFound, ...] = ()
 
 
 class LearnedFound(msgspec.Struct, frozen=True):
     """A learned law: knots and values with the 95 % band (its low and its high ends), and what it is worth.
 
-    ``exported`` says what the corrected FMU makes of it, where it was asked for.
+    ``gain`` is the share of the squared error of blocks left out that it takes, ``exported`` what the corrected FMU makes
+    of it, where that was asked for.
     """
 
     site: str
@@ -127,61 +138,34 @@ class LearnedFound(msgspec.Struct, frozen=True):
     values: tuple[float | None, ...]
     band: tuple[tuple[float | None, ...], tuple[float | None, ...]]
     formula: str
-    misfit: dict[str, MisfitFound]
-    times_smaller: float | None
+    gain: float | None
+    t: float | None
     exported: LawExportFound | None = None
 
 
-class HorizonFound(msgspec.Struct, frozen=True):
-    """A horizon, and for each ``model`` the rms error of each signal at it."""
-
-    horizon: str
-    errors: tuple[dict[str, str | float | None], ...]
-
-
 class AnalysisFound(msgspec.Struct, frozen=True):
-    """The record as it was analysed: rate [Hz], rows, rows of the file for each, notes."""
+    """A record as it was analysed: rate [Hz], rows, rows of the file for each, and the band of each body [Hz]."""
 
+    source: str
     rate: float
     rows: int
     rows_of_the_file: int
-    notes: tuple[str, ...] = ()
-
-
-class PredictableFound(msgspec.Struct, frozen=True):
-    """What the rest follows: its gain in log-likelihood, and its share of the rest."""
-
-    site: str
-    kind: str
-    gain: float | None
-    share: float
-
-
-class RemainderFound(msgspec.Struct, frozen=True):
-    """What the best model leaves."""
-
-    explained: float | None = None
-    missing_log_likelihood: float | None = None
-    growth: float | None = None
-    tails: float | None = None
-    predictable: tuple[PredictableFound, ...] = ()
+    band: dict[str, float]
 
 
 class TriedFound(msgspec.Struct, frozen=True):
-    """A candidate: its effect, and its gain in log-likelihood on the fitted and on the deciding part."""
+    """An effect that was tried: its gain on blocks left out, and that gain over its standard error."""
 
     effect: str
     gain: float | None
-    fitted: float | None = None
-    decided: float | None = None
-    process_noise: float | None = None
+    t: float | None
 
 
 class StepFound(msgspec.Struct, frozen=True):
-    """A step of the search: the effects before it, whether the best candidate was taken, and all of them."""
+    """A step of the search: the effects before it, the one that was taken ("": none), and all that were tried."""
 
     on_top_of: tuple[str, ...]
-    accepted: bool
+    taken: str
     tried: tuple[TriedFound, ...]
 
 
@@ -192,46 +176,26 @@ class DifferenceFound(msgspec.Struct, frozen=True):
     unit: str = ""
 
 
-class TermFound(msgspec.Struct, frozen=True):
-    """What the final model leaves that follows position or direction; ``level`` is the gain at any period."""
-
-    name: str
-    period: float | None
-    period_unit: str | None
-    size: float
-    unit: str
-    gain: float
-    level: float
-    sure: bool
-
-
 class DiagnoseFound(Found, frozen=True, kw_only=True):
-    """``diagnose``: verdict, effects, misfit, and how they were found."""
+    """``diagnose``: graded effects, the corrected model, what is left, and how it was found."""
 
-    schema_version: int = 2
+    schema_version: int = 3
     verdict: str
     effects: tuple[EffectFound, ...] = ()
     play: Sizes | None = None
-    nuisances: tuple[EffectFound, ...] = ()
+    nuisances: tuple[NuisanceFound, ...] = ()
     parameters: dict[str, ParameterFound] = msgspec.field(default_factory=dict)
-    where: tuple[PlaceFound, ...] = ()
-    misfit: dict[str, MisfitFound] = msgspec.field(default_factory=dict)
-    records: tuple[EvidenceFound, ...] = ()
-    repeats: FloorFound | None = None
+    test: tuple[TestFound, ...] = ()
+    validation: TestFound | None = None
+    remaining: RemainingFound = RemainingFound()
     learned_law: LearnedFound | None = None
-    horizons: tuple[HorizonFound, ...] = ()
-    analysis: AnalysisFound | None = None
+    analysis: tuple[AnalysisFound, ...] = ()
     trust: TrustFound | None = None
     model: str | None = None
-    suspects: tuple[EffectFound, ...] = ()
-    warnings: tuple[str, ...] = ()
-    remainder: RemainderFound = RemainderFound()
+    notes: tuple[str, ...] = ()
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
     candidates: tuple[StepFound, ...] = ()
     cosimulation: DifferenceFound = DifferenceFound()
-    validation: dict[str, ValidatedFound] | UnsetType = UNSET
-    torque_error: dict[str, dict[str, float | None]] | UnsetType = UNSET
-    also_seen: tuple[TermFound, ...] = ()
     live: LiveFound | None = None
-    told: tuple[str, ...] = ()
+    summary: tuple[str, ...] = ()
     seconds: float | None = None

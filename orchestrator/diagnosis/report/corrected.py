@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from orchestrator.building.build import build_variant, ensure_built
 from orchestrator.checking.check import check_fmu
-from orchestrator.diagnosis.outcome import Diagnosis
-from orchestrator.diagnosis.proof.free_run import free_run
-from orchestrator.diagnosis.proof.misfit import segments
+from orchestrator.diagnosis.model.drive import shifted
+from orchestrator.diagnosis.report.motion_misfit import free_runs, run_parts
+from orchestrator.diagnosis.report.run_signals import RunSignals
+from orchestrator.diagnosis.report.test_report import test_signals
+from orchestrator.diagnosis.result import Diagnosis
 from orchestrator.errors import SimulationError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
@@ -19,13 +21,14 @@ from orchestrator.master.session import Session
 from orchestrator.master.signals import Samples
 from orchestrator.master.system import SignalSource, System
 from orchestrator.plants.description import Plant
+from orchestrator.plants.measurement import LEAD
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class BeforeAfter:
-    """The held-out part, measured and co-simulated with the nominal and the corrected FMU.
+    """The test part, measured and co-simulated with the nominal and the corrected FMU.
 
     Attributes:
         time: (n,) s.
@@ -77,8 +80,8 @@ def build_corrected(diagnosis: Diagnosis, source: str, directory: Path) -> Path:
         FmuError: it cannot be built.
         SimulationError: the check found an error in it.
     """
-    plant = diagnosis.workings.plant
-    values = start_values(plant, diagnosis.workings.final.p)
+    plant = diagnosis.model.plant
+    values = start_values(plant, diagnosis.workings.final)
     return checked(build_variant(fmu_name(plant.name, source), plant.name, values, directory))
 
 
@@ -119,7 +122,7 @@ def start_values(plant: Plant, p: Array) -> dict[str, float]:
 
 
 def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
-    """Run the nominal and the corrected FMU, in one process and one system, over the held-out part.
+    """Run the nominal and the corrected FMU, in one process and one system, over the test part.
 
     Each segment starts from the initial state that :func:`free_run` finds for each model.
 
@@ -130,49 +133,54 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     Returns:
         Times, measured angles and those of both models.
     """
-    w = diagnosis.workings
-    signals, h, settings = w.likelihood.signals, w.likelihood.signals.h, diagnosis.settings.proof
-    m = signals.channels
-    nominal = ensure_built([w.plant.name])[w.plant.name]
-    parts = segments(w.parts.held_out, signals, settings)
+    w, plant, settings = diagnosis.workings, diagnosis.model.plant, diagnosis.settings.report
+    _, signals, first = test_signals(w)[0]
+    step, count = signals.step, signals.channels
+    nominal = ensure_built([plant.name])[plant.name]
+    parts = run_parts(first, signals.size, settings)
     length = parts[0].stop - parts[0].start
-    whole = w.likelihood.over(signals.size)
-    models = {"before": w.nominal, "after": w.final.p}
-    instances = (
-        fmu_instance("before", nominal, start_values(w.plant, w.nominal)),
-        fmu_instance("after", fmu),
-    )
-    outputs = w.plant.encoders[:m]
+    models = {"before": w.nominal, "after": w.final}
+    instances = (fmu_instance("before", nominal, start_values(plant, w.nominal)), fmu_instance("after", fmu))
+    outputs = plant.encoders[:count]
     record = tuple(f"{model}.{name}" for model in models for name in outputs)
-    asked = {model: signals.aligned(w.plant, p).meant for model, p in models.items()}
-    sources = tuple(SignalSource(f"{model}.u", Samples(asked[model][parts[0]], h)) for model in models)
+    asked = {model: requests_for_fmu(signals, plant, p) for model, p in models.items()}
+    sources = tuple(SignalSource(f"{model}.u", Samples(asked[model][parts[0]], step)) for model in models)
     system = System(instances, (), sources)
+    expected = {model: free_runs(plant, p, signals, parts, settings, history=False) for model, p in models.items()}
     runs: dict[str, list[Array]] = {model: [] for model in models}
-    difference = 0.0
-    starts: list[dict[str, float]] = []
-    with Session(system, record, GaussSeidel(h), (length - 1) * h) as session:
-        for part in parts:
-            given: dict[str, float] = {}
-            expected: dict[str, Array] = {}
-            for model, p in models.items():
-                _, states = whole.innovations(p, w.final.q)
-                run = free_run(w.plant, p, states[part.start], signals, part, settings.free_run, history=False)
-                given |= {f"{model}.{w.plant.starts[s]}": float(run.start[s]) for s in w.plant.states}
-                expected[model] = run.outputs
+    difference, starts = 0.0, list[dict[str, float]]()
+    with Session(system, record, GaussSeidel(step), (length - 1) * step) as session:
+        for n, part in enumerate(parts):
+            given = {
+                f"{model}.{plant.starts[place]}": float(expected[model][n].start[place])
+                for model in models
+                for place in plant.states
+            }
             starts.append({name.partition(".")[2]: v for name, v in given.items() if name.startswith("after.")})
-            result = session.run(given, {n: Samples(u[part], h) for n, u in enumerate(asked.values())})
+            result = session.run(given, {k: Samples(u[part], step) for k, u in enumerate(asked.values())})
             for model in models:
                 runs[model].append(np.column_stack([result[f"{model}.{name}"] for name in outputs]))
-            difference = max(difference, float(np.max(np.abs(runs["after"][-1] - expected["after"]))))
+            off = runs["after"][-1] - expected["after"][n].outputs
+            difference = max(difference, float(np.max(np.abs(off))))
     covered = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     return BeforeAfter(
-        np.asarray(h * np.arange(signals.size)[covered]),
-        signals.u[covered],
-        signals.aligned(w.plant, w.final.p).y[covered][:, :m],
-        np.concatenate(runs["before"]),
-        np.concatenate(runs["after"]),
-        difference,
-        tuple(h * part.start for part in parts),
-        tuple(part.start - parts[0].start for part in parts),
+        np.asarray(step * np.arange(signals.size)[covered]), signals.requests[covered],
+        signals.aligned_angles(plant, w.final)[covered], np.concatenate(runs["before"]), np.concatenate(runs["after"]),
+        difference, tuple(step * part.start for part in parts), tuple(part.start - parts[0].start for part in parts),
         tuple(starts),
-    )
+    )  # fmt: skip
+
+
+def requests_for_fmu(signals: RunSignals, plant: Plant, p: Array) -> Array:
+    """Return the requests (n,) for an FMU that takes one a sample: what the log has early comes later.
+
+    Args:
+        signals: of the record.
+        plant: the plant.
+        p: its parameters, those of the log among them.
+
+    Returns:
+        The requests.
+    """
+    lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
+    return shifted(signals.requests, -lead / signals.step)

@@ -1,6 +1,6 @@
 """The corrected model as a model file, which a validation without a search takes."""
 
-from orchestrator.diagnosis.outcome import Diagnosis
+from orchestrator.diagnosis.result import Diagnosis, ValueEstimate
 from orchestrator.records.model_file import Model
 
 
@@ -17,17 +17,20 @@ def corrected_model(model: Model, diagnosis: Diagnosis) -> str:
     Returns:
         The text.
     """
-    w = diagnosis.workings
-    plant, final = w.plant, w.final
-    fitted = {entry.place for entry in final.free}
+    plant, final = model.plant, diagnosis.workings.final
+    fitted: dict[str, ValueEstimate] = dict(diagnosis.parameters)
+    for row in plant.bank:
+        named = next((one for one in diagnosis.effects if one.label == row.label), None)
+        if named is not None:
+            fitted |= {name: named.parameters[short] for short, name in row.parameters.items()}
     lines = [f'fmu = "{model.fmu}"']
     for place, entry in enumerate(plant.table):
-        value = float(final.p[place])
-        if value == entry.default and place not in fitted:
+        value = float(final[place])
+        if value == entry.default and entry.name not in fitted:
             continue
         lines += ["", f'[parameters."{entry.name}"]', f"value = {value!r}"]
-        if place in fitted:
-            low, high = final.interval(place)
+        if entry.name in fitted:
+            low, high = fitted[entry.name].interval
             lines.append(f"uncertainty = {0.5 * (high - low)!r}")
     for name, encoder in model.encoders.items():
         lines += ["", f"[encoders.{name}]"]

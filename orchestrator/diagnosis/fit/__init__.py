@@ -1,1 +1,0 @@
-"""Fits of a model to a record: likelihood of innovations, damped fit, standard errors from blocks."""

@@ -1,0 +1,135 @@
+"""A diagnosis in the form of ``diagnose.json``."""
+
+import math
+from collections.abc import Mapping
+
+from orchestrator.diagnosis.report.summary import play_of, summarise
+from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit, ValueEstimate
+from orchestrator.diagnosis.selection.remaining import Dependence
+from orchestrator.shared.results.diagnose import (
+    AnalysisFound,
+    DependenceFound,
+    DiagnoseFound,
+    EffectFound,
+    ExplainedFound,
+    LearnedFound,
+    NuisanceFound,
+    ParameterFound,
+    RemainingFound,
+    SignalMisfitFound,
+    StepFound,
+    TestFound,
+    TriedFound,
+    ValueFound,
+)
+from orchestrator.shared.settings import as_tables
+
+
+def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
+    """Return the results for ``diagnose.json``, as far as the diagnosis knows them.
+
+    Args:
+        diagnosis: of the records.
+
+    Returns:
+        The results without the corrected FMU and what follows from it.
+    """
+    play, law = play_of(diagnosis), diagnosis.law
+    return DiagnoseFound(
+        verdict=diagnosis.verdict,
+        effects=tuple(_effect(effect) for effect in diagnosis.effects),
+        play=None if play is None else play.found(),
+        nuisances=tuple(NuisanceFound(n.name, n.grade.word, _values(n.parameters)) for n in diagnosis.nuisances),
+        parameters={
+            name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
+            for name, one in diagnosis.parameters.items()
+        },
+        test=tuple(test_found(test, diagnosis) for test in diagnosis.test),
+        remaining=RemainingFound(dict(diagnosis.left), tuple(_dependence(one) for one in diagnosis.remaining)),
+        learned_law=None if law is None else _law(law),
+        analysis=_analysis(diagnosis),
+        trust=diagnosis.trust.found(),
+        notes=diagnosis.notes,
+        settings=as_tables(diagnosis.settings),
+        candidates=tuple(
+            StepFound(
+                step.before.labels,
+                step.taken,
+                tuple(TriedFound(one.label, _finite(one.comparison.gain), _finite(one.comparison.t)) for one in step.tried),
+            )
+            for step in diagnosis.workings.search.steps
+        ),
+        summary=tuple(summarise(diagnosis)),
+    )
+
+
+def test_found(test: TestMisfit, diagnosis: Diagnosis) -> TestFound:
+    """Return how the models do on test data of one record.
+
+    Args:
+        test: misfits.
+        diagnosis: whose settings say what is worse.
+
+    Returns:
+        The results.
+    """
+    report = diagnosis.settings.report
+    misfit = {
+        one.signal: SignalMisfitFound(
+            _finite(one.nominal), _finite(one.parameters), _finite(one.final), _finite(one.noise), one.unit
+        )
+        for one in test.signals
+    }
+    names = ("nominal", "parameters", "final")
+    left = dict(zip(names, map(_finite, test.torque), strict=True)) if test.torque else {}
+    r_squared = {one.signal: _finite(one.r_squared) for one in test.signals}
+    return TestFound(test.source, test.rows, misfit, test.is_worse(report.worse, report.of_noise), r_squared, left)
+
+
+def _effect(effect: GradedEffect) -> EffectFound:
+    evidence = effect.evidence
+    return EffectFound(
+        effect.name, effect.site, effect.grade.word, _values(effect.parameters),
+        ExplainedFound(_finite(evidence.share), _finite(effect.motion_share)), _finite(evidence.gain),
+        _finite(evidence.t), evidence.family, effect.lowered_by,
+        {name: tuple(map(_finite, values)) for name, values in effect.block_values.items()},
+    )  # fmt: skip
+
+
+def _values(parameters: Mapping[str, ValueEstimate]) -> dict[str, ValueFound]:
+    return {
+        name: ValueFound(one.value, _finite(one.standard_error), (_finite(one.interval[0]), _finite(one.interval[1])), one.unit)
+        for name, one in parameters.items()
+    }
+
+
+def _dependence(one: Dependence) -> DependenceFound:
+    comparison = one.comparison
+    return DependenceFound(
+        one.site, one.argument, _finite(one.share), _finite(comparison.gain), _finite(comparison.t), one.formula
+    )
+
+
+def _law(law: Dependence) -> LearnedFound:
+    low, high = (
+        tuple(_finite(value + side * 2.0 * error) for value, error in zip(law.values, law.errors, strict=True))
+        for side in (-1.0, 1.0)
+    )
+    return LearnedFound(
+        law.site, law.argument, law.argument_unit, law.unit, f"of what is left at the {law.site}, {law.words}", law.knots,
+        law.values, (low, high), law.formula, _finite(law.comparison.gain), _finite(law.comparison.t),
+    )  # fmt: skip
+
+
+def _analysis(diagnosis: Diagnosis) -> tuple[AnalysisFound, ...]:
+    return tuple(
+        AnalysisFound(
+            balance.signals.source, 1.0 / balance.step, balance.size, balance.signals.rows_each,
+            dict(zip(balance.channels, balance.cutoffs, strict=True)),
+        )
+        for balance in diagnosis.workings.balances
+    )  # fmt: skip
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

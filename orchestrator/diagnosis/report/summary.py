@@ -1,0 +1,218 @@
+"""A diagnosis in the words of a drive engineer: what is missing, how sure, what it does, what is left, what to do next."""
+
+from collections.abc import Iterator, Sequence
+
+from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance
+from orchestrator.diagnosis.selection.grading import GRADE_RULES, Grade
+from orchestrator.plants.description import Plant
+from orchestrator.shared.play import Play
+
+SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the drive"}
+BODIES = {"motor": "the motor", "load": "the load"}
+SIGNALS = {"theta_m": "the motor", "theta_l": "the load"}
+PROPER = {"coulomb": "Coulomb", "stribeck": "Stribeck"}
+# What each effect does to the motion.
+MOTION = {
+    "backlash": "between the flanks the motor turns alone; the load follows late, and each contact is an impact",
+    "coulomb_friction": "a torque of one size against every motion; at a reversal the axis sticks",
+    "stribeck_friction": "a torque against every motion that is largest at a crawl: stick-slip at low speed",
+    "directional_friction": "the axis is braked more in one direction than in the other",
+    "quadratic_drag": "a brake that grows with the square of the speed",
+    "input_delay": "the torque comes late, which takes phase from every control loop",
+    "drive_filter": "the torque comes late and smoothed, which takes phase from every control loop",
+    "torque_saturation": "requests beyond the limit are not delivered: the axis lags when it must accelerate most",
+    "rate_limit": "the torque cannot follow fast requests: steps become ramps, and the axis answers late",
+    "load_dependent_friction": "a torque against every motion that grows with what the gear transmits: lost efficiency",
+    "lower_end_stop": "the axis runs into a stop at the lower end and bounces",
+    "upper_end_stop": "the axis runs into a stop at the upper end and bounces",
+    "hardening_stiffness": "the shaft is soft for small twists and stiff for large ones: its resonance moves with load",
+    "shaft_hysteresis": "the twist depends on where the torque came from: lost motion without a free gap",
+    "torque_ripple": "a torque that repeats with the motor's angle: speed ripple at constant request",
+    "gear_eccentricity": "the load's angle wanders about the motor's once in each cycle of the gear",
+    "load_torque": "a constant torque pulls the load to one side",
+    "gravity_load": "a torque that turns with the load's angle: it helps on one side and hinders on the other",
+    "extra_resonance": "a part of the load swings on its own: a further resonance and its notch",
+    "sensor_offset": "the encoders' zeros are not where the model has them: no motion, but a biased twist",
+    "spring_load": "the load is pulled back to one position, the more the farther it is from it",
+    "varying_inertia": "the load is heavier at some angles than at others",
+}
+# Experiments that tell effects apart, by their kind.
+EXPERIMENTS = {
+    "friction": "constant speeds in both directions, from a crawl to the highest",
+    "speed": "constant speeds in both directions, from a crawl to the highest",
+    "position": "slow turns at constant speed, there and back, over the whole travel",
+    "constant": "slow turns at constant speed, there and back, over the whole travel",
+    "wave": "slow turns at constant speed, there and back, over the whole travel",
+    "gap": "torque reversals with the load held, slowly and then fast",
+    "timing": "torque steps of several sizes in both directions",
+    "limit": "torque steps of several sizes in both directions",
+    "resonance": "a torque that sweeps slowly through all frequencies",
+}
+REPEAT = "the same torque twice: what comes again is the machine, what does not is a disturbance"
+CERTAINTY = {
+    Grade.CERTAIN: "certain",
+    Grade.LIKELY: "likely",
+    Grade.POSSIBLE: "possible: it is not in the verdict, and the corrected model has it all the same",
+}
+
+
+def summarise(found: Diagnosis) -> Iterator[str]:
+    """Yield the answer of a diagnosis, a sentence or two a line.
+
+    Args:
+        found: the diagnosis.
+
+    Yields:
+        What is missing; for each effect its size, how sure it is and what it does; what is left; what to do next.
+    """
+    yield headline(found)
+    for effect in found.effects:
+        yield from _effect(effect, found)
+    for nuisance in found.nuisances:
+        yield f"  In the log: {nuisance_words(nuisance)}"
+    yield _left(found)
+    yield from _motion(found)
+    experiments = list(dict.fromkeys(_experiments(found)))
+    if experiments:
+        yield f"To settle what is open, record: {'; '.join(experiments)}."
+
+
+def effect_words(label: str) -> str:
+    """Return an effect at a site, ``coulomb_friction@motor``, in words.
+
+    Args:
+        label: name and site.
+
+    Returns:
+        The words.
+    """
+    name, _, site = label.partition("@")
+    parts = name.split("_")
+    words = " ".join(PROPER.get(word, word) for word in parts)
+    return words if site in parts else f"{words} {SITES.get(site, site)}".strip()
+
+
+def listed(labels: Sequence[str]) -> str:
+    """Return effects in words, as a list in a sentence.
+
+    Args:
+        labels: names and sites.
+
+    Returns:
+        The words.
+    """
+    words = [effect_words(label) for label in labels]
+    return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
+
+
+def headline(found: Diagnosis) -> str:
+    """Return the verdict in one sentence.
+
+    Args:
+        found: the diagnosis.
+
+    Returns:
+        The sentence.
+    """
+    if found.verdict == "none":
+        return "Verdict: none. Nothing is missing: the model explains the record."
+    if found.verdict == "parameters":
+        return "Verdict: parameters. Nothing is missing: the model explains the record once its values are re-fitted."
+    if found.verdict == "effects":
+        named = [effect.label for effect in found.graded(Grade.LIKELY)]
+        return f"Verdict: effects. The model lacks {listed(named)}." if named else "Verdict: effects, in the log alone."
+    near = [effect.label for effect in found.effects]
+    text = "Verdict: unknown. The model misses something, and no effect of the library is likely."
+    return text + (f" Possible: {listed(near)}." if near else "")
+
+
+def play_of(found: Diagnosis) -> Play | None:
+    """Return the size of the backlash that was named; None: none is likely.
+
+    Args:
+        found: the diagnosis.
+
+    Returns:
+        Half-gap and play.
+    """
+    gap = next((effect for effect in found.graded(Grade.LIKELY) if effect.name == "backlash"), None)
+    if gap is None:
+        return None
+    plant: Plant = found.model.plant
+    return Play(gap.parameters["alpha"].value, plant.ratio(found.workings.final))
+
+
+def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
+    values = ", ".join(
+        f"{name.replace('_', ' ')} {e.value:.5g} +- {e.standard_error:.2g} {'' if e.unit == '1' else e.unit}".rstrip()
+        for name, e in effect.parameters.items()
+    )
+    words = effect_words(effect.label)
+    yield f"  {words[:1].upper()}{words[1:]}: {values}"
+    play = play_of(found)
+    if effect.name == "backlash" and play is not None:
+        yield f"    {play}"
+    yield f"    How sure: {CERTAINTY[effect.grade]}; {_reasons(effect)}"
+    shares = [f"{100.0 * max(effect.evidence.share, 0.0):.0f} % of the missing torque"]
+    if effect.motion_share == effect.motion_share:
+        shares.append(f"{100.0 * max(effect.motion_share, 0.0):.0f} % of the motion's misfit on test data")
+    yield f"    It explains {' and '.join(shares)}."
+    if effect.name in MOTION:
+        yield f"    In the motion: {MOTION[effect.name]}"
+
+
+def _reasons(effect: GradedEffect) -> str:
+    evidence = effect.evidence
+    text = f"on data left out it takes {100.0 * evidence.gain:.0f} % of the error, {evidence.t:.1f} times its uncertainty"
+    rules = {rule.name: rule.reason for rule in GRADE_RULES}
+    lowered = [rules[name] for name in effect.lowered_by if rules[name] != "the same"]
+    if evidence.family:
+        text += f"; the record does not tell it from {listed(evidence.family)}"
+    return text + (f"; not surer because {'; '.join(dict.fromkeys(lowered))}" if lowered else "")
+
+
+def nuisance_words(nuisance: Nuisance) -> str:
+    """Return a property of the log in words.
+
+    Args:
+        nuisance: the property.
+
+    Returns:
+        Part of a sentence.
+    """
+    ((name, e),) = nuisance.parameters.items()
+    if name == "gain":
+        return (
+            f"the drive delivers {e.value:.3f} +- {e.standard_error:.2g} times `u`, or all values that carry a torque "
+            "are off by as much; sizes are in units of `u`"
+        )
+    size = f"{1e3 * abs(e.value):.3g} +- {1e3 * e.standard_error:.2g} ms"
+    sure = "" if nuisance.grade is Grade.CERTAIN else f" ({nuisance.grade.word})"
+    if name == "lead":
+        return f"`u` acts {size} before its time stamp{sure}"
+    return f"`theta_l` is stamped {size} {'later' if e.value > 0.0 else 'earlier'} than `theta_m`{sure}"
+
+
+def _left(found: Diagnosis) -> str:
+    parts = [f"{100.0 * share:.2g} % of the torque's power at {BODIES.get(name, name)}" for name, share in found.left.items()]
+    text = f"What is left: {' and '.join(parts)}"
+    strongest = [f"at {BODIES.get(one.site, one.site)} {one.words}" for one in found.remaining[:2]]
+    return f"{text}; {'; '.join(strongest)}." if strongest else f"{text}; it follows no signal."
+
+
+def _motion(found: Diagnosis) -> Iterator[str]:
+    for test in found.test:
+        parts = [
+            f"{SIGNALS.get(one.signal, one.signal)} {one.nominal:.3g} -> {one.final:.3g} {one.unit} "
+            f"(noise {one.noise:.2g})"
+            for one in test.signals
+        ]
+        yield f"Test data of {test.source} ({test.rows} rows that nothing was fitted to), rms of free runs: {'; '.join(parts)}."
+
+
+def _experiments(found: Diagnosis) -> Iterator[str]:
+    if found.verdict == "unknown" and not found.effects:
+        yield REPEAT
+    for effect in found.effects:
+        if effect.grade is not Grade.CERTAIN:
+            yield EXPERIMENTS.get(effect.evidence.kind, REPEAT)

@@ -1,1 +1,0 @@
-"""The search: candidates screened, fitted, accepted and taken out again."""
