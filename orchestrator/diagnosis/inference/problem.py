@@ -112,6 +112,31 @@ class FitProblem:
         ]
         return [np.concatenate(of_records) for of_records in zip(*parts, strict=True)]
 
+    def changes(self, point: ModelPoint, residual: Array, trials: Sequence[tuple[str, Values]]) -> list[Array]:
+        """Return what effects change of the whitened residuals, approximately where a model can tell.
+
+        Args:
+            point: values of the model.
+            residual: (rows,) whitened residuals there.
+            trials: an effect that the point lacks and its values, each.
+
+        Returns:
+            The change (rows,) for each.
+        """
+        found = [np.empty(residual.size) for _ in trials]
+        first = 0
+        for model, whitening, seen in zip(self.models, self.whitenings, self.record_points(point), strict=True):
+            rows = slice(first, first + whitening.size)
+            first += whitening.size
+            changes = model.approximate_changes(seen, trials)
+            exact = [n for n, change in enumerate(changes) if change is None]
+            for n, left in zip(exact, model.residuals([seen.with_effect(*trials[n]) for n in exact]), strict=True):
+                found[n][rows] = whitening.apply(left) - residual[rows]
+            for n, change in enumerate(changes):
+                if change is not None:
+                    found[n][rows] = whitening.apply(change)
+        return found
+
     def reweighted(self, point: ModelPoint) -> "FitProblem":
         """Return the problem with the whitening that the residuals at a point ask for.
 

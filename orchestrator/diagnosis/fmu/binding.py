@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.diagnosis.blackbox.loop import AWAY, GET, SET, STEP, run_loop
-from orchestrator.diagnosis.blackbox.wire import Array, Batch, Guide, Job, Load
+from orchestrator.diagnosis.fmu.loop import AWAY, GET, SET, STEP, run_loop
+from orchestrator.diagnosis.fmu.wire import Array, Batch, Guide, Job, Load
 from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 from orchestrator.fmi.model_description import read_description
 from orchestrator.fmi.slave import FmuSlave

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from orchestrator.diagnosis.blackbox.model import Data
-from orchestrator.diagnosis.blackbox.problem import BoxProblem, series_of
-from orchestrator.diagnosis.blackbox.runner import Plan
+from orchestrator.diagnosis.fmu.model import Data
+from orchestrator.diagnosis.fmu.problem import BoxProblem, series_of
+from orchestrator.diagnosis.fmu.runner import Plan
 
 Array = NDArray[np.float64]
 

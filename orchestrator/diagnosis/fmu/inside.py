@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.wire import Batch, Load
+from orchestrator.diagnosis.fmu.wire import Batch, Load
 from orchestrator.errors import OrchestratorError
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ def opened(request: Load) -> Callable[[Batch], Answer]:
         Called with a batch, it gives results, reasons of failures and the time taken [s].
     """
     _use_compiled()
-    from orchestrator.diagnosis.blackbox.binding import Box
+    from orchestrator.diagnosis.fmu.binding import Box
 
     box = Box(request)
 

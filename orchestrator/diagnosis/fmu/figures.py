@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.diagnosis.blackbox.judged import BoxOutcome
+from orchestrator.diagnosis.fmu.judged import BoxOutcome
 
 
 def draw_signals(path: Path, outcome: BoxOutcome) -> None:

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox import series
-from orchestrator.diagnosis.blackbox.bank import BoxEffect
+from orchestrator.diagnosis.fmu import series
+from orchestrator.diagnosis.fmu.bank import BoxEffect
 
 Array = NDArray[np.float64]
 

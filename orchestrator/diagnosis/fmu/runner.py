@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, ProcessSettings
-from orchestrator.diagnosis.blackbox.subject import Subject
-from orchestrator.diagnosis.blackbox.wire import Batch, Feedback, Guide, Job, Load, Through, Wire
+from orchestrator.diagnosis.fmu.settings import DEFAULT, ProcessSettings
+from orchestrator.diagnosis.fmu.subject import Subject
+from orchestrator.diagnosis.fmu.wire import Batch, Feedback, Guide, Job, Load, Through, Wire
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
@@ -206,7 +206,7 @@ class Runner:
             own = self.settings
             limits = Limits(time=own.loading, memory=own.memory * MEBIBYTE, total=own.total)
             folders = list(self._folders.values())
-            jail = Jail("orchestrator.diagnosis.blackbox.inside:opened", request, read=folders, limits=limits)
+            jail = Jail("orchestrator.diagnosis.fmu.inside:opened", request, read=folders, limits=limits)
             try:
                 jail.start(own.loading)
             except BaseException:
@@ -330,7 +330,7 @@ def _compile_loop() -> None:
         return
     import numba
 
-    from orchestrator.diagnosis.blackbox.loop import run_loop
+    from orchestrator.diagnosis.fmu.loop import run_loop
 
     whole, real = numba.int64, numba.float64
     run_loop.compile(

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.model import Data
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxRateSettings
+from orchestrator.diagnosis.fmu.model import Data
+from orchestrator.diagnosis.fmu.settings import DEFAULT, RateSettings
 from orchestrator.shared.inference.decimation import content_band
 from orchestrator.shared.inference.noise import residual_noise
 
 Array = NDArray[np.float64]
 
 
-def factor_of(data: Data, settings: BoxRateSettings = DEFAULT.rate) -> int:
+def factor_of(data: Data, settings: RateSettings = DEFAULT.rate) -> int:
     """Return how many rows of a record come to one: none of a short record, and none where that would hide motion.
 
     Args:

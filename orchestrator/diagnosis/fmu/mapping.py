@@ -30,7 +30,7 @@ from typing import Any
 
 import msgspec
 
-from orchestrator.diagnosis.blackbox.subject import Subject
+from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import Variable
 from orchestrator.records.model_file import ModelParameter
@@ -119,6 +119,7 @@ class Map(msgspec.Struct, frozen=True):
         uncertain: what is re-fitted.
         fixed: values by name of what is set and not re-fitted.
         tunable: those of what is re-fitted that their FMU says may change within a run.
+        initial: those of what is re-fitted that one record begins with.
         source: file name, for messages.
     """
 
@@ -132,6 +133,7 @@ class Map(msgspec.Struct, frozen=True):
     signals: dict[str, SignalEntry] = {}
     cuts: dict[str, CutEntry] = {}
     tunable: tuple[str, ...] = ()
+    initial: tuple[str, ...] = ()
 
 
 def read_map(path: Path, subject: Subject) -> Map:
@@ -224,6 +226,7 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
         {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.signals.items()},
         written.cuts,
         tuple(u.name for u in uncertain if subject.model.variables[u.name].variability == "tunable"),
+        tuple(u.name for u in uncertain if u.name in written.start),
     )
 
 

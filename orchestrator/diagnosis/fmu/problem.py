@@ -6,15 +6,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox import series
-from orchestrator.diagnosis.blackbox.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
-from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.model import BoxModel, Data
-from orchestrator.diagnosis.blackbox.passed import at_input, at_output
-from orchestrator.diagnosis.blackbox.runner import Plan, Runner
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
-from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
-from orchestrator.diagnosis.blackbox.wire import Feedback, Guide
+from orchestrator.diagnosis.fmu import series
+from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
+from orchestrator.diagnosis.fmu.mapping import Map
+from orchestrator.diagnosis.fmu.model import BoxModel, Data
+from orchestrator.diagnosis.fmu.passed import at_input, at_output
+from orchestrator.diagnosis.fmu.runner import Plan, Runner
+from orchestrator.diagnosis.fmu.settings import DEFAULT, FmuSettings
+from orchestrator.diagnosis.fmu.wire import Feedback, Guide
 from orchestrator.errors import SlaveError
 from pyfmu_sources.port_laws import COMPLIANCE
 
@@ -45,10 +44,9 @@ class BoxProblem:
     noise: Array
     sign: dict[str, float] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
-    settings: BoxSettings = DEFAULT
+    settings: FmuSettings = DEFAULT
     short: float = 0.0
     late: float = 0.0
-    _from_inputs: Surrogate | None = field(init=False, default=None, repr=False)
     _tables: dict[tuple[int, int], Array] = field(init=False, default_factory=dict, repr=False)
 
     @property
@@ -129,6 +127,11 @@ class BoxProblem:
     def _plan(self, model: BoxModel, rows: int | None) -> Plan:
         plain = self._plain(self.n if rows is None else rows)
         return Plan(self.starts(model), self.table(model, plain), self._feedback(model))
+
+    @property
+    def plain_table(self) -> Array:
+        """Return the recorded inputs over every communication step (steps, inputs)."""
+        return self._plain(self.n)
 
     def _plain(self, rows: int) -> Array:
         """Return the recorded inputs up to ``rows`` samples, the same array each time."""
@@ -296,59 +299,39 @@ class BoxProblem:
             y[:, column] = at_output(effect, y[:, column], self.step, float(values[0]), self.m)
         return y[:: self.m]
 
-    def impulses(self, model: BoxModel, length: int, places: Sequence[int] | None = None) -> tuple[Surrogate, Array]:
-        """Return the surrogate at the ports, and the size (ports,) that a share of noise stands for.
-
-        Responses are measured within the record, where the FMU works, unless they grow there.
+    def pulse_runs(
+        self, model: BoxModel, rows: Sequence[int], places: Sequence[int]
+    ) -> tuple[Array, list[list[Array | None]]]:
+        """Return the run of a model, and those with a pulse one sample long at some rows of some inputs.
 
         Args:
             model: parameters, effects and their values.
-            length: of the responses, in samples.
-            places: of the inputs (default: those of the ports).
+            rows: at which a pulse begins, one run each.
+            places: of the inputs.
 
         Returns:
-            The surrogate, and the sizes in the units of the ports.
+            All that is read (rows, reads) without a pulse; for each input, for each row, outputs (rows, outputs) with
+            it, over the pulse's size as a share of the drive; None where the FMU failed.
 
         Raises:
             SlaveError: the FMU does not run over the record.
         """
-        places = self.noise_places if places is None else places
-        later = min(self.n // 4, self.n - length)
-        within = self._responses(model, later, length, places)
-        first = self._responses(model, 0, length, places)
-        chosen = (
-            within
-            if float(np.max(np.abs(within))) < self.settings.probe.grows * float(np.max(np.abs(first)))
-            else first
-        )
-        return realised(chosen, self.settings.noise), np.ones(len(places))
-
-    def input_surrogate(self) -> Surrogate:
-        """Return the surrogate from the recorded inputs to the outputs, measured when first asked for.
-
-        Returns:
-            The surrogate; an input is in units of its drive.
-        """
-        if self._from_inputs is None:
-            places = [self.runner.inputs.index(name) for name in self.inputs]
-            self._from_inputs = self.impulses(self.nominal, max(self.n // 2, 16), places)[0]
-        return self._from_inputs
-
-    def _responses(self, model: BoxModel, at: int, length: int, places: Sequence[int]) -> Array:
-        """Return responses (length - 1, outputs, ports) to pulses in sample ``at``, in units of noise and drive."""
-        plain = series_of(self, at + length)
-        tables = [plain]
+        plain, feedback, starts = self._plain(self.n), self._feedback(model), self.starts(model)
+        table = self.table(model, plain)
+        plans = [Plan(starts, table, feedback)]
         for place, size in zip(places, self.drive(places), strict=True):
-            pulsed = plain.copy()
-            pulsed[at * self.m : (at + 1) * self.m, place] += self.settings.probe.impulse * size
-            tables.append(pulsed)
-        plans = [Plan(self.starts(model), t, self._feedback(model)) for t in tables]
-        rows = [None if y is None else self._measured(y, model) for y in self._runs(plans)]
-        base = rows[0]
-        if base is None or any(y is None for y in rows):
+            for row in rows:
+                pulsed = table.copy()
+                pulsed[row * self.m : (row + 1) * self.m, place] += self.settings.probe.impulse * size
+                plans.append(Plan(starts, pulsed, feedback))
+        base, *found = self._runs(plans)
+        if base is None:
             raise self.does_not_run()
-        responses = [(y - base)[at + 1 :] / self.noise / self.settings.probe.impulse for y in rows[1:] if y is not None]
-        return np.stack(responses, axis=2)
+        output = self._measured(base, model)
+        share = self.settings.probe.impulse
+        changes = [None if y is None else (self._measured(y, model) - output) / share for y in found]
+        count = len(rows)
+        return base[:: self.m], [changes[k * count : (k + 1) * count] for k in range(len(places))]
 
     @property
     def noise_places(self) -> list[int]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from orchestrator.diagnosis.blackbox.subject import Subject
+from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.master.protocol import Unit, Variable
 
 CONJUGATE = (

@@ -1,25 +1,18 @@
 """Where effects could act around an FMU, and how large the signals there are."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import (
+from orchestrator.diagnosis.fmu.bank import (
     BANK,
     INPUT,
     OUTPUT,
     PORT,
-    REMEMBERS,
     BoxEffect,
     Surroundings,
 )
-from orchestrator.diagnosis.blackbox.estimates import ValueEstimate
-from orchestrator.diagnosis.blackbox.followed import Motion, measured_motions
-from orchestrator.diagnosis.blackbox.problem import BoxProblem
-
-EFFORTS = ("N.m", "N")
-"""Units of efforts that dry friction has."""
+from orchestrator.diagnosis.fmu.motion import port_motions
+from orchestrator.diagnosis.fmu.problem import BoxProblem
 
 FLOWS = ("W", "kW", "m3/s", "m3/h", "l/s", "l/min", "kg/s")
 """Units of inputs that are flows of heat or matter: what they change has no direction of motion, and no cycles."""
@@ -46,25 +39,19 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
     """
     found = []
     h, runner, own = problem.h, problem.runner, problem.settings.place
-    motions = measured_motions(problem)
+    motions = port_motions(problem, nominal)
     for k, name in enumerate(problem.inputs):
         u = problem.data.driven[:, k]
         if float(np.ptp(u)) == 0.0:
             continue
         scene = Surroundings(h / problem.data.factor, _rms(u), float(np.max(np.abs(u))), u)
         found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == INPUT]
-        if abs(u[0]) > own.starts_off * scene.size:
-            found += [BoxEffect(BANK[kind], name, scene, at_rest=True) for kind in REMEMBERS]
     for k, name in enumerate(problem.outputs):
         y = problem.data.outputs[:, k]
         scene = Surroundings(h, _rms(y), float(np.max(np.abs(y))), y, float(problem.noise[k]))
         found += [BoxEffect(kind, name, scene) for kind in BANK.values() if kind.where == OUTPUT]
     for name, port in problem.map.ports.items():
-        motion = motions.get(name)
-        if motion is None:
-            x = nominal[:, runner.reads.index(port.position)]
-            v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]
-            motion = Motion(x, v, np.gradient(v, h))
+        motion = motions[name]
         x, v = motion.x, motion.v
         effort = float(problem.drive([runner.inputs.index(port.input)])[0])
         angular = problem.units.get(port.position, "") in ANGLES
@@ -93,43 +80,7 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
         kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
         kinds = [k for k in kinds if k.name not in left_out]
         found += [BoxEffect(kind, name, scene) for kind in kinds]
-    alike = alike_one_way(problem)
-    stood_for = {label for labels in alike.values() for label in labels}
-    found = [effect for effect in found if effect.label not in stood_for]
     return [*found, *_of_parameters(problem), *_of_cuts(problem, nominal)]
-
-
-def alike_one_way(problem: BoxProblem) -> dict[str, tuple[str, ...]]:
-    """Return the effects that do what dry friction does, by its label, at ports that turn one way in all of the record.
-
-    Every machine has friction: it stands for all of them.
-
-    Args:
-        problem: the FMU and the record.
-
-    Returns:
-        Labels of a constant effort, of what grows with speed in one direction, and of an input that drives one way too
-        and loses as much.
-    """
-    found = {}
-    for name, port in problem.map.ports.items():
-        unit = problem.units.get(port.input)
-        if unit not in EFFORTS or port.position not in problem.outputs:
-            continue
-        x = problem.data.outputs[:, problem.outputs.index(port.position)]
-        back = min(float(np.max(np.maximum.accumulate(s * x) - s * x)) for s in (1.0, -1.0))
-        if back > problem.settings.place.one_way * float(np.ptp(x)):
-            continue
-        driven = [
-            given
-            for given, u in zip(problem.inputs, problem.data.driven.T, strict=True)
-            if problem.units.get(given) == unit and (np.all(u >= 0.0) or np.all(u <= 0.0))
-        ]
-        here = [f"{kind}@{name}" for kind in ("load", "directional_friction")]
-        found[f"coulomb_friction@{name}"] = (
-            *here, *(f"{kind}@{given}" for given in driven for kind in ("input_offset", "input_dead_zone"))
-        )  # fmt: skip
-    return found
 
 
 def _of_parameters(problem: BoxProblem) -> list[BoxEffect]:
@@ -172,36 +123,3 @@ def _of_cuts(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
-
-
-def alike_at_input(
-    problem: BoxProblem, effects: Sequence[BoxEffect], values: Sequence[Sequence[ValueEstimate]]
-) -> tuple[tuple[str, ...], ...]:
-    """Return what effects at an input stand for that is none of the bank, for each of them.
-
-    Straight lines between rows lie half a row ahead of values that are held: an input that is late by that may be held
-    (``hold``). An offset and a dead zone as wide leave one direction as it is, and nothing of the other: an input that
-    goes one way only (``one_way``).
-
-    Args:
-        problem: the FMU and the record.
-        effects: that were found.
-        values: of each.
-
-    Returns:
-        Labels, with ``@`` and the input.
-    """
-    own, half = problem.settings.place, 0.5 * problem.data.step / problem.data.factor
-    found: list[tuple[str, ...]] = []
-    for effect, estimates in zip(effects, values, strict=True):
-        name, place, value = effect.kind.name, effect.place, estimates[0]
-        labels: list[str] = []
-        if name in ("input_delay", "input_lag") and problem.map.inputs[place].hold == "linear":
-            labels += [f"hold@{place}"] if abs(value.value - half) < own.half_a_row * half else []
-        for other, (size, *_) in zip(effects, values, strict=True):
-            if other.place == place and {name, other.kind.name} == {"input_offset", "input_dead_zone"}:
-                spread = own.as_wide * float(np.hypot(value.standard_error, size.standard_error))
-                apart = abs(abs(value.value) - abs(size.value))
-                labels += [f"one_way@{place}"] if apart < spread + own.half_a_row * abs(size.value) else []
-        found.append(tuple(labels))
-    return tuple(found)

@@ -12,10 +12,10 @@ from lxml import etree
 
 import pyfmu_sources
 from orchestrator.building.archive import write_archive
-from orchestrator.diagnosis.blackbox.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
-from orchestrator.diagnosis.blackbox.binding import owned
-from orchestrator.diagnosis.blackbox.judged import BoxOutcome
-from orchestrator.diagnosis.blackbox.problem import series_of
+from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT, BoxEffect
+from orchestrator.diagnosis.fmu.binding import owned
+from orchestrator.diagnosis.fmu.judged import BoxOutcome
+from orchestrator.diagnosis.fmu.problem import series_of
 from orchestrator.errors import FmuError, OrchestratorError
 from orchestrator.master.signals import Samples
 from orchestrator.scenarios.isolated import Safety

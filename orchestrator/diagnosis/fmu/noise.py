@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.model import Data
-from orchestrator.diagnosis.blackbox.probe_settings import ProbeSettings
-from orchestrator.diagnosis.blackbox.problem import BoxProblem
+from orchestrator.diagnosis.fmu.mapping import Map
+from orchestrator.diagnosis.fmu.model import Data
+from orchestrator.diagnosis.fmu.probe_settings import ProbeSettings
+from orchestrator.diagnosis.fmu.problem import BoxProblem
 
 Array = NDArray[np.float64]
 

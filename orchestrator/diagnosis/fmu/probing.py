@@ -7,15 +7,15 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.clock import compared_later, own_clock
-from orchestrator.diagnosis.blackbox.mapping import Map
-from orchestrator.diagnosis.blackbox.model import BoxModel, Data
-from orchestrator.diagnosis.blackbox.noise import noise_of
-from orchestrator.diagnosis.blackbox.problem import BoxProblem, series_of
-from orchestrator.diagnosis.blackbox.runner import Plan, Runner
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
-from orchestrator.diagnosis.blackbox.subject import Subject
-from orchestrator.diagnosis.blackbox.wire import Through
+from orchestrator.diagnosis.fmu.clock import compared_later, own_clock
+from orchestrator.diagnosis.fmu.mapping import Map
+from orchestrator.diagnosis.fmu.model import BoxModel, Data
+from orchestrator.diagnosis.fmu.noise import noise_of
+from orchestrator.diagnosis.fmu.problem import BoxProblem, series_of
+from orchestrator.diagnosis.fmu.runner import Plan, Runner
+from orchestrator.diagnosis.fmu.settings import DEFAULT, FmuSettings
+from orchestrator.diagnosis.fmu.subject import Subject
+from orchestrator.diagnosis.fmu.wire import Through
 from orchestrator.errors import FmuError
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ def opened(
     data: Data,
     workers: int | None = None,
     progress: Progress = lambda what: None,
-    settings: BoxSettings = DEFAULT,
+    settings: FmuSettings = DEFAULT,
 ) -> tuple[BoxProblem, Probe]:
     """Return a problem ready to be fitted, and what its FMU was found to be.
 
@@ -99,7 +99,7 @@ def opened(
         raise
 
 
-def _passing(runner: Runner, given: Map, data: Data, settings: BoxSettings) -> list[Through]:
+def _passing(runner: Runner, given: Map, data: Data, settings: FmuSettings) -> list[Through]:
     """Return what FMUs hand on that depends at once on what they are handed, measured over one step.
 
     Raises:
@@ -135,7 +135,7 @@ def _passing(runner: Runner, given: Map, data: Data, settings: BoxSettings) -> l
     return found
 
 
-def _affordable(runner: Runner, given: Map, data: Data, progress: Progress, settings: BoxSettings) -> int:
+def _affordable(runner: Runner, given: Map, data: Data, progress: Progress, settings: FmuSettings) -> int:
     """Return how many communication steps a sample has, fewer where the FMU is too slow for as many.
 
     Raises:

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.blackbox.bank import BoxEffect
+from orchestrator.diagnosis.fmu.bank import BoxEffect
 
 Array = NDArray[np.float64]
 
