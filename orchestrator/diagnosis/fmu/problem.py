@@ -300,7 +300,7 @@ class BoxProblem:
         return y[:: self.m]
 
     def pulse_runs(
-        self, model: BoxModel, rows: Sequence[int], places: Sequence[int]
+        self, model: BoxModel, rows: Sequence[int], places: Sequence[int], beyond: int = 0
     ) -> tuple[Array, list[list[Array | None]]]:
         """Return the run of a model, and those with a pulse one sample long at some rows of some inputs.
 
@@ -308,6 +308,7 @@ class BoxProblem:
             model: parameters, effects and their values.
             rows: at which a pulse begins, one run each.
             places: of the inputs.
+            beyond: rows by which runs go on after the record, their inputs as at its end.
 
         Returns:
             All that is read (rows, reads) without a pulse; for each input, for each row, outputs (rows, outputs) with
@@ -318,6 +319,7 @@ class BoxProblem:
         """
         plain, feedback, starts = self._plain(self.n), self._feedback(model), self.starts(model)
         table = self.table(model, plain)
+        table = np.vstack([table, np.repeat(table[-1:], beyond * self.m, axis=0)]) if beyond else table
         plans = [Plan(starts, table, feedback)]
         for place, size in zip(places, self.drive(places), strict=True):
             for row in rows:

@@ -15,13 +15,14 @@ from orchestrator.diagnosis.fmu.model import BoxModel
 from orchestrator.diagnosis.fmu.motion import efforts_along, port_motions
 from orchestrator.diagnosis.fmu.passed import at_input, at_output
 from orchestrator.diagnosis.fmu.problem import BoxProblem
-from orchestrator.diagnosis.fmu.response import PulseResponses, measure_responses
+from orchestrator.diagnosis.fmu.response import PulseResponses, measure_responses, start_responses
 from orchestrator.diagnosis.fmu.sites import effects_of
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, NoiseSources, UncertainParameter, Values
 from pyfmu_sources.port_laws import COMPLIANCE
 
 Array = NDArray[np.float64]
 FAILED = 1e3  # times the span of an output: residual of a run that failed, from which every fit turns back
+START = "state at the start"
 BAND = 0.45  # of the rate of samples: highest frequency of the analysis
 
 
@@ -39,11 +40,11 @@ class FmuResiduals:
         self.cutoffs = tuple(BAND / problem.h for _ in self.channels)
         self.edges = problem.settings.response.fade
         self.active = np.ones((len(self.channels), self.size))
-        self.parameters = _parameters(problem)
-        self._local = np.array([entry.local for entry in self.parameters], dtype=bool)
         self._order = _order(problem)
         self._responses: dict[tuple[object, ...], tuple[Array, PulseResponses]] = {}
         self._places = self._input_places()
+        self._start = start_responses(problem, problem.nominal, self._places)
+        self.parameters = _parameters(problem, len(self._start))
         nominal = self._nominal_point()
         reads, _ = self._measured_responses(nominal)
         self._motions = port_motions(problem, reads)
@@ -65,8 +66,8 @@ class FmuResiduals:
         Returns:
             The model.
         """
-        p = np.empty(len(point.parameters))
-        for place, entry, value in zip(self._order, self.parameters, point.parameters, strict=True):
+        p = np.empty(len(self._order))
+        for place, entry, value in zip(self._order, self.parameters, point.parameters, strict=False):
             own = self.problem.map.uncertain[place]
             p[place] = np.clip(own.value + value if entry.local else value, own.minimum, own.maximum)
         found = [self._placed[label].at(values) for label, values in point.effects.items()]
@@ -77,7 +78,11 @@ class FmuResiduals:
         runs = self.problem.simulate([self.box_model(point) for point in points])
         measured = self.problem.data.outputs
         failed = np.broadcast_to(FAILED * np.ptp(measured, axis=0)[:, None], measured.T.shape)
-        return [failed if y is None else np.ascontiguousarray((measured - y).T) for y in runs]
+        starts = [np.tensordot(point.parameters[len(self._order) :], self._start, 1) for point in points]
+        return [
+            failed if y is None else np.ascontiguousarray((measured - y).T) - start
+            for y, start in zip(runs, starts, strict=True)
+        ]
 
     def is_possible(self, label: str, values: Values) -> bool:
         """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
@@ -185,7 +190,7 @@ def _order(problem: BoxProblem) -> list[int]:
     return [*shared, *(k for k in range(len(uncertain)) if k not in shared)]
 
 
-def _parameters(problem: BoxProblem) -> tuple[UncertainParameter, ...]:
+def _parameters(problem: BoxProblem, starts: int) -> tuple[UncertainParameter, ...]:
     found = []
     for k in _order(problem):
         u = problem.map.uncertain[k]
@@ -193,4 +198,4 @@ def _parameters(problem: BoxProblem) -> tuple[UncertainParameter, ...]:
             found.append(UncertainParameter(u.name, u.uncertainty, 1.0, u.unit, local=True))
         else:
             found.append(UncertainParameter(u.name, u.value, u.uncertainty / abs(u.value), u.unit))
-    return tuple(found)
+    return (*found, *(UncertainParameter(f"{START} {k + 1}", 1.0, 1.0, local=True) for k in range(starts)))

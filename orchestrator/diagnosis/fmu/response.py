@@ -134,3 +134,35 @@ def measure_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int
             responses.append(change[row:] / size)
         found[place] = tuple(responses)
     return reads, PulseResponses(rows, found, problem.n)
+
+
+def start_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int]) -> Array:
+    """Return what another state at the start changes of the outputs, which an FMU need not let be set.
+
+    Any state that inputs lead to is one that pulses before the record have left: responses from a pulse's later rows on.
+    Their principal components are the changes.
+
+    Args:
+        problem: the FMU and the record.
+        model: parameters, effects and their values.
+        places: of the inputs.
+
+    Returns:
+        Shape (changes, outputs, n), each as large at most as the settings grant.
+    """
+    own = problem.settings.response
+    reach = max(problem.n // 4, 8)
+    _, runs = problem.pulse_runs(model, (0,), places, reach)
+    lags = np.unique(np.geomspace(1, reach, own.start_lags).astype(int))
+    found = []
+    for (change,) in runs:
+        if change is not None and float(np.max(np.abs(change))) > 0.0:
+            scaled = change / problem.noise / float(np.max(np.abs(change / problem.noise)))
+            found += [scaled[lag : lag + problem.n].T.ravel() for lag in lags]
+    if not found:
+        return np.zeros((0, len(problem.outputs), problem.n))
+    left, sizes, _ = np.linalg.svd(np.array(found).T, full_matrices=False)
+    kept = left[:, : own.start_states][:, sizes[: own.start_states] > own.start_least * sizes[0]].T
+    kept = kept.reshape(len(kept), len(problem.outputs), problem.n)
+    kept = kept / np.max(np.abs(kept), axis=(1, 2), keepdims=True)
+    return np.asarray(own.start_spread * kept * problem.noise[:, None])
