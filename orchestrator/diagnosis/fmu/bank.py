@@ -225,7 +225,7 @@ _FEEDBACK = (
          ("effort", "effort", "flow/s", "flow"),
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 * s.speed, 0.2 * s.speed * s.h), lambda s: (),
          law=laws.STRIBECK, lower=(0.0, 0.0, 1e-300, 1e-300), needs="coulomb_friction",
-         grows=_from_coulomb, becomes=_to_coulomb, departs=_falls, plausible=lambda v, s: v[1] > 1.03 * v[0] > 0.0),
+         grows=_from_coulomb, becomes=_to_coulomb, departs=_falls, plausible=lambda v, s: v[1] > max(1.03 * v[0], 0.0)),
     Kind("quadratic_drag", PORT, ("coefficient",), ("effort.s2/flow2",), lambda s: (0.01 * s.size / s.speed**2,),
          lambda s: ((0.01 * s.size / s.speed**2,),), True, laws.QUADRATIC, plausible=_positive),
     Kind("viscous_drag", PORT, ("coefficient",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
