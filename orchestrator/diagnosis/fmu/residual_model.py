@@ -5,6 +5,8 @@ measured pulse responses. With them the analysis whitens residuals as it does th
 """
 
 from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +90,21 @@ class FmuResiduals:
         """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
         effect, given = self._placed[label].at(values)
         return effect.kind.plausible(tuple(given), effect.scene)
+
+    def driving(self, point: ModelPoint) -> Array:
+        """Return the measured outputs (outputs, n); see :class:`ResidualModel`."""
+        del point
+        return np.ascontiguousarray(self.problem.data.outputs.T)
+
+    def inertia_shares(self) -> Mapping[str, float]:
+        """Return nothing: no parameter of an FMU must show in every record; see :class:`ResidualModel`."""
+        return {}
+
+    def without_priors(self, spread: float) -> "FmuResiduals":
+        """Return the model with every parameter unknown; see :class:`ResidualModel`."""
+        other = copy(self)
+        other.parameters = tuple(entry if entry.local else replace(entry, spread=spread) for entry in self.parameters)
+        return other
 
     # --- noise ---------------------------------------------------------------------------------------------
 

@@ -144,6 +144,28 @@ class _Search:
             gone = set(step.entry.fitted.labels) - set(pruned.labels)
             problem, final = settle(found.problem, pruned)
             found = replace(found, problem=problem, final=final, refused=found.refused | gone)
+        return self._simplified(found)
+
+    def _simplified(self, found: SearchResult) -> SearchResult:
+        """Return the result with simpler effects in place of those that stand for them and gain nothing over them.
+
+        What one effect needs more values for while a second is missing, a simpler one may do beside that.
+        """
+        for label in found.final.labels:
+            for simpler in found.problem.effects[label].contains:
+                problem, model = found.problem, found.final
+                without = fit_model(problem, model.point.without_effects([label]), 3)
+                screened = Screening(problem, without, self.settings).screen([problem.effects[simpler]])
+                if not screened:
+                    continue
+                fitted = fit_model(problem, screened_point(without, screened[0]))
+                if self._gains(compare(fitted, model)):
+                    continue
+                pair = ((simpler, fitted), (label, model))
+                tried = tuple(TriedEffect(name, compare(without, one), one) for name, one in pair)
+                steps = (*found.steps, SearchStep(without, tried, simpler, (label,)))
+                found = replace(found, final=fitted, steps=steps)
+                break
         return found
 
     def _step(self, found: SearchResult, first: bool) -> SearchStep:
