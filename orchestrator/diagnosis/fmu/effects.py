@@ -50,7 +50,8 @@ class PlacedEffect:
 
 
 def place_effects(
-    effects: Sequence[BoxEffect], motions: dict[str, Array], through: Callable[[str, Array], Array], starts_off: float
+    effects: Sequence[BoxEffect], motions: dict[str, Array], through: Callable[[str, Array], Array], starts_off: float,
+    linear: bool,
 ) -> dict[str, PlacedEffect]:
     """Return effects as the analysis sees them, by label.
 
@@ -59,6 +60,7 @@ def place_effects(
         motions: port -> its position (n,), over which ripples repeat.
         through: port, gradient (outputs, n) by the residuals -> gradient (n,) by the effort at the port.
         starts_off: share of its rms by which a signal starts away from zero to be tried from both.
+        linear: what an effect changes is known without a run, so that many values of it can be tried.
 
     Returns:
         The effects.
@@ -72,17 +74,18 @@ def place_effects(
         wave = None
         if effect.kind.name == "ripple":
             wave = _wave_scan(effect, motions[effect.place], through)
-        found[effect.label] = PlacedEffect(effect, _candidate(effect, wave, simpler, timing + grown, starts_off))
+        found[effect.label] = PlacedEffect(effect, _candidate(effect, wave, simpler, timing + grown, starts_off, linear))
     return found
 
 
 def _candidate(
-    effect: BoxEffect, wave: WaveScan | None, simpler: str, excludes: tuple[str, ...], starts_off: float
+    effect: BoxEffect, wave: WaveScan | None, simpler: str, excludes: tuple[str, ...], starts_off: float,
+    linear: bool,
 ) -> CandidateEffect:
     kind, scene = effect.kind, effect.scene
     count = len(kind.parameters)
     amplitudes = (0, 1) if kind.name == "stribeck_friction" else tuple(range(effect.amplitudes))
-    starts = _starts(effect, amplitudes)
+    starts = _starts(effect, amplitudes, linear)
     remembers = kind.name in REMEMBERS and abs(scene.signal[0]) > starts_off * scene.size
     flags = ((0.0,), (1.0,)) if remembers else ((),)
     positive = tuple(n for n in amplitudes if kind.name in POSITIVE)
@@ -96,14 +99,14 @@ def _candidate(
     )  # fmt: skip
 
 
-def _starts(effect: BoxEffect, amplitudes: Sequence[int]) -> list[Values]:
+def _starts(effect: BoxEffect, amplitudes: Sequence[int], linear: bool) -> list[Values]:
     """Return values to try, those that regression finds at zero."""
     kind, scene = effect.kind, effect.scene
     given = list(kind.starts(scene))
     if kind.name == "stribeck_friction":
         walk = scene.speed * scene.h
         given = [(0.0, 0.0, v * scene.speed, d * walk) for v in (0.1, 0.3) for d in (0.1, 0.6, 3.0)]
-    elif not amplitudes:
+    elif not amplitudes and linear:
         given += [(value,) for value in kind.scan(scene)]
     elif kind.name == "ripple":
         given = given[:1]

@@ -1,5 +1,6 @@
 """A record as a map names its columns, and a model: values of parameters, effects, and their values."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -56,6 +57,14 @@ class BoxModel:
     p: Array
     effects: tuple[BoxEffect, ...] = ()
     values: tuple[Array, ...] = ()
+
+    @property
+    def key(self) -> Hashable:
+        """What two models of the same run have in common."""
+        effects = tuple(
+            (e.label, e.at_rest, tuple(v.tolist())) for e, v in zip(self.effects, self.values, strict=True)
+        )
+        return tuple(self.p.tolist()), effects
 
     @property
     def vector(self) -> Array:

@@ -4,7 +4,7 @@ Noise of the outputs is white; unknown efforts at the ports (else at the recorde
 measured pulse responses. With them the analysis whitens residuals as it does those of our plants' torque balances.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -25,6 +25,7 @@ from pyfmu_sources.port_laws import COMPLIANCE
 Array = NDArray[np.float64]
 FAILED = 1e3  # times the span of an output: residual of a run that failed, from which every fit turns back
 START = "state at the start"
+KEPT = 3_000_000  # rows of outputs of runs that are kept
 BAND = 0.45  # of the rate of samples: highest frequency of the analysis
 
 
@@ -43,17 +44,19 @@ class FmuResiduals:
         self.edges = problem.settings.response.fade
         self.active = np.ones((len(self.channels), self.size))
         self._order = _order(problem)
+        self._kept: dict[Hashable, Array | None] = {}
         self._responses: dict[tuple[object, ...], tuple[Array, PulseResponses]] = {}
         self._places = self._input_places()
         self._start = start_responses(problem, problem.nominal, self._places)
         self.parameters = _parameters(problem, len(self._start))
         nominal = self._nominal_point()
-        reads, _ = self._measured_responses(nominal)
+        reads, responses = self._measured_responses(nominal)
         self._motions = port_motions(problem, reads)
         self._nominal = nominal
+        self._linear = responses.is_linear(problem.settings.response.linear)
         self._placed = place_effects(
             effects_of(problem, reads), {name: m.x for name, m in self._motions.items()}, self._effort_gradient,
-            problem.settings.place.starts_off,
+            problem.settings.place.starts_off, self._linear,
         )  # fmt: skip
         self.effects: Mapping[str, CandidateEffect] = {k: placed.candidate for k, placed in self._placed.items()}
 
@@ -77,7 +80,7 @@ class FmuResiduals:
 
     def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
         """Return the residuals (outputs, n) at each of some points; see :class:`ResidualModel`."""
-        runs = self.problem.simulate([self.box_model(point) for point in points])
+        runs = self._runs([self.box_model(point) for point in points])
         measured = self.problem.data.outputs
         failed = np.broadcast_to(FAILED * np.ptp(measured, axis=0)[:, None], measured.T.shape)
         starts = [np.tensordot(point.parameters[len(self._order) :], self._start, 1) for point in points]
@@ -85,6 +88,17 @@ class FmuResiduals:
             failed if y is None else np.ascontiguousarray((measured - y).T) - start
             for y, start in zip(runs, starts, strict=True)
         ]
+
+    def _runs(self, models: Sequence[BoxModel]) -> list[Array | None]:
+        """Return the outputs of runs, those of the last models kept: fits under another whitening ask for them again."""
+        keys = [model.key for model in models]
+        missing = {key: model for key, model in zip(keys, models, strict=True) if key not in self._kept}
+        found = dict(zip(missing, self.problem.simulate(list(missing.values())), strict=True))
+        runs = [found[key] if key in found else self._kept[key] for key in keys]
+        self._kept |= found
+        for key in list(self._kept)[: max(len(self._kept) - KEPT // self.size, 0)]:
+            del self._kept[key]
+        return runs
 
     def is_possible(self, label: str, values: Values) -> bool:
         """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
@@ -124,6 +138,8 @@ class FmuResiduals:
 
     def approximate_changes(self, point: ModelPoint, trials: Sequence[tuple[str, Values]]) -> list[Array | None]:
         """Return what effects change of the residuals, by the measured responses; see :class:`ResidualModel`."""
+        if not self._linear:
+            return [None] * len(trials)
         reads, responses = self._measured_responses(point)
         model = self.box_model(point)
         pushes: dict[int, list[tuple[int, Array]]] = {}

@@ -33,6 +33,22 @@ class PulseResponses:
     found: dict[int, tuple[Array, ...]]
     size: int
 
+    def is_linear(self, share: float) -> bool:
+        """Tell whether the responses along the record are the same.
+
+        Args:
+            share: of a response by which they may differ.
+
+        Returns:
+            True where they are.
+        """
+        for first, *others in self.found.values():
+            for other in others:
+                same = first[: len(other)]
+                if np.linalg.norm(other - same) > share * np.linalg.norm(same):
+                    return False
+        return True
+
     def changes(self, pushes: Array, place: int) -> Array:
         """Return what efforts at an input change of the outputs.
 
