@@ -50,7 +50,10 @@ class PlacedEffect:
 
 
 def place_effects(
-    effects: Sequence[BoxEffect], motions: dict[str, Array], through: Callable[[str, Array], Array], starts_off: float,
+    effects: Sequence[BoxEffect],
+    motions: dict[str, Array],
+    through: Callable[[str, Array], Array],
+    starts_off: float,
     linear: bool,
 ) -> dict[str, PlacedEffect]:
     """Return effects as the analysis sees them, by label.
@@ -74,12 +77,18 @@ def place_effects(
         wave = None
         if effect.kind.name == "ripple":
             wave = _wave_scan(effect, motions[effect.place], through)
-        found[effect.label] = PlacedEffect(effect, _candidate(effect, wave, simpler, timing + grown, starts_off, linear))
+        found[effect.label] = PlacedEffect(
+            effect, _candidate(effect, wave, simpler, timing + grown, starts_off, linear)
+        )
     return found
 
 
 def _candidate(
-    effect: BoxEffect, wave: WaveScan | None, simpler: str, excludes: tuple[str, ...], starts_off: float,
+    effect: BoxEffect,
+    wave: WaveScan | None,
+    simpler: str,
+    excludes: tuple[str, ...],
+    starts_off: float,
     linear: bool,
 ) -> CandidateEffect:
     kind, scene = effect.kind, effect.scene

@@ -61,9 +61,7 @@ class BoxModel:
     @property
     def key(self) -> Hashable:
         """What two models of the same run have in common."""
-        effects = tuple(
-            (e.label, e.at_rest, tuple(v.tolist())) for e, v in zip(self.effects, self.values, strict=True)
-        )
+        effects = tuple((e.label, e.at_rest, tuple(v.tolist())) for e, v in zip(self.effects, self.values, strict=True))
         return tuple(self.p.tolist()), effects
 
     @property

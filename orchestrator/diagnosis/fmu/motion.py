@@ -31,7 +31,7 @@ class Motion:
 def port_motions(problem: BoxProblem, reads: Array) -> dict[str, Motion]:
     """Return the motion of each port: as measured where its position is a column of the record, else that of a run.
 
-    A run of a model that lacks an effect may be far from the record; what the missing effect answers to is in the record.
+    A run of a model that lacks an effect may be far from the record; what the effect answers to is in the record.
 
     Args:
         problem: the FMU and the record.

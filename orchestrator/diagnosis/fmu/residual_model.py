@@ -90,7 +90,7 @@ class FmuResiduals:
         ]
 
     def _runs(self, models: Sequence[BoxModel]) -> list[Array | None]:
-        """Return the outputs of runs, those of the last models kept: fits under another whitening ask for them again."""
+        """Return the outputs of runs, the last ones kept: fits under another whitening ask again."""
         keys = [model.key for model in models]
         missing = {key: model for key, model in zip(keys, models, strict=True) if key not in self._kept}
         found = dict(zip(missing, self.problem.simulate(list(missing.values())), strict=True))

@@ -1,7 +1,7 @@
 """Responses of outputs to pulses at inputs, measured along a record.
 
-A pulse is one sample long. Responses at several rows follow an FMU that is not linear: what is pushed at a row is answered
-by the response that was measured last before it.
+A pulse is one sample long. Responses at several rows follow an FMU that is not linear: what is pushed at a row is
+answered by the response that was measured last before it.
 """
 
 from collections.abc import Sequence
@@ -143,11 +143,12 @@ def measure_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int
     for place, size, of_place in zip(places, problem.drive(places), runs, strict=True):
         responses: list[Array] = []
         for row, change in zip(rows, of_place, strict=True):
-            if change is None:
-                change = np.zeros((problem.n, len(problem.outputs)))
-                if responses:
-                    change[row:] = responses[-1][: problem.n - row] * size
-            responses.append(change[row:] / size)
+            if change is not None:
+                responses.append(change[row:] / size)
+            elif responses:
+                responses.append(responses[-1][: problem.n - row])
+            else:
+                responses.append(np.zeros((problem.n - row, len(problem.outputs))))
         found[place] = tuple(responses)
     return reads, PulseResponses(rows, found, problem.n)
 
@@ -155,8 +156,8 @@ def measure_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int
 def start_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int]) -> Array:
     """Return what another state at the start changes of the outputs, which an FMU need not let be set.
 
-    Any state that inputs lead to is one that pulses before the record have left: responses from a pulse's later rows on.
-    Their principal components are the changes.
+    Any state that inputs lead to is one that pulses before the record have left: what they change later on. The changes
+    are the principal components of that.
 
     Args:
         problem: the FMU and the record.

@@ -26,12 +26,18 @@ class ResponseSettings(Settings, frozen=True):
     """Pulse responses at inputs and ports: how noise there reaches the outputs, and what effects there change."""
 
     pulses: Annotated[int, setting("rows of the record at which a pulse is given: an FMU need not be linear", ge=1)] = 6
-    memory: Annotated[float, share("of the record after which noise at a port is forgotten: integrators have no spectrum")] = 0.2
+    memory: Annotated[
+        float, share("of the record after which noise at a port is forgotten: integrators have no spectrum")
+    ] = 0.2
     linear: Annotated[float, share("by which responses along the record may differ, to tell what effects change")] = 0.1
-    start_states: Annotated[int, setting("states at the start that may be off, where the FMU does not let them be set")] = 4
+    start_states: Annotated[
+        int, setting("states at the start that may be off, where the FMU does not let them be set")
+    ] = 4
     start_spread: Annotated[float, setting("how far the start may be off, in noise deviations of the outputs")] = 10.0
     start_least: Annotated[float, share("of the largest, that a state's response must have: less is rounding")] = 1e-3
-    start_lags: Annotated[int, setting("rows before the record at which what was pushed has led to its start", ge=1)] = 24
+    start_lags: Annotated[
+        int, setting("rows before the record at which what was pushed has led to its start", ge=1)
+    ] = 24
     window: Annotated[
         int, setting("samples of the sliding cubic that gives speed and acceleration of a measured motion", ge=5)
     ] = 7

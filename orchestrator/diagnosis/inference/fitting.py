@@ -173,8 +173,8 @@ class Comparison:
 
     Attributes:
         gain: share of the squared error that it takes away.
-        t: paired gain over its standard error: the larger of the mean log ratio, in which blocks count alike, and of the
-            sum, whose error is that of what is left: an effect that acts in few blocks is no less sure there.
+        t: paired gain over its standard error: the larger of the mean log ratio, in which blocks count alike, and of
+            the sum, whose error is that of what is left: an effect that acts in few blocks is no less sure there.
     """
 
     gain: float
@@ -196,7 +196,7 @@ def compare(before: FittedModel, after: FittedModel) -> Comparison:
     logs = np.log(a / b)
     even = logs.mean() / (logs.std(ddof=1) / np.sqrt(count) + 1e-9)
     ratio = a.sum() / b.sum()
-    # r1^2 - r2^2 = d^2 + 2 d r2 with d = r1 - r2: what d is in a block is the effect's doing, only r2 is left to chance.
+    # r1^2 - r2^2 = d^2 + 2 d r2 with d = r1 - r2: the effect makes d what it is in a block, only r2 is left to chance.
     chance = np.bincount(after.blocks, 2.0 * (before.held_out - after.held_out) * after.held_out, count)
     fixed = (a.sum() - b.sum()) / (np.sqrt(chance @ chance) + 1e-9 * b.sum())
     t = max(even, fixed) if ratio > 1.0 else min(even, fixed)

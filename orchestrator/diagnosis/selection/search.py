@@ -214,7 +214,12 @@ class _Search:
         return own
 
     def _chosen(
-        self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect], refused: frozenset[str], first: bool
+        self,
+        problem: FitProblem,
+        model: FittedModel,
+        tried: Sequence[TriedEffect],
+        refused: frozenset[str],
+        first: bool,
     ) -> SearchStep:
         fair = [one for one in tried if self._pays(problem, model, one)]
         if not fair:
