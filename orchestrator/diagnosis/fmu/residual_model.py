@@ -47,16 +47,17 @@ class FmuResiduals:
         self._kept: dict[Hashable, Array | None] = {}
         self._responses: dict[tuple[object, ...], tuple[Array, PulseResponses]] = {}
         self._places = self._input_places()
-        self._start = start_responses(problem, problem.nominal, self._places)
+        self.parameters = _parameters(problem, 0)
+        reads, responses = measure_responses(problem, problem.nominal, self._places)
+        self.is_linear = responses.is_linear(problem.settings.response.linear)
+        self._start = start_responses(problem, problem.nominal, self._places if self.is_linear else ())
         self.parameters = _parameters(problem, len(self._start))
-        nominal = self._nominal_point()
-        reads, responses = self._measured_responses(nominal)
+        self._nominal = self._nominal_point()
+        self._responses[self._nominal.parameters, ()] = reads, responses
         self._motions = port_motions(problem, reads)
-        self._nominal = nominal
-        self._linear = responses.is_linear(problem.settings.response.linear)
         self._placed = place_effects(
             effects_of(problem, reads), {name: m.x for name, m in self._motions.items()}, self._effort_gradient,
-            problem.settings.place.starts_off, self._linear,
+            problem.settings.place.starts_off, self.is_linear,
         )  # fmt: skip
         self.effects: Mapping[str, CandidateEffect] = {k: placed.candidate for k, placed in self._placed.items()}
 
@@ -138,7 +139,7 @@ class FmuResiduals:
 
     def approximate_changes(self, point: ModelPoint, trials: Sequence[tuple[str, Values]]) -> list[Array | None]:
         """Return what effects change of the residuals, by the measured responses; see :class:`ResidualModel`."""
-        if not self._linear:
+        if not self.is_linear:
             return [None] * len(trials)
         reads, responses = self._measured_responses(point)
         model = self.box_model(point)

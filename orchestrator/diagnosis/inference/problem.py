@@ -35,12 +35,14 @@ class FitProblem:
         settings: of fits.
         overdispersion: by how much blocks differ more than white residuals do, as a factor on variances: the prior
             counts for as much more.
+        first: values from which a fit without effects begins too, beside the nominal ones.
     """
 
     models: tuple[ResidualModel, ...]
     whitenings: tuple[Whitening, ...]
     settings: FitSettings
     overdispersion: float = 1.0
+    first: ModelPoint | None = None
 
     @cached_property
     def shared(self) -> tuple[UncertainParameter, ...]:
@@ -263,15 +265,18 @@ def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:
     return float(np.log(ratio)) / deviation, 1.0 / ratio / deviation
 
 
-def fit_problem(models: Sequence[ResidualModel], settings: FitSettings) -> FitProblem:
-    """Return the problem of some records, whitened by what the nominal model leaves.
+def fit_problem(
+    models: Sequence[ResidualModel], settings: FitSettings, first: ModelPoint | None = None
+) -> FitProblem:
+    """Return the problem of some records, whitened by what the first model leaves.
 
     Args:
         models: one for each record.
         settings: of fits.
+        first: values from which fits begin, beside the nominal ones.
 
     Returns:
         The problem.
     """
-    problem = FitProblem(tuple(models), tuple(band_only(model, settings) for model in models), settings)
-    return problem.reweighted(problem.start)
+    problem = FitProblem(tuple(models), tuple(band_only(model, settings) for model in models), settings, first=first)
+    return problem.reweighted(first or problem.start)

@@ -12,7 +12,7 @@ import numpy as np
 
 from orchestrator.diagnosis.inference.fitting import Comparison, FittedModel, compare, fit_model, weigh_prior
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
-from orchestrator.diagnosis.model.interface import CandidateEffect
+from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint
 from orchestrator.diagnosis.selection.screening import Screening, screened_point
 from orchestrator.diagnosis.settings import SelectionSettings
 
@@ -102,7 +102,8 @@ def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
     Returns:
         Model and problem.
     """
-    fitted = fit_model(problem, problem.start)
+    starts = [problem.start] if problem.first is None else [problem.first, problem.start]
+    fitted = min((fit_model(problem, start) for start in starts), key=lambda one: one.cost)
     for _ in range(2):
         problem, fitted = settle(problem, fitted)
     return fitted, problem
@@ -120,6 +121,22 @@ def settle(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, Fitted
     """
     problem = weigh_prior(problem.reweighted(fitted.point), fitted)
     return problem, fit_model(problem, fitted.point)
+
+
+def settle_anew(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, FittedModel]:
+    """Return what :func:`settle` returns, from the model file's values too where these lead to less.
+
+    What the model lacked before may have led its values to where no fit comes back from.
+
+    Args:
+        problem: of the fit.
+        fitted: the model.
+
+    Returns:
+        Problem and model.
+    """
+    again = fit_model(problem, ModelPoint(problem.start.parameters, fitted.point.effects))
+    return settle(problem, again if again.cost < fitted.cost else fitted)
 
 
 @dataclass(frozen=True)
@@ -142,7 +159,7 @@ class _Search:
                 break
             pruned = self._pruned(problem, step.entry.fitted)
             gone = set(step.entry.fitted.labels) - set(pruned.labels)
-            problem, final = settle(problem, pruned)
+            problem, final = settle_anew(problem, pruned)
             found = replace(found, problem=problem, final=final, refused=found.refused | gone)
         return self._simplified(found)
 
