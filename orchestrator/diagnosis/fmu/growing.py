@@ -12,7 +12,8 @@ from orchestrator.diagnosis.inference.whitening import band_only
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.settings import FitSettings
 
-PARTS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 3 / 4, 1.0)
+PARTS = (1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0)
+ITERATIONS = 8  # of each part: a motion that is hardly to be foretold converges slowly
 
 
 def grow_fit(model: FmuResiduals, settings: FitSettings) -> ModelPoint | None:
@@ -33,5 +34,5 @@ def grow_fit(model: FmuResiduals, settings: FitSettings) -> ModelPoint | None:
     for part in PARTS:
         active = white.active.copy()
         active[:, white.rows > part * model.size] = 0.0
-        point = fit_model(FitProblem((model,), (replace(white, active=active),), settings), point).point
+        point = fit_model(FitProblem((model,), (replace(white, active=active),), settings), point, ITERATIONS).point
     return point

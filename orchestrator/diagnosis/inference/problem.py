@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Coordinate = int | tuple[str, int]
 """Place of an uncertain parameter, or label of an effect and place of one of its values."""
 
-SMALL_SHARE = 1e-2  # of a parameter, for its derivative
+SMALL_SHARE = 1e-3  # of a parameter, for its derivative
 FARTHEST = 1e-3  # of its nominal value, below which no parameter falls
 
 

@@ -17,6 +17,8 @@ from orchestrator.diagnosis.selection.screening import Screening, screened_point
 from orchestrator.diagnosis.settings import SelectionSettings
 
 Progress = Callable[[str], None]
+SETTLINGS = 5  # of fit and whitening at most
+SETTLED = 0.02  # share of the score by which one changes it that is the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +106,11 @@ def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
     """
     starts = [problem.start] if problem.first is None else [problem.first, problem.start]
     fitted = min((fit_model(problem, start) for start in starts), key=lambda one: one.cost)
-    for _ in range(2):
+    for number in range(SETTLINGS):
+        score = fitted.score
         problem, fitted = settle(problem, fitted)
+        if number and abs(fitted.score - score) < SETTLED * score:
+            break
     return fitted, problem
 
 
