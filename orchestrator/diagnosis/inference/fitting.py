@@ -28,6 +28,8 @@ class FittedModel:
         jacobian: (rows, coordinates).
         cost: squared residuals and prior.
         covariance: (coordinates, coordinates) of white residuals.
+        held_out: (rows,) residuals of each block, predicted from the others.
+        blocks: (rows,) block of each residual.
         block_errors: (blocks,) squared error of each block, predicted from the others.
         block_shifts: (blocks, coordinates) how the values move when a block is left out.
     """
@@ -38,6 +40,8 @@ class FittedModel:
     jacobian: Array
     cost: float
     covariance: Array
+    held_out: Array
+    blocks: NDArray[np.int64]
     block_errors: Array
     block_shifts: Array
 
@@ -125,16 +129,17 @@ def _scored(
     gradient = gradients.sum(axis=0) + slopes * prior
     # What a record begins with belongs to its first block alone, and stays.
     moving = [n for n, one in enumerate(coordinates) if not (isinstance(one, int) and problem.parameters[one].local)]
-    errors, shifts = np.empty(count), np.zeros((count, width))
+    errors, shifts, held_out = np.empty(count), np.zeros((count, width)), np.empty_like(residual)
     for block in range(count):
         inner = (normal - normals[block])[np.ix_(moving, moving)]
         ridge = 1e-10 * np.diag(np.diag(inner) + 1e-30)
         shifts[block, moving] = -np.linalg.lstsq(inner + ridge, (gradient - gradients[block])[moving], rcond=1e-12)[0]
-        shift = shifts[block]
+        shift, rows = shifts[block], problem.blocks == block
+        held_out[rows] = residual[rows] + jacobian[rows] @ shift
         errors[block] = squares[block] + 2.0 * shift @ gradients[block] + shift @ normals[block] @ shift
     return FittedModel(
         point, tuple(coordinates), residual, jacobian, cost, np.linalg.pinv(normal, hermitian=True),
-        np.maximum(errors, 1e-12 * squares.sum()), shifts,
+        held_out, problem.blocks, np.maximum(errors, 1e-12 * squares.sum()), shifts,
     )  # fmt: skip
 
 
@@ -168,8 +173,8 @@ class Comparison:
 
     Attributes:
         gain: share of the squared error that it takes away.
-        t: paired gain over its standard error: the larger of the mean log ratio, in which blocks count alike, and the
-            pooled ratio, in which they count by their error.
+        t: paired gain over its standard error: the larger of the mean log ratio, in which blocks count alike, and of
+            the sum, whose error is that of what is left: an effect that acts in few blocks is no less sure there.
     """
 
     gain: float
@@ -191,7 +196,8 @@ def compare(before: FittedModel, after: FittedModel) -> Comparison:
     logs = np.log(a / b)
     even = logs.mean() / (logs.std(ddof=1) / np.sqrt(count) + 1e-9)
     ratio = a.sum() / b.sum()
-    influence = (a - ratio * b) / b.mean() / ratio
-    pooled = np.log(ratio) / (influence.std(ddof=1) / np.sqrt(count) + 1e-9)
-    t = max(even, pooled) if ratio > 1.0 else min(even, pooled)
+    # r1^2 - r2^2 = d^2 + 2 d r2 with d = r1 - r2: the effect makes d what it is in a block, only r2 is left to chance.
+    chance = np.bincount(after.blocks, 2.0 * (before.held_out - after.held_out) * after.held_out, count)
+    fixed = (a.sum() - b.sum()) / (np.sqrt(chance @ chance) + 1e-9 * b.sum())
+    t = max(even, fixed) if ratio > 1.0 else min(even, fixed)
     return Comparison(float(1.0 - b.sum() / a.sum()), float(t))

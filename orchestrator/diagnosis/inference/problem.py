@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Coordinate = int | tuple[str, int]
 """Place of an uncertain parameter, or label of an effect and place of one of its values."""
 
-SMALL_SHARE = 1e-2  # of a parameter, for its derivative
+SMALL_SHARE = 1e-3  # of a parameter, for its derivative
 FARTHEST = 1e-3  # of its nominal value, below which no parameter falls
 
 
@@ -35,12 +35,14 @@ class FitProblem:
         settings: of fits.
         overdispersion: by how much blocks differ more than white residuals do, as a factor on variances: the prior
             counts for as much more.
+        first: values from which a fit without effects begins too, beside the nominal ones.
     """
 
     models: tuple[ResidualModel, ...]
     whitenings: tuple[Whitening, ...]
     settings: FitSettings
     overdispersion: float = 1.0
+    first: ModelPoint | None = None
 
     @cached_property
     def shared(self) -> tuple[UncertainParameter, ...]:
@@ -111,6 +113,31 @@ class FitProblem:
             for n, (model, whitening) in enumerate(zip(self.models, self.whitenings, strict=True))
         ]
         return [np.concatenate(of_records) for of_records in zip(*parts, strict=True)]
+
+    def changes(self, point: ModelPoint, residual: Array, trials: Sequence[tuple[str, Values]]) -> list[Array]:
+        """Return what effects change of the whitened residuals, approximately where a model can tell.
+
+        Args:
+            point: values of the model.
+            residual: (rows,) whitened residuals there.
+            trials: an effect that the point lacks and its values, each.
+
+        Returns:
+            The change (rows,) for each.
+        """
+        found = [np.empty(residual.size) for _ in trials]
+        first = 0
+        for model, whitening, seen in zip(self.models, self.whitenings, self.record_points(point), strict=True):
+            rows = slice(first, first + whitening.size)
+            first += whitening.size
+            changes = model.approximate_changes(seen, trials)
+            exact = [n for n, change in enumerate(changes) if change is None]
+            for n, left in zip(exact, model.residuals([seen.with_effect(*trials[n]) for n in exact]), strict=True):
+                found[n][rows] = whitening.apply(left) - residual[rows]
+            for n, change in enumerate(changes):
+                if change is not None:
+                    found[n][rows] = whitening.apply(change)
+        return found
 
     def reweighted(self, point: ModelPoint) -> "FitProblem":
         """Return the problem with the whitening that the residuals at a point ask for.
@@ -238,15 +265,18 @@ def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:
     return float(np.log(ratio)) / deviation, 1.0 / ratio / deviation
 
 
-def fit_problem(models: Sequence[ResidualModel], settings: FitSettings) -> FitProblem:
-    """Return the problem of some records, whitened by what the nominal model leaves.
+def fit_problem(
+    models: Sequence[ResidualModel], settings: FitSettings, first: ModelPoint | None = None
+) -> FitProblem:
+    """Return the problem of some records, whitened by what the first model leaves.
 
     Args:
         models: one for each record.
         settings: of fits.
+        first: values from which fits begin, beside the nominal ones.
 
     Returns:
         The problem.
     """
-    problem = FitProblem(tuple(models), tuple(band_only(model, settings) for model in models), settings)
-    return problem.reweighted(problem.start)
+    problem = FitProblem(tuple(models), tuple(band_only(model, settings) for model in models), settings, first=first)
+    return problem.reweighted(first or problem.start)

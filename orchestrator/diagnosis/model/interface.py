@@ -39,13 +39,16 @@ class WaveScan:
         phase: (n,) signal over which the wave repeats.
         channel: of the residual in which it acts.
         coordinate: place of the cycles in the effect's values.
-        cycles: grid of cycles for each unit of ``phase``.
+        cycles: grid of cycles, in radians of the wave for each unit of ``phase``.
+        through: where it acts on the residuals through a dynamic response: gradient (channels, n) by the residuals ->
+            gradient (n,) by what it adds; None: on its channel directly.
     """
 
     phase: Array
     channel: int
     coordinate: int
     cycles: Array
+    through: Callable[[Array], Array] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,6 +229,17 @@ class ResidualModel(Protocol):
 
         Returns:
             The sources, at the nominal values.
+        """
+
+    def approximate_changes(self, point: ModelPoint, trials: Sequence[tuple[str, Values]]) -> list[Array | None]:
+        """Return what effects would change of the residuals, where that is known without working these out.
+
+        Args:
+            point: values of the model.
+            trials: an effect that the point lacks and its values, each.
+
+        Returns:
+            The change (channels, n) for each; None: the residuals must be worked out.
         """
 
     def is_possible(self, label: str, values: Values) -> bool:

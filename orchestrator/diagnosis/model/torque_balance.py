@@ -308,6 +308,11 @@ class TorqueBalance:
         other.parameters = tuple(entry if entry.local else replace(entry, spread=spread) for entry in self.parameters)
         return other
 
+    def approximate_changes(self, point: ModelPoint, trials: Sequence[tuple[str, Values]]) -> list[Array | None]:
+        """Return no change: residuals of a balance cost little; see :class:`ResidualModel`."""
+        del point
+        return [None] * len(trials)
+
     # --- noise ---------------------------------------------------------------------------------------------
 
     def noise_sources(self, frequencies: Array) -> NoiseSources:

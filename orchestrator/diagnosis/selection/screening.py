@@ -73,11 +73,15 @@ class Screening:
         assert wave is not None
         total = np.zeros(wave.cycles.size, dtype=complex)
         for model, whitening in zip(self.problem.models, self.problem.whitenings, strict=True):
-            phase = model.effects[effect.label].wave
-            assert phase is not None
-            gradient = whitening.back_filter(self.fitted.residual[rows : rows + whitening.size], phase.channel)
+            own = model.effects[effect.label].wave
+            assert own is not None
+            left = self.fitted.residual[rows : rows + whitening.size]
             rows += whitening.size
-            total += products_with_waves(gradient, phase.phase, wave.cycles)
+            if own.through is None:
+                gradient = whitening.back_filter(left, own.channel)
+            else:
+                gradient = own.through(np.array([whitening.back_filter(left, n) for n in range(len(model.channels))]))
+            total += products_with_waves(gradient, own.phase, wave.cycles)
         power = np.abs(total)
         if power.size == 0:
             return []
@@ -86,15 +90,15 @@ class Screening:
 
     def _changes(self, trials: Sequence[tuple[CandidateEffect, Values]]) -> list[Array]:
         """Return the columns (rows, k) of each trial: of each amplitude, or of the effect as it is."""
-        points, counts = [], []
+        single, counts = [], []
         for effect, values in trials:
             moved = [self._with_amplitude(effect, values, place) for place in effect.amplitudes] or [values]
-            points += [self.fitted.point.with_effect(effect.label, one) for one in moved]
+            single += [(effect.label, one) for one in moved]
             counts.append(len(moved))
-        found = self.problem.whitened(points)
+        found = self.problem.changes(self.fitted.point, self.fitted.residual, single)
         columns, first = [], 0
         for count in counts:
-            columns.append(np.column_stack([one - self.fitted.residual for one in found[first : first + count]]))
+            columns.append(np.column_stack(found[first : first + count]))
             first += count
         return columns
 

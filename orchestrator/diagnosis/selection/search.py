@@ -12,11 +12,13 @@ import numpy as np
 
 from orchestrator.diagnosis.inference.fitting import Comparison, FittedModel, compare, fit_model, weigh_prior
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
-from orchestrator.diagnosis.model.interface import CandidateEffect
+from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint
 from orchestrator.diagnosis.selection.screening import Screening, screened_point
 from orchestrator.diagnosis.settings import SelectionSettings
 
 Progress = Callable[[str], None]
+SETTLINGS = 5  # of fit and whitening at most
+SETTLED = 0.02  # share of the score by which one changes it that is the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +104,13 @@ def fit_base(problem: FitProblem) -> tuple[FittedModel, FitProblem]:
     Returns:
         Model and problem.
     """
-    fitted = fit_model(problem, problem.start)
-    for _ in range(2):
+    starts = [problem.start] if problem.first is None else [problem.first, problem.start]
+    fitted = min((fit_model(problem, start) for start in starts), key=lambda one: one.cost)
+    for number in range(SETTLINGS):
+        score = fitted.score
         problem, fitted = settle(problem, fitted)
+        if number and abs(fitted.score - score) < SETTLED * score:
+            break
     return fitted, problem
 
 
@@ -122,6 +128,22 @@ def settle(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, Fitted
     return problem, fit_model(problem, fitted.point)
 
 
+def settle_anew(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, FittedModel]:
+    """Return what :func:`settle` returns, from the model file's values too where these lead to less.
+
+    What the model lacked before may have led its values to where no fit comes back from.
+
+    Args:
+        problem: of the fit.
+        fitted: the model.
+
+    Returns:
+        Problem and model.
+    """
+    again = fit_model(problem, ModelPoint(problem.start.parameters, fitted.point.effects))
+    return settle(problem, again if again.cost < fitted.cost else fitted)
+
+
 @dataclass(frozen=True)
 class _Search:
     settings: SelectionSettings
@@ -136,25 +158,97 @@ class _Search:
                 break
             if self.out_of_time():
                 return replace(found, complete=False)
-            step = self._step(found, number == 0)
+            problem, step = self._step(found, number == 0)
             found = replace(found, steps=(*found.steps, step))
             if step.entry is None:
                 break
-            pruned = self._pruned(found.problem, step.entry.fitted)
+            pruned = self._pruned(problem, step.entry.fitted)
             gone = set(step.entry.fitted.labels) - set(pruned.labels)
-            problem, final = settle(found.problem, pruned)
+            problem, final = settle_anew(problem, pruned)
             found = replace(found, problem=problem, final=final, refused=found.refused | gone)
+        return self._simplified(found)
+
+    def _simplified(self, found: SearchResult) -> SearchResult:
+        """Return the result with simpler effects in place of those that stand for them and gain nothing over them.
+
+        What one effect needs more values for while a second is missing, a simpler one may do beside that.
+        """
+        for label in found.final.labels:
+            for simpler in found.problem.effects[label].contains:
+                problem, model = found.problem, found.final
+                without = fit_model(problem, model.point.without_effects([label]), 3)
+                screened = Screening(problem, without, self.settings).screen([problem.effects[simpler]])
+                if not screened:
+                    continue
+                fitted = fit_model(problem, screened_point(without, screened[0]))
+                if self._gains(compare(fitted, model)):
+                    continue
+                pair = ((simpler, fitted), (label, model))
+                tried = tuple(TriedEffect(name, compare(without, one), one) for name, one in pair)
+                steps = (*found.steps, SearchStep(without, tried, simpler, (label,)))
+                found = replace(found, final=fitted, steps=steps)
+                break
         return found
 
-    def _step(self, found: SearchResult, first: bool) -> SearchStep:
+    def _step(self, found: SearchResult, first: bool) -> tuple[FitProblem, SearchStep]:
         problem, model = found.problem, found.final
         tried = self._tried(problem, model, found.refused, self.settings.refined)
+        step = self._chosen(problem, model, tried, found.refused, first)
+        quieter = None if step.taken else self._quieter_problem(problem, model, tried)
+        if quieter is None:
+            return problem, step
+        model, again = self._compared(quieter, model, tried)
+        return quieter, self._chosen(quieter, model, again, found.refused, first=False)
+
+    def _compared(
+        self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect]
+    ) -> tuple[FittedModel, list[TriedEffect]]:
+        """Return a model and the effects tried on top of it, fitted again in a problem of another whitening."""
+        model = fit_model(problem, model.point)
+        fits = [fit_model(problem, one.fitted.point) for one in tried]
+        again = [TriedEffect(one.label, compare(model, fit), fit) for one, fit in zip(tried, fits, strict=True)]
+        return model, sorted(again, key=lambda one: -one.comparison.gain)
+
+    def _quieter_problem(
+        self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect]
+    ) -> FitProblem | None:
+        """Return the problem whitened by what an effect leaves, where the effect pays in that.
+
+        The whitening of a model that lacks an effect takes what the effect does for unknown torques or inputs. A true
+        effect leaves less of these with each fit and its whitening; one that stands for nothing does not.
+        """
+        rising: list[tuple[float, FitProblem, list[TriedEffect]]] = []
+        for one in tried[: self.settings.look_ahead]:
+            own, fitted = settle(problem, one.fitted)
+            _, (again,) = self._compared(own, model, [replace(one, fitted=fitted)])
+            if again.comparison.gain > one.comparison.gain:
+                rising.append((again.comparison.gain, own, [again]))
+        if not rising:
+            return None
+        gain, own, leading = max(rising, key=lambda one: one[0])
+        others = [one for one in tried[: self.settings.look_ahead] if one.label != leading[0].label]
+        for _ in range(self.settings.most_effects):
+            quieter, fitted = settle(own, leading[0].fitted)
+            _, again = self._compared(quieter, model, [replace(leading[0], fitted=fitted), *leading[1:], *others])
+            if again[0].comparison.gain <= gain:
+                break
+            gain, own, leading, others = again[0].comparison.gain, quieter, again, []
+        return own
+
+    def _chosen(
+        self,
+        problem: FitProblem,
+        model: FittedModel,
+        tried: Sequence[TriedEffect],
+        refused: frozenset[str],
+        first: bool,
+    ) -> SearchStep:
         fair = [one for one in tried if self._pays(problem, model, one)]
         if not fair:
             return SearchStep(model, tuple(tried))
         best = fair[0]
         if first and len(fair) > 1 and best.comparison.gain < self.settings.certain_alone:
-            best = self._best_with_second(problem, fair[: self.settings.look_ahead], found.refused) or best
+            best = self._best_with_second(problem, fair[: self.settings.look_ahead], refused) or best
         family = [one for one in fair if one is best or self._is_alike(best, one)]
         kind = problem.effects[best.label].kind
         same = [one for one in family if problem.effects[one.label].kind == kind]

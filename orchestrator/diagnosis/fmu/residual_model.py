@@ -1,0 +1,235 @@
+"""Any FMU beside one record: residuals are measured outputs minus those of its runs.
+
+Noise of the outputs is white; unknown efforts at the ports (else at the recorded inputs) reach the outputs through the
+measured pulse responses. With them the analysis whitens residuals as it does those of our plants' torque balances.
+"""
+
+from collections.abc import Hashable, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, BoxEffect
+from orchestrator.diagnosis.fmu.effects import place_effects
+from orchestrator.diagnosis.fmu.model import BoxModel
+from orchestrator.diagnosis.fmu.motion import efforts_along, port_motions
+from orchestrator.diagnosis.fmu.passed import at_input, at_output
+from orchestrator.diagnosis.fmu.problem import BoxProblem
+from orchestrator.diagnosis.fmu.response import PulseResponses, measure_responses, start_responses
+from orchestrator.diagnosis.fmu.sites import effects_of
+from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, NoiseSources, UncertainParameter, Values
+from pyfmu_sources.port_laws import COMPLIANCE
+
+Array = NDArray[np.float64]
+FAILED = 1e3  # times the span of an output: residual of a run that failed, from which every fit turns back
+START = "state at the start"
+KEPT = 3_000_000  # rows of outputs of runs that are kept
+BAND = 0.45  # of the rate of samples: highest frequency of the analysis
+
+
+class FmuResiduals:
+    """An FMU, or several, beside one record: a :class:`ResidualModel`.
+
+    Args:
+        problem: FMU, map and record, probed.
+    """
+
+    def __init__(self, problem: BoxProblem) -> None:
+        self.problem = problem
+        self.channels = problem.outputs
+        self.step, self.size = problem.h, problem.n
+        self.cutoffs = tuple(BAND / problem.h for _ in self.channels)
+        self.edges = problem.settings.response.fade
+        self.active = np.ones((len(self.channels), self.size))
+        self._order = _order(problem)
+        self._kept: dict[Hashable, Array | None] = {}
+        self._responses: dict[tuple[object, ...], tuple[Array, PulseResponses]] = {}
+        self._places = self._input_places()
+        self.parameters = _parameters(problem, 0)
+        reads, responses = measure_responses(problem, problem.nominal, self._places)
+        self.is_linear = responses.is_linear(problem.settings.response.linear)
+        self._start = start_responses(problem, problem.nominal, self._places if self.is_linear else ())
+        self.parameters = _parameters(problem, len(self._start))
+        self._nominal = self._nominal_point()
+        self._responses[self._nominal.parameters, ()] = reads, responses
+        self._motions = port_motions(problem, reads)
+        self._placed = place_effects(
+            effects_of(problem, reads), {name: m.x for name, m in self._motions.items()}, self._effort_gradient,
+            problem.settings.place.starts_off, self.is_linear,
+        )  # fmt: skip
+        self.effects: Mapping[str, CandidateEffect] = {k: placed.candidate for k, placed in self._placed.items()}
+
+    # --- residuals -----------------------------------------------------------------------------------------
+
+    def box_model(self, point: ModelPoint) -> BoxModel:
+        """Return parameters and effects at a point as runs of the FMU take them.
+
+        Args:
+            point: values of the model.
+
+        Returns:
+            The model.
+        """
+        p = np.empty(len(self._order))
+        for place, entry, value in zip(self._order, self.parameters, point.parameters, strict=False):
+            own = self.problem.map.uncertain[place]
+            p[place] = np.clip(own.value + value if entry.local else value, own.minimum, own.maximum)
+        found = [self._placed[label].at(values) for label, values in point.effects.items()]
+        return BoxModel(p, tuple(effect for effect, _ in found), tuple(values for _, values in found))
+
+    def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
+        """Return the residuals (outputs, n) at each of some points; see :class:`ResidualModel`."""
+        runs = self._runs([self.box_model(point) for point in points])
+        measured = self.problem.data.outputs
+        failed = np.broadcast_to(FAILED * np.ptp(measured, axis=0)[:, None], measured.T.shape)
+        starts = [np.tensordot(point.parameters[len(self._order) :], self._start, 1) for point in points]
+        return [
+            failed if y is None else np.ascontiguousarray((measured - y).T) - start
+            for y, start in zip(runs, starts, strict=True)
+        ]
+
+    def _runs(self, models: Sequence[BoxModel]) -> list[Array | None]:
+        """Return the outputs of runs, the last ones kept: fits under another whitening ask again."""
+        keys = [model.key for model in models]
+        missing = {key: model for key, model in zip(keys, models, strict=True) if key not in self._kept}
+        found = dict(zip(missing, self.problem.simulate(list(missing.values())), strict=True))
+        runs = [found[key] if key in found else self._kept[key] for key in keys]
+        self._kept |= found
+        for key in list(self._kept)[: max(len(self._kept) - KEPT // self.size, 0)]:
+            del self._kept[key]
+        return runs
+
+    def is_possible(self, label: str, values: Values) -> bool:
+        """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
+        effect, given = self._placed[label].at(values)
+        return effect.kind.plausible(tuple(given), effect.scene)
+
+    def driving(self, point: ModelPoint) -> Array:
+        """Return the measured outputs (outputs, n); see :class:`ResidualModel`."""
+        del point
+        return np.ascontiguousarray(self.problem.data.outputs.T)
+
+    def inertia_shares(self) -> Mapping[str, float]:
+        """Return nothing: no parameter of an FMU must show in every record; see :class:`ResidualModel`."""
+        return {}
+
+    def without_priors(self, spread: float) -> "FmuResiduals":
+        """Return the model with every parameter unknown; see :class:`ResidualModel`."""
+        other = copy(self)
+        other.parameters = tuple(entry if entry.local else replace(entry, spread=spread) for entry in self.parameters)
+        return other
+
+    # --- noise ---------------------------------------------------------------------------------------------
+
+    def noise_sources(self, frequencies: Array) -> NoiseSources:
+        """Return noise of the outputs, and efforts through the measured responses; see :class:`ResidualModel`."""
+        count = len(self.channels)
+        identity = np.broadcast_to(np.eye(count, dtype=complex), (frequencies.size, count, count))
+        levels = 2.0 * self.problem.noise**2 * self.step
+        _, responses = self._measured_responses(self._nominal)
+        own = PulseResponses(
+            responses.rows, {place: responses.found[place] for place in self.problem.noise_places}, self.size
+        )
+        process = own.frequency_response(frequencies, self.step, self.problem.settings.response.memory)
+        return NoiseSources(identity, levels, process, np.zeros(process.shape[2]))
+
+    # --- linear approximation ------------------------------------------------------------------------------
+
+    def approximate_changes(self, point: ModelPoint, trials: Sequence[tuple[str, Values]]) -> list[Array | None]:
+        """Return what effects change of the residuals, by the measured responses; see :class:`ResidualModel`."""
+        if not self.is_linear:
+            return [None] * len(trials)
+        reads, responses = self._measured_responses(point)
+        model = self.box_model(point)
+        pushes: dict[int, list[tuple[int, Array]]] = {}
+        found: list[Array | None] = [None] * len(trials)
+        table = self.problem.table(model, self.problem.plain_table)
+        for n, (label, values) in enumerate(trials):
+            effect, given = self._placed[label].at(values)
+            if effect.kind.where == OUTPUT:
+                found[n] = self._changed_output(effect, given, reads)
+            elif effect.kind.where != PARAMETER:
+                place, push = self._push(effect, given, reads, table)
+                pushes.setdefault(place, []).append((n, push))
+        for place, of_place in pushes.items():
+            changes = responses.changes(np.array([push for _, push in of_place]), place)
+            for (n, _), change in zip(of_place, changes, strict=True):
+                found[n] = -change
+        return found
+
+    def _push(self, effect: BoxEffect, values: Array, reads: Array, table: Array) -> tuple[int, Array]:
+        """Return the input at which an effect acts, and the effort (n,) that it adds there in each sample."""
+        problem, runner = self.problem, self.problem.runner
+        push = np.zeros(self.size)
+        if effect.kind.where == INPUT:
+            place = runner.inputs.index(effect.place)
+            fine = table[:, place]
+            added = at_input(effect, fine, problem.step, float(values[0])) - fine
+            push[:-1] = added.reshape(-1, problem.m).mean(axis=1)
+            return place, push
+        if effect.kind.where == CUT:
+            return self._push_at_cut(effect, values, reads)
+        place = runner.inputs.index(problem.map.ports[effect.place].input)
+        effort = efforts_along(self._motions[effect.place], effect.kind.law, tuple(values), self.step)
+        push[:-1] = -problem.sign.get(effect.place, 1.0) * 0.5 * (effort[:-1] + effort[1:])
+        return place, push
+
+    def _push_at_cut(self, effect: BoxEffect, values: Array, reads: Array) -> tuple[int, Array]:
+        problem, runner = self.problem, self.problem.runner
+        target = problem.map.cuts[effect.place].input
+        wire = next(c for c in runner.subject.connections if c.target == target)
+        other = reads[:, runner.reads.index(problem.beyond(effect))]
+        if effect.kind.law == COMPLIANCE:
+            return runner.inputs.index(target), -values[0] * problem.sign.get(effect.place, 1.0) * other
+        between = wire.factor * reads[:, runner.reads.index(wire.source)] + wire.offset - other
+        return runner.inputs.index(target), -np.clip(between, -0.5 * values[0], 0.5 * values[0])
+
+    def _changed_output(self, effect: BoxEffect, values: Array, reads: Array) -> Array:
+        channel = self.problem.outputs.index(effect.place)
+        y = reads[:, channel]
+        change = np.zeros((len(self.channels), self.size))
+        change[channel] = y - at_output(effect, y, self.step, float(values[0]), 1)
+        return change
+
+    def _effort_gradient(self, port: str, by_residuals: Array) -> Array:
+        _, responses = self._measured_responses(self._nominal)
+        return -responses.gradient(by_residuals, self.problem.runner.inputs.index(self.problem.map.ports[port].input))
+
+    def _measured_responses(self, point: ModelPoint) -> tuple[Array, PulseResponses]:
+        """Return run and responses at a point, kept for the nominal one and the last."""
+        key = (point.parameters, tuple(point.effects.items()))
+        if key not in self._responses:
+            for old in list(self._responses)[1:]:
+                del self._responses[old]
+            self._responses[key] = measure_responses(self.problem, self.box_model(point), self._places)
+        return self._responses[key]
+
+    def _input_places(self) -> list[int]:
+        """Return the inputs at which effects or noise may act."""
+        problem, names = self.problem, self.problem.runner.inputs
+        acting = [*problem.inputs, *(port.input for port in problem.map.ports.values())]
+        acting += [cut.input for cut in problem.map.cuts.values()]
+        return [names.index(name) for name in dict.fromkeys(acting)]
+
+    def _nominal_point(self) -> ModelPoint:
+        return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in self.parameters))
+
+
+def _order(problem: BoxProblem) -> list[int]:
+    """Return the places of the uncertain values of a map in the order of the analysis: those of one record last."""
+    uncertain = problem.map.uncertain
+    shared = [k for k, u in enumerate(uncertain) if u.value != 0.0 and u.name not in problem.map.initial]
+    return [*shared, *(k for k in range(len(uncertain)) if k not in shared)]
+
+
+def _parameters(problem: BoxProblem, starts: int) -> tuple[UncertainParameter, ...]:
+    found = []
+    for k in _order(problem):
+        u = problem.map.uncertain[k]
+        if u.value == 0.0 or u.name in problem.map.initial:
+            found.append(UncertainParameter(u.name, u.uncertainty, 1.0, u.unit, local=True))
+        else:
+            found.append(UncertainParameter(u.name, u.value, u.uncertainty / abs(u.value), u.unit))
+    return (*found, *(UncertainParameter(f"{START} {k + 1}", 1.0, 1.0, local=True) for k in range(starts)))

@@ -1,0 +1,185 @@
+"""Responses of outputs to pulses at inputs, measured along a record.
+
+A pulse is one sample long. Responses at several rows follow an FMU that is not linear: what is pushed at a row is
+answered by the response that was measured last before it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from orchestrator.diagnosis.fmu.model import BoxModel
+from orchestrator.diagnosis.fmu.problem import BoxProblem
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class PulseResponses:
+    """What outputs answer to a pulse of one sample, over its size.
+
+    Attributes:
+        rows: of the record at which pulses began, the first one zero.
+        found: input -> for each of these rows, the response (n - row, outputs) from there on, over the pulse's size in
+            the input's unit.
+        size: rows of the record.
+    """
+
+    rows: tuple[int, ...]
+    found: dict[int, tuple[Array, ...]]
+    size: int
+
+    def is_linear(self, share: float) -> bool:
+        """Tell whether the responses along the record are the same.
+
+        Args:
+            share: of a response by which they may differ.
+
+        Returns:
+            True where they are.
+        """
+        for first, *others in self.found.values():
+            for other in others:
+                same = first[: len(other)]
+                if np.linalg.norm(other - same) > share * np.linalg.norm(same):
+                    return False
+        return True
+
+    def changes(self, pushes: Array, place: int) -> Array:
+        """Return what efforts at an input change of the outputs.
+
+        Args:
+            pushes: (trials, n) efforts, each held over a sample.
+            place: of the input.
+
+        Returns:
+            Shape (trials, outputs, n).
+        """
+        length = next_fast_len(2 * self.size)
+        responses = self.found[place]
+        total = np.zeros((len(pushes), responses[0].shape[1], length // 2 + 1), dtype=complex)
+        for spectrum, part in zip(self._spectra(place, length), self._parts(pushes), strict=True):
+            total += rfft(part, length, axis=1)[:, None, :] * spectrum
+        return np.asarray(irfft(total, length, axis=2)[:, :, : self.size])
+
+    def gradient(self, by_outputs: Array, place: int) -> Array:
+        """Return the gradient (n,) by the effort in each sample, of what has a gradient (outputs, n) by the outputs.
+
+        Args:
+            by_outputs: the gradient by the outputs.
+            place: of the input.
+
+        Returns:
+            The transpose of :meth:`changes`.
+        """
+        length = next_fast_len(2 * self.size)
+        spectra = rfft(by_outputs, length, axis=1)
+        ends = (*self.rows[1:], self.size)
+        found = np.zeros(self.size)
+        for spectrum, row, end in zip(self._spectra(place, length), self.rows, ends, strict=True):
+            back = irfft(np.sum(spectra * np.conj(spectrum), axis=0), length)
+            found[row:end] = back[row:end]
+        return found
+
+    def frequency_response(self, frequencies: Array, step: float, memory: float) -> Complex:
+        """Return the transfer (f, outputs, inputs) from efforts to outputs.
+
+        Responses fade over a share of the record: an integrator would have no spectrum.
+
+        Args:
+            frequencies: (f,) [Hz], evenly spaced from zero on.
+            step: sample time [s].
+            memory: that share.
+
+        Returns:
+            The transfer.
+        """
+        from scipy.signal import czt
+
+        spacing = frequencies[1] - frequencies[0]
+        turn = np.exp(-2j * np.pi * spacing * step)
+        columns = []
+        for responses in self.found.values():
+            response = responses[min(1, len(responses) - 1)]
+            faded = response * np.exp(-np.arange(len(response)) / (memory * self.size))[:, None]
+            columns.append(czt(faded, frequencies.size, turn, axis=0))
+        return np.stack(columns, axis=2)
+
+    def _spectra(self, place: int, length: int) -> list[Complex]:
+        return [rfft(response.T, length, axis=1) for response in self.found[place]]
+
+    def _parts(self, pushes: Array) -> list[Array]:
+        """Return the pushes between each row of a pulse and the next, zero elsewhere."""
+        found = []
+        for row, end in zip(self.rows, (*self.rows[1:], self.size), strict=True):
+            part = np.zeros_like(pushes)
+            part[:, row:end] = pushes[:, row:end]
+            found.append(part)
+        return found
+
+
+def measure_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int]) -> tuple[Array, PulseResponses]:
+    """Return the run of a model, and its responses to pulses at some inputs.
+
+    Args:
+        problem: the FMU and the record.
+        model: parameters, effects and their values.
+        places: of the inputs.
+
+    Returns:
+        All that is read (n, reads), and the responses.
+
+    Raises:
+        SlaveError: the FMU does not run over the record.
+    """
+    count = problem.settings.response.pulses
+    rows = tuple(int(row) for row in np.unique(np.arange(count) * problem.n // count))
+    reads, runs = problem.pulse_runs(model, rows, places)
+    found = {}
+    for place, size, of_place in zip(places, problem.drive(places), runs, strict=True):
+        responses: list[Array] = []
+        for row, change in zip(rows, of_place, strict=True):
+            if change is not None:
+                responses.append(change[row:] / size)
+            elif responses:
+                responses.append(responses[-1][: problem.n - row])
+            else:
+                responses.append(np.zeros((problem.n - row, len(problem.outputs))))
+        found[place] = tuple(responses)
+    return reads, PulseResponses(rows, found, problem.n)
+
+
+def start_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int]) -> Array:
+    """Return what another state at the start changes of the outputs, which an FMU need not let be set.
+
+    Any state that inputs lead to is one that pulses before the record have left: what they change later on. The changes
+    are the principal components of that.
+
+    Args:
+        problem: the FMU and the record.
+        model: parameters, effects and their values.
+        places: of the inputs.
+
+    Returns:
+        Shape (changes, outputs, n), each as large at most as the settings grant.
+    """
+    own = problem.settings.response
+    reach = max(problem.n // 4, 8)
+    _, runs = problem.pulse_runs(model, (0,), places, reach)
+    lags = np.unique(np.geomspace(1, reach, own.start_lags).astype(int))
+    found = []
+    for (change,) in runs:
+        if change is not None and float(np.max(np.abs(change))) > 0.0:
+            scaled = change / problem.noise / float(np.max(np.abs(change / problem.noise)))
+            found += [scaled[lag : lag + problem.n].T.ravel() for lag in lags]
+    if not found:
+        return np.zeros((0, len(problem.outputs), problem.n))
+    left, sizes, _ = np.linalg.svd(np.array(found).T, full_matrices=False)
+    kept = left[:, : own.start_states][:, sizes[: own.start_states] > own.start_least * sizes[0]].T
+    kept = kept.reshape(len(kept), len(problem.outputs), problem.n)
+    kept = kept / np.max(np.abs(kept), axis=(1, 2), keepdims=True)
+    return np.asarray(own.start_spread * kept * problem.noise[:, None])
