@@ -4,16 +4,14 @@ import itertools
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
-from orchestrator.api.any_fmu import FmuDiagnosisResult, of_a_box
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.law import request_law
 from orchestrator.api.numerics import fitting
 from orchestrator.api.records import as_record
 from orchestrator.diagnosis import diagnose as diagnosing
-from orchestrator.diagnosis.blackbox.settings import BoxSettings
 from orchestrator.diagnosis.data.admission import check_record
 from orchestrator.diagnosis.report.test_report import misfit_on_record
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -21,6 +19,9 @@ from orchestrator.errors import ScenarioError
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
+
+if TYPE_CHECKING:
+    from orchestrator.api.any_fmu import FmuDiagnosisResult
 
 
 @overload
@@ -46,9 +47,9 @@ def diagnose(
     map: Path | str,
     *,
     validate: Path | str | None = None,
-    settings: BoxSettings | Path | str | None = None,
+    settings: DiagnosisSettings | Path | str | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
-) -> FmuDiagnosisResult:
+) -> "FmuDiagnosisResult":
     """Of an FMU of others."""
 
 
@@ -59,12 +60,12 @@ def diagnose(
     *,
     validate: Record | Path | str | None = None,
     test: Record | Path | str | None = None,
-    settings: DiagnosisSettings | BoxSettings | Path | str | None = None,
+    settings: DiagnosisSettings | Path | str | None = None,
     search: bool = True,
     with_law: bool = False,
     time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
-) -> DiagnosisResult | FmuDiagnosisResult:
+) -> "DiagnosisResult | FmuDiagnosisResult":
     """Find out which effects a model misses, with a grade for each, and test it on data that nothing was fitted to.
 
     Args:
@@ -108,8 +109,6 @@ def diagnose(
             )
         return _of_a_box(record, model, map, validate, settings, search, progress)
     model = read_model(None) if model is None else model
-    if isinstance(settings, BoxSettings):
-        raise ScenarioError("`settings` must be those of a diagnosis of a model of ours, but are of an FMU", "settings")
     chosen = chosen_settings(settings, DiagnosisSettings)
     records = [record] if isinstance(record, (Record, Path, str)) else list(record)
     if not records:
@@ -136,16 +135,18 @@ def diagnose(
 def _of_a_box(
     record: Any, fmu: Any, given: Path | str | None, validate: Any, settings: Any, search: bool,
     progress: Callable[[int, int, str], None],
-) -> FmuDiagnosisResult:  # fmt: skip
+) -> "FmuDiagnosisResult":  # fmt: skip
     """Return what a record says of an FMU, its arguments checked."""
     if not isinstance(fmu, (Path, str)) or given is None:
         raise ScenarioError("`map` must come with the path of an FMU as `model`, and the path with a `map`", "map")
     if not isinstance(record, (Path, str)) or not isinstance(validate, (Path, str, type(None))):
         raise ScenarioError("`record` and `validate` must be paths with an FMU, but are not", "record", "validate")
-    if isinstance(settings, DiagnosisSettings) or not search:
-        raise ScenarioError("`settings` must be those of an FMU, and `search` left as it is", "settings", "search")
+    if not search:
+        raise ScenarioError("`search` must be left as it is with an FMU: `calibrate` searches none", "search")
+    from orchestrator.api.any_fmu import diagnose_fmu  # which takes its time to import
+
     done = itertools.count()
-    return of_a_box(
+    return diagnose_fmu(
         record, fmu, given, validate=validate, settings=settings, progress=lambda what: progress(next(done), 0, what)
     )
 

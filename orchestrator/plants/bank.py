@@ -20,6 +20,8 @@ PRESLIDING = Parameter("presliding", "1", math.log(1e-5), math.log(1e-9), 0.0, "
 # Shorter distances [rad] than an encoder sees are left out of the FMU, where they would only cost time.
 SHORTEST = 1e-7
 
+LEAST_CYCLES = 1.5  # of a wave within the travel: what comes round less often is told from no spring
+
 
 def built_up(stated: float, fitted: float) -> float:
     """Return the build-up distance [rad] that the FMU gets: the fitted one, or as stated where none was fitted.
@@ -148,7 +150,7 @@ def _wave(name: str, site: str, small: str) -> Effect:
     """Return the row of a wave over the motor's angle; ``small`` says what its amplitude is measured by."""
 
     def least(scales: SignalScales) -> float:
-        return max(4.0 / scales.turns, 0.5)
+        return LEAST_CYCLES / scales.turns
 
     sizes = {"torque": lambda s: 0.01 * s.torque, "twist": _small_twist}
     return Effect(
@@ -222,7 +224,7 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "gravity_load", "load", "position", group("gravity_load", "amplitude", "phase"), "amplitude",
         lambda s: {"amplitude": 0.01 * s.torque_at("load")}, amplitudes=("amplitude",), phase="phase", angular=True,
-        possible=lambda v, s: float(np.ptp(s.angles["load"])) > 0.5, against="angle",
+        against="angle",
     ),
     Effect(
         "extra_resonance", "load", "resonance",
@@ -258,7 +260,6 @@ DRIVETRAIN_BANK: tuple[Effect, ...] = (
     Effect(
         "varying_inertia", "load", "position", group("varying_inertia", "amplitude", "phase"), "amplitude",
         lambda s: {"amplitude": 0.02 * s.inertia}, amplitudes=("amplitude",), phase="phase", angular=True,
-        possible=lambda v, s: float(np.ptp(s.angles["load"])) > 0.5,
     ),
     Effect(
         "shaft_hysteresis", "shaft", "gap", group("shaft_hysteresis", "torque", "twist"), "torque",

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
+from orchestrator.plants.bank import LEAST_CYCLES
 from orchestrator.plants.description import Plant
 from orchestrator.plants.effects import Effect, SignalScales
 from orchestrator.records.model_file import Model
@@ -95,7 +96,7 @@ def _wave_scan(row: Effect, scales: SignalScales, channels: Sequence[str], names
     """Return where cycles are looked for: so close that no line lies between, up to what the samples follow."""
     phase = scales.angles[row.wave_site]
     spacing = max(0.35 / scales.turns, 0.01)
-    least = max(4.0 / scales.turns, 0.5)
+    least = LEAST_CYCLES / scales.turns
     channel = channels.index(row.site) if row.site in channels else len(channels) - 1
     return WaveScan(phase, channel, list(names).index("cycles_per_rev"), np.arange(least, MOST_CYCLES, spacing))
 

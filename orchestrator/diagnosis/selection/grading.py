@@ -174,8 +174,9 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "limit explains", Grade.POSSIBLE,
-        lambda e, r, s: e.kind != "limit" or r.left_of_base < s.grades.limit_left, "share of the misfit that is left",
-        "grades.limit_left", "a control loop that reacts to a disturbance looks like a limit",
+        lambda e, r, s: e.kind != "limit" or min(r.left_of_base, r.left / s.grades.likely_share) < s.grades.limit_left,
+        "share of the misfit that is left", "grades.limit_left",
+        "a control loop that reacts to a disturbance looks like a limit",
     ),
 )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""The page of ``diagnose``: what the model lacks, how far the misfit shrinks, where, and what is left."""
+"""The page of ``diagnose``: what the model lacks and how sure, how far the misfit shrinks on test data, what is left."""
 
 from collections.abc import Mapping, Sequence
 
@@ -18,64 +18,40 @@ from orchestrator.reporting.model import (
 from orchestrator.reporting.pages import any_fmu
 from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.pages.live import plant_section
-from orchestrator.reporting.pages.predictions import SIGNALS, analysed, free_runs, horizons, torque_errors
 from orchestrator.reporting.pages.record import record_plots
 from orchestrator.reporting.source import ResultDocument, words
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
 from orchestrator.shared.results.diagnose import (
+    AnalysisFound,
     DiagnoseFound,
     EffectFound,
-    FloorFound,
     LearnedFound,
-    MisfitFound,
+    NuisanceFound,
     ParameterFound,
-    PlaceFound,
+    RemainingFound,
     StepFound,
-    TermFound,
-    ValidatedFound,
+    TestFound,
     ValueFound,
 )
 
-PLACED = (
-    "schema_version verdict effects parameters where misfit model suspects warnings candidates validation remainder"
-)
-SHOWN_ELSEWHERE = frozenset(
-    (
-        *PLACED.split(),
-        "cosimulation",
-        "also_seen",
-        "live",
-        "torque_error",
-        "seconds",
-        "trust",
-        "told",
-        "records",
-        "repeats",
-        "play",
-        "learned_law",
-        "nuisances",
-        "horizons",
-        "analysis",
-        "settings",  # in diagnose.json; they are what was asked for, not what was found
-    )
-)
+KNOWN = frozenset(DiagnoseFound.__struct_fields__)
+SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
+SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the actuator"}
+MODELS = {"nominal": "model as given", "parameters": "with re-fitted parameters", "final": "with the effects"}
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
-    "none": ("good", "nothing is missing", "The model explains the record to its noise."),
+    "none": ("good", "nothing is missing", "The model explains the record."),
     "parameters": (
         "good",
         "nothing is missing; some values are off",
         "The model explains the record once its parameters are re-fitted.",
     ),
     "effects": ("neutral", "effects are missing", ""),
-    "unknown": ("bad", "unexplained", "A misfit is left that nothing in the library explains."),
+    "unknown": ("bad", "unexplained", "Something is missing in the model, and no effect of the library is likely."),
 }
-SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the actuator"}
-STAGES = {"nominal": "model as given", "parameters": "with re-fitted parameters"}
-MISSING = (
-    "For each effect: the torque that the model misses without it, and how much of that the fitted law accounts for."
-)
-HELD_OUT = "Root mean square of simulated minus measured, on the part of the record that no fit has seen."
+MISSING = "For each effect: the torque that the model misses without it, and how much of that its law accounts for."
+BLOCKS = "The size of each effect as every block of the record by itself says it. Blocks that agree make an effect certain."
+TEST = "Root mean square of free runs minus measured, on data that nothing was fitted to and nothing was chosen by."
 
 
 def build(source: ResultDocument) -> Report:
@@ -91,37 +67,26 @@ def build(source: ResultDocument) -> Report:
         return any_fmu.build(source)
     results = read(source.results, DiagnoseFound)
     badge, label, sentence = VERDICTS[results.verdict]
-    effects, misfit = results.effects, results.misfit
-    sections: list[Section] = _in_short(results)
-    sections += trust_section(results.trust)
-    if effects:
-        sections.append(_lacking("What the model lacks", effects))
-    if results.nuisances:
-        sections.append(_lacking("What the log has, and the machine has not", results.nuisances))
-    if results.warnings:
-        sections.append(Text("Take note", tuple(_sentence(w) for w in results.warnings)))
-    sections += [*_shrinking(misfit), *_misfit_table("Misfit before and after", misfit, HELD_OUT)]
-    sections += _each_record(results)
-    note = "Root mean square of simulated minus measured, over the whole of the other record."
-    sections += _misfit_table("Misfit on the other record", results.validation or {}, note)
-    sections += free_runs(results.validation or {})
-    sections += horizons(results.horizons, misfit)
-    sections += _picture(source, "missing_torque", "Missing torque", MISSING)
-    sections += _learned(source, results.learned_law)
-    sections += record_plots(source, "diagnose.csv", results.live.rows if results.live else ())
-    sections += plant_section(source, "diagnose.csv", results.live)
-    sections += _where(results.where)
-    sections += [_evidence("Why these effects", effects)] if effects else []
-    sections += [_evidence("What came nearest, too little to be named", results.suspects)] if results.suspects else []
-    sections.append(_parameters(results.parameters))
-    sections += [*_candidates(results.candidates), *_remainder(results)]
-    sections += torque_errors(results.torque_error or {})
-    sections += analysed(results.analysis)
-    sections += _also_seen(source, results.also_seen)
-    sections += sections_of("More", {n: v for n, v in source.results.items() if n not in SHOWN_ELSEWHERE})
+    live = results.live
+    sections: list[Section] = [*_in_short(results), *trust_section(results.trust), *effect_tables(results.effects)]
+    sections += _nuisances(results.nuisances)
+    if results.notes:
+        sections.append(Text("Take note", tuple(_sentence(note) for note in results.notes)))
+    for test in results.test:
+        sections += [*_shrinking(test), _test_table(f"Misfit on test data of {test.source}", test)]
+    if results.validation is not None:
+        sections.append(_test_table(f"Misfit on the other record, {results.validation.source}", results.validation))
+    sections += _torque_left([*results.test, *([results.validation] if results.validation else [])])
+    sections += picture(source, "missing_torque", "Missing torque", MISSING)
+    sections += picture(source, "blocks", "Sizes block by block", BLOCKS)
+    sections += [*_remaining(results.remaining), *_learned(source, results.learned_law)]
+    sections += record_plots(source, "diagnose.csv", live.rows if live else ())
+    sections += plant_section(source, "diagnose.csv", live)
+    sections += [parameter_table(results.parameters), *candidate_table(results.candidates), *_analysis(results)]
+    sections += sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"})
     return Report(
         title="Diagnosis",
-        summary=" ".join(filter(None, [sentence, _found(effects), _closed(misfit)])),
+        summary=" ".join(filter(None, [sentence, _named(results.effects), _closed(results.test)])),
         badge=trust_badge(results.trust, label, badge),
         sections=tuple(sections),
         origin=source.origin(("corrected model", results.model), ("time taken [s]", results.seconds)),
@@ -131,7 +96,7 @@ def build(source: ResultDocument) -> Report:
 
 def _in_short(results: DiagnoseFound) -> list[Section]:
     """Return the answer in words, and how the corrected model is used."""
-    lines = [line.strip() for line in results.told]
+    lines = [line.strip() for line in results.summary]
     if not lines:
         return []
     if results.model:
@@ -147,37 +112,95 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
 
 
-def _place(name: str, site: str) -> str:
+def place_words(name: str, site: str) -> str:
+    """Return an effect at its site in words.
+
+    Args:
+        name: of the effect.
+        site: where it acts.
+
+    Returns:
+        The words.
+    """
     name = words(name).replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
     return f"{name} {SITES.get(site, site)}"
 
 
-def _found(effects: Sequence[EffectFound]) -> str:
-    named = [_place(e.name, e.site) for e in effects]
+def _named(effects: Sequence[EffectFound]) -> str:
+    named = [f"{place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
     listed = " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]]))
     return f"The model lacks {listed}." if named else ""
 
 
-def _closed(misfit: Mapping[str, MisfitFound]) -> str:
+def _closed(tests: Sequence[TestFound]) -> str:
     parts = []
-    for signal, g in misfit.items():
-        before, after = g.before, g.after
-        if before is None or after is None:
-            continue
-        way = "falls" if after < before else "goes"
-        noise = f" (noise: {g.noise:.3g})" if g.noise is not None else ""
-        parts.append(f"of the {SIGNALS.get(signal, signal)} {way} from {before:.3g} to {after:.3g} {g.unit}{noise}")
-    return f"On data that no fit has seen, the rms misfit {'; that '.join(parts)}." if parts else ""
+    for test in tests[:1]:
+        for signal, g in test.misfit.items():
+            if g.nominal is None or g.final is None:
+                continue
+            noise = f" (noise: {g.noise:.3g})" if g.noise is not None else ""
+            name = SIGNALS.get(signal, signal)
+            parts.append(f"of the {name} goes from {g.nominal:.3g} to {g.final:.3g} {g.unit}{noise}")
+    return f"On test data the rms misfit {'; that '.join(parts)}." if parts else ""
 
 
-def _lacking(title: str, effects: Sequence[EffectFound]) -> ReportTable:
-    rows = tuple(
-        (_place(e.name, e.site), words(name), _quantity(p)) for e in effects for name, p in e.parameters.items()
+def effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
+    """Return what the model lacks, how sure each effect is, and why.
+
+    Args:
+        effects: of the result.
+
+    Returns:
+        Two tables; none without effects.
+    """
+    if not effects:
+        return []
+    sizes = tuple(
+        (place_words(e.name, e.site), e.grade, words(name), quantity(p))
+        for e in effects
+        for name, p in e.parameters.items()
     )
-    return ReportTable(title, (TableColumn("effect"), TableColumn("quantity"), TableColumn("value")), rows)
+    reasons = tuple(
+        (
+            place_words(e.name, e.site), e.grade, _percent(e.gain), e.t, _percent(e.explains.torque),
+            _percent(e.explains.motion), ", ".join(_label_words(label) for label in e.family) or None,
+            ", ".join(e.lowered_by) or None,
+        )
+        for e in effects
+    )  # fmt: skip
+    titles = (
+        "effect", "grade", "error of left out data that it takes [%]", "over its uncertainty",
+        "explains of the missing torque [%]", "of the motion's misfit [%]", "not told from", "rules that lower the grade",
+    )  # fmt: skip
+    note = (
+        "Certain, likely or possible. A possible effect is no answer: it is shown, and it is part of the corrected model."
+    )
+    return [
+        ReportTable("What the model lacks", tuple(map(TableColumn, ("effect", "grade", "quantity", "value"))), sizes, note),
+        ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons),
+    ]
 
 
-def _quantity(p: ValueFound) -> str:
+def _label_words(label: str) -> str:
+    name, _, site = label.partition("@")
+    return place_words(name, site)
+
+
+def _nuisances(nuisances: Sequence[NuisanceFound]) -> list[Section]:
+    rows = tuple((words(n.name), n.grade, words(name), quantity(p)) for n in nuisances for name, p in n.parameters.items())
+    columns = tuple(map(TableColumn, ("property", "grade", "quantity", "value")))
+    return [ReportTable("What the log has, and the machine has not", columns, rows)] if rows else []
+
+
+def quantity(p: ValueFound) -> str:
+    """Return a value with its interval and unit.
+
+    Args:
+        p: the value.
+
+    Returns:
+        The text.
+    """
     if p.value is None:
         return "unknown"
     unit = "" if p.unit in (None, "1") else f" {p.unit}"
@@ -188,100 +211,79 @@ def _quantity(p: ValueFound) -> str:
     return f"{p.value:.5g}{error}{unit}"
 
 
-def _shrinking(misfit: Mapping[str, MisfitFound]) -> list[Section]:
+def _shrinking(test: TestFound) -> list[Section]:
     """Return bars of the misfit from model to model, as multiples of the noise."""
     made: list[Section] = []
-    for signal, g in misfit.items():
-        stages = [(_stage(stage.model), stage.rms) for stage in g.stages if stage.rms is not None]
+    for signal, g in test.misfit.items():
+        stages = [(title, getattr(g, name)) for name, title in MODELS.items() if getattr(g, name) is not None]
         if not stages or not g.noise:
             continue
-        largest = max(rms for _, rms in stages)
-        items = tuple(
-            Bar(name, rms / largest if largest > 0.0 else 0.0, f"{rms / g.noise:.3g} times noise")
-            for name, rms in stages
-        )
-        made.append(Bars(f"Misfit of the {SIGNALS.get(signal, signal)}, from model to model", items))
+        largest = max(rms for _, rms in stages) or 1.0
+        items = tuple(Bar(name, rms / largest, f"{rms / g.noise:.3g} times noise") for name, rms in stages)
+        made.append(Bars(f"Misfit of the {SIGNALS.get(signal, signal)} on test data, from model to model", items))
     return made
 
 
-def _stage(model: str) -> str:
-    if not model.startswith("+ "):
-        return STAGES.get(model, model)
-    name, _, site = model.removeprefix("+ ").partition("@")
-    return f"and {_place(name, site)}".rstrip()
-
-
-def _each_record(results: DiagnoseFound) -> list[Section]:
-    """Return what each of several records says of the common model, and what repeats differ by."""
-    repeats = results.repeats or FloorFound((), {})
-    rows = [
-        (one.source, signal, g.before, g.after, g.noise, repeats.floor.get(signal))
-        for one in results.records
-        for signal, g in one.misfit.items()
-    ]
-    if not rows:
-        return []
-    note = "Held-out part of each record; one set of values for all, a start and a noise level for each."
-    if repeats.floor:
-        note += f" {', '.join(repeats.sources)} had the same input: no model can do better than what they differ by."
-    names = ("record", "signal", "before", "after", "encoder's noise", "repeats differ by")
-    return [ReportTable("Misfit of each record", tuple(TableColumn(name) for name in names), tuple(rows), note)]
-
-
-def _misfit_table(title: str, misfit: Mapping[str, MisfitFound | ValidatedFound], note: str) -> list[Section]:
-    if not misfit:
-        return []
-    columns = tuple(TableColumn(n) for n in ("signal", "before", "after", "noise", "unit", "times smaller"))
-    rows = tuple((s, g.before, g.after, g.noise, g.unit, _quotient(g.before, g.after)) for s, g in misfit.items())
-    return [ReportTable(title, columns, rows, note)]
-
-
-def _quotient(before: float | None, after: float | None) -> float | None:
-    return before / after if before is not None and after else None
-
-
-def _also_seen(source: ResultDocument, terms: Sequence[TermFound]) -> list[Section]:
-    """Return what the final model leaves that follows position or direction, and the gain at every period."""
-    if not terms:
-        return []
-    names = ("what", "period", "size", "gain in log-likelihood", "gain at an arbitrary period", "beyond chance")
+def _test_table(title: str, test: TestFound) -> Section:
+    columns = tuple(TableColumn(n) for n in ("signal", *MODELS.values(), "noise", "unit", "R² of the free runs"))
     rows = tuple(
-        (
-            words(t.name),
-            None if t.period is None else f"{t.period:.4g} {t.period_unit}",
-            f"{t.size:.3g} {t.unit}",
-            *(t.gain, t.level, t.sure),
-        )
-        for t in terms
+        (SIGNALS.get(s, s), g.nominal, g.parameters, g.final, g.noise, g.unit, test.r_squared.get(s))
+        for s, g in test.misfit.items()
     )
-    note = "Too little to be named as an effect."
-    made: list[Section] = [
-        ReportTable("What else follows position or direction", tuple(TableColumn(n) for n in names), rows, note)
-    ]
-    return made + _picture(source, "ripple", "Gain of a ripple at each period", "")
+    worse = " The final model does worse than re-fitted parameters." if test.worse else ""
+    return ReportTable(title, columns, rows, f"{TEST} {test.rows} rows.{worse}")
 
 
-def _picture(source: ResultDocument, name: str, title: str, note: str) -> list[Section]:
+def _torque_left(tests: Sequence[TestFound]) -> list[Section]:
+    rows = tuple((t.source, *(_percent(t.torque_left.get(name)) for name in MODELS)) for t in tests if t.torque_left)
+    columns = tuple(TableColumn(n) for n in ("on", *(f"{title} [%]" for title in MODELS.values())))
+    note = "Rms of the torque that the measured motion needs and the model does not explain, over that of the drive."
+    return [ReportTable("Torque that is left", columns, rows, note)] if rows else []
+
+
+def picture(source: ResultDocument, name: str, title: str, note: str) -> list[Section]:
+    """Return a figure of the diagnosis, where there is one.
+
+    Args:
+        source: of the result.
+        name: of the file, behind ``diagnose_``.
+        title: of the section.
+        note: below it.
+
+    Returns:
+        One section or none.
+    """
     path = source.directory / f"diagnose_{name}.png"
     return [Picture(title, path, note)] if path.is_file() else []
 
 
+def _remaining(remaining: RemainingFound) -> list[Section]:
+    """Return what no effect explains, and which signals it follows."""
+    facts = tuple((f"torque's power at the {site} [%]", _percent(share)) for site, share in remaining.torque.items())
+    made: list[Section] = [Facts("What is left", facts)] if facts else []
+    if remaining.follows:
+        columns = ("at", "follows", "share [%]", "error of left out data that it takes [%]", "over its uncertainty", "like")
+        rows = tuple(
+            (d.site, d.argument, _percent(d.share), _percent(d.gain), d.t, d.formula or None) for d in remaining.follows
+        )
+        note = "Curves over one signal. They are no effects and no part of the corrected model."
+        made.append(ReportTable("What the rest follows", tuple(TableColumn(c, "", 3) for c in columns), rows, note))
+    return made
+
+
 def _learned(source: ResultDocument, law: LearnedFound | None) -> list[Section]:
     """Return the law that was learned from what no effect explains: sentence, curve and knots."""
+    figure = picture(source, "learned_law", "The strongest curve of what is left", "")
     if law is None:
-        return []
-    title = "A law learned from what is left"
+        return figure
     columns = (
         TableColumn("argument", law.argument_unit),
         *(TableColumn(name, law.unit) for name in ("value", "95 % from", "to")),
     )
     rows = tuple(zip(law.knots, law.values, *law.band, strict=True))
-    note = (
-        "Straight lines between the knots, and on beyond the last. It is no name: nothing in the library has this law."
-    )
     return [
-        Text(title, (_sentence(law.words), *_in_the_fmu(law))),
-        *_picture(source, "learned_law", "Learned law", note),
+        Text("A law learned from what is left", (_sentence(law.words), *_in_the_fmu(law))),
+        *figure,
         ReportTable("Knots of the learned law", columns, rows),
     ]
 
@@ -294,27 +296,15 @@ def _in_the_fmu(law: LearnedFound) -> tuple[str, ...]:
     return (f"The corrected FMU has it, off until its parameter {fmu.parameter} is 1; then it misses {missed}.",)
 
 
-def _where(places: Sequence[PlaceFound]) -> list[Section]:
-    if not places:
-        return []
-    names = ("signal", "regime", "from", "to", "unit", "share of the misfit [%]")
-    rows = tuple((p.signal, p.regime, *p.interval, p.unit, 100.0 * p.share_of_misfit) for p in places)
-    return [ReportTable("Where model and record disagree", tuple(TableColumn(n) for n in names), rows)]
+def parameter_table(parameters: Mapping[str, ParameterFound]) -> ReportTable:
+    """Return the model's own parameters beside their nominal values.
 
+    Args:
+        parameters: by name.
 
-def _evidence(title: str, effects: Sequence[EffectFound]) -> ReportTable:
-    columns = ("effect", "gain in log-likelihood", "runner-up", "which gains less by", "cannot be told from")
-    rows = []
-    for e in effects:
-        family = ", ".join(words(name) for name in e.family if name != e.name)
-        rows.append((_place(e.name, e.site), e.score, e.runner_up, e.margin, family or None))
-    shown = [i for i in range(len(columns)) if i < 4 or any(row[i] for row in rows)]
-    return ReportTable(
-        title, tuple(TableColumn(columns[i]) for i in shown), tuple(tuple(row[i] for i in shown) for row in rows)
-    )
-
-
-def _parameters(parameters: Mapping[str, ParameterFound]) -> ReportTable:
+    Returns:
+        The table.
+    """
     columns = ("parameter", "nominal", "value", "standard error", "lower", "upper", "change [%]", "unit")
     rows = tuple(
         (name, p.nominal, p.value, p.standard_error, *(p.interval or (None, None)), _change(p), p.unit)
@@ -329,36 +319,42 @@ def _change(p: ParameterFound) -> float | None:
     return 100.0 * (p.value - p.nominal) / p.nominal if p.nominal and p.value is not None else None
 
 
-def _candidates(steps: Sequence[StepFound]) -> list[Section]:
+def candidate_table(steps: Sequence[StepFound]) -> list[Section]:
+    """Return what was tried in each step of the search.
+
+    Args:
+        steps: of the search.
+
+    Returns:
+        The table; none without steps.
+    """
     rows: list[tuple[Cell, ...]] = []
     for number, step in enumerate(steps, start=1):
-        base = ", ".join(step.on_top_of) or "re-fitted parameters"
-        rows += [(number, base, t.effect, t.gain, t.decided) for t in step.tried]
+        base = ", ".join(_label_words(label) for label in step.on_top_of) or "re-fitted parameters"
+        rows += [
+            (number, base, _label_words(t.effect), _percent(t.gain), t.t, "taken" if t.effect == step.taken else None)
+            for t in step.tried
+        ]
     if not rows:
         return []
-    columns = ("step", "on top of", "tried", "gain in log-likelihood", "gain on data that decide")
-    return [ReportTable("What was tried", tuple(TableColumn(c) for c in columns), tuple(rows), limit=200)]
+    columns = ("step", "on top of", "tried", "error of left out data that it takes [%]", "over its uncertainty", "")
+    return [ReportTable("What was tried", tuple(TableColumn(c, "", 3) for c in columns), tuple(rows), limit=200)]
 
 
-def _remainder(results: DiagnoseFound) -> list[Section]:
-    """Return what the final model leaves, and of which kind it is."""
-    remainder, built = results.remainder, results.cosimulation
-    facts: list[tuple[str, Cell]] = []
-    if remainder.explained is not None:
-        facts.append(("explained of what re-fitted parameters leave", f"{100.0 * remainder.explained:.3g} %"))
-    if remainder.growth is not None:
-        facts.append(("innovations on held-out data over those on fitted data", remainder.growth))
+def _analysis(results: DiagnoseFound) -> list[Section]:
+    rows = tuple((a.source, a.rate, a.rows, a.rows_of_the_file, _band(a)) for a in results.analysis)
+    columns = tuple(map(TableColumn, ("record", "rate [Hz]", "rows", "rows of the file for each", "band [Hz]")))
+    made: list[Section] = [ReportTable("What was analysed", columns, rows)] if rows else []
+    built = results.cosimulation
     if built.largest_difference_from_compiled is not None:
         difference = f"{built.largest_difference_from_compiled:.2g} {built.unit}".strip()
-        facts.append(("corrected FMU against the compiled equations", difference))
-    made: list[Section] = [Facts("What is left", tuple(facts))] if facts else []
-    if remainder.predictable:
-        columns = (
-            TableColumn("site"),
-            TableColumn("follows"),
-            TableColumn("gain in log-likelihood"),
-            TableColumn("share of the rest [%]"),
-        )
-        rows = tuple((p.site, p.kind, p.gain, 100.0 * p.share) for p in remainder.predictable)
-        made.append(ReportTable("What the rest follows", columns, rows))
+        made.append(Facts("The corrected FMU", (("largest difference from the compiled equations", difference),)))
     return made
+
+
+def _band(analysis: AnalysisFound) -> str:
+    return ", ".join(f"{body} {cutoff:.3g}" for body, cutoff in analysis.band.items())
+
+
+def _percent(share: float | None) -> float | None:
+    return None if share is None else 100.0 * share
