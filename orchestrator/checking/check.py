@@ -5,8 +5,8 @@ from pathlib import Path
 
 from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.dynamic import can_run, check_dynamic
-from orchestrator.checking.findings import FmuFindings, has_errors, ordered
-from orchestrator.checking.static import check_static
+from orchestrator.checking.findings import Execution, FmuFindings, has_errors, ordered
+from orchestrator.checking.static import StaticResult, check_static
 from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.isolation.walls import support
 
@@ -40,18 +40,36 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     options = options or CheckOptions()
     result = check_static(path, options.archive)
     findings = list(result.findings)
-    executed = False
-    d, files = result.description, result.files
+    executions: tuple[Execution, ...] = ()
+    reason = _not_run(options, result)
     try:
-        if not options.static and d is not None and files is not None and not has_errors(findings):
-            executed = can_run(d, files)
-            if executed:
-                findings += check_dynamic(d, files, result.references, options.limits, not options.trust)
+        if not reason:
+            assert result.description is not None
+            assert result.files is not None
+            probed, execution = check_dynamic(
+                result.description, result.files, result.references, options.limits, not options.trust
+            )
+            findings += probed
+            executions = (execution,)
     finally:
-        if files is not None:
-            files.close()
-    facts = result.facts | ({"walls": _walls(options.trust)} if executed else {})
-    return FmuFindings(str(path), ordered(findings), executed, facts)
+        if result.files is not None:
+            result.files.close()
+    facts = result.facts | ({"walls": _walls(options.trust)} if executions else {})
+    version = "2.0" if result.description is not None else ""
+    return FmuFindings(str(path), ordered(findings), version, result.stages, executions, reason, facts)
+
+
+def _not_run(options: CheckOptions, result: StaticResult) -> str:
+    """Why nothing is executed; empty when something is."""
+    if options.static:
+        return "nothing is executed, as was asked"
+    if has_errors(result.findings):
+        return "there are errors in what is read"
+    if result.description is None or result.files is None:
+        return "the version of FMI is not covered"
+    if not can_run(result.description, result.files):
+        return "there is no co-simulation library for this machine"
+    return ""
 
 
 def _walls(trust: bool) -> str:

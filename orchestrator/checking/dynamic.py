@@ -9,7 +9,7 @@ from typing import Any
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.binaries import here, library_name
 from orchestrator.checking.description import Description, Interface, ScalarVariable, number
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Execution, Finding
 from orchestrator.checking.layered import ReferenceResult
 from orchestrator.checking.probing import probes, probes_compare, probes_misuse, probes_reference, trajectory
 from orchestrator.checking.probing.binding import PENDING, Library, StatusError, TerminatedError
@@ -62,7 +62,7 @@ def can_run(d: Description, files: FmuFiles) -> bool:
 
 def check_dynamic(
     d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits, walls: bool = True
-) -> list[Finding]:
+) -> tuple[list[Finding], Execution]:
     """Run the FMU in a child process and report what it did.
 
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
@@ -74,7 +74,7 @@ def check_dynamic(
         walls: whether the kernel shall keep the FMU from files, network and other processes.
 
     Returns:
-        What it did wrong.
+        What it did wrong, and which probes were carried out.
 
     Raises:
         OutputError: there is no room to unpack the FMU.
@@ -87,13 +87,13 @@ def check_dynamic(
             files.extract(fmu)
         except OSError as error:
             raise OutputError(f"the FMU must be unpacked to {scratch.path}, but cannot be: {error.strerror}") from None
-        findings: list[Finding] = []
-        for position, reference in enumerate(references or [None]):
-            probes = PROBES if position == 0 else ("reference",)
-            if position and any(f.severity == "error" for f in findings):
+        first = _Watcher(fmu, limits, walls)
+        findings = first.run(_job(d, interface, fmu, references[0] if references else None, limits), PROBES)
+        for reference in references[1:]:
+            if any(f.severity == "error" for f in findings):
                 break
-            findings += _Watcher(fmu, limits, walls).run(_job(d, interface, fmu, reference, limits), probes)
-    return findings
+            findings += _Watcher(fmu, limits, walls).run(_job(d, interface, fmu, reference, limits), ("reference",))
+    return findings, Execution(interface.element.tag, first.stages)
 
 
 class _Watcher:
@@ -103,7 +103,7 @@ class _Watcher:
         self.fmu, self.limits, self.walls = fmu, limits, walls
         self.findings: list[Finding] = []
         self.probe = "load"
-        self.stopped = False
+        self.stages: dict[str, str] = {}
 
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
@@ -115,11 +115,11 @@ class _Watcher:
             try:
                 self._probes(library, job, names)
             except ChildError as error:
-                self.stopped = True
                 self._ended_early(error, library.current)
             left = jail.finish()
             self._skipped(names)
             self._left_behind(before, jail, left)
+            self.stages |= dict.fromkeys(("run", "afterwards"), "")
         return self.findings
 
     def _probes(self, library: Library, job: ProbeJob, names: tuple[str, ...]) -> None:
@@ -128,19 +128,21 @@ class _Watcher:
             self._add("load.library", f"the library must load, but: {problem}")
             return
         probes.load(library, self._add)
+        self.stages["load"] = ""
         single = "canBeInstantiatedOnlyOncePerProcess" in job.flags
         context = probes.Context(probes.Bench(job, library), self._add, single=single)
         for self.probe in names:
             try:
-                go_on = _PROBES[self.probe](context)
+                _PROBES[self.probe](context)
+            except probes.SkippedError as reason:
+                self.stages[self.probe] = str(reason)
+                continue
             except TerminatedError:
-                go_on = True  # the slave ended this run earlier than the undisturbed one: nothing to compare
+                pass  # the slave ended this run earlier than the undisturbed one: nothing to compare
             except StatusError as error:
                 self._add(_rule_of(error), str(error))
-                go_on = False
-            if not go_on:
-                self.stopped = True
                 return
+            self.stages[self.probe] = ""
 
     def _add(self, rule: str, message: str, path: str = "") -> None:
         if len(self.findings) < _MOST_FINDINGS:
@@ -163,9 +165,12 @@ class _Watcher:
             self._add("run.failed", f"the probe `{self.probe}` must end, but {error} ({error.said})")
 
     def _skipped(self, names: tuple[str, ...]) -> None:
-        rest = names[names.index(self.probe) + 1 :] if self.probe in names else names
-        if rest and (self.stopped or self.probe == "load"):
-            self._add("run.skipped", f"not carried out after that: {', '.join(rest)}")
+        """Say what was not reached, and why."""
+        missing = [name for name in names if name not in self.stages]
+        ended = f"the run ended in the probe `{self.probe}`"
+        self.stages |= dict.fromkeys(missing, ended)
+        if missing[1:] or "load" not in self.stages:
+            self._add("run.skipped", f"not carried out after that: {', '.join(missing[1:] or missing)}")
 
     def _left_behind(self, before: dict[str, tuple[int, int]], jail: Jail, left: bool) -> None:
         self.probe = "afterwards"

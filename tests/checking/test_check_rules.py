@@ -181,3 +181,24 @@ def test_any_bytes_are_a_reference_result_or_refused(rows: list[list[str]], tail
         return
     assert result.names == ("x",)
     assert all(len(r) == 2 for r in result.rows)
+
+
+def test_an_outcome_per_rule_says_what_was_run(tmp_path: Path) -> None:
+    if not have_compiler():
+        pytest.skip("the FMU is built with a C compiler")
+    from tests.support.broken_fmus import QUICK, good
+
+    report = check_fmu(good(tmp_path / "good.fmu"), QUICK)
+    assert {o.rule for o in report.outcomes} == {n for n, rule in RULES.items() if "2.0" in rule.versions}
+    assert {o.outcome for o in report.outcomes} == {"passed"}
+    static = check_fmu(tmp_path / "good.fmu", CheckOptions(static=True))
+    not_run = {o.rule for o in static.outcomes if o.outcome == "not run"}
+    assert not_run == {o.rule for o in static.outcomes if RULES[o.rule].stage not in static.stages}
+    assert {o.reason for o in static.outcomes if o.outcome == "not run"} == {"nothing is executed, as was asked"}
+
+
+def test_every_rule_has_a_version_and_its_link() -> None:
+    for rule in RULES.values():
+        assert rule.versions
+        for version in rule.versions:
+            assert rule.link(version).startswith("https://") == bool(rule.anchor[version])

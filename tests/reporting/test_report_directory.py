@@ -5,6 +5,7 @@ from dataclasses import asdict
 
 import pytest
 
+from orchestrator.checking.findings import Execution
 from orchestrator.checking.findings import Finding as CheckFinding
 from orchestrator.checking.findings import FmuFindings as CheckReport
 from orchestrator.checking.rules import RULES
@@ -64,9 +65,10 @@ def test_the_page_of_a_sweep_shows_statistics_estimates_and_failures(sweep):
 def test_the_page_of_a_check_lists_what_was_found(tmp_path):
     rule = next(name for name, rule in RULES.items() if rule.severity == "error")
     found = CheckReport("a/bad.fmu", (CheckFinding(rule, "modelDescription.xml", "A unit must be defined."),))
-    write_result(
-        tmp_path, "check", {}, None, as_results([found, CheckReport("good.fmu", (), True, {"version": "2.0"})])
+    good = CheckReport(
+        "good.fmu", (), "2.0", executions=(Execution("CoSimulation", {"load": ""}),), facts={"model": "m"}
     )
+    write_result(tmp_path, "check", {}, None, as_results([found, good]))
     report = report_from_directory(tmp_path)
     assert report.badge == ("bad", "1 error")
     assert report.summary.startswith("1 of 2 FMUs have no error.")
