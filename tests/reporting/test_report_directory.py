@@ -66,7 +66,7 @@ def test_the_page_of_a_check_lists_what_was_found(tmp_path):
     rule = next(name for name, rule in RULES.items() if rule.severity == "error")
     found = CheckReport("a/bad.fmu", (CheckFinding(rule, "modelDescription.xml", "A unit must be defined."),))
     good = CheckReport(
-        "good.fmu", (), "2.0", executions=(Execution("CoSimulation", {"load": ""}),), facts={"model": "m"}
+        "good.fmu", (), "2.0", executions=(Execution("CoSimulation", {"load": ""}),), facts={"version": "2.0"}
     )
     write_result(tmp_path, "check", {}, None, as_results([found, good]))
     report = report_from_directory(tmp_path)
