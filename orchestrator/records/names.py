@@ -186,6 +186,7 @@ def choose(
     source: str,
     skip: Sequence[str] = (),
     rated: bool = False,
+    torque_needed: bool = True,
 ) -> dict[str, Choice]:
     """Return the channel of each column of a record: named, of the same name, or recognised without doubt.
 
@@ -195,6 +196,7 @@ def choose(
         source: file name, for messages.
         skip: columns that are not looked for.
         rated: whether a time can be made of the rows, so that none is needed.
+        torque_needed: whether two angles without a torque are refused.
 
     Returns:
         The choice of each column that was found, by name.
@@ -224,8 +226,10 @@ def choose(
             choice = _recognised(name, heads, {c.place for c in found.values()}, source)
             if choice is not None:
                 found[name] = choice
-            elif name not in OPTIONAL and not (name == "time" and rated):
+            elif name not in OPTIONAL and not (name == "time" and rated) and (name != "u" or torque_needed):
                 raise RecordError(_missing(name, heads, source))
+    if "u" in names and "u" not in found and "theta_l" not in found:
+        raise RecordError(_missing("u", heads, source))
     return found
 
 
