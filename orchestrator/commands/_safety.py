@@ -7,6 +7,7 @@ from orchestrator.commands._parser import number
 from orchestrator.scenarios.isolated import DEFAULT_MEMORY_LIMIT, DEFAULT_TIME_LIMIT, Safety
 from orchestrator.shared.isolation.limits import MEBIBYTE
 from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.operating_system import LIMITS
 
 
 def add_safety_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,7 +73,7 @@ def chosen_safety(arguments: argparse.Namespace) -> Safety:
 def note_missing_walls() -> None:
     """Say what this system does not enforce around FMUs that are not ours, where it does not enforce everything."""
     if support().missing:
-        note(f"FMUs that are not ours run with limits, but {support().missing}")
+        note(f"FMUs that are not ours run with {LIMITS}, but {support().missing}")
 
 
 def note(text: str) -> None:
