@@ -143,6 +143,7 @@ class Journal:
         """Remove the file: its content is in the published results now."""
         self.done = 0
         self.close()
+        self.path.unlink(missing_ok=True)
 
     def _offset_table(self) -> IO[bytes]:
         """Return a nameless file of zeros, eight bytes per case."""

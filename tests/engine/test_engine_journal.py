@@ -135,6 +135,14 @@ def test_a_discarded_journal_is_gone_and_its_file_closed(tmp_path):
     assert len(os.listdir("/proc/self/fd")) == before
 
 
+def test_a_journal_is_discarded_after_it_was_closed(tmp_path):
+    with Journal(tmp_path / "j", DEFINITION, 10, resume=False) as journal:
+        journal.append(outcomes([1]))
+    assert list(tmp_path.iterdir())
+    journal.discard()
+    assert not list(tmp_path.iterdir())
+
+
 def test_nothing_is_left_of_a_journal_without_cases(tmp_path):
     with Journal(tmp_path / "a" / "b" / "j", DEFINITION, 10, resume=False):
         assert (tmp_path / "a" / "b" / "j").exists()
