@@ -1,11 +1,11 @@
-"""The check of one FMU: static first, then, if that found no error, dynamic."""
+"""The check of one FMU: static first, then dynamic, unless the FMU cannot be read or has nothing that runs here."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.checking.archive import ArchiveLimits
-from orchestrator.checking.dynamic import can_run, check_dynamic
-from orchestrator.checking.findings import Execution, FmuFindings, has_errors, ordered
+from orchestrator.checking.dynamic import check_dynamic, obstacle
+from orchestrator.checking.findings import Execution, Finding, FmuFindings, has_errors, ordered
 from orchestrator.checking.static import StaticResult, check_static
 from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.isolation.walls import support
@@ -41,7 +41,7 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     result = check_static(path, options.archive)
     findings = list(result.findings)
     executions: tuple[Execution, ...] = ()
-    reason = _not_run(options, result)
+    reason = "nothing is executed, as was asked" if options.static else _obstacle(result)
     try:
         if not reason:
             assert result.description is not None
@@ -51,6 +51,8 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
             )
             findings += probed
             executions = (execution,)
+        elif not options.static and not has_errors(findings):
+            findings.append(Finding("run.not-executed", "", f"the FMU must be executed to pass, but is not: {reason}"))
     finally:
         if result.files is not None:
             result.files.close()
@@ -59,17 +61,13 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     return FmuFindings(str(path), ordered(findings), version, result.stages, executions, reason, facts)
 
 
-def _not_run(options: CheckOptions, result: StaticResult) -> str:
-    """Why nothing is executed; empty when something is."""
-    if options.static:
-        return "nothing is executed, as was asked"
-    if has_errors(result.findings):
-        return "there are errors in what is read"
-    if result.description is None or result.files is None:
-        return "the version of FMI is not covered"
-    if not can_run(result.description, result.files):
-        return "there is no co-simulation library for this machine"
-    return ""
+def _obstacle(result: StaticResult) -> str:
+    """Why nothing can be executed; empty when something can. Formal faults are no reason."""
+    if result.files is None:
+        return "its archive cannot be read"
+    if result.description is None:
+        return "its modelDescription.xml cannot be read, or is of a version that is not covered"
+    return obstacle(result.description, result.files)
 
 
 def _walls(trust: bool) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.checking.archive import FmuFiles
-from orchestrator.checking.binaries import here, library_name
+from orchestrator.checking.binaries import MAXIMUM_BYTES, here, inspect, library_name, misfit
 from orchestrator.checking.description import Description, Interface, ScalarVariable, number
 from orchestrator.checking.findings import Execution, Finding
 from orchestrator.checking.layered import ReferenceResult
@@ -44,20 +44,24 @@ _FLAGS = (
 )
 
 
-def can_run(d: Description, files: FmuFiles) -> bool:
-    """Whether there is a co-simulation library for this machine.
+def obstacle(d: Description, files: FmuFiles) -> str:
+    """Why an FMU cannot be executed here; empty when it can.
 
     Args:
         d: the model description.
         files: of the FMU.
 
     Returns:
-        True when the FMU can be executed here.
+        The reason, in words.
     """
     interface = d.cosimulation
-    if interface is None or interface.identifier is None:
-        return False
-    return library_name(interface.identifier, here()) in files.names()
+    if interface is None:
+        return "it has no co-simulation interface"
+    path = library_name(interface.identifier or "", here())
+    if path not in files.names():
+        return f"there is no {path}, which this machine would load"
+    unfit = misfit(inspect(files.read(path, MAXIMUM_BYTES)), path, here())
+    return "" if unfit is None else unfit.message
 
 
 def check_dynamic(
@@ -68,7 +72,7 @@ def check_dynamic(
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
 
     Args:
-        d, files: of an FMU whose static checks found no error, and for which ``can_run`` is true.
+        d, files: of an FMU without an ``obstacle``.
         references: reference results; each is simulated.
         limits: of the child process.
         walls: whether the kernel shall keep the FMU from files, network and other processes.
@@ -228,17 +232,21 @@ def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:
 def _job(
     d: Description, interface: Interface, fmu: Path, reference: ReferenceResult | None, limits: Limits
 ) -> ProbeJob:
-    start = d.experiment("startTime") or 0.0
+    start = _or(d.experiment("startTime"), 0.0)
     stop = d.experiment("stopTime")
+    if stop is not None and not start < stop < math.inf:
+        stop = None  # a finding already
     length = (stop if stop is not None else start + 1.0) - start
     step = d.experiment("stepSize") or length / _STEPS
+    if not 0.0 < step <= length:
+        step = length / _STEPS
     # Steps beyond the stop time may be refused, so a fraction of one is left out.
     steps = max(1, math.floor(min(_STEPS, length / step + 1e-6)))
     return ProbeJob(
         library=str(fmu / library_name(str(interface.identifier), here())),
         guid=d.root.get("guid", ""),
         resources=(fmu / "resources").as_uri(),
-        variables=tuple(_plain(v, v.reference) for v in d.variables if v.reference is not None),
+        variables=tuple(_plain(v, v.reference) for v in d.variables if v.reference is not None and v.kind),
         start=start,
         stop=stop,
         step=step,
@@ -248,6 +256,10 @@ def _job(
         flags=frozenset(f for f in _FLAGS if interface.flag(f)),
         reference=reference,
     )
+
+
+def _or(value: float | None, default: float) -> float:
+    return default if value is None or not math.isfinite(value) else value
 
 
 def _plain(v: ScalarVariable, reference: int) -> trajectory.ProbedVariable:

@@ -67,7 +67,8 @@ class Execution:
 
     Attributes:
         interface: "CoSimulation", "ModelExchange" or "ScheduledExecution".
-        stages: every probe by name, in their order: empty when it was carried out, otherwise why it was not.
+        stages: what was done with the running FMU, "load" and then every probe by name: empty when it was carried
+            out, otherwise why it was not.
     """
 
     interface: str
@@ -75,7 +76,7 @@ class Execution:
 
     @property
     def carried_out(self) -> tuple[str, ...]:
-        """The probes that were carried out."""
+        """The stages that were carried out."""
         return tuple(stage for stage, reason in self.stages.items() if not reason)
 
 
@@ -104,7 +105,7 @@ class FmuFindings:
     @property
     def executed(self) -> bool:
         """Whether the FMU's binary was run."""
-        return any(execution.carried_out for execution in self.executions)
+        return any("load" in execution.carried_out for execution in self.executions)
 
     @property
     def outcomes(self) -> tuple[RuleOutcome, ...]:

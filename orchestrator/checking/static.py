@@ -13,7 +13,7 @@ from orchestrator.checking.rules_model import check_model
 from orchestrator.checking.rules_variables import check_variables
 from orchestrator.checking.schema import check_schema, check_with_fmpy
 
-_STAGES = ("archive", "xml", "schema", "description", "files", "binaries")
+STAGES = ("archive", "xml", "schema", "description", "files", "binaries")
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
         Findings, and what the probes need: files, description, reference results, facts.
     """
     files, findings = open_fmu(path, limits)
-    stages = dict.fromkeys(_STAGES, "the archive cannot be read") | {"archive": ""}
+    stages = dict.fromkeys(STAGES, "the archive cannot be read") | {"archive": ""}
     if files is None:
         return StaticResult(findings, stages)
     data = files.read("modelDescription.xml", xml_reading.MAXIMUM_BYTES)
     root, problems = xml_reading.parse(data, "modelDescription.xml")
     findings += problems
-    stages = dict.fromkeys(_STAGES, "modelDescription.xml cannot be read") | {"archive": "", "xml": ""}
+    stages = dict.fromkeys(STAGES, "modelDescription.xml cannot be read") | {"archive": "", "xml": ""}
     if root is None:
         return StaticResult(findings, stages, files)
     version = root.get("fmiVersion", "")
@@ -74,7 +74,7 @@ def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
         findings.append(Finding("model.no-co-simulation", where, "the FMU has model exchange only: it is not run"))
     if not any(f.severity == "error" for f in findings):
         findings += check_with_fmpy(path, len(description.variables))
-    return StaticResult(findings, dict.fromkeys(_STAGES, ""), files, description, references, facts)
+    return StaticResult(findings, dict.fromkeys(STAGES, ""), files, description, references, facts)
 
 
 def _other_version(path: Path, version: str, root: "xml_reading.etree._Element") -> list[Finding]:

@@ -19,11 +19,19 @@ def summary(report: FmuFindings) -> str:
     Returns:
         One line.
     """
-    how = "" if report.executed else " (not executed)"
+    how = f" ({_extent(report)})"
     if not report.findings:
         return f"{report.fmu}: no findings{how}"
     counts = [f"{report.count(s)} {s}{'s' * (report.count(s) > 1)}" for s in SEVERITIES if report.count(s)]
     return f"{report.fmu}: {', '.join(counts)}{how}"
+
+
+def _extent(report: FmuFindings) -> str:
+    """How far the FMU was executed, in a few words."""
+    if not report.executed:
+        return "not executed"
+    runs = (f"{e.interface}: {len(e.carried_out)} of {len(e.stages)} stages" for e in report.executions)
+    return f"executed, {', '.join(runs)}"
 
 
 def as_lines(report: FmuFindings) -> list[str]:

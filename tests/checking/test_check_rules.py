@@ -1,7 +1,6 @@
 """Rules one by one, where no whole FMU is needed."""
 
 import csv
-import re
 from pathlib import Path
 
 import pytest
@@ -21,8 +20,7 @@ from orchestrator.checking.rules_variables import check_variables
 from orchestrator.checking.units import dimension_of
 from orchestrator.checking.writing import as_junit, as_lines
 from tests.support.c_fmu import have_compiler, model_description
-
-DOCS = Path(__file__).parents[2] / "docs" / "check.md"
+from tools.rules_page import PAGE, page
 
 
 def rules_of(text: str) -> set[str]:
@@ -156,9 +154,8 @@ def test_hostile_names_reach_neither_terminal_nor_junit() -> None:
 
 
 def test_the_documentation_lists_every_rule() -> None:
-    rows = re.findall(r"^\| `([a-z0-9.-]+)` \| (\w+) \| (.+?) \| (.+?) \|$", DOCS.read_text(encoding="utf-8"), re.M)
-    written = {name: (severity, expects, advice) for name, severity, expects, advice in rows}
-    assert written == {name: (r.severity, r.expects, r.advice) for name, r in RULES.items()}
+    text = PAGE.read_text(encoding="utf-8")
+    assert text == page(text), "run `python -m tools.rules_page`"
 
 
 @given(st.binary(max_size=300) | st.text(max_size=200).map(lambda t: f"<a b='{t}'/>".encode(errors="replace")))

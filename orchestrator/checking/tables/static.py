@@ -38,7 +38,7 @@ model.fmi-version | E | 2.2.1 | 2.4.1 | fmiVersion is 1.0, 2.0 or 3.x | write th
 model.not-covered | W | - | * | the FMU is one of FMI 2.0 | use FMPy or the tools of that version for the rest
 model.no-co-simulation | I | * | - | the FMU has a co-simulation interface | nothing; model exchange is checked by the static rules only
 model.guid | E | 2.2.1 | - | the guid is not empty | write the same guid into the XML and the binary
-model.date | E | 2.2.1 | - | generationDateAndTime is YYYY-MM-DDThh:mm:ssZ | write the time in UTC with a Z
+model.date | W | 2.2.1 | - | generationDateAndTime is YYYY-MM-DDThh:mm:ssZ | write the time in UTC with a Z
 model.identifier | E | 4.3.1 | - | modelIdentifier is a C identifier | use letters, digits and underscores
 model.capability | E | 4.3.1 | - | capability flags fit one another | correct the flag
 model.execution-tool | I | 4.3.1 | - | the FMU runs without its tool | nothing, if the tool is installed; else export a stand-alone FMU
