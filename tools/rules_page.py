@@ -10,8 +10,8 @@ from orchestrator.checking.rules import RULES, VERSIONS, Rule, Version
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "check.md"
 HEADING = "## Rules\n"
 HEAD = """
-The sections are those of the texts of FMI 2.0.4 and 3.0.2; "own" is a rule that the standard does not have, "-" is one that does not
-apply. This table is written by `python -m tools.rules_page`.
+The sections are those of the texts of FMI 2.0.4 and 3.0.2; "own" is a rule that the standard does not have, "-" is one
+that does not apply. This table is written by `python -m tools.rules_page`.
 
 | rule | severity | FMI 2.0 | FMI 3.0 | what must hold | what to do |
 |---|---|---|---|---|---|

@@ -35,7 +35,7 @@ FORMAL = {
     "Latin-1": ("xml.encoding", _edited("UTF-8", "ISO-8859-1")),
     "initial unknown missing": ("structure.initial-unknowns", _edited("(?s)<InitialUnknowns>.*</InitialUnknowns>", "")),
     "an attribute of a vendor": ("schema.invalid", _edited("<CoSimulation", '<CoSimulation vendorFlag="1"')),
-    "unit unknown": ("variable.unit", _edited('unit="m"', 'unit="ell"')),
+    "unit unknown": ("type.unit", _edited('unit="m"', 'unit="ell"')),
     "another platform without library": (
         "binary.missing",
         lambda files: files | {"binaries/win64/other.dll": b"MZ"},

@@ -1,8 +1,8 @@
 """Messages of a logger of C with their arguments filled in, as ``printf`` would, without a library of C for it.
 
 The logger of FMI 2.0 is variadic. A callback of ctypes is not; so it is declared with integer arguments and then with
-floating point ones, as many as the platform hands over in registers, and each conversion of the format takes the next of
-its kind, which is where the calling convention of the platform puts it.
+floating point ones, as many as come in registers. Each conversion of the format takes the next of its
+kind, which is where the calling convention of the platform puts it.
 """
 
 import ctypes
