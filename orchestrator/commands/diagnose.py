@@ -12,8 +12,8 @@ from orchestrator.api.diagnose import comparable_record, diagnose
 from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
-from orchestrator.commands._safety import note_missing_walls
 from orchestrator.commands._stages import Stages, diagnosis_seconds
+from orchestrator.commands._trust import note_missing_walls
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.output import staged

@@ -13,12 +13,15 @@ from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.checking.description import read_description
 from orchestrator.checking.findings import Finding, FmuFindings, ordered
+from orchestrator.checking.formats.junit import as_junit
+from orchestrator.checking.formats.text import as_lines
 from orchestrator.checking.layered import _read_csv
+from orchestrator.checking.policy import Policy
 from orchestrator.checking.rules import RULES
 from orchestrator.checking.rules_model import check_model
 from orchestrator.checking.rules_variables import check_variables
 from orchestrator.checking.units import dimension_of
-from orchestrator.checking.writing import as_junit, as_lines
+from orchestrator.checking.verdict import judge
 from tests.support.c_fmu import have_compiler, model_description
 from tools.rules_page import PAGE, page
 
@@ -147,9 +150,10 @@ def test_errors_come_first_and_repeats_go() -> None:
 
 def test_hostile_names_reach_neither_terminal_nor_junit() -> None:
     report = FmuFindings("x.fmu", (Finding("archive.odd-name", "a\x1b[31m\nfake: no findings", "<&\"'\x00"),))
-    assert all("\x1b" not in line and "\n" not in line for line in as_lines(report))
-    suite = etree.fromstring(as_junit([report]).encode())[0]
-    assert suite.get("tests") == "1"
+    verdict = judge(report, Policy())
+    assert all("\x1b" not in line and "\n" not in line for line in as_lines(verdict))
+    suite = etree.fromstring(as_junit([verdict]).encode())[0]
+    assert suite.get("tests") == str(len(RULES))
     assert suite.get("failures") == "0"
 
 

@@ -174,10 +174,20 @@ class FindingFound(msgspec.Struct, frozen=True):
     path: str = ""
     message: str = ""
     advice: str = ""
+    fingerprint: str = ""
+    known: bool = False
+
+
+class RuleFound(msgspec.Struct, frozen=True):
+    """What became of a rule on an FMU, with the reason where it was not run."""
+
+    rule: str
+    outcome: Literal["passed", "failed", "not run"]
+    reason: str = ""
 
 
 class CheckedFmu(msgspec.Struct, frozen=True):
-    """An FMU that was checked: counts by severity, and facts by name."""
+    """An FMU that was checked: counts by severity, facts by name, and why nothing was executed."""
 
     fmu: str
     ok: bool
@@ -185,6 +195,8 @@ class CheckedFmu(msgspec.Struct, frozen=True):
     counts: dict[str, int] = {}
     facts: dict[str, str | int | list[str]] = {}
     findings: list[FindingFound] = []
+    not_executed: str = ""
+    rules: list[RuleFound] = []
 
 
 class CheckFound(Found, frozen=True, kw_only=True):
