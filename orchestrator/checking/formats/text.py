@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from orchestrator.checking.findings import SEVERITIES
+from orchestrator.checking.findings import SEVERITIES, FmuFindings
 from orchestrator.checking.verdict import Verdict
 from orchestrator.shared.results import CheckedFmu, CheckFound, FindingFound, RuleFound
 
@@ -11,7 +11,7 @@ FORBIDDEN = dict.fromkeys((*range(9), 11, 12, *range(14, 32), *range(0xD800, 0xE
 
 
 def summary(verdict: Verdict) -> str:
-    """The line of one FMU: how many issues of which severity, what the baseline has, and why nothing was executed.
+    """The line of one FMU: how many issues of which severity, what the baseline has, and what was executed.
 
     Args:
         verdict: on the FMU.
@@ -19,13 +19,19 @@ def summary(verdict: Verdict) -> str:
     Returns:
         One line.
     """
-    report = verdict.report
-    how = "" if report.executed else f" (not executed: {report.not_executed})" if report.not_executed else ""
     counts = [f"{verdict.count(s)} {s}{'s' * (verdict.count(s) > 1)}" for s in SEVERITIES if verdict.count(s)]
     known = sum(issue.known for issue in verdict.issues)
     if known:
         counts.append(f"{known} known")
-    return f"{verdict.fmu}: {', '.join(counts) or 'no findings'}{how}"
+    return f"{verdict.fmu}: {', '.join(counts) or 'no findings'} ({_extent(verdict.report)})"
+
+
+def _extent(report: FmuFindings) -> str:
+    """How far the FMU was executed, in a few words."""
+    if not report.executed:
+        return "not executed"
+    runs = (f"{e.interface}: {len(e.carried_out)} of {len(e.stages)} stages" for e in report.executions)
+    return f"executed, {', '.join(runs)}"
 
 
 def as_lines(verdict: Verdict) -> list[str]:
