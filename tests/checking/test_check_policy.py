@@ -12,7 +12,7 @@ from orchestrator.cli import main
 from orchestrator.errors import InputError
 from tests.support.c_fmu import build_c_fmu, have_compiler
 
-FINDINGS = (Finding("model.date", "", "no Z"), Finding("misuse.guid", "", "accepted"))
+FINDINGS = (Finding("model.guid", "", "no Z"), Finding("misuse.guid", "", "accepted"))
 
 
 def policy(tmp_path: Path, text: str) -> Policy:
@@ -24,13 +24,13 @@ def policy(tmp_path: Path, text: str) -> Policy:
 @pytest.mark.parametrize(
     ("text", "rules", "ok"),
     [
-        ("", ["model.date", "misuse.guid"], False),
+        ("", ["model.guid", "misuse.guid"], False),
         ('ignore = ["model.*"]', ["misuse.guid"], True),
         ('select = ["misuse.*"]\nfail-on = "warning"', ["misuse.guid"], False),
-        ('[severity]\n"model.date" = "info"', ["misuse.guid", "model.date"], True),
-        ('[severity]\n"misuse.*" = "error"\n[[fmu]]\nfmu = "*.fmu"\nignore = ["model.date"]', ["misuse.guid"], False),
+        ('[severity]\n"model.guid" = "info"', ["misuse.guid", "model.guid"], True),
+        ('[severity]\n"misuse.*" = "error"\n[[fmu]]\nfmu = "*.fmu"\nignore = ["model.guid"]', ["misuse.guid"], False),
         ('[[fmu]]\nfmu = "old/*.fmu"\nignore = ["*"]', [], True),
-        ('[[fmu]]\nfmu = "new/*.fmu"\nignore = ["*"]', ["model.date", "misuse.guid"], False),
+        ('[[fmu]]\nfmu = "new/*.fmu"\nignore = ["*"]', ["model.guid", "misuse.guid"], False),
         ('ignore = ["*"]\n[[fmu]]\nfmu = "a.fmu"\nselect = ["misuse.guid"]', ["misuse.guid"], True),
     ],
 )
@@ -41,19 +41,19 @@ def test_rules_are_selected_ignored_and_rated(text: str, rules: list[str], ok: b
 
 
 def test_a_rule_that_does_not_count_was_not_run(tmp_path: Path) -> None:
-    verdict = judge(FmuFindings("a.fmu", FINDINGS), policy(tmp_path, 'ignore = ["model.date"]'))
-    (outcome,) = (o for o in verdict.outcomes if o.rule == "model.date")
+    verdict = judge(FmuFindings("a.fmu", FINDINGS), policy(tmp_path, 'ignore = ["model.guid"]'))
+    (outcome,) = (o for o in verdict.outcomes if o.rule == "model.guid")
     assert (outcome.outcome, outcome.reason) == ("not run", "the policy ignores it")
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ('ignor = ["model.date"]', "unknown field `ignor`"),
-        ('ignore = ["model.dates"]', "`ignore` must name a rule or a group such as `archive.*`, but is 'model.dates'"),
-        ('[severity]\n"model.date" = "bad"', "'bad'"),
+        ('ignor = ["model.guid"]', "unknown field `ignor`"),
+        ('ignore = ["model.guids"]', "`ignore` must name a rule or a group such as `archive.*`, but is 'model.guids'"),
+        ('[severity]\n"model.guid" = "bad"', "'bad'"),
         ('fail-on = "never"', "'never'"),
-        ('[[fmu]]\nignore = ["model.date"]', "missing required field `fmu`"),
+        ('[[fmu]]\nignore = ["model.guid"]', "missing required field `fmu`"),
         ('[[fmu]]\nfmu = "a.fmu"\nignore = ["x"]', "`fmu[0].ignore` must name a rule"),
         ("select = [", "must be such a file"),
         ("\xff", "must name a rule"),
@@ -73,7 +73,7 @@ def test_a_baseline_knows_what_it_was_written_for_and_nothing_else(tmp_path: Pat
     rules = policy(tmp_path, 'baseline = "known.json"\nfail-on = "warning"')
     known = read_baseline(Path(rules.baseline))
     assert judge(verdict.report, rules, known).ok
-    more = FmuFindings("a.fmu", (*FINDINGS, Finding("model.date", "", "no Z")))
+    more = FmuFindings("a.fmu", (*FINDINGS, Finding("model.guid", "", "no Z")))
     assert not judge(more, rules, known).ok
     assert not judge(FmuFindings("b.fmu", FINDINGS), rules, known).ok
 
