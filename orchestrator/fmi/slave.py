@@ -320,7 +320,12 @@ class FmuSlave(Slave):
             self.try_step(time, step)
 
     def try_step(self, time: float, step: float) -> None:
-        """Call ``fmi2DoStep`` once; see ``do_step``."""
+        """Call ``fmi2DoStep`` once; see ``do_step``.
+
+        Args:
+            time: [s].
+            step: [s].
+        """
         status = self._step(self._component, time, step, 1)
         self._reached = time
         if status:
