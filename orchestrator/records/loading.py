@@ -93,7 +93,9 @@ def load(
     table, more = _same_rows(table, source, chosen, extra, values, path, reading)
     notes += [", ".join(units), *more]
     drive = columns.get("u", Column())
-    unit = parse_unit(drive.unit or source.heads[chosen["u"].place].unit) if "u" in chosen else None
+    unit = None
+    if "u" in chosen:
+        unit = parse_unit(drive.unit or source.heads[chosen["u"].place].unit, KINDS["u"])
     if unit is not None and unit.kind == "voltage":
         table["u"] = torque_of_voltage(table["u"], table["theta_m"], table["time"], drive)
         notes.append("torque from the voltage, the winding's resistance and the motor's speed")

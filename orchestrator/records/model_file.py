@@ -301,7 +301,7 @@ def _column(name: str, entry: Entry, content: _Content) -> Column:
     if name not in COLUMNS:
         raise content.wrong(key, f"be one of {', '.join(f'columns.{known}' for known in COLUMNS)}")
     unit = entry.get("unit", "")
-    parsed = parse_unit(unit)
+    parsed = parse_unit(unit, KINDS[name])
     if unit and (parsed is None or parsed.kind not in KINDS[name]):
         raise content.wrong(f"{key}.unit", f"be one of {EXAMPLES[name]}, but is {unit!r}")
     numbers: dict[str, float] = {}

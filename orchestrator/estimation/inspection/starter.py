@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.estimation.inspection.machine import ROUGH
-from orchestrator.records.columns import COLUMNS, Column
+from orchestrator.records.columns import COLUMNS, KINDS, Column
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
 from orchestrator.records.loading import chosen_channels
@@ -48,7 +48,7 @@ def assumed_columns(path: Path, columns: Mapping[str, Column]) -> tuple[dict[str
     for name, choice in chosen.items():
         column = filled.get(name, Column())
         head = source.heads[choice.place]
-        unit = parse_unit(column.unit or head.unit)
+        unit = parse_unit(column.unit or head.unit, KINDS[name])
         kind = unit.kind if unit is not None else ""
         changed = column
         if kind == "counts" and column.counts_per_rev is None:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import RecordError
+from orchestrator.records.formats.heads import named
 from orchestrator.records.formats.source import MAXIMUM_CHANNELS, Head
 from orchestrator.records.stamps import is_stamp
-from orchestrator.records.units import parse_unit
+from orchestrator.shared.units import is_unit
 
 SEPARATORS = (";", "\t", ",", "|", " ")
 SPOKEN = {";": "`;`", "\t": "tab", ",": "`,`", "|": "`|`", " ": "blanks"}
@@ -19,13 +20,6 @@ LOOK_AHEAD = 5
 _POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity)")
 _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity)")
 _EMPTY = frozenset(("", "-", "--", "n/a", "na", "null"))
-_BRACKETS = re.compile(r"(.+?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*")
-_SLASH = re.compile(r"(.+?)\s*(?:\s/\s*|/\s+|,\s+|\s+in\s+)(\S.*)")
-_SUFFIX = re.compile(
-    r"(?i)(.+?)[_ .](ms|us|s|sec|deg|rad|mrad|rev|nm|mnm|rpm|degps|radps|rads|a|ma|v|pct|percent|counts|cnt|inc|mm|hz)"
-)
-_SPELLED = {"degps": "deg/s", "radps": "rad/s", "rads": "rad/s", "nm": "N.m", "mnm": "mN.m", "a": "A", "ma": "mA",
-            "v": "V", "hz": "Hz"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -183,7 +177,7 @@ def _fitting(line: str, separator: str, width: int) -> list[str] | None:
 
 def _are_units(cells: Sequence[str]) -> bool:
     filled = [cell for cell in cells if cell not in ("", "-", "[-]", "[]")]
-    known = sum(parse_unit(cell) is not None or bool(re.fullmatch(r"\[.*\]|\(.*\)", cell)) for cell in filled)
+    known = sum(is_unit(cell) or bool(re.fullmatch(r"\[.*\]|\(.*\)", cell)) for cell in filled)
     return bool(filled) and 2 * known > len(filled)
 
 
@@ -202,32 +196,6 @@ def _head(text: str, unit: str, kind: str) -> Head:
     if unit:
         return Head(plain, unit, kind, 0, plain)
     return named(plain, "", kind)
-
-
-def named(text: str, unit: str = "", kind: str = "number", raster: int = 0) -> Head:
-    """Return a channel whose unit may be part of its name: ``qm [deg]``, ``M / Nm``, ``speed_rpm``.
-
-    Args:
-        text: the written name.
-        unit: the written unit, where it stands apart.
-        kind: "number" or "stamp".
-        raster: number of the raster that it is sampled in.
-
-    Returns:
-        The channel, with name and unit apart.
-    """
-    if unit:
-        return Head(text, unit, kind, raster, text)
-    bracket = _BRACKETS.fullmatch(text)
-    if bracket is not None and (text.rstrip().endswith("]") or parse_unit(bracket[2]) is not None):
-        return Head(bracket[1].strip(), bracket[2], kind, raster, text)
-    for pattern in (_SLASH, _SUFFIX):
-        found = pattern.fullmatch(text)
-        if found is not None:
-            written = _SPELLED.get(found[2].lower(), found[2]) if pattern is _SUFFIX else found[2]
-            if parse_unit(written) is not None or written == "Hz":
-                return Head(found[1].strip(), written, kind, raster, text)
-    return Head(text, "", kind, raster, text)
 
 
 def cells_of(line: str, separator: str) -> list[str]:
