@@ -1,5 +1,6 @@
 """Readers of file formats, one module each, behind the interface of :mod:`orchestrator.records.formats.source`."""
 
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -57,6 +58,8 @@ def open_source(path: Path) -> Iterator[RecordSource]:
         if head.startswith(start):
             raise RecordError(f"{path}: must be {FORMATS}, but {what}")
     module = next((name for at, magic, name in _MAGIC if head[at : at + len(magic)] == magic), "text")
+    if module == "text" and _is_mat_4(head):
+        module = "mat"
     if module == "text":
         yield text.open_file(path)
     elif module == "numpy_file":
@@ -64,6 +67,19 @@ def open_source(path: Path) -> Iterator[RecordSource]:
     else:
         with opened_apart(module, path) as source:
             yield source
+
+
+def _is_mat_4(head: bytes) -> bool:
+    """Return whether a file begins with the head of a matrix as MATLAB 4 wrote it, which has no magic bytes."""
+    for order, place in (("<", 0), (">", 1000)):
+        if len(head) < 22:
+            return False
+        kind, rows, columns, imaginary, length = struct.unpack(f"{order}5i", head[:20])
+        numbers, texts = divmod(kind - place, 10)
+        name = head[20 : 20 + length]
+        if 0 <= numbers <= 5 and texts <= 2 and min(rows, columns) >= 0 and imaginary in (0, 1) and 1 < length <= 64:
+            return name.endswith(b"\x00") and name[:-1].decode("latin-1").isidentifier()
+    return False
 
 
 def _first_bytes(path: Path) -> bytes:
