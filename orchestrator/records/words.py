@@ -54,4 +54,4 @@ def describes(text: str) -> bool:
     Returns:
         True when each of its words does.
     """
-    return all(word in DESCRIBING for word in words_of(text)) and not re.search("[%°‰µΩ]", text)
+    return all(word in DESCRIBING for word in words_of(text)) and not re.search("[%°‰µΩ]|[A-Za-z][.]", text)

@@ -159,7 +159,7 @@ def _names(
     if len(filled) > 1 and _are_units(last):
         above = _fitting(lines[filled[-2]], separator, width)
         if above is not None and sum(map(_is_word, above)) * 2 > len(above):
-            return above, [cell.strip("[](){} ") for cell in last], lines[: filled[-2]]
+            return above, [re.sub(r"^[\[({]\s*(.*?)\s*[\])}]$", r"\1", cell) for cell in last], lines[: filled[-2]]
     return last, none, lines[: filled[-1]]
 
 

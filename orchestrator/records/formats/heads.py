@@ -45,12 +45,11 @@ def _split(text: str) -> tuple[str, str]:
     square = _SQUARE.fullmatch(text)
     if square is not None and square[2] and not re.fullmatch(r"\d+|:", square[2]):
         return f"{square[1]} {square[3]}".strip(), square[2]
-    bracket = _BRACKETS.fullmatch(text)
-    if bracket is not None and _states(bracket[2]):
-        return bracket[1].strip(), bracket[2]
-    apart = _APART.fullmatch(text)
-    if apart is not None and _states(apart[2]):
-        return apart[1].strip(), apart[2].strip()
+    found = [f for pattern in (_APART, _BRACKETS) if (f := pattern.fullmatch(text)) is not None]
+    for holds in (is_unit, _states):
+        for match in found:
+            if holds(match[2].strip()) and not re.fullmatch(r"[\d.,: ]+", match[2]):
+                return match[1].strip(), match[2].strip()
     fraction = _FRACTION.fullmatch(text)
     if fraction is not None and is_unit(fraction[2]) and not is_unit(fraction[1]) and not fraction[1].endswith(" 1"):
         return fraction[1], fraction[2]
@@ -63,9 +62,7 @@ def _split(text: str) -> tuple[str, str]:
 
 def _states(text: str) -> bool:
     """Return whether what stands in brackets is a unit, known or not."""
-    if not text or re.fullmatch(r"[\d.,: ]+", text):
-        return False
-    return is_unit(text) or not describes(text)
+    return bool(text) and (is_unit(text) or not describes(text))
 
 
 def _endings(text: str) -> Iterator[tuple[str, str]]:
@@ -85,7 +82,7 @@ def _endings(text: str) -> Iterator[tuple[str, str]]:
 def _written(name: str, ending: str) -> Iterator[str]:
     """Yield the texts of units that an ending may be: ``rad_s`` is ``rad/s``, ``lb_in`` is ``lb.in``."""
     plain = ending.strip("_ .")
-    if plain.lower() in _WORDS or (re.match(r"[1-9-]", plain) and plain != "1/min"):
+    if plain.lower() in _WORDS or (re.match(r"[^A-Za-z%°µ0]", plain) and plain != "1/min"):
         return
     if len(plain) == 1 and plain not in "%°" and not _LETTERS.get(plain.lower(), frozenset()) & set(words_of(name)):
         return
