@@ -39,17 +39,19 @@ FORMATS = "CSV, Parquet, MDF4, MAT or NumPy"
 
 
 @contextmanager
-def open_source(path: Path) -> Iterator[RecordSource]:
+def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]:
     """Open a file for a ``with`` statement; its first bytes decide on the reader, not its name.
 
     Args:
         path: the file.
+        header: line of the names in a text, from 1; 0: it has none; None: found.
 
     Yields:
         Its channels, read when they are asked for.
 
     Raises:
-        RecordError: the file is missing, too large, broken, of an unknown format, or its reader is not installed.
+        RecordError: the file is missing, too large, broken, of an unknown format, or its reader is not installed; or
+            ``header`` is given for what is no text.
     """
     head = _first_bytes(path)
     if not head:
@@ -60,8 +62,10 @@ def open_source(path: Path) -> Iterator[RecordSource]:
     module = next((name for at, magic, name in _MAGIC if head[at : at + len(magic)] == magic), "text")
     if module == "text" and _is_mat_4(head):
         module = "mat"
+    if header is not None and module != "text":
+        raise RecordError(f"{path}: `header` must be left out, but is {header}: it is for text files")
     if module == "text":
-        yield text.open_file(path)
+        yield text.open_file(path, header)
     elif module == "numpy_file":
         yield numpy_file.open_file(path)
     else:
