@@ -156,7 +156,7 @@ def comparable_record(given: Record | Path | str, model: Model, settings: Diagno
         given: a record or its path.
         model: the model.
         settings: thresholds of the diagnosis.
-        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
 
     Returns:
         The record.

@@ -20,6 +20,7 @@ def read_record(
     resample: str | None = None,
     rate: float | None = None,
     torque_needed: bool = True,
+    header: int | None = None,
 ) -> Record:
     """Read a measured record.
 
@@ -33,6 +34,8 @@ def read_record(
             uniform).
         rate: samples per second to come down to [Hz] (default: as in the file).
         torque_needed: refuse a log of two angles without a torque; else its ``u`` is NaN.
+        header: line of a text that holds the names, from 1; 0: there are none (default: the last line before the
+            longest run of rows of numbers).
 
     Returns:
         The record in SI units; its arrays have shape (n,).
@@ -45,7 +48,7 @@ def read_record(
         >>> record.size, round(record.duration, 2)
         (4000, 20.0)
     """
-    return record.read_record(Path(path), columns or {}, reading=Reading(part, resample, rate, torque_needed))
+    return record.read_record(Path(path), columns or {}, reading=Reading(part, resample, rate, torque_needed, header))
 
 
 def read_model(path: Path | str | None = None) -> Model:
@@ -76,7 +79,7 @@ def as_record(given: Record | Path | str, model: Model, torque_needed: bool = Tr
         given: a record or the path of one.
         model: whose ``columns`` say what the file calls them.
         torque_needed: whether two angles without a torque are refused.
-        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
 
     Returns:
         The record.
@@ -85,7 +88,9 @@ def as_record(given: Record | Path | str, model: Model, torque_needed: bool = Tr
         RecordError: as ``read_record``.
     """
     if not isinstance(given, Record):
-        return read_record(given, model.columns, torque_needed=torque_needed, **reading)
+        header = reading.pop("header", None)
+        header = model.header if header is None else header
+        return read_record(given, model.columns, torque_needed=torque_needed, header=header, **reading)
     if torque_needed and not given.has_torque:
         raise RecordError(f"{given.source}: `u` must hold numbers, but the record has no torque")
     return given

@@ -118,7 +118,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
     if args.scenario is not None and (args.fmu is not None or args.scenario.suffix.lower() != ".toml"):
         raise ScenarioError("`scenario` must be a TOML file, without `fmu`, but is not", "scenario", "fmu")
     fmu = args.fmu if args.scenario is None else args.scenario
-    for name in ("model", "time_limit", "part", "resample", "rate"):
+    for name in ("model", "time_limit", "part", "resample", "rate", "header"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
     if args.no_search:

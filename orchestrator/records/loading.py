@@ -37,12 +37,14 @@ class Reading:
         resample: "uniform" (only the stamps jitter), "linear" or "cubic"; None: refuse times that are not uniform.
         rate: samples per second to come down to; None: as in the file.
         torque_needed: whether a file of two angles without a torque is refused.
+        header: line of the names in a text, from 1; 0: it has none; None: found.
     """
 
     part: tuple[float, float] | None = None
     resample: str | None = None
     rate: float | None = None
     torque_needed: bool = True
+    header: int | None = None
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ def read_record(
         RecordError: the file is missing or unreadable, or breaks a rule; the message names the place and the cure.
     """
     reading = reading or Reading()
-    with open_source(path) as source:
+    with open_source(path, reading.header) as source:
         loaded = load(source, path, columns or {}, further, reading)
     if "u" in loaded.table:
         check_driven(loaded.table["u"], loaded.labels["u"], path.name)
