@@ -25,6 +25,7 @@ _SAMPLED = {
 # Hooks of a slave with continuous states; those with a kind return it.
 _CONTINUOUS = {"derivatives": "", "indicators": "", "update": ", double time", "observe": ""}
 _ARGUMENTS = {"advance": "time, step", "update": "time"}
+_TYPES = {"Real": "REAL_VALUE", "Integer": "WHOLE_VALUE", "Enumeration": "CHOICE_VALUE"}
 _CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER", "local": "LOCAL"}
 
 
@@ -184,7 +185,7 @@ def _variables(cls: Any) -> str:
     rows = []
     for variable in cls.table:
         low, high = variable.bounds
-        kind = "REAL_VALUE" if variable.type == "Real" else "WHOLE_VALUE"
+        kind = _TYPES[variable.type]
         numbers = ", ".join(repr(float(number)) for number in (variable.start or 0.0, low, high))
         rows.append(f'    {{"`{variable.name}`", {kind}, {_CAUSALITIES[variable.causality]}, {numbers}}},')
     return "static const Variable variables[] = {\n" + "\n".join(rows) + "\n};"
