@@ -49,8 +49,15 @@ def fmi3_description(cls: Any, name: str, native: bool) -> Element:
     )
     if has_states(cls):
         SubElement(root, "ModelExchange", shared)
-    step = _flags(canHandleVariableCommunicationStepSize=cls.variable_step)
-    SubElement(root, "CoSimulation", shared | step | _flags(hasEventMode=has_states(cls)))
+    plant = has_states(cls)
+    step = _flags(
+        canHandleVariableCommunicationStepSize=cls.variable_step,
+        providesIntermediateUpdate=plant,
+        mightReturnEarlyFromDoStep=plant,
+        canReturnEarlyAfterIntermediateUpdate=plant,
+        hasEventMode=plant,
+    )
+    SubElement(root, "CoSimulation", shared | step | {"maxOutputDerivativeOrder": str(int(plant))})
     _units(root, cls.table)
     _types(root, cls.table)
     categories = SubElement(root, "LogCategories")
@@ -96,12 +103,12 @@ def _variables(root: Element, cls: Any) -> None:
     variables = SubElement(root, "ModelVariables")
     references = {variable.name: n for n, variable in enumerate(cls.table)}
     for array in arrays(cls.table):
-        variables.append(_variable(array, references))
+        variables.append(_variable(array, references, has_states(cls)))
     time = {"name": "time", "valueReference": str(len(cls.table)), "description": "Time", "causality": "independent"}
     SubElement(variables, "Float64", time | {"variability": "continuous", "unit": "s"})
 
 
-def _variable(array: Array, references: dict[str, int]) -> Element:
+def _variable(array: Array, references: dict[str, int], plant: bool) -> Element:
     first = array.variables[0]
     kind = TYPES[first.type]
     whole = first.type != "Real" and first.causality != "parameter"
@@ -119,6 +126,7 @@ def _variable(array: Array, references: dict[str, int]) -> Element:
         "max": _number(first, first.maximum),
         "nominal": _number(first, first.nominal),
         "start": " ".join(_number(variable, variable.start) for variable in array.variables).strip(),
+        "intermediateUpdate": "true" if plant and first.causality in ("input", "output") and not whole else "",
         "derivative": str(references[first.derivative_of]) if first.derivative_of else "",
     }
     element = Element(kind, {key: value for key, value in attributes.items() if value})

@@ -22,7 +22,7 @@ RUNTIME = Path(__file__).parent / "native_fmu"
 _HEADERS = ("translated.h", "pairs.h", "slave_types.h", "slave_core.h", "slave_states.h", "slave_exchange.h")
 _OF_VERSION = {
     2: ("fmi2_types.h", "fmi2_slave.h", "fmi2_model_exchange.h"),
-    3: ("fmi3_types.h", "fmi3_slave.h", "fmi3_steps.h", "fmi3_absent.h"),
+    3: ("fmi3_types.h", "fmi3_slave.h", "fmi3_steps.h", "fmi3_updates.h", "fmi3_absent.h"),
 }
 _FILE = """/* {name}: {title}
  *
@@ -111,7 +111,7 @@ def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, by
     Raises:
         FmuError: the slave is outside the subset that can be translated; the message names file and line.
     """
-    translated = translate_slave(cls, _runtime_names())
+    translated = translate_slave(cls, _runtime_names(), fmi)
     files = ", ".join(path.name for path in closure(recipe.module) if path.stem not in _PYTHON_ONLY)
     text = _FILE.format(
         name=recipe.name,
@@ -132,7 +132,7 @@ def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, by
 
 
 def _is_needed(header: str, cls: Any, types: str) -> bool:
-    if header in ("slave_exchange.h", "fmi2_model_exchange.h"):
+    if header in ("slave_exchange.h", "fmi2_model_exchange.h", "fmi3_updates.h"):
         return has_states(cls)
     return header != "pairs.h" or '"pairs.h"' in types
 

@@ -64,3 +64,33 @@ class Slave3:
     def step(self, time: float, step: float) -> tuple[bool, bool, bool, float]:
         """Return eventHandlingNeeded, terminateSimulation, earlyReturn and lastSuccessfulTime."""
         return self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=step)
+
+    def handle_event(self) -> None:
+        """Go through event mode once; our FMUs settle in one call."""
+        self.fmu.enterEventMode()
+        self.settle()
+
+    def settle(self) -> None:
+        """Leave event mode after discrete states are up to date."""
+        again, end, nominals, _, has_next, _ = self.fmu.updateDiscreteStates()
+        assert (again, end, nominals, has_next) == (False, False, False, False)
+        self.fmu.enterStepMode()
+
+    def run_with_events(self, stop: float, step: float, outputs: tuple[str, ...]) -> tuple[list[Any], list[Any]]:
+        """Step to the grid and to every event; return the rows at the grid, and for each event (time, before, after)."""
+        self.settle()
+        rows, events, n, time = [], [], 0, 0.0
+        while n * step < stop - 1e-12:
+            end = (n + 1) * step
+            event, _, early, reached = self.step(time, end - time)
+            assert event or not early
+            assert time <= reached <= end + 1e-12
+            time = reached
+            if event:
+                before = [self.get(name)[0] for name in outputs]
+                self.handle_event()
+                events.append((time, before, [self.get(name)[0] for name in outputs]))
+            if not early:
+                n, time = n + 1, reached
+                rows.append([self.get(name)[0] for name in outputs])
+        return rows, events

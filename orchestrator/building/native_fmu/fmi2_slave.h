@@ -96,9 +96,14 @@ EXPORT Status FMI(fmi2Reset)(Component c)
 
 EXPORT Status FMI(fmi2DoStep)(Component c, double time, double step, Boolean no_return)
 {
+    Fault fault;
     ENTER(fmi2DoStep, 1)
     (void)no_return;
-    return do_step(s, time, step);
+    fault.kind = NO_FAULT;
+    if (!may_step(s, time, step))
+        return refuse_step(s, time, step);
+    advance_slave(s, time, step, &fault);
+    return conclude_step(s, time + step, &fault);
 }
 
 /* --- Values ------------------------------------------------------------------------------------------------------------ */

@@ -83,10 +83,10 @@ UNSUPPORTED(fmi3SetShiftDecimal, (Component c, const Reference r[], size_t n, co
 UNSUPPORTED(fmi3SetShiftFraction, (Component c, const Reference r[], size_t n, const uint64_t counters[],
                                    const uint64_t resolutions[]))
 UNSUPPORTED(fmi3EvaluateDiscreteStates, (Component c))
-UNSUPPORTED(fmi3GetOutputDerivatives, (Component c, const Reference r[], size_t n, const int32_t orders[], double v[],
-                                       size_t total))
 UNSUPPORTED(fmi3ActivateModelPartition, (Component c, Reference clock, double time))
 #ifndef CONTINUOUS_STATES
+UNSUPPORTED(fmi3GetOutputDerivatives, (Component c, const Reference r[], size_t n, const int32_t orders[], double v[],
+                                       size_t total))
 UNSUPPORTED(fmi3GetNumberOfContinuousStates, (Component c, size_t *n))
 UNSUPPORTED(fmi3GetNumberOfEventIndicators, (Component c, size_t *n))
 UNSUPPORTED(fmi3SetContinuousStates, (Component c, const double x[], size_t n))

@@ -31,6 +31,7 @@ EXPORT Status FMI(fmi3EnterEventMode)(Component c)
     return s->worst;
 }
 
+/* The slave settles by itself: one call is enough. */
 EXPORT Status FMI(fmi3UpdateDiscreteStates)(Component c, bool *again, bool *end, bool *nominals_changed, bool *jumped,
                                             bool *has_next, double *next)
 {
@@ -40,7 +41,9 @@ EXPORT Status FMI(fmi3UpdateDiscreteStates)(Component c, bool *again, bool *end,
     if (!in_mode(s, true))
         return s->worst;
 #ifdef CONTINUOUS_STATES
-    return update_slave(s, jumped);
+    if (update_slave(s, jumped) <= WARNING)
+        s->course.event_due = false;
+    return s->worst;
 #else
     return s->worst;
 #endif
@@ -65,19 +68,86 @@ EXPORT Status FMI(fmi3EnterContinuousTimeMode)(Component c)
     return leave_event_mode(s, MODEL_EXCHANGE);
 }
 
+/* --- Steps ------------------------------------------------------------------------------------------------------------- */
+
+/* Advance over a piece of a step, or to the first event in it where the host takes events; return how far. */
+static double advance_piece(Instance *s, double time, double step, Fault *fault)
+{
+#ifdef CONTINUOUS_STATES
+    if (s->host.events && s->host.early_return) {
+        const double taken = slave_advance_to_event(&s->slave, time, step, fault);
+        s->course.event_due = !fault->kind && HAS_EVENT(&s->slave);
+        return taken;
+    }
+#endif
+    advance_slave(s, time, step, fault);
+    return step;
+}
+
+#ifdef CONTINUOUS_STATES
+#include "fmi3_updates.h"
+#endif
+
 EXPORT Status FMI(fmi3DoStep)(Component c, double time, double step, bool no_return, bool *event, bool *end,
                               bool *early_return, double *reached)
 {
+    Fault fault;
+    double taken = step;
     ENTER(fmi3DoStep, event && end && early_return && reached)
     (void)no_return;
     *event = *end = *early_return = false;
     *reached = s->course.time;
+    fault.kind = NO_FAULT;
+    if (!may_step(s, time, step))
+        return refuse_step(s, time, step);
     if (s->course.in_event_mode && !in_mode(s, false))
         return s->worst;
-    do_step(s, time, step);
+    if (s->course.event_due) {
+        say(s, ERROR, "%s must not be called before the event has been handled in event mode", s->function);
+        return s->worst;
+    }
+#ifdef CONTINUOUS_STATES
+    if (s->host.update)
+        taken = advance_with_updates(s, time, step, &fault);
+    else
+#endif
+        taken = advance_piece(s, time, step, &fault);
+    conclude_step(s, taken == step ? time + step : time + taken, &fault);
+    *event = s->course.event_due;
+    *early_return = !fault.kind && taken < step;
     *reached = s->course.time;
     return s->worst;
 }
+
+#ifdef CONTINUOUS_STATES
+/* First derivatives, with the inputs held. */
+EXPORT Status FMI(fmi3GetOutputDerivatives)(Component c, const Reference r[], size_t n, const int32_t orders[], double v[],
+                                            size_t total)
+{
+    Fault fault;
+    double rates[OUTPUT_RATES];
+    char text[64];
+    ENTER(fmi3GetOutputDerivatives, n == 0 || (r && orders && v))
+    fault.kind = NO_FAULT;
+    if (!is_type(s, CO_SIMULATION) || !expects(s, STEPPING))
+        return s->worst;
+    slave_output_rates(&s->slave, rates, &fault);
+    if (fault.kind)
+        return concluded(s, &fault);
+    for (size_t k = 0; k < n; k++) {
+        size_t place = 0;
+        while (place < OUTPUT_RATES && rated_outputs[place] != r[k])
+            place++;
+        if (place == OUTPUT_RATES || orders[k] != 1 || k >= total) {
+            say(s, ERROR, "%s must be asked for first derivatives of Float64 outputs, but is for order %i of %s", s->function,
+                (int64_t)orders[k], name_of(r[k], text));
+            return s->worst;
+        }
+        v[k] = rates[place];
+    }
+    return s->worst;
+}
+#endif
 
 /* --- Model exchange ---------------------------------------------------------------------------------------------------- */
 

@@ -23,6 +23,7 @@ typedef struct {
     int32_t phase;
     int32_t type;
     int32_t in_event_mode; /* FMI 3.0: within STEPPING */
+    int32_t event_due;     /* FMI 3.0: a step has ended at an event that has had no effect yet */
 } Course;
 
 typedef struct {
@@ -303,6 +304,8 @@ static Status exit_initialization(Instance *s)
     initialise(s, &fault);
 #ifdef CONTINUOUS_STATES
     if (s->course.type == MODEL_EXCHANGE && !fault.kind)
+        slave_begin_exchange(&s->slave, &fault);
+    if (s->course.type == MODEL_EXCHANGE && !fault.kind)
         slave_update(&s->slave, s->course.time, &fault);
 #endif
     if (fault.kind) {
@@ -354,16 +357,6 @@ static Status conclude_step(Instance *s, double end, const Fault *fault)
     s->course.time = end;
     s->fresh = true;
     return s->worst;
-}
-
-static Status do_step(Instance *s, double time, double step)
-{
-    Fault fault;
-    fault.kind = NO_FAULT;
-    if (!may_step(s, time, step))
-        return refuse_step(s, time, step);
-    advance_slave(s, time, step, &fault);
-    return conclude_step(s, time + step, &fault);
 }
 
 /* --- Values ------------------------------------------------------------------------------------------------------------ */
