@@ -77,7 +77,7 @@ class Slave3:
         self.fmu.enterStepMode()
 
     def run_with_events(self, stop: float, step: float, outputs: tuple[str, ...]) -> tuple[list[Any], list[Any]]:
-        """Step to the grid and to every event; return the rows at the grid, and for each event (time, before, after)."""
+        """Step to the grid and to every event; return the grid's rows, and (time, before, after) of each event."""
         self.settle()
         rows, events, n, time = [], [], 0, 0.0
         while n * step < stop - 1e-12:
