@@ -1,12 +1,16 @@
 """``python -m orchestrator``, and the program ``backlash-cosim``."""
 
 import gc
+import importlib
 import os
 import sys
 
 
-def run() -> None:
-    """Run the command line and end the process with its exit code.
+def run(module: str = "orchestrator.cli") -> None:
+    """Run a command line and end the process with its exit code.
+
+    Args:
+        module: whose function ``main`` is run.
 
     Raises:
         SystemExit: always.
@@ -19,9 +23,7 @@ def run() -> None:
             setattr(sys, name, open(number, "w", encoding="utf-8"))  # noqa: SIM115 - until the process ends
     try:
         # Here, for Ctrl-C and a lack of memory or descriptors may come while modules are loaded.
-        from orchestrator.cli import main
-
-        code = main()
+        code = importlib.import_module(module).main()
         sys.stdout.flush()
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")

@@ -2,17 +2,13 @@
 
 import argparse
 import importlib
-import io
 import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TextIO, cast
 
-from orchestrator.commands._console import ForgivingStream
-from orchestrator.commands._lines import folded
-from orchestrator.commands._parser import Parser, flags_of, one_line, worded
-from orchestrator.errors import InputError, OrchestratorError
+from orchestrator.commands._outcome import exit_code
+from orchestrator.commands._parser import Parser, flags_of
 from orchestrator.shared.version import __version__
 
 PROGRAM = "backlash-cosim"
@@ -75,30 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     words = list(sys.argv[1:] if argv is None else argv)
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # a home that cannot be written is no news to the user
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # names of any script, whatever the terminal's encoding
-        sys.stdout = cast(TextIO, ForgivingStream(sys.stdout))
     command = next((w for w in words if not w.startswith("-")), None)
     arguments = build_parser(command).parse_args(words)
     flags = vars(arguments).pop("flags")
-    try:
-        code = int(arguments.run(arguments))
-        sys.stdout.flush()
-        return code
-    except OrchestratorError as error:
-        _say(f"error: {one_line(worded(error, flags))}")
-        return 2 if isinstance(error, InputError) else 1
-    except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
-        text = worded(interruption, flags)
-        _say(f"interrupted: {text}" if text else "interrupted")
-        return 130
-    except BrokenPipeError:
-        raise  # whoever read the output has gone: the program ends without a word
-    except (OSError, MemoryError) as error:  # no descriptors, no memory, a full disk behind standard output
-        _say(f"error: {one_line(str(error) or 'out of memory')}")
-        return 1
-
-
-def _say(text: str) -> None:
-    """Write one line to standard error, folded between words on a terminal."""
-    sys.stderr.write(f"{folded(text, sys.stderr)}\n")
+    return exit_code(lambda: arguments.run(arguments), flags)

@@ -6,16 +6,12 @@ A step of ``h`` seconds with held inputs goes to the exact linear solution when 
 
 from math import exp
 
-from .backlash_models import NEVER_PULLING
 from .bristles import has_friction_l, has_friction_m
-from .contact import after_event, consistent_start, initial_contact
+from .contact import consistent_start, initial_contact
 from .drive_request import UNASKED, ramp_end, ramp_target, ramp_time
 from .drivetrain_parameters import (
     BIG,
     NONE,
-    P_ALPHA,
-    P_B_L,
-    P_B_M,
     P_CUBIC,
     P_DIRECTION_L,
     P_DIRECTION_M,
@@ -24,7 +20,6 @@ from .drivetrain_parameters import (
     P_FILTER,
     P_GRAVITY,
     P_HYSTERESIS,
-    P_I,
     P_J_WAVE,
     P_K_WAVE,
     P_LOAD_TORQUE,
@@ -48,14 +43,14 @@ from .equations import (
     contact_of,
     is_rigid,
     rates,
-    shaft_damping,
-    shaft_stiffness,
     twist,
     twist_rate,
 )
-from .linear_mode import Transition, evaluate, first_event, law_of, taylor
-from .smooth_mode import advance_smooth, refused
-from .transition import fastest_rate, relaxation_rate, transition
+from .event_numbers import NO_EVENT, TOO_MUCH
+from .linear_mode import law_of
+from .linear_steps import Table, advance_linear, leap, linear_to_event
+from .smooth_mode import advance_smooth, advance_smooth_to_event, refused
+from .transition import relaxation_rate, transition
 
 __all__ = [
     "Mode",
@@ -63,6 +58,7 @@ __all__ = [
     "State",
     "Table",
     "advance",
+    "advance_to_event",
     "consistent_start",
     "contact_of",
     "has_nonlinear_effect",
@@ -74,15 +70,6 @@ __all__ = [
     "twist",
     "twist_rate",
 ]
-
-# Transitions with and without contact, relaxation of a parted shaft (rate, and factor of a step), whether nonlinear.
-Table = tuple[Transition, Transition, float, float, bool]
-
-# Work that one communication step may take, and how much more for each second of it; see ``smooth_mode``.
-MAX_EVENTS = 5000
-MAX_PIECES = 1000
-MAX_PIECES_PER_SECOND = 20000.0
-NEGLIGIBLE_TWIST = 1e-18
 
 
 def has_nonlinear_effect(p: Parameters) -> bool:
@@ -208,78 +195,41 @@ def advance_ramp(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: f
     return (x, mode)
 
 
-def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, table: Table) -> tuple[State, bool]:
-    """Return the state after one product with the transition matrix, and whether no event can lie inside.
-
-    An event is ruled out when both ends are farther from it than the speeds at both ends could carry.
+def advance_to_event(
+    x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, table: Table
+) -> tuple[State, Mode, float, int]:
+    """Return :func:`advance` up to the first event, which has not had its effect yet.
 
     Args:
-        x: state, as in ``equations``.
-        contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
+        x: state.
+        mode: mode.
+        p: parameters.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-        h: length of the step [s].
+        h: step [s], positive.
         table: ``prepare(p, h)`` of the same ``p`` and ``h``.
 
     Returns:
-        Both.
+        State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
     """
-    i = p[P_I]
-    model = backlash_model(p)
-    offset = 0.0 if model == NONE else contact * p[P_ALPHA]
-    rows = table[1] if contact == 0 else table[0]
-    theta_m, omega_m, theta_l, omega_l, T_m = x[0], x[1], x[2], x[3], x[4]
-    wound = theta_m / i - theta_l - offset
-    a, b, c, d, e, f = rows[0]
-    theta_m += a * wound + b * omega_m + c * omega_l + d * T_m + e * u + f * T_l
-    a, b, c, d, e, f = rows[2]
-    theta_l += a * wound + b * omega_m + c * omega_l + d * T_m + e * u + f * T_l
-    a, b, c, d, e, f = rows[1]
-    next_m = omega_m + (a * wound + b * omega_m + c * omega_l + d * T_m + e * u + f * T_l)
-    a, b, c, d, e, f = rows[3]
-    next_l = omega_l + (a * wound + b * omega_m + c * omega_l + d * T_m + e * u + f * T_l)
-    lag = rows[4]
-    left = x[7] * table[3]
-    if abs(left) < NEGLIGIBLE_TWIST:
-        left = 0.0
-    moved = (
-        theta_m,
-        next_m,
-        theta_l,
-        next_l,
-        T_m + (lag[3] * T_m + lag[4] * u),
-        x[5],
-        x[6],
-        left,
-        x[8],
-        x[9],
-        x[10],
-        x[11],
-    )
-    if model == NONE:
-        return (moved, True)
-    wound_next = theta_m / i - theta_l - offset
-    speed = omega_m / i - omega_l
-    speed_next = next_m / i - next_l
-    reach = h * (abs(speed) + abs(speed_next))
-    if contact == 0:
-        room = p[P_ALPHA] - max(abs(wound), abs(wound_next))
-        return (moved, room > reach + 2.0 * abs(x[7]))
-    if model not in NEVER_PULLING:
-        return (moved, min(contact * wound, contact * wound_next) > reach)
-    stiffness = shaft_stiffness(p)
-    damping = shaft_damping(p)
-    torque = contact * (stiffness * wound + damping * speed)
-    torque_next = contact * (stiffness * wound_next + damping * speed_next)
-    swing = stiffness * reach + 2.0 * damping * abs(speed_next - speed)
-    return (moved, min(torque, torque_next) > swing)
+    if table[4]:
+        if x[11] == UNASKED and (p[P_FILTER] > 0.0 or p[P_RATE] < BIG):
+            x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
+        if p[P_RATE] < BIG:
+            return ramp_to_event(x, mode, p, u, T_l, h)
+        return advance_smooth_to_event(x, mode, p, u, T_l, h)
+    if not is_rigid(p):
+        moved, clear = leap(x, mode[0], p, u, T_l + p[P_LOAD_TORQUE], h, table)
+        if clear:
+            return (moved, mode, h, NO_EVENT)
+    x, elapsed, _, which = linear_to_event(x, mode[0], p, u, T_l + p[P_LOAD_TORQUE], h, table[2], 0.0, 0)
+    return (refused(x) if which == TOO_MUCH else x, mode, elapsed, which)
 
 
-def advance_linear(
-    x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, kappa: float
-) -> tuple[State, Mode]:
-    """Return state and mode after ``h`` [s] of the exact linear solution, events located; NaN for too much work.
+def ramp_to_event(
+    x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float
+) -> tuple[State, Mode, float, int]:
+    """Return :func:`advance_ramp` up to the first event.
 
     Args:
         x: state, as in ``equations``.
@@ -288,39 +238,18 @@ def advance_linear(
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-        kappa: rate at which a parted shaft unwinds [1/s].
 
     Returns:
-        Both.
+        State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
     """
-    contact = mode[0]
-    elapsed = 0.0
-    events = 0
-    pieces = 0
-    most = MAX_PIECES + int(MAX_PIECES_PER_SECOND * h)
-    while elapsed < h:
-        if events >= MAX_EVENTS or pieces >= most:
-            return (refused(x), mode)
-        pieces += 1
-        law = law_of(contact, p)
-        unwinding = kappa if x[7] != 0.0 else 0.0
-        step = h - elapsed
-        longest = 1.0 / (fastest_rate(law, p) + unwinding)
-        last = step <= longest
-        if not last:
-            step = longest
-        start = (x[0], x[1], x[2], x[3], x[4], x[7])
-        coefficients = taylor(start, law, p, u, T_l, step, unwinding)
-        time, which = first_event(coefficients, contact, p, u, T_l)
-        a, b, c, d, e, left = evaluate(coefficients, time)
-        left = left if abs(left) >= NEGLIGIBLE_TWIST else 0.0
-        x = (a, b, c, d, e, x[5], x[6], left, x[8], x[9], x[10], x[11])
-        elapsed += time * step
-        if which >= 0:
-            push_m = x[4] - p[P_B_M] * x[1]
-            push = p[P_I] * push_m - p[P_B_L] * x[3] - T_l
-            x, contact = after_event(x, contact, which, events, push_m, push, p, 0.0, 0.0)
-            events += 1
-        elif last:
-            break
-    return (x, (contact, mode[1], mode[2]))
+    before = x[11]
+    ramp = min(h, ramp_time(before, u, p[P_FILTER], p[P_RATE]))
+    if ramp > 0.0:
+        target = ramp_target(before, u, p[P_FILTER], p[P_RATE], ramp)
+        x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, target, T_l, ramp)
+        if which != NO_EVENT or ramp >= h:
+            return (x, mode, elapsed, which)
+        end = ramp_end(before, u, p[P_FILTER], p[P_RATE])
+        x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], end)
+    x, mode, elapsed, which = advance_smooth_to_event(x, mode, p, u, T_l, h - ramp)
+    return (x, mode, ramp + elapsed, which)

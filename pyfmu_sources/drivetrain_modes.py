@@ -4,11 +4,12 @@ The laws and their guards are those of :mod:`smooth_events`; here they are witho
 """
 
 from .dormand_prince import mode_rates
-from .drive_request import UNASKED, saturated
+from .drive_request import saturated
 from .drivetrain_parameters import P_LIMIT, P_OFFSET_L, P_OFFSET_M, P_RES_J
 from .dry_friction import NEVER, shaft_torque
 from .equations import Mode, Parameters, State
-from .smooth_events import guard, guard_room, settled
+from .event_numbers import NO_EVENT
+from .smooth_events import guard, guard_room, settled, switched
 
 Indicators = tuple[float, float, float, float]
 Outputs = tuple[float, float, float, float, float, float]
@@ -18,6 +19,8 @@ Outputs = tuple[float, float, float, float, float, float]
 ROOMS = 2.0
 # Events that follow each other within this time [s] are chattering, as events within one communication step are.
 QUIET = 1e-3
+# Half the time [s] over which the derivative of the shaft's torque is taken: rounding and curvature are equally small.
+LITTLE = 1e-6
 
 
 def state_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> State:
@@ -98,16 +101,75 @@ def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Ind
     )
 
 
+def asked_first(x: State, u: float) -> State:
+    """Return a state whose drive has settled at what is asked first.
+
+    Args:
+        x: state, as in ``equations``.
+        u: requested torque [N.m], saturated already.
+
+    Returns:
+        The state.
+    """
+    return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
+
+
+def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Outputs:
+    """Return the derivatives of the outputs of :func:`rates_and_outputs`; that of T_shaft is a central difference.
+
+    Args:
+        x: state.
+        mode: mode, which is held.
+        p: parameters.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+
+    Returns:
+        The derivatives, SI units per second.
+    """
+    r = state_rates(x, mode, p, u, T_l)
+    later = shaft_torque(beside(x, r, LITTLE), mode, p, T_l)
+    sooner = shaft_torque(beside(x, r, -LITTLE), mode, p, T_l)
+    return (r[0], r[2], r[1], r[3], r[4], (later - sooner) / (2.0 * LITTLE))
+
+
+def beside(x: State, r: State, h: float) -> State:
+    """Return ``x + h r``; the drive's filter, which may not have been asked yet, stays.
+
+    Args:
+        x: state, as in ``equations``.
+        r: its derivative.
+        h: time [s].
+
+    Returns:
+        The state.
+    """
+    return (
+        x[0] + h * r[0],
+        x[1] + h * r[1],
+        x[2] + h * r[2],
+        x[3] + h * r[3],
+        x[4] + h * r[4],
+        x[5] + h * r[5],
+        x[6] + h * r[6],
+        x[7] + h * r[7],
+        x[8] + h * r[8],
+        x[9] + h * r[9],
+        x[10] + h * r[10],
+        x[11],
+    )
+
+
 def after_events(
-    x: State, mode: Mode, events: int, quiet: bool, p: Parameters, u: float, T_l: float
+    x: State, mode: Mode, which: int, events: int, p: Parameters, u: float, T_l: float
 ) -> tuple[State, Mode, int]:
     """Return state, mode and number of events in a row once no guard is violated.
 
     Args:
         x: state at the event.
         mode: the mode that ends.
+        which: guard that is known to end it, or ``NO_EVENT``.
         events: how many events came before this one without a pause.
-        quiet: whether there was a pause, so that counting begins anew.
         p: parameters.
         u: requested torque [N.m], saturated already.
         T_l: load torque [N.m].
@@ -115,6 +177,7 @@ def after_events(
     Returns:
         The three.
     """
-    if x[11] == UNASKED:  # the drive has settled at what is asked first
-        x = (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
-    return settled(x, mode, 0 if quiet else events, p, u, T_l)
+    if which != NO_EVENT:
+        x, mode = switched(x, mode, which, events, p, u, T_l)
+        events += 1
+    return settled(x, mode, events, p, u, T_l)

@@ -9,7 +9,17 @@ from typing import Annotated, Any, ClassVar
 from . import drivetrain
 from .drive_request import saturated
 from .drivetrain import Mode, State, Table
-from .drivetrain_modes import QUIET, Indicators, after_events, indicators, rates_and_outputs, state_rates
+from .drivetrain_modes import (
+    QUIET,
+    Indicators,
+    Outputs,
+    after_events,
+    asked_first,
+    indicators,
+    output_rates,
+    rates_and_outputs,
+    state_rates,
+)
 from .drivetrain_parameters import (
     BIG,
     COUNT,
@@ -22,6 +32,7 @@ from .drivetrain_parameters import (
     PARAMETERS,
     Parameter,
 )
+from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable
 from .plant_slave import PlantSlave
 from .slave_base import TOO_STIFF, StepRefusedError
@@ -156,7 +167,7 @@ class Drivetrain(PlantSlave):
         self._x = drivetrain.consistent_start(x, self._p)
         self._mode = drivetrain.initial_mode(self._x, self._p)
         self._known = []
-        self._requests = []
+        self._start_requests()
         self._events = 0
         self._event_time = 0.0
         self._write()
@@ -175,6 +186,14 @@ class Drivetrain(PlantSlave):
         known = self._known
         return drivetrain.advance(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
 
+    def _moved_to_event(
+        self, x: State, mode: Mode, u: float, time: float, step: float
+    ) -> tuple[State, Mode, float, int]:
+        """Return state and mode at the first event of a piece, how far it is, and the guard that ends the mode."""
+        number = self._step_number(time, step)
+        known = self._known
+        return drivetrain.advance_to_event(x, mode, self._p, u, self.real[T_L], known[number][0], known[number][1])
+
     def _take(self, x: State, mode: Mode, acting: float, step: float) -> None:
         """Take over a state that is finite and not too far away to be told from its neighbours, or refuse the step."""
         if x[0] != x[0]:
@@ -185,6 +204,7 @@ class Drivetrain(PlantSlave):
             raise StepRefusedError(f"the state must stay finite, but is {x!r} after a step of {step!r} s")
         self._x = x
         self._mode = mode
+        self._acting = acting
         self._write()
 
     def _step_number(self, time: float, step: float) -> int:
@@ -210,13 +230,20 @@ class Drivetrain(PlantSlave):
         return len(self._known) - 1
 
     def derivatives(self) -> State:
-        """Return the derivatives of the state, for model exchange.
+        """Return the derivatives of the state.
 
         Returns:
             The derivatives, in the order of the state.
         """
-        u = self._request()
-        return state_rates(self._x, self._mode, self._p, u, self.real[T_L])
+        return state_rates(self._x, self._mode, self._p, self._acting_request(), self.real[T_L])
+
+    def output_rates(self) -> Outputs:
+        """Return the derivatives of the outputs that ``response_outputs`` names, with the inputs held.
+
+        Returns:
+            The derivatives, SI units per second.
+        """
+        return output_rates(self._x, self._mode, self._p, self._acting_request(), self.real[T_L])
 
     def indicators(self) -> Indicators:
         """Return the event indicators, for model exchange.
@@ -228,27 +255,33 @@ class Drivetrain(PlantSlave):
         return indicators(self._x, self._mode, self._p, u, self.real[T_L])
 
     def update(self, time: float) -> None:
-        """Settle state and mode at an event, for model exchange.
+        """Give an event its effect, and settle state and mode at the inputs of the moment.
 
         Args:
             time: [s].
+        """
+        u = self._acting_request()
+        events = 0 if time - self._event_time > QUIET else self._events
+        x, mode, events = after_events(self._x, self._mode, self._event, events, self._p, u, self.real[T_L])
+        if events > 0:
+            self._event_time = time
+        self._x = x
+        self._mode = mode
+        self._event = NO_EVENT
+        self._events = events
+        self._write()
+
+    def begin_exchange(self) -> None:
+        """Settle the drive at what is asked first; effects that need time events are refused in model exchange.
 
         Raises:
-            ValueError: an effect is on that model exchange does not have.
+            ValueError: such an effect is on.
         """
         if self._p[P_DELAY] > 0.0:
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
         if self._p[P_RATE] < BIG:
             raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
-        u = self._request()
-        quiet = time - self._event_time > QUIET
-        x, mode, events = after_events(self._x, self._mode, self._events, quiet, self._p, u, self.real[T_L])
-        if events > 0:
-            self._event_time = time
-        self._x = x
-        self._mode = mode
-        self._events = events
-        self._write()
+        self._x = asked_first(self._x, self._request())
 
     def observe(self) -> None:
         """Write the outputs at the inputs of the moment, for model exchange."""

@@ -12,6 +12,7 @@ from math import ceil
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from .drivetrain_parameters import BIG, Parameter
+from .event_numbers import NO_EVENT
 from .fmu_variables import FmuVariable
 from .learned_law import (
     KNOTS,
@@ -222,6 +223,11 @@ class WithLaw(_Base):
                 x, mode = self._acted(x, mode, u, clock + span * n / count, span / count)
             clock, rest = clock + span, rest - span
         return x, mode
+
+    def _moved_to_event(self, x: Any, mode: Any, u: float, time: float, step: float) -> tuple[Any, Any, float, int]:
+        """Return state and mode after a whole piece: events stay inside steps of a plant with a law."""
+        x, mode = self._moved(x, mode, u, time, step)
+        return x, mode, step, NO_EVENT
 
     def _acted(self, x: Any, mode: Any, u: float, clock: float, step: float) -> tuple[Any, Any]:
         """Return state and mode after a piece over which the law is held at its value half-way."""

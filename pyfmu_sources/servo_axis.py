@@ -31,6 +31,7 @@ from .servo_axis_parameters import P_FILTER, P_RATE, P_WAVY
 __all__ = [
     "State",
     "advance",
+    "advance_to_event",
     "drive_torque",
     "friction",
     "inertia",
@@ -92,32 +93,94 @@ def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h:
     Returns:
         Both.
     """
+    elapsed = 0.0
+    pieces = 0
+    event = True
+    while event:
+        x, mode, elapsed, pieces, event = request_to_event(x, mode, p, u, T_l, h, elapsed, pieces)
+    return (x, mode)
+
+
+def advance_to_event(
+    x: State, mode: int, p: Parameters, u: float, T_l: float, h: float
+) -> tuple[State, int, float, bool]:
+    """Return :func:`advance` up to the first event, its effect included.
+
+    Args:
+        x: state.
+        mode: direction of sliding.
+        p: parameters.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: step [s], positive.
+
+    Returns:
+        State, direction of sliding, how far it is [s], and whether there is an event.
+    """
+    if x[4] == UNASKED and filtered(p):
+        x = (x[0], x[1], x[2], x[3], u)
+    ramp = 0.0
+    if p[P_RATE] < BIG:
+        before = x[4]
+        ramp = min(h, ramp_time(before, u, p[P_FILTER], p[P_RATE]))
+        if ramp > 0.0:
+            target = ramp_target(before, u, p[P_FILTER], p[P_RATE], ramp)
+            x, mode, elapsed, _, event = request_to_event(x, mode, p, target, T_l, ramp, 0.0, 0)
+            if event or ramp >= h:
+                return (x, mode, elapsed, event)
+            x = (x[0], x[1], x[2], x[3], ramp_end(before, u, p[P_FILTER], p[P_RATE]))
+    x, mode, elapsed, _, event = request_to_event(x, mode, p, u, T_l, h - ramp, 0.0, 0)
+    return (x, mode, ramp + elapsed, event)
+
+
+def request_to_event(
+    x: State, mode: int, p: Parameters, u: float, T_l: float, h: float, elapsed: float, pieces: int
+) -> tuple[State, int, float, int, bool]:
+    """Return the solution right after its next event, or at the end of a step: it breaks away, stops, or meets a stop.
+
+    An axis that breaks away is still at rest; its direction follows from the torque of what comes next.
+
+    Args:
+        x: position, speed, drive torque, bristle and filtered request.
+        mode: direction of sliding, 0: none.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+        elapsed: time since the beginning of the step at which ``x`` is [s].
+        pieces: integration steps of the step so far.
+
+    Returns:
+        State, direction of sliding, time since the beginning of the step, pieces so far, and whether it is an event.
+    """
     bends = builds_up(p)
     dry = rest(p) + abs(p[P_WAVY]) > 0.0
     least = leaves_sliding(p)
     if mode == 0 and not dry:
         mode = 1
-    elapsed = 0.0
-    pieces = 0
     most = MAX_STEPS + int(MAX_STEPS_PER_SECOND * h)
     while h - elapsed > 1e-12 * h:
         pieces += 1
         if pieces > most:
             nan = float("nan")
-            return ((nan, nan, nan, nan, nan), mode)
+            return ((nan, nan, nan, nan, nan), mode, h, pieces, False)
         step = min(longest_step(x, mode, p, u, T_l, h), h - elapsed)
         if dry and not bends and mode == 0:
             mode = slip_at_rest(x, p, u, T_l)
             if mode == 0:
                 stays = held(x, p, u, T_l, step)
-                if slip_at_rest(stays, p, u, T_l) != 0:
+                breaks = slip_at_rest(stays, p, u, T_l) != 0
+                if breaks:
                     step = breaking_time(x, p, u, T_l, step)
                     stays = held(x, p, u, T_l, step)
                 x = stays
                 elapsed += step
+                if breaks:
+                    return (x, mode, elapsed, pieces, True)
                 continue
         moved = smooth_step(x, mode, p, u, T_l, step)
-        if past_stop(x, p) != past_stop(moved, p):
+        meets = past_stop(x, p) != past_stop(moved, p)
+        if meets:
             step = stop_time(x, mode, p, u, T_l, step)
             moved = smooth_step(x, mode, p, u, T_l, step)
         if dry and mode != 0 and moved[1] * mode < least:
@@ -129,9 +192,11 @@ def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h:
             else:
                 x = (moved[0], 0.0, moved[2], moved[3], moved[4])
                 mode = slip_at_rest(x, p, u, T_l)
-        else:
-            x = moved
-            if bends and mode == 0:
-                mode = settled(x, p)
+            return (x, mode, elapsed + step, pieces, True)
+        x = moved
+        if bends and mode == 0:
+            mode = settled(x, p)
         elapsed += step
-    return (x, mode)
+        if meets:
+            return (x, mode, elapsed, pieces, True)
+    return (x, mode, elapsed, pieces, False)

@@ -19,7 +19,7 @@ from .axis_equations import (
     sliding_torque,
     slip_at_rest,
 )
-from .drive_request import UNASKED, saturated
+from .drive_request import saturated
 from .drivetrain_parameters import BIG
 from .servo_axis_parameters import P_LIMIT, P_OFFSET, P_STOP_LOWER, P_STOP_UPPER, P_WAVY
 
@@ -179,8 +179,6 @@ def after_events(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: f
     Returns:
         The three.
     """
-    if x[4] == UNASKED:
-        x = (x[0], x[1], x[2], x[3], u)
     mode = decided(x, mode, p, u)
     if slipping(x, mode, p, u, T_l) < -slipping_room(x, mode):
         if builds_up(p):

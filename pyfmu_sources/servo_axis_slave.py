@@ -8,11 +8,12 @@ from typing import Annotated, Any, ClassVar
 from . import servo_axis
 from .drive_request import saturated
 from .drivetrain_parameters import BIG
+from .event_numbers import NO_EVENT
 from .fmu_variables import LARGEST, FmuVariable
 from .plant_slave import PlantSlave
 from .servo_axis import State
-from .servo_axis_modes import UNDECIDED, Indicators, after_events, decided, indicators, rates_and_outputs
-from .servo_axis_parameters import COUNT, P_DELAY, P_LIMIT, P_OFFSET, P_RATE, PARAMETERS
+from .servo_axis_modes import UNDECIDED, Indicators, Outputs, after_events, decided, indicators, rates_and_outputs
+from .servo_axis_parameters import COUNT, P_DELAY, P_LIMIT, P_OFFSET, P_RATE, P_TAU, PARAMETERS
 from .slave_base import TOO_STIFF, StepRefusedError
 
 U, T_L, THETA_M, OMEGA_M, T_M = range(5)
@@ -43,7 +44,6 @@ class ServoAxis(PlantSlave):
     _x: State
     _mode: int
     _p: Values
-    _acting: float
     _end_stop: int
 
     # The hidden attribute that model exchange integrates, and its items: name, unit, nominal value, meaning.
@@ -70,8 +70,7 @@ class ServoAxis(PlantSlave):
         self._x = servo_axis.start(real[FIRST_START], real[FIRST_START + 1], real[FIRST_START + 2], self._p)
         self._mode = UNDECIDED
         self._end_stop = 0
-        self._requests = []
-        self._acting = 0.0
+        self._start_requests()
         self._write()
 
     def _request(self) -> float:
@@ -88,6 +87,13 @@ class ServoAxis(PlantSlave):
             mode = servo_axis.initial_mode(x, self._p, u)
         return servo_axis.advance(x, mode, self._p, u, self.real[T_L], step)
 
+    def _moved_to_event(self, x: State, mode: int, u: float, time: float, step: float) -> tuple[State, int, float, int]:
+        """Return state and direction of sliding at the first event of a piece, how far it is, and whether it is one."""
+        if mode == UNDECIDED:
+            mode = servo_axis.initial_mode(x, self._p, u)
+        x, mode, taken, event = servo_axis.advance_to_event(x, mode, self._p, u, self.real[T_L], step)
+        return (x, mode, taken, 0 if event else NO_EVENT)
+
     def _take(self, x: State, mode: int, acting: float, step: float) -> None:
         """Take over a state that is finite, or refuse the step."""
         if x[0] != x[0]:
@@ -100,14 +106,23 @@ class ServoAxis(PlantSlave):
         self._write()
 
     def derivatives(self) -> State:
-        """Return the derivatives of the state, for model exchange.
+        """Return the derivatives of the state.
 
         Returns:
             The derivatives, in the order of the state.
         """
-        u = self._request()
+        u = self._acting_request()
         mode = decided(self._x, self._mode, self._p, u)
         return servo_axis.mode_rates(self._x, mode, self._p, u, self.real[T_L])
+
+    def output_rates(self) -> Outputs:
+        """Return the derivatives of the outputs that ``response_outputs`` names, with the inputs held.
+
+        Returns:
+            The derivatives, SI units per second; a drive without a lag holds its torque.
+        """
+        r = self.derivatives()
+        return (r[0], r[1], r[2] if self._p[P_TAU] > 0.0 else 0.0)
 
     def indicators(self) -> Indicators:
         """Return the event indicators, for model exchange.
@@ -119,28 +134,35 @@ class ServoAxis(PlantSlave):
         return indicators(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
 
     def update(self, time: float) -> None:
-        """Settle state and mode at an event, for model exchange.
+        """Settle state and mode at an event, at the inputs of the moment.
 
         Args:
             time: [s].
+        """
+        u = self._acting_request()
+        x, mode, stop = after_events(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
+        self._x = x
+        self._mode = mode
+        self._end_stop = stop
+        self._event = NO_EVENT
+        self.observe()
+
+    def begin_exchange(self) -> None:
+        """Settle the drive at what is asked first; effects that need time events are refused in model exchange.
 
         Raises:
-            ValueError: an effect is on that model exchange does not have.
+            ValueError: such an effect is on.
         """
         if self._p[P_DELAY] > 0.0:
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
         if self._p[P_RATE] < BIG:
             raise ValueError("`effects.rate_limit.rate` must be its default in model exchange")
-        u = self._request()
-        x, mode, stop = after_events(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
-        self._x = x
-        self._mode = mode
-        self._end_stop = stop
-        self.observe()
+        x = self._x
+        self._x = (x[0], x[1], x[2], x[3], self._request())
 
     def observe(self) -> None:
-        """Write the outputs at the inputs of the moment, for model exchange."""
-        self._acting = self._request()
+        """Write the outputs at the inputs of the moment."""
+        self._acting = self._acting_request()
         self._write()
 
     def _write(self) -> None:

@@ -8,6 +8,7 @@ from .bristles import settled_slips
 from .dormand_prince import mode_rates, runge_kutta
 from .dry_friction import NEVER, direction
 from .equations import Mode, Parameters, State, twist_rate
+from .event_numbers import NO_EVENT, TOO_MUCH
 from .smooth_events import joined_body, settled, switched, violated
 
 # Integration steps that one communication step may take, and how many more for each second of it. What needs more is
@@ -113,12 +114,62 @@ def advance_smooth(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h:
         Both.
     """
     elapsed = 0.0
-    events = 0
-    x, mode = joined_body(x, mode, p, T_l)
-    x, mode, events = settled(x, mode, events, p, u, T_l)
-    k1 = mode_rates(x, mode, p, u, T_l)
-    step = h
     work = 0
+    x, mode = joined_body(x, mode, p, T_l)
+    x, mode, events = settled(x, mode, 0, p, u, T_l)
+    while elapsed < h:
+        x, mode, elapsed, work, which = smooth_to_event(x, mode, p, u, T_l, h, elapsed, work)
+        if which == TOO_MUCH:
+            return (refused(x), mode)
+        if which == NO_EVENT:
+            return (x, mode)
+        x, mode = switched(x, mode, which, events, p, u, T_l)
+        x, mode, events = settled(x, mode, events + 1, p, u, T_l)
+    return (x, mode)
+
+
+def advance_smooth_to_event(
+    x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float
+) -> tuple[State, Mode, float, int]:
+    """Return :func:`advance_smooth` up to the first event, which has not had its effect yet.
+
+    Args:
+        x: state, as in ``equations``.
+        mode: contact, and the directions in which motor and load slide.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+
+    Returns:
+        State, mode, how far it is [s], and the guard that ends the mode (``NO_EVENT``: none does).
+    """
+    x, mode = joined_body(x, mode, p, T_l)
+    x, mode, _ = settled(x, mode, 0, p, u, T_l)
+    x, mode, elapsed, _, which = smooth_to_event(x, mode, p, u, T_l, h, 0.0, 0)
+    return (refused(x) if which == TOO_MUCH else x, mode, elapsed, which)
+
+
+def smooth_to_event(
+    x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float, elapsed: float, work: int
+) -> tuple[State, Mode, float, int, int]:
+    """Return the solution at its next event, or at the end of a step.
+
+    Args:
+        x: state, as in ``equations``.
+        mode: contact, and the directions in which motor and load slide.
+        p: parameters, in the order of the FMU's table.
+        u: requested torque [N.m], delayed and saturated already.
+        T_l: load torque [N.m].
+        h: length of the step [s].
+        elapsed: time since the beginning of the step at which ``x`` is [s].
+        work: integration steps of the step so far.
+
+    Returns:
+        State, mode, time since the beginning of the step, work so far, and the guard: ``NO_EVENT``, ``TOO_MUCH`` work.
+    """
+    k1 = mode_rates(x, mode, p, u, T_l)
+    step = h - elapsed
     most = MAX_STEPS + int(MAX_STEPS_PER_SECOND * h)
     while work < most:
         work += 1
@@ -139,15 +190,7 @@ def advance_smooth(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h:
                 after, step, last = inside, turn, False
         if violated(after, mode, p, u, T_l) >= 0:
             after, step, which = locate(x, k1, mode, p, u, T_l, step)
-            work += WORK_OF_EVENT
-            x, mode = switched(after, mode, which, events, p, u, T_l)
-            x, mode, events = settled(x, mode, events + 1, p, u, T_l)
-            elapsed += step
-            k1 = mode_rates(x, mode, p, u, T_l)
-            step = h - elapsed
-            if step <= 0.0:
-                return (x, mode)
-            continue
+            return (after, mode, elapsed + step, work + WORK_OF_EVENT, which)
         x = after
         k1 = k7
         elapsed += step
@@ -157,6 +200,6 @@ def advance_smooth(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h:
                 mode = settled_mode
                 k1 = mode_rates(x, mode, p, u, T_l)
         if last:
-            return (x, mode)
+            return (x, mode, h, work, NO_EVENT)
         step *= min(5.0, 0.9 * error**-0.2) if error > 1e-10 else 5.0
-    return (refused(x), mode)
+    return (x, mode, elapsed, work, TOO_MUCH)

@@ -14,6 +14,7 @@ from orchestrator.errors import FmuError, OutputError
 from orchestrator.shared.results import BuildFound
 
 PLATFORMS = ("all", "here")
+VERSIONS = (2, 3)
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,16 +67,18 @@ def build(
     force: bool = False,
     native: bool = False,
     platforms: str = "all",
+    fmi: int = 2,
 ) -> BuildResult:
     """Build the FMUs that are missing or older than what they are made from.
 
     Args:
         names: which FMUs (default: all).
         directory: where they go (default: ``fmus/`` of the repository, or of the current folder; native ones
-            ``fmus/native/``).
+            ``fmus/native/``, those of FMI 3.0 ``fmus/fmi3/`` and ``fmus/fmi3/native/``).
         force: build also what is up to date.
         native: translate the sources to C and compile them, so that the FMUs need no Python at run time.
         platforms: of native FMUs: "all" that the compiler can make, or this one alone ("here"), which is quicker.
+        fmi: version of FMI: 2, or 3 of native FMUs.
 
     Returns:
         The path of each FMU, by name.
@@ -88,7 +91,9 @@ def build(
         >>> oc.build(["Drivetrain"])["Drivetrain"].name
         'Drivetrain.fmu'
     """
-    usual = native_directory() if native else default_directory()
+    if fmi not in VERSIONS or (fmi == 3 and not native):
+        raise FmuError(f"`fmi` must be 2, or 3 of native FMUs, but is {fmi!r}", "fmi")
+    usual = native_directory(fmi) if native else default_directory(fmi)
     folder = usual if directory is None else Path(directory)
     if folder.exists() and not folder.is_dir():
         raise OutputError(f"`directory` must be a folder, but {folder} is a file", "directory")
@@ -98,13 +103,14 @@ def build(
     if platforms not in PLATFORMS:
         raise FmuError(f"`platforms` must be one of {', '.join(PLATFORMS)}, but is {platforms!r}", "platforms")
     if native:
-        return _native(list(names) if names else None, folder, force, platforms)
+        return _native(list(names) if names else None, folder, force, platforms, fmi)
     paths = ensure_built(list(names) if names else None, folder, force=force)
     given = {"names": list(paths), "directory": str(folder), "force": force}
     return BuildResult(paths, find_toolchain().remark, given)
 
 
-def _native(names: Sequence[str] | None, folder: Path, force: bool, platforms: str) -> BuildResult:
-    paths = ensure_native(names, folder, force=force, here=platforms == "here")
+def _native(names: Sequence[str] | None, folder: Path, force: bool, platforms: str, fmi: int) -> BuildResult:
+    paths = ensure_native(names, folder, force=force, here=platforms == "here", fmi=fmi)
     given = {"names": list(paths), "directory": str(folder), "force": force, "native": True, "platforms": platforms}
+    given |= {"fmi": fmi} if fmi != 2 else {}
     return BuildResult(paths, native_remark() if platforms == "all" else None, given)

@@ -6,10 +6,15 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from orchestrator.api.shown import Block, Result
-from orchestrator.checking.check import CheckOptions, check_fmu
+from orchestrator.checking.batch import check_fmus, chosen_policy, find_fmus
+from orchestrator.checking.check import CheckOptions
 from orchestrator.checking.findings import Finding, FmuFindings
-from orchestrator.checking.writing import as_junit, as_lines, as_results
-from orchestrator.errors import FmuError
+from orchestrator.checking.formats.code_quality import as_code_quality
+from orchestrator.checking.formats.junit import as_junit
+from orchestrator.checking.formats.sarif import as_sarif
+from orchestrator.checking.formats.text import as_lines, as_results
+from orchestrator.checking.policy import Policy
+from orchestrator.checking.verdict import Verdict
 from orchestrator.shared.isolation.archives import ArchiveLimits
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
 from orchestrator.shared.results import CheckFound
@@ -20,39 +25,60 @@ class CheckResult(Result):
     """The findings on one FMU or several.
 
     Attributes:
-        reports: one for each FMU.
+        verdicts: one for each FMU.
         arguments: what was asked for.
     """
 
     command: ClassVar[str] = "check"
-    reports: tuple[FmuFindings, ...]
+    verdicts: tuple[Verdict, ...]
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
-        """Whether no FMU has a finding of severity "error"."""
-        return all(report.ok for report in self.reports)
+        """Whether no FMU has a finding that fails: an error, where the policy says nothing else."""
+        return all(verdict.ok for verdict in self.verdicts)
+
+    @property
+    def reports(self) -> tuple[FmuFindings, ...]:
+        """What the checks found, before the policy: one for each FMU."""
+        return tuple(verdict.report for verdict in self.verdicts)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """All findings, FMU after FMU, errors first."""
-        return tuple(finding for report in self.reports for finding in report.findings)
+        """The findings of the rules that count, FMU after FMU, errors first."""
+        return tuple(issue.finding for verdict in self.verdicts for issue in verdict.issues)
 
     def blocks(self) -> Sequence[Block]:
         """Return the lines of each FMU."""
-        return [line for report in self.reports for line in as_lines(report)]
+        return [line for verdict in self.verdicts for line in as_lines(verdict)]
 
     def junit(self) -> str:
-        """Write the findings as JUnit XML.
+        """Write the verdicts as JUnit XML.
 
         Returns:
-            The XML text: a suite per FMU, a case per finding.
+            The XML text: a suite per FMU, a case per rule.
         """
-        return as_junit(self.reports)
+        return as_junit(self.verdicts)
+
+    def sarif(self) -> str:
+        """Write the verdicts as SARIF 2.1.0.
+
+        Returns:
+            The JSON text: one run.
+        """
+        return as_sarif(self.verdicts)
+
+    def code_quality(self) -> str:
+        """Write the findings as GitLab's Code Quality report.
+
+        Returns:
+            The JSON text.
+        """
+        return as_code_quality(self.verdicts)
 
     def results(self, place: Path | None = None) -> CheckFound:
         """Return what ``check.json`` says."""
-        return as_results(self.reports)
+        return as_results(self.verdicts)
 
 
 def check(
@@ -60,10 +86,11 @@ def check(
     *,
     static: bool = False,
     trust: bool = False,
+    policy: Policy | Path | str | None = None,
     time_limit: float = Limits().time,
     memory_limit: float = Limits().memory / MEBIBYTE,
     size_limit: float = ArchiveLimits().total / MEBIBYTE,
-    progress: Callable[[FmuFindings], None] = lambda report: None,
+    progress: Callable[[Verdict], None] = lambda verdict: None,
 ) -> CheckResult:
     """Check FMUs for compliance with FMI; an FMU is run in a process of its own.
 
@@ -71,16 +98,18 @@ def check(
         fmus: an FMU, an unpacked FMU or a folder with FMUs, or several of these.
         static: execute nothing.
         trust: run FMUs without the kernel's walls around them; limits remain.
+        policy: which rules count, and how much: a file such as ``fmu-check.toml`` (default: all rules, as they are).
         time_limit: wall time that one call may take [s].
         memory_limit: memory that the running FMU may take [MiB].
         size_limit: size that the unpacked FMU may have [MiB].
-        progress: called with the report of each FMU as it is ready.
+        progress: called with the verdict on each FMU as it is ready.
 
     Returns:
         All findings; ``ok`` when none is an error.
 
     Raises:
         FmuError: a path does not exist, or a folder has no FMU.
+        InputError: the policy or its baseline is wrong.
 
     Example:
         >>> assert oc.check("other.fmu").ok
@@ -96,38 +125,10 @@ def check(
         "fmus": [str(p) for p in paths],
         "static": static,
         "trust": trust,
+        "policy": policy if policy is None or isinstance(policy, Policy) else str(policy),
         "time_limit": time_limit,
         "memory_limit": memory_limit,
         "size_limit": size_limit,
     }
-    reports = []
-    for path in paths:
-        reports.append(check_fmu(path, options))
-        progress(reports[-1])
-    return CheckResult(tuple(reports), given)
-
-
-def find_fmus(paths: Sequence[Path | str]) -> list[Path]:
-    """Return the FMUs that paths mean: files, unpacked FMUs, and the ``*.fmu`` of folders.
-
-    Args:
-        paths: files and folders.
-
-    Returns:
-        Each FMU once, in their order.
-
-    Raises:
-        FmuError: a path does not exist, or a folder has no FMU.
-    """
-    found: list[Path] = []
-    for path in map(Path, paths):
-        if path.is_dir() and not (path / "modelDescription.xml").exists():
-            inside = sorted(p for p in path.iterdir() if p.suffix.lower() == ".fmu")
-            if not inside:
-                raise FmuError(f"a folder must have *.fmu files or a modelDescription.xml, but {path} has neither")
-            found += inside
-        elif path.is_file() or path.is_dir():
-            found.append(path)
-        else:
-            raise FmuError(f"an FMU must be an existing file or folder, but {path} is not")
-    return list(dict.fromkeys(found))
+    rules = policy if isinstance(policy, Policy) else chosen_policy(policy)
+    return CheckResult(tuple(check_fmus(paths, options, rules, progress)), given)

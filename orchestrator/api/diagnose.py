@@ -157,7 +157,7 @@ def comparable_record(given: Record | Path | str, model: Model, **reading: Any) 
     Args:
         given: a record or its path.
         model: the model.
-        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
 
     Returns:
         The record.

@@ -17,7 +17,7 @@ def plausible_record(record: Record | Path | str, model: Model, motor_only: bool
         record: a record or its path.
         model: what it is compared with.
         motor_only: leave the load encoder out.
-        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
 
     Returns:
         The record.

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -194,6 +194,7 @@ def inspect(
     part: tuple[float, float] | None = None,
     resample: str | None = None,
     rate: float | None = None,
+    header: int | None = None,
 ) -> InspectResult:
     """Look at a record before any fit: what is in it, what it would show, what is assumed.
 
@@ -203,6 +204,7 @@ def inspect(
         part: first and last time to keep [s] (default: all).
         resample: as ``read_record`` has it.
         rate: as ``read_record`` has it [Hz].
+        header: as ``read_record`` has it.
 
     Returns:
         Channels, excitation, the smallest gap and effects that would show, better experiments and a model file.
@@ -217,11 +219,12 @@ def inspect(
         True
     """
     base = read_model(None) if model is None else model
+    base = base if header is None else replace(base, header=header)
     assumed: tuple[str, ...] = ()
     columns = dict(base.columns)
     if not isinstance(record, Record):
-        columns, assumed = assumed_columns(Path(record), columns)
-        base = Model(base.fmu, base.parameters, base.encoders, columns, base.source)
+        columns, assumed = assumed_columns(Path(record), columns, base.header)
+        base = replace(base, columns=columns)
     measured = as_record(record, base, part=part, resample=resample, rate=rate)
     origin: Mapping[str, str] = {}
     machine = base
@@ -240,5 +243,8 @@ def inspect(
     return InspectResult(
         measured, machine, tuple(channels_of(measured)), tuple(excitation_of(measured)), delay_between(measured),
         reversals_of(measured), enough, tuple(effects), assumed, text,
-        {"record": measured.source, "model": base.source, "part": part, "resample": resample, "rate": rate},
+        {
+            "record": measured.source, "model": base.source, "part": part, "resample": resample, "rate": rate,
+            "header": header,
+        },
     )  # fmt: skip

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from orchestrator.errors import RecordError
 from orchestrator.records import model_file, record
 from orchestrator.records.columns import Column
 from orchestrator.records.loading import Reading
@@ -18,6 +19,8 @@ def read_record(
     part: tuple[float, float] | None = None,
     resample: str | None = None,
     rate: float | None = None,
+    torque_needed: bool = True,
+    header: int | None = None,
 ) -> Record:
     """Read a measured record.
 
@@ -30,6 +33,9 @@ def read_record(
         resample: "uniform" where only the stamps jitter, "linear" or "cubic" (default: refuse times that are not
             uniform).
         rate: samples per second to come down to [Hz] (default: as in the file).
+        torque_needed: refuse a log of two angles without a torque; else its ``u`` is NaN.
+        header: line of a text that holds the names, from 1; 0: there are none (default: the last line before the
+            longest run of rows of numbers).
 
     Returns:
         The record in SI units; its arrays have shape (n,).
@@ -42,7 +48,7 @@ def read_record(
         >>> record.size, round(record.duration, 2)
         (4000, 20.0)
     """
-    return record.read_record(Path(path), columns or {}, reading=Reading(part, resample, rate))
+    return record.read_record(Path(path), columns or {}, reading=Reading(part, resample, rate, torque_needed, header))
 
 
 def read_model(path: Path | str | None = None) -> Model:
@@ -66,13 +72,14 @@ def read_model(path: Path | str | None = None) -> Model:
     return model_file.read_model(None if path is None else Path(path))
 
 
-def as_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
+def as_record(given: Record | Path | str, model: Model, torque_needed: bool = True, **reading: Any) -> Record:
     """Return a record, read with the model's columns where a path is given.
 
     Args:
         given: a record or the path of one.
         model: whose ``columns`` say what the file calls them.
-        reading: ``part``, ``resample`` and ``rate`` of ``read_record``, for a path.
+        torque_needed: whether two angles without a torque are refused.
+        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
 
     Returns:
         The record.
@@ -80,4 +87,10 @@ def as_record(given: Record | Path | str, model: Model, **reading: Any) -> Recor
     Raises:
         RecordError: as ``read_record``.
     """
-    return given if isinstance(given, Record) else read_record(given, model.columns, **reading)
+    if not isinstance(given, Record):
+        header = reading.pop("header", None)
+        header = model.header if header is None else header
+        return read_record(given, model.columns, torque_needed=torque_needed, header=header, **reading)
+    if torque_needed and not given.has_torque:
+        raise RecordError(f"{given.source}: `u` must hold numbers, but the record has no torque")
+    return given

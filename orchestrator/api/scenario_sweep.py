@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -45,13 +46,30 @@ class ScenarioSweepResult(AnySweepResult):
             rows.append(_last_values(row, len(self.scenario.record)))
         name = self.scenario.name
         title = f"{name}: {len(self.cases)} cases, {self.failed} failed; last values, more in sweep.csv"
-        return [table(title, [*self.cases.names, *self.scenario.record], rows)]
+        shown: list[Block] = [table(title, [*self.cases.names, *self.scenario.record], rows)]
+        remarked, first = self._remarks
+        if remarked:
+            shown.append(f"Note: {remarked} of {len(self.cases)} cases have remarks, see sweep.csv; the first: {first}")
+        return shown
+
+    @cached_property
+    def _remarks(self) -> tuple[int, str]:
+        """How many cases have remarks, and those of the first."""
+        count, first = 0, ""
+        for row in self.rows():
+            text = str(row.outcome.values[-1]) if row.outcome.status is Status.DONE else ""
+            first = first or text
+            count += bool(text)
+        return count, first
 
     def results(self, place: Path | None = None) -> SweepFound:
         """Return what ``sweep.json`` says."""
+        remarked, first = self._remarks
         return SweepFound(
             cases=len(self.cases),
             failed=self.failed,
+            remarked=remarked,
+            first_remark=first,
             columns=self.columns(),
             scenario=SweptScenario(self.scenario.name, list(self.scenario.record), self.scenario.stop),
             isolation=self.isolation,
@@ -108,5 +126,5 @@ def _last_values(row: Row, count: int) -> list[str]:
     if row.outcome.status is not Status.DONE:
         message = f"{row.outcome.status.value}: {row.outcome.message}"
         return [*start, message, *[""] * (count - 1)]
-    last = row.outcome.values[:: len(SUMMARIES)]
+    last = row.outcome.values[: -1 : len(SUMMARIES)]
     return start + [f"{v:.6g}" if isinstance(v, float) else str(v) for v in last]

@@ -16,7 +16,8 @@ from orchestrator.scenarios import scenario as scenarios
 from orchestrator.scenarios.isolated import Safety, described
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.read import opened_ssp
-from orchestrator.shared.results import SignalFound, SignalsFound, WallsFound
+from orchestrator.shared.operating_system import LIMITS
+from orchestrator.shared.results import RemarkFound, SignalFound, SignalsFound, WallsFound
 
 Array = NDArray[np.float64]
 HEAD = ("signal", "unit", "first", "last", "smallest", "largest")
@@ -99,8 +100,11 @@ class SimulationResult(Result):
         draw_signals(Path(path), self.time, {name: self[name] for name in self.names}, units)
 
     def blocks(self) -> Sequence[Block]:
-        """Return the table of the signals."""
-        return [table(f"{self.title}: {self.steps} steps", HEAD, self._rows())]
+        """Return the table of the signals, and what is to be known of the run."""
+        return [
+            table(f"{self.title}: {self.steps} steps", HEAD, self._rows()),
+            *(f"Note: {remark}" for remark in self.run.remarks),
+        ]
 
     def _rows(self) -> list[list[str]]:
         rows = []
@@ -113,7 +117,8 @@ class SimulationResult(Result):
     def results(self, place: Path | None = None) -> SignalsFound:
         """Return what the JSON file says of the run."""
         signals = [SignalFound(*row) for row in self._rows()]
-        return SignalsFound(signals=signals, steps=self.steps, isolation=self.isolation)
+        remarks = [RemarkFound(r.instance, r.text, r.count) for r in self.run.remarks]
+        return SignalsFound(signals=signals, steps=self.steps, remarks=remarks, isolation=self.isolation)
 
     def write_files(self, folder: Path) -> None:
         """Write the signals as CSV; of ``simulate`` also the figure."""
@@ -178,7 +183,7 @@ def _run(
     safety = safety or Safety()
     walls = described(scenario.system, safety)
     if walls.not_enforced and tell is not None:
-        tell(f"FMUs that are not ours run with limits, but {walls.not_enforced}")
+        tell(f"FMUs that are not ours run with {LIMITS}, but {walls.not_enforced}")
     result = scenarios.simulate(scenario if stop is None else replace(scenario, stop=stop), safety)
     return SimulationResult(result, title, walls, command, given)
 

@@ -28,16 +28,21 @@ IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 _STAMP = re.compile(rb'<Build fingerprint="([0-9a-f]{64})"')
 
 
-def default_directory() -> Path:
+def default_directory(fmi: int = 2) -> Path:
     """Return where FMUs live: ``fmus/`` of the repository; of an installed package, ``fmus/`` in the current folder.
 
-    A repository that the user cannot write is an installed package, too.
+    A repository that the user cannot write is an installed package, too. FMUs of FMI 3.0 have a folder of their own
+    in it, because they have the same names.
+
+    Args:
+        fmi: version of FMI, 2 or 3.
 
     Returns:
         The folder, which may not exist yet.
     """
     beside = ROOT / "fmus"
-    return beside if (ROOT / "pyproject.toml").exists() and os.access(beside, os.W_OK) else Path("fmus")
+    folder = beside if (ROOT / "pyproject.toml").exists() and os.access(beside, os.W_OK) else Path("fmus")
+    return folder if fmi == 2 else folder / "fmi3"
 
 
 def ensure_built(
@@ -138,7 +143,8 @@ def trusted(path: Path) -> bool:
     """
     if is_ours(path):
         return True
-    if path.parent.resolve() in (ROOT / "fmus", ROOT / "fmus" / "native") and (ROOT / "pyproject.toml").exists():
+    own = (ROOT / "fmus" / folder for folder in ("", "native", "fmi3", "fmi3/native"))
+    if path.parent.resolve() in own and (ROOT / "pyproject.toml").exists():
         record(path)
         return True
     return False

@@ -32,23 +32,42 @@ WEB_FLAGS = ("-std=gnu99", *ZIG_FLAGS, "-target", "wasm32-wasi", "-mexec-model=r
 
 @dataclass(frozen=True)
 class Target:
-    """One platform: folder in ``binaries/``, suffix of its libraries, zig's names of the machines that it runs on."""
+    """One platform: folders in ``binaries/``, suffix of its libraries, zig's names of the machines that it runs on."""
 
     folder: str
+    folders3: tuple[str, ...]  # of FMI 3.0
     suffix: str
     zig: tuple[str, ...]
     system: str
     machines: tuple[str, ...]
 
+    def folders(self, fmi: int) -> tuple[str, ...]:
+        """Return its folders in ``binaries/``.
+
+        Args:
+            fmi: version of FMI, 2 or 3.
+
+        Returns:
+            The names.
+        """
+        return (self.folder,) if fmi == 2 else self.folders3
+
 
 TARGETS = (
     # An old glibc, so that the library loads on every Linux of the last ten years.
-    Target("linux64", ".so", ("x86_64-linux-gnu.2.17",), "linux", ("x86_64", "amd64")),
+    Target("linux64", ("x86_64-linux",), ".so", ("x86_64-linux-gnu.2.17",), "linux", ("x86_64", "amd64")),
     # FMI 2.0 has no name for this platform; the folder is named as in FMI 3.0.
-    Target("aarch64-linux", ".so", ("aarch64-linux-gnu.2.17",), "linux", ("aarch64", "arm64")),
-    Target("win64", ".dll", ("x86_64-windows-gnu",), "win32", ("x86_64", "amd64")),
+    Target("aarch64-linux", ("aarch64-linux",), ".so", ("aarch64-linux-gnu.2.17",), "linux", ("aarch64", "arm64")),
+    Target("win64", ("x86_64-windows",), ".dll", ("x86_64-windows-gnu",), "win32", ("x86_64", "amd64")),
     # One folder for both machines in FMI 2.0: a universal library.
-    Target("darwin64", ".dylib", ("x86_64-macos", "aarch64-macos"), "darwin", ("x86_64", "arm64", "aarch64")),
+    Target(
+        "darwin64",
+        ("x86_64-darwin", "aarch64-darwin"),
+        ".dylib",
+        ("x86_64-macos", "aarch64-macos"),
+        "darwin",
+        ("x86_64", "arm64", "aarch64"),
+    ),
 )
 
 

@@ -21,14 +21,14 @@ PAGE = """<!DOCTYPE html>
 </style></head>
 <body>
 <h1>{name}</h1>
-<p>{title}. FMI 2.0 for {interfaces}.</p>
+<p>{title}. FMI {fmi}.0 for {interfaces}.</p>
 {equations}
 {plot}
 {tables}
 <h2>Running it</h2>
 <p>{running}</p>
-<p>Refused calls change nothing: values out of range and steps that cannot be taken return fmi2Discard, calls that the
-standard forbids return fmi2Error, both with a message.</p>
+<p>Refused calls change nothing: values out of range and steps that cannot be taken return fmi{fmi}Discard, calls that
+the standard forbids return fmi{fmi}Error, both with a message.</p>
 <h2>Licence</h2>
 <p>MIT; see <a href="licenses/license.txt">licenses/license.txt</a>.{license}</p>
 </body>
@@ -49,13 +49,16 @@ PLOTTED = {
 COLOURS = ("#1b6ca8", "#c8553d", "#4b8b3b")
 
 
-def documentation(recipe: Recipe, description: Element, platforms: Sequence[str] = ()) -> dict[str, bytes]:
+def documentation(
+    recipe: Recipe, description: Element, platforms: Sequence[str] = (), fmi: int = 2
+) -> dict[str, bytes]:
     """Return members of the archive: a page, the licence and the icon.
 
     Args:
         recipe: of the FMU.
-        description: its model description.
+        description: its model description in FMI 2.0.
         platforms: of a native FMU, for which it has binaries; none for an FMU that runs Python.
+        fmi: version of FMI that the FMU has, 2 or 3.
 
     Returns:
         Content by name in the archive.
@@ -70,14 +73,16 @@ def documentation(recipe: Recipe, description: Element, platforms: Sequence[str]
         name=html.escape(description.attrib["modelName"]),
         title=html.escape(description.attrib["description"]),
         style=STYLE,
+        fmi=fmi,
         interfaces="co-simulation" if description.find("ModelExchange") is None else "co-simulation and model exchange",
         equations="\n".join(path.read_text(encoding="utf-8").strip() for path in paths if path.exists()),
         plot=_plot(recipe.class_name),
         running=RUNNING_NATIVE.format(platforms=", ".join(platforms)) if platforms else RUNNING_PYTHON,
-        license="" if platforms else PYTHONFMU_LICENSE,
+        license="" if platforms or fmi == 3 else PYTHONFMU_LICENSE,
         tables="\n".join(_table(description, *section) for section in _SECTIONS),
     )
-    files = {"documentation/index.html": page.encode(), "model.png": (DATA / "model.png").read_bytes()}
+    icon = "model.png" if fmi == 2 else "terminalsAndIcons/icon.png"
+    files = {"documentation/index.html": page.encode(), icon: (DATA / "model.png").read_bytes()}
     return files | {"documentation/licenses/license.txt": (DATA / "license.txt").read_bytes()}
 
 

@@ -13,6 +13,8 @@ from orchestrator.building.archive import write_archive
 from orchestrator.building.build import default_directory, stamp_of, trusted
 from orchestrator.building.compilers import FLAGS, TARGETS, Compiler, compile_library, find_compiler
 from orchestrator.building.documentation import documentation
+from orchestrator.building.fmi3_description import fmi3_description
+from orchestrator.building.fmi3_files import build_description
 from orchestrator.building.native_description import native_description
 from orchestrator.building.native_sources import RUNTIME, c_sources, indicator_count, slave_class
 from orchestrator.building.reference_files import reference_files
@@ -25,17 +27,24 @@ PLACEHOLDER = "{00000000-0000-0000-0000-000000000000}"
 NO_COMPILER = "native FMUs need a C compiler: install one (cc), or `pip install 'backlash-cosim[native]'` for zig"
 
 
-def native_directory() -> Path:
+def native_directory(fmi: int = 2) -> Path:
     """Return where native FMUs live: ``native/`` beside the others, because they have the same names.
+
+    Args:
+        fmi: version of FMI, 2 or 3.
 
     Returns:
         The folder, which may not exist yet.
     """
-    return default_directory() / "native"
+    return default_directory(fmi) / "native"
 
 
 def ensure_native(
-    names: Sequence[str] | None = None, directory: Path | None = None, force: bool = False, here: bool = False
+    names: Sequence[str] | None = None,
+    directory: Path | None = None,
+    force: bool = False,
+    here: bool = False,
+    fmi: int = 2,
 ) -> dict[str, Path]:
     """Return the path of each native FMU in ``names`` (default: all), after building what is missing or stale.
 
@@ -44,6 +53,7 @@ def ensure_native(
         directory: where they are (default: :func:`native_directory`).
         force: build also what is up to date.
         here: for this platform alone, with the local compiler where there is one: a second instead of half a minute.
+        fmi: version of FMI, 2 or 3.
 
     Returns:
         Path by name.
@@ -53,8 +63,8 @@ def ensure_native(
             directory cannot be written.
     """
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
-    folder = native_directory() if directory is None else directory
-    return {recipe.name: _ensure(recipe, folder, force, here) for recipe in recipes}
+    folder = native_directory(fmi) if directory is None else directory
+    return {recipe.name: _ensure(recipe, folder, force, here, fmi) for recipe in recipes}
 
 
 def _needed_compiler(here: bool = False) -> Compiler:
@@ -85,17 +95,19 @@ def native_remark() -> str | None:
     )
 
 
-def native_fingerprint(recipe: Recipe, compiler: Compiler) -> str:
+def native_fingerprint(recipe: Recipe, compiler: Compiler, fmi: int = 2) -> str:
     """Return what changes whenever a native build would.
 
     Args:
         recipe: of the FMU.
         compiler: what makes the binaries.
+        fmi: version of FMI, 2 or 3.
 
     Returns:
         A hash.
     """
     options = {
+        "fmi": fmi,
         "name": recipe.name,
         "class": recipe.class_name,
         "starts": {name: float(value).hex() for name, value in sorted(recipe.starts.items())},
@@ -112,8 +124,11 @@ def _builder_files() -> tuple[Path, ...]:
     here = Path(__file__).parent
     names = (
         "archive",
+        "arrays",
         "compilers",
         "documentation",
+        "fmi3_description",
+        "fmi3_files",
         "native_build",
         "native_description",
         "native_sources",
@@ -125,37 +140,42 @@ def _builder_files() -> tuple[Path, ...]:
     return (*files, *DATA_FILES)
 
 
-def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool) -> Path:
+def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int) -> Path:
     compiler = _needed_compiler(here)
     path = directory / f"{recipe.name}.fmu"
-    current = native_fingerprint(recipe, compiler)
+    current = native_fingerprint(recipe, compiler, fmi)
     if force or stamp_of(path) != current or not trusted(path):
-        write_archive(path, _native_members(recipe, compiler, current))
+        write_archive(path, _native_members(recipe, compiler, current, fmi))
         record(path)
     return path
 
 
-def _native_members(recipe: Recipe, compiler: Compiler, fingerprint: str) -> dict[str, bytes]:
+def _native_members(recipe: Recipe, compiler: Compiler, fingerprint: str, fmi: int) -> dict[str, bytes]:
     """Return the members of the archive.
 
     Args:
         recipe: of the FMU.
         compiler: what makes the binaries.
         fingerprint: from :func:`native_fingerprint`.
+        fmi: version of FMI, 2 or 3.
 
     Raises:
         FmuError: the slave is outside the translated subset, or the compiler fails.
     """
-    cls = slave_class(recipe)
-    sources = c_sources(recipe, cls, PLACEHOLDER)
+    cls = slave_class(recipe, fmi)
+    sources = c_sources(recipe, cls, PLACEHOLDER, fmi)
+    folders = {target: target.folders(fmi) for target in compiler.targets}
     description = native_description(recipe, cls, indicator_count(sources[f"{recipe.name}.c"]))
-    members = documentation(recipe, description, [target.folder for target in compiler.targets])
+    members = documentation(recipe, description, [name for names in folders.values() for name in names], fmi)
     members |= reference_files(recipe, description)
+    if fmi == 3:
+        description = fmi3_description(cls, recipe.name, native=True)
+        sources["buildDescription.xml"] = build_description(recipe.name)
     stamp(description, fingerprint)
     guid = content_guid(description, members | {f"sources/{name}": data for name, data in sources.items()})
     sources = {name: data.replace(PLACEHOLDER.encode(), guid.encode()) for name, data in sources.items()}
     members |= {f"sources/{name}": data for name, data in sources.items()}
     for target in compiler.targets:
         library = compile_library(compiler, target, recipe.name, sources)
-        members[f"binaries/{target.folder}/{recipe.name}{target.suffix}"] = library
+        members |= {f"binaries/{folder}/{recipe.name}{target.suffix}": library for folder in folders[target]}
     return members | {"modelDescription.xml": final_text(description, guid)}

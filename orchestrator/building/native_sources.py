@@ -8,16 +8,22 @@ import textwrap
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
+from orchestrator.building.arrays import arrays
+from orchestrator.building.fmi3_description import INDICATOR
 from orchestrator.building.sources import Recipe, closure
 from orchestrator.building.starts import default_starts
-from orchestrator.building.translation.slave import translate_slave
+from orchestrator.building.translation.slave import has_states, translate_slave
 from orchestrator.errors import FmuError
 from pyfmu_sources.fmu_variables import FmuVariable
 
 RUNTIME = Path(__file__).parent / "native_fmu"
-_HEADERS = ("translated.h", "fmi2_types.h", "fmi2_slave.h", "fmi2_model_exchange.h", "fmi2_states.h", "pairs.h")
+_HEADERS = ("translated.h", "pairs.h", "slave_types.h", "slave_core.h", "slave_states.h", "slave_exchange.h")
+_OF_VERSION = {
+    2: ("fmi2_types.h", "fmi2_slave.h", "fmi2_model_exchange.h"),
+    3: ("fmi3_types.h", "fmi3_slave.h", "fmi3_steps.h", "fmi3_updates.h", "fmi3_absent.h"),
+}
 _FILE = """/* {name}: {title}
  *
  * Made by backlash-cosim from {files}:
@@ -37,21 +43,22 @@ _FILE = """/* {name}: {title}
 /* {line} */
 /* What the runtime has to know of this slave. */
 
-#include "fmi2_types.h"
+#include "slave_types.h"
 
 {tables}
 
 #define GUID "{guid}"
 
-#include "fmi2_slave.h"
+#include "fmi{fmi}_slave.h"
 """
 
 
-def slave_class(recipe: Recipe) -> Any:
+def slave_class(recipe: Recipe, fmi: int = 2) -> Any:
     """Return the adapter of a recipe with the recipe's name and start values, as a class of its own.
 
     Args:
         recipe: of the FMU.
+        fmi: version of FMI, 2 or 3; in the latter event indicators are variables too.
 
     Returns:
         The class.
@@ -65,7 +72,7 @@ def slave_class(recipe: Recipe) -> Any:
         cls.customise(recipe.name, "native", default_starts(recipe.class_name) | dict(recipe.starts))
     except ValueError as error:
         raise FmuError(str(error)) from None
-    cls.table = (*cls.table, *_state_variables(cls))
+    cls.table = (*cls.table, *_state_variables(cls), *(_indicators(cls) if fmi == 3 else ()))
     cls._index()
     return cls
 
@@ -80,13 +87,23 @@ def _state_variables(cls: Any) -> Iterator[FmuVariable]:
         yield FmuVariable(f"der({name})", "local", rate, None, f"Rate of: {text}", derivative_of=name)
 
 
-def c_sources(recipe: Recipe, cls: Any, guid: str) -> dict[str, bytes]:
+def _indicators(cls: Any) -> Iterator[FmuVariable]:
+    """Yield the event indicators as variables."""
+    if not has_states(cls):
+        return
+    count = len(get_type_hints(cls.indicators)["return"].__args__)
+    for n in range(1, count + 1):
+        yield FmuVariable(f"{INDICATOR}[{n}]", "local", description="Positive until an event ends the mode")
+
+
+def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, bytes]:
     """Return the members of ``sources/``: file name to content.
 
     Args:
         recipe: of the FMU.
         cls: from :func:`slave_class`.
         guid: of the FMU.
+        fmi: version of FMI, 2 or 3.
 
     Returns:
         Content by file name.
@@ -94,7 +111,7 @@ def c_sources(recipe: Recipe, cls: Any, guid: str) -> dict[str, bytes]:
     Raises:
         FmuError: the slave is outside the subset that can be translated; the message names file and line.
     """
-    translated = translate_slave(cls, _runtime_names())
+    translated = translate_slave(cls, _runtime_names(), fmi)
     files = ", ".join(path.name for path in closure(recipe.module) if path.stem not in _PYTHON_ONLY)
     text = _FILE.format(
         name=recipe.name,
@@ -102,15 +119,34 @@ def c_sources(recipe: Recipe, cls: Any, guid: str) -> dict[str, bytes]:
         files="\n * ".join(textwrap.wrap(files, 110)),
         line="-" * 110,
         guid=guid,
+        fmi=fmi,
         types=translated.types,
         constants=translated.constants,
         prototypes=translated.prototypes,
         definitions=translated.definitions,
-        tables=translated.tables,
+        tables=translated.tables + (f"\n\n{_counts(cls)}" if fmi == 3 else ""),
     )
-    needed = [name for name in _HEADERS if name != "pairs.h" or '"pairs.h"' in translated.types]
+    needed = [name for name in (*_HEADERS, *_OF_VERSION[fmi]) if _is_needed(name, cls, translated.types)]
     headers = {name: (RUNTIME / name).read_bytes() for name in needed}
     return {f"{recipe.name}.c": text.encode("utf-8"), **headers}
+
+
+def _is_needed(header: str, cls: Any, types: str) -> bool:
+    if header in ("slave_exchange.h", "fmi2_model_exchange.h", "fmi3_updates.h"):
+        return has_states(cls)
+    return header != "pairs.h" or '"pairs.h"' in types
+
+
+def _counts(cls: Any) -> str:
+    """Return the C table of how many values there are at each value reference, and where event indicators stand."""
+    counts = [0] * len(cls.table)
+    indicators = ""
+    for array in arrays(cls.table):
+        counts[array.first] = len(array.variables)
+        if array.name == INDICATOR:
+            indicators = f"\n#define FIRST_INDICATOR {array.first}"
+    numbers = textwrap.fill(", ".join(map(str, counts)), 110, initial_indent="    ", subsequent_indent="    ")
+    return f"static const unsigned short counts[] = {{\n{numbers}}};{indicators}"
 
 
 def indicator_count(source: bytes) -> int:
@@ -133,7 +169,7 @@ _PYTHON_ONLY = ("slave_base", "sampled_slave", "fmu_variables", "hidden_state", 
 def _runtime_names() -> frozenset[str]:
     """Return every identifier in the runtime's code, so that translated names keep clear of them."""
     names: set[str] = set()
-    for file in _HEADERS:
+    for file in (*_HEADERS, *_OF_VERSION[2], *_OF_VERSION[3]):
         text = re.sub(r"/\*.*?\*/|\"[^\"\n]*\"", " ", (RUNTIME / file).read_text(encoding="utf-8"), flags=re.DOTALL)
         names |= set(re.findall(r"[A-Za-z_]\w*", text))
     return frozenset(names)

@@ -15,11 +15,15 @@ def stamp(description: Element, fingerprint: str) -> None:
         description: root of the model description.
         fingerprint: 64 hexadecimal digits.
     """
-    annotations = Element("VendorAnnotations")
-    tool = ElementTree.SubElement(annotations, "Tool", {"name": "backlash-cosim"})
+    if description.attrib["fmiVersion"] == "3.0":
+        annotations = ElementTree.SubElement(description, "Annotations")
+        tool = ElementTree.SubElement(annotations, "Annotation", {"type": "backlash-cosim"})
+    else:
+        annotations = Element("VendorAnnotations")
+        tool = ElementTree.SubElement(annotations, "Tool", {"name": "backlash-cosim"})
+        before = [child.tag for child in description].index("ModelVariables")
+        description.insert(before, annotations)
     ElementTree.SubElement(tool, "Build", {"fingerprint": fingerprint})
-    before = [child.tag for child in description].index("ModelVariables")
-    description.insert(before, annotations)
 
 
 def content_guid(description: Element, members: Mapping[str, bytes]) -> str:
@@ -46,7 +50,7 @@ def final_text(description: Element, guid: str) -> bytes:
     Returns:
         The file's content.
     """
-    description.set("guid", guid)
+    description.set("guid" if description.attrib["fmiVersion"] == "2.0" else "instantiationToken", guid)
     for element in description.iter():
         element.text = element.tail = None
     ElementTree.indent(description)

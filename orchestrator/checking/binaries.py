@@ -135,17 +135,10 @@ def _check_library(
         return
     data = files.read(path, MAXIMUM_BYTES)
     library = inspect(data)
-    wanted = _FORMAT[folder[:3]]
-    if library.format != wanted or not library.shared:
-        found = f"a {library.format} file" if library.shared else "an executable, not a shared library"
-        yield Finding("binary.format", path, f"the library must be a {wanted} shared library, but is {found}")
+    unfit = misfit(library, path, folder)
+    if unfit is not None:
+        yield unfit
         return
-    if library.bits != int(folder[-2:]):
-        yield Finding("binary.architecture", path, f"the library must be {folder[-2:]}-bit, but is {library.bits}-bit")
-        return
-    if folder == here() and library.machine != _this_machine() and library.machine != "fat":
-        message = f"the library is for {library.machine}, which this {_this_machine()} machine cannot run"
-        yield Finding("binary.architecture", path, message)
     functions = COSIMULATION_FUNCTIONS if interface is d.cosimulation else MODEL_EXCHANGE_FUNCTIONS
     missing = [f for f in functions if not _exports(library, data, f)]
     if missing:
@@ -158,6 +151,29 @@ def _check_library(
             f"the library uses {python[0]} and {len(python) - 1} more of Python without naming libpython as needed"
         )
         yield Finding("binary.python-symbols", path, message)
+
+
+def misfit(library: LibraryHeader, path: str, folder: str) -> Finding | None:
+    """Why a library cannot be loaded on the platform of its folder, as far as its header tells.
+
+    Args:
+        library: its header.
+        path, folder: where it is, such as "linux64".
+
+    Returns:
+        The finding, or None when it can.
+    """
+    wanted = _FORMAT[folder[:3]]
+    if library.format != wanted or not library.shared:
+        found = f"a {library.format} file" if library.shared else "an executable, not a shared library"
+        return Finding("binary.format", path, f"the library must be a {wanted} shared library, but is {found}")
+    if library.bits != int(folder[-2:]):
+        message = f"the library must be {folder[-2:]}-bit, but is {library.bits}-bit"
+        return Finding("binary.architecture", path, message)
+    if folder == here() and library.machine not in (_this_machine(), "fat"):
+        message = f"the library is for {library.machine}, which this {_this_machine()} machine cannot run"
+        return Finding("binary.architecture", path, message)
+    return None
 
 
 def _exports(library: LibraryHeader, data: bytes, function: str) -> bool:

@@ -1,12 +1,12 @@
-"""The check of one FMU: static first, then, if that found no error, dynamic."""
+"""The check of one FMU: static first, then dynamic, unless the FMU cannot be read or has nothing that runs here."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.checking.archive import ArchiveLimits
-from orchestrator.checking.dynamic import can_run, check_dynamic
-from orchestrator.checking.findings import FmuFindings, has_errors, ordered
-from orchestrator.checking.static import check_static
+from orchestrator.checking.dynamic import check_dynamic, obstacle
+from orchestrator.checking.findings import Execution, Finding, FmuFindings, has_errors, ordered
+from orchestrator.checking.static import StaticResult, check_static
 from orchestrator.shared.isolation.limits import Limits
 from orchestrator.shared.isolation.walls import support
 
@@ -40,18 +40,34 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     options = options or CheckOptions()
     result = check_static(path, options.archive)
     findings = list(result.findings)
-    executed = False
-    d, files = result.description, result.files
+    executions: tuple[Execution, ...] = ()
+    reason = "nothing is executed, as was asked" if options.static else _obstacle(result)
     try:
-        if not options.static and d is not None and files is not None and not has_errors(findings):
-            executed = can_run(d, files)
-            if executed:
-                findings += check_dynamic(d, files, result.references, options.limits, not options.trust)
+        if not reason:
+            assert result.description is not None
+            assert result.files is not None
+            probed, execution = check_dynamic(
+                result.description, result.files, result.references, options.limits, not options.trust
+            )
+            findings += probed
+            executions = (execution,)
+        elif not options.static and not has_errors(findings):
+            findings.append(Finding("run.not-executed", "", f"the FMU must be executed to pass, but is not: {reason}"))
     finally:
-        if files is not None:
-            files.close()
-    facts = result.facts | ({"walls": _walls(options.trust)} if executed else {})
-    return FmuFindings(str(path), ordered(findings), executed, facts)
+        if result.files is not None:
+            result.files.close()
+    facts = result.facts | ({"walls": _walls(options.trust)} if executions else {})
+    version = "2.0" if result.description is not None else ""
+    return FmuFindings(str(path), ordered(findings), version, result.stages, executions, reason, facts)
+
+
+def _obstacle(result: StaticResult) -> str:
+    """Why nothing can be executed; empty when something can. Formal faults are no reason."""
+    if result.files is None:
+        return "its archive cannot be read"
+    if result.description is None:
+        return "its modelDescription.xml cannot be read, or is of a version that is not covered"
+    return obstacle(result.description, result.files)
 
 
 def _walls(trust: bool) -> str:

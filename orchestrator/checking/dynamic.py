@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.checking.archive import FmuFiles
-from orchestrator.checking.binaries import here, library_name
+from orchestrator.checking.binaries import MAXIMUM_BYTES, here, inspect, library_name, misfit
 from orchestrator.checking.description import Description, Interface, ScalarVariable, number
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Execution, Finding
 from orchestrator.checking.layered import ReferenceResult
 from orchestrator.checking.probing import probes, probes_compare, probes_misuse, probes_reference, trajectory
 from orchestrator.checking.probing.binding import PENDING, Library, StatusError, TerminatedError
@@ -44,37 +44,41 @@ _FLAGS = (
 )
 
 
-def can_run(d: Description, files: FmuFiles) -> bool:
-    """Whether there is a co-simulation library for this machine.
+def obstacle(d: Description, files: FmuFiles) -> str:
+    """Why an FMU cannot be executed here; empty when it can.
 
     Args:
         d: the model description.
         files: of the FMU.
 
     Returns:
-        True when the FMU can be executed here.
+        The reason, in words.
     """
     interface = d.cosimulation
-    if interface is None or interface.identifier is None:
-        return False
-    return library_name(interface.identifier, here()) in files.names()
+    if interface is None:
+        return "it has no co-simulation interface"
+    path = library_name(interface.identifier or "", here())
+    if path not in files.names():
+        return f"there is no {path}, which this machine would load"
+    unfit = misfit(inspect(files.read(path, MAXIMUM_BYTES)), path, here())
+    return "" if unfit is None else unfit.message
 
 
 def check_dynamic(
     d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits, walls: bool = True
-) -> list[Finding]:
+) -> tuple[list[Finding], Execution]:
     """Run the FMU in a child process and report what it did.
 
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
 
     Args:
-        d, files: of an FMU whose static checks found no error, and for which ``can_run`` is true.
+        d, files: of an FMU without an ``obstacle``.
         references: reference results; each is simulated.
         limits: of the child process.
         walls: whether the kernel shall keep the FMU from files, network and other processes.
 
     Returns:
-        What it did wrong.
+        What it did wrong, and which probes were carried out.
 
     Raises:
         OutputError: there is no room to unpack the FMU.
@@ -87,13 +91,13 @@ def check_dynamic(
             files.extract(fmu)
         except OSError as error:
             raise OutputError(f"the FMU must be unpacked to {scratch.path}, but cannot be: {error.strerror}") from None
-        findings: list[Finding] = []
-        for position, reference in enumerate(references or [None]):
-            probes = PROBES if position == 0 else ("reference",)
-            if position and any(f.severity == "error" for f in findings):
+        first = _Watcher(fmu, limits, walls)
+        findings = first.run(_job(d, interface, fmu, references[0] if references else None, limits), PROBES)
+        for reference in references[1:]:
+            if any(f.severity == "error" for f in findings):
                 break
-            findings += _Watcher(fmu, limits, walls).run(_job(d, interface, fmu, reference, limits), probes)
-    return findings
+            findings += _Watcher(fmu, limits, walls).run(_job(d, interface, fmu, reference, limits), ("reference",))
+    return findings, Execution(interface.element.tag, first.stages)
 
 
 class _Watcher:
@@ -103,7 +107,7 @@ class _Watcher:
         self.fmu, self.limits, self.walls = fmu, limits, walls
         self.findings: list[Finding] = []
         self.probe = "load"
-        self.stopped = False
+        self.stages: dict[str, str] = {}
 
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
@@ -115,11 +119,11 @@ class _Watcher:
             try:
                 self._probes(library, job, names)
             except ChildError as error:
-                self.stopped = True
                 self._ended_early(error, library.current)
             left = jail.finish()
             self._skipped(names)
             self._left_behind(before, jail, left)
+            self.stages |= dict.fromkeys(("run", "afterwards"), "")
         return self.findings
 
     def _probes(self, library: Library, job: ProbeJob, names: tuple[str, ...]) -> None:
@@ -128,19 +132,21 @@ class _Watcher:
             self._add("load.library", f"the library must load, but: {problem}")
             return
         probes.load(library, self._add)
+        self.stages["load"] = ""
         single = "canBeInstantiatedOnlyOncePerProcess" in job.flags
         context = probes.Context(probes.Bench(job, library), self._add, single=single)
         for self.probe in names:
             try:
-                go_on = _PROBES[self.probe](context)
+                _PROBES[self.probe](context)
+            except probes.SkippedError as reason:
+                self.stages[self.probe] = str(reason)
+                continue
             except TerminatedError:
-                go_on = True  # the slave ended this run earlier than the undisturbed one: nothing to compare
+                pass  # the slave ended this run earlier than the undisturbed one: nothing to compare
             except StatusError as error:
                 self._add(_rule_of(error), str(error))
-                go_on = False
-            if not go_on:
-                self.stopped = True
                 return
+            self.stages[self.probe] = ""
 
     def _add(self, rule: str, message: str, path: str = "") -> None:
         if len(self.findings) < _MOST_FINDINGS:
@@ -163,9 +169,12 @@ class _Watcher:
             self._add("run.failed", f"the probe `{self.probe}` must end, but {error} ({error.said})")
 
     def _skipped(self, names: tuple[str, ...]) -> None:
-        rest = names[names.index(self.probe) + 1 :] if self.probe in names else names
-        if rest and (self.stopped or self.probe == "load"):
-            self._add("run.skipped", f"not carried out after that: {', '.join(rest)}")
+        """Say what was not reached, and why."""
+        missing = [name for name in names if name not in self.stages]
+        ended = f"the run ended in the probe `{self.probe}`"
+        self.stages |= dict.fromkeys(missing, ended)
+        if missing[1:] or "load" not in self.stages:
+            self._add("run.skipped", f"not carried out after that: {', '.join(missing[1:] or missing)}")
 
     def _left_behind(self, before: dict[str, tuple[int, int]], jail: Jail, left: bool) -> None:
         self.probe = "afterwards"
@@ -223,17 +232,21 @@ def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:
 def _job(
     d: Description, interface: Interface, fmu: Path, reference: ReferenceResult | None, limits: Limits
 ) -> ProbeJob:
-    start = d.experiment("startTime") or 0.0
+    start = _or(d.experiment("startTime"), 0.0)
     stop = d.experiment("stopTime")
+    if stop is not None and not start < stop < math.inf:
+        stop = None  # a finding already
     length = (stop if stop is not None else start + 1.0) - start
     step = d.experiment("stepSize") or length / _STEPS
+    if not 0.0 < step <= length:
+        step = length / _STEPS
     # Steps beyond the stop time may be refused, so a fraction of one is left out.
     steps = max(1, math.floor(min(_STEPS, length / step + 1e-6)))
     return ProbeJob(
         library=str(fmu / library_name(str(interface.identifier), here())),
         guid=d.root.get("guid", ""),
         resources=(fmu / "resources").as_uri(),
-        variables=tuple(_plain(v, v.reference) for v in d.variables if v.reference is not None),
+        variables=tuple(_plain(v, v.reference) for v in d.variables if v.reference is not None and v.kind),
         start=start,
         stop=stop,
         step=step,
@@ -243,6 +256,10 @@ def _job(
         flags=frozenset(f for f in _FLAGS if interface.flag(f)),
         reference=reference,
     )
+
+
+def _or(value: float | None, default: float) -> float:
+    return default if value is None or not math.isfinite(value) else value
 
 
 def _plain(v: ScalarVariable, reference: int) -> trajectory.ProbedVariable:

@@ -1,8 +1,9 @@
 """What the checks report: one flat list of findings per FMU."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from orchestrator.checking.rules import RULES, Severity
 
@@ -42,6 +43,43 @@ class Finding:
         return RULES[self.rule].advice
 
 
+Outcome = Literal["passed", "failed", "not run"]
+
+
+@dataclass(frozen=True)
+class RuleOutcome:
+    """What became of one rule on one FMU.
+
+    Attributes:
+        rule: key of ``RULES``.
+        outcome: "failed" with a finding of the rule, "passed" when its stage was carried out without one.
+        reason: why it was not run; empty otherwise.
+    """
+
+    rule: str
+    outcome: Outcome
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Execution:
+    """How far one interface of an FMU was executed.
+
+    Attributes:
+        interface: "CoSimulation", "ModelExchange" or "ScheduledExecution".
+        stages: what was done with the running FMU, "load" and then every probe by name: empty when it was carried
+            out, otherwise why it was not.
+    """
+
+    interface: str
+    stages: Mapping[str, str]
+
+    @property
+    def carried_out(self) -> tuple[str, ...]:
+        """The stages that were carried out."""
+        return tuple(stage for stage, reason in self.stages.items() if not reason)
+
+
 @dataclass(frozen=True)
 class FmuFindings:
     """All that was found about one FMU.
@@ -49,14 +87,43 @@ class FmuFindings:
     Attributes:
         fmu: path as the user gave it.
         findings: sorted by severity, then in the order found.
-        executed: whether the FMU's binary was run.
+        version: "2.0" or "3.0"; empty where the check got not so far, or the version is another one.
+        stages: the stages that execute nothing, by name: empty when carried out, otherwise why not.
+        executions: one for each interface that was run, or tried.
+        not_executed: why nothing was executed; empty when something was.
         facts: what is known about the FMU (name, version, platforms, …), for the reader.
     """
 
     fmu: str
     findings: tuple[Finding, ...]
-    executed: bool = False
+    version: str = ""
+    stages: Mapping[str, str] = field(default_factory=dict)
+    executions: tuple[Execution, ...] = ()
+    not_executed: str = ""
     facts: Facts = field(default_factory=dict)
+
+    @property
+    def executed(self) -> bool:
+        """Whether the FMU's binary was run."""
+        return any("load" in execution.carried_out for execution in self.executions)
+
+    @property
+    def outcomes(self) -> tuple[RuleOutcome, ...]:
+        """What became of each rule of the FMU's version (of every rule while the version is not known)."""
+        failed = {f.rule for f in self.findings}
+        rules = (name for name, rule in RULES.items() if not self.version or self.version in rule.versions)
+        return tuple(self._outcome(name, name in failed) for name in rules)
+
+    def _outcome(self, rule: str, failed: bool) -> RuleOutcome:
+        if failed:
+            return RuleOutcome(rule, "failed")
+        stage = RULES[rule].stage
+        reasons = [e.stages[stage] for e in self.executions if stage in e.stages]
+        if stage in self.stages:
+            reasons.append(self.stages[stage])
+        if "" in reasons:
+            return RuleOutcome(rule, "passed")
+        return RuleOutcome(rule, "not run", reasons[0] if reasons else self.not_executed)
 
     def count(self, severity: str) -> int:
         """Number of findings of one severity.

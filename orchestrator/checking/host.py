@@ -10,7 +10,8 @@ from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from typing import Any
 
-_LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+from orchestrator.checking.probing.varargs import LOGGER, fill_in
+
 _TYPES: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
 _MESSAGES = 4
 _LONGEST_TEXT = 1 << 20
@@ -18,7 +19,7 @@ _LONGEST_TEXT = 1 << 20
 
 class _Callbacks(ctypes.Structure):
     _fields_ = (
-        ("logger", _LOGGER),
+        ("logger", LOGGER),
         ("allocateMemory", c_void_p),
         ("freeMemory", c_void_p),
         ("stepFinished", c_void_p),
@@ -48,13 +49,15 @@ class Host:
         self._states: dict[int, c_void_p] = {}
         self._number = 0
         self._messages: list[str] = []
-        self._logger = _LOGGER(self._log)
+        self._logger = LOGGER(self._log)
 
-    def _log(self, _environment: int, _name: bytes, _status: int, _category: bytes, message: bytes) -> None:
-        # The arguments behind the format cannot be read here: the format says enough.
-        text = (message or b"").decode("utf-8", "replace").strip()[:200]
+    def _log(self, _environment: int, _name: bytes, _status: int, _category: bytes, message: int, *rest: Any) -> None:
+        self._take(fill_in(message, rest))
+
+    def _take(self, text: str) -> None:
+        """Keep a message, the last few of a call."""
         if text:
-            self._messages = [*self._messages[1 - _MESSAGES :], text]
+            self._messages = [*self._messages[1 - _MESSAGES :], text[:200]]
 
     def load(self, path: str) -> str:
         """Load the library; return why that fails, or nothing.

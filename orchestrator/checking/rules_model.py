@@ -13,6 +13,7 @@ from orchestrator.checking.units import dimension_of
 from orchestrator.checking.xml_reading import xpath
 
 _DATE = re.compile(r"\d{4}-(0[1-9]|1[0-2])-(0[1-9]|[12]\d|3[01])T([01]\d|2[0-3]):[0-5]\d:([0-5]\d|60)Z")
+_ANY_DATE = re.compile(r"-?\d{4,}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?(Z|[+-]\d\d:\d\d)?")  # the schema has the rest
 C_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _C_KEYWORD = re.compile(
     r"auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|long"
@@ -41,8 +42,8 @@ def _head(d: Description) -> Iterator[Finding]:
     if root.get("guid") is not None and not root.get("guid", "").strip():
         yield Finding("model.guid", xpath(root, "guid"), "the guid must not be empty, but is")
     date = root.get("generationDateAndTime")
-    if date is not None and not _DATE.fullmatch(date):
-        message = f"generationDateAndTime must be YYYY-MM-DDThh:mm:ssZ (UTC), but is {date!r}"
+    if date is not None and _ANY_DATE.fullmatch(date) and not _DATE.fullmatch(date):
+        message = f"generationDateAndTime should be YYYY-MM-DDThh:mm:ssZ (UTC), but is {date!r}"
         yield Finding("model.date", xpath(root, "generationDateAndTime"), message)
     yield from _unique(root.findall("LogCategories/Category"), "model.log-category", "log category")
     yield from _unique(root.findall("VendorAnnotations/Tool"), "model.vendor-annotation", "vendor annotation")

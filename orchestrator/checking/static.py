@@ -13,6 +13,8 @@ from orchestrator.checking.rules_model import check_model
 from orchestrator.checking.rules_variables import check_variables
 from orchestrator.checking.schema import check_schema, check_with_fmpy
 
+STAGES = ("archive", "xml", "schema", "description", "files", "binaries")
+
 
 @dataclass(frozen=True)
 class StaticResult:
@@ -20,10 +22,12 @@ class StaticResult:
 
     Attributes:
         files, description: None when they cannot be read or are not FMI 2.0.
+        stages: what was carried out (empty) and what not, with the reason.
         references: reference results fit for comparison.
     """
 
     findings: list[Finding]
+    stages: dict[str, str]
     files: FmuFiles | None = None
     description: Description | None = None
     references: list[ReferenceResult] = field(default_factory=list)
@@ -41,18 +45,21 @@ def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
         Findings, and what the probes need: files, description, reference results, facts.
     """
     files, findings = open_fmu(path, limits)
+    stages = dict.fromkeys(STAGES, "the archive cannot be read") | {"archive": ""}
     if files is None:
-        return StaticResult(findings)
+        return StaticResult(findings, stages)
     data = files.read("modelDescription.xml", xml_reading.MAXIMUM_BYTES)
     root, problems = xml_reading.parse(data, "modelDescription.xml")
     findings += problems
+    stages = dict.fromkeys(STAGES, "modelDescription.xml cannot be read") | {"archive": "", "xml": ""}
     if root is None:
-        return StaticResult(findings, files)
+        return StaticResult(findings, stages, files)
     version = root.get("fmiVersion", "")
     facts: Facts = {"modelName": root.get("modelName", ""), "fmiVersion": version}
     if version != "2.0":
         findings += _other_version(path, version, root)
-        return StaticResult(findings, files, facts=facts)
+        stages = {name: reason and f"FMI {version} is not covered" for name, reason in stages.items()}
+        return StaticResult(findings, stages, files, facts=facts)
     findings += check_schema(root)
     description = read_description(root)
     facts |= _facts(description, files)
@@ -67,7 +74,7 @@ def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
         findings.append(Finding("model.no-co-simulation", where, "the FMU has model exchange only: it is not run"))
     if not any(f.severity == "error" for f in findings):
         findings += check_with_fmpy(path, len(description.variables))
-    return StaticResult(findings, files, description, references, facts)
+    return StaticResult(findings, dict.fromkeys(STAGES, ""), files, description, references, facts)
 
 
 def _other_version(path: Path, version: str, root: "xml_reading.etree._Element") -> list[Finding]:

@@ -1,11 +1,9 @@
 """Tables on standard output."""
 
-import os
 import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -87,39 +85,3 @@ def say(text: str) -> None:
     """
     if sys.stderr.isatty():
         sys.stderr.write(f"{text} ...\n")
-
-
-class ForgivingStream:
-    """Standard output that may close while a command goes on: files count, what is printed after that is dropped."""
-
-    def __init__(self, stream: Any) -> None:
-        self._stream = stream
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        """Write ``text``; after the reader has gone away, write nothing.
-
-        Args:
-            text: to be written.
-
-        Returns:
-            The number of characters.
-        """
-        try:
-            return int(self._stream.write(text))
-        except BrokenPipeError:
-            self._drop()
-            return len(text)
-
-    def flush(self) -> None:
-        """Hand on what is buffered; after the reader has gone away, drop it."""
-        try:
-            self._stream.flush()
-        except BrokenPipeError:
-            self._drop()
-
-    def _drop(self) -> None:
-        with open(os.devnull, "wb") as nothing:
-            os.dup2(nothing.fileno(), self._stream.fileno())

@@ -26,6 +26,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser, rate_too: str = "") -
         choices=RESAMPLING,
         help="times that are not uniform: trust the rows and not their stamps, or interpolate (default: refuse them)",
     )
+    group.add_argument(
+        "--header", type=int, metavar="LINE", help="line of a text that holds the names; 0: none (default: found)"
+    )
     text = "samples per second to come down to, through an anti-alias filter (default: all samples)"
     group.add_argument("--rate", type=float, metavar="HZ", help=f"{text}{rate_too}")
 
@@ -44,7 +47,9 @@ def reading_of(args: argparse.Namespace) -> dict[str, Any]:
     """
     if args.rate is not None and not RATES[0] <= args.rate <= RATES[1]:
         raise ScenarioError(f"`rate` must be between {RATES[0]:g} and {RATES[1]:g}, but is {args.rate:g}", "rate")
-    return {"part": _part(args.part), "resample": args.resample, "rate": args.rate}
+    if args.header is not None and args.header < 0:
+        raise ScenarioError(f"`header` must be a line from 1 on, or 0, but is {args.header}", "header")
+    return {"part": _part(args.part), "resample": args.resample, "rate": args.rate, "header": args.header}
 
 
 def what_was_read(records: Iterable[Record]) -> list[str]:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.api.build import PLATFORMS, build, shown
+from orchestrator.api.build import PLATFORMS, VERSIONS, build, shown
 from orchestrator.building.build import default_directory
 from orchestrator.building.native_build import native_directory
 from orchestrator.commands._console import print_blocks
@@ -33,6 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="all",
         help="of native FMUs: all that the compiler can make (default), or this one alone, which is quicker",
     )
+    parser.add_argument(
+        "--fmi", type=int, choices=VERSIONS, default=2, help="version of FMI (default: 2); 3 of native FMUs"
+    )
     parser.add_argument("--force", action="store_true", help="build even what is up to date")
 
 
@@ -47,7 +50,12 @@ def run(args: argparse.Namespace) -> int:
     """
     with staged(args.out) as folder:
         result = build(
-            args.names, directory=args.directory, force=args.force, native=args.native, platforms=args.platforms
+            args.names,
+            directory=args.directory,
+            force=args.force,
+            native=args.native,
+            platforms=args.platforms,
+            fmi=args.fmi,
         )
         result.write(folder, args.out)
     print_blocks(result.blocks())

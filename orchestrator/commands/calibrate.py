@@ -5,7 +5,7 @@ from pathlib import Path
 
 from orchestrator.api.calibrate import calibrate
 from orchestrator.commands._console import print_blocks, say
-from orchestrator.commands._safety import note_missing_walls
+from orchestrator.commands._trust import note_missing_walls
 from orchestrator.shared.output import staged
 
 

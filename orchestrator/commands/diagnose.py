@@ -10,8 +10,8 @@ from orchestrator.api.diagnose import comparable_record, diagnose
 from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
-from orchestrator.commands._safety import note_missing_walls
 from orchestrator.commands._stages import Stages, diagnosis_seconds
+from orchestrator.commands._trust import note_missing_walls
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.output import staged
@@ -114,7 +114,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
     if args.scenario is not None and (args.fmu is not None or args.scenario.suffix.lower() != ".toml"):
         raise ScenarioError("`scenario` must be a TOML file, without `fmu`, but is not", "scenario", "fmu")
     fmu = args.fmu if args.scenario is None else args.scenario
-    for name in ("model", "test", "time_limit", "part", "resample", "rate"):
+    for name in ("model", "test", "time_limit", "part", "resample", "rate", "header"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
     if args.no_search:

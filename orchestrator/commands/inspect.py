@@ -35,7 +35,11 @@ def run(args: argparse.Namespace) -> int:
     found = inspect(args.record, model, **reading_of(args))
     given = {"record": str(args.record), "model": args.model and str(args.model)}
     with staged(args.out) as folder:
-        found.write(folder, args.out, given | {"part": args.part, "resample": args.resample, "rate": args.rate})
+        found.write(
+            folder,
+            args.out,
+            given | {"part": args.part, "resample": args.resample, "rate": args.rate, "header": args.header},
+        )
     print_blocks(found.blocks())
     sys.stdout.write(
         f"Model file to start from: {args.out / STARTER}\nWritten to {args.out}: report.html, inspect.json\n"

@@ -8,7 +8,8 @@ from orchestrator.api.shown import Result
 from orchestrator.api.simulate import simulate
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
-from orchestrator.commands._safety import add_safety_arguments, chosen_safety, note
+from orchestrator.commands._safety import add_safety_arguments, chosen_safety
+from orchestrator.commands._trust import note
 from orchestrator.shared.output import staged
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from orchestrator.api.simulate import run_ssp
 from orchestrator.api.ssp import export_ssp
 from orchestrator.commands._console import print_blocks
-from orchestrator.commands._safety import add_safety_arguments, chosen_safety, note
+from orchestrator.commands._safety import add_safety_arguments, chosen_safety
+from orchestrator.commands._trust import note
 from orchestrator.errors import ScenarioError
 from orchestrator.reporting import write_report
 from orchestrator.shared.output import staged, write_result

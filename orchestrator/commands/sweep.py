@@ -9,7 +9,7 @@ from orchestrator.api.sweep import SweepResult, sweep
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
 from orchestrator.commands._progress import CaseProgress, add_engine_arguments
-from orchestrator.commands._safety import add_trust, note_missing_walls
+from orchestrator.commands._trust import add_trust, note_missing_walls
 from orchestrator.engine import choose_tls
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.output import staged

@@ -7,7 +7,6 @@ a full disk has left torn are ignored, and their cases run again.
 """
 
 import errno
-import fcntl
 import json
 import os
 import stat
@@ -22,8 +21,10 @@ import numpy as np
 
 from orchestrator.engine.cases import Outcome, Status
 from orchestrator.errors import OutputError, ScenarioError
+from orchestrator.shared.operating_system import PLAIN_FILE, close_and_remove, lock, sync_folder, write_at
 
 FORMAT = "backlash-cosim journal 1"
+_CHUNK = 1 << 20
 
 
 class JournalFullError(OutputError):
@@ -64,8 +65,10 @@ class Journal:
             self._lock()
             self._end = self._read(definition, resume)
         except BaseException:
-            self._forget_if_empty()
-            os.close(self._descriptor)
+            if os.fstat(self._descriptor).st_size == 0:
+                self._remove()
+            else:
+                os.close(self._descriptor)
             raise
 
     def __enter__(self) -> "Journal":
@@ -126,29 +129,30 @@ class Journal:
         """Close the file; remove it, and the directories made for it, when it holds no case."""
         if self._descriptor < 0:
             return
-        if not self.done:
-            self.path.unlink(missing_ok=True)
-            _remove_directories(self._made)
-        os.close(self._descriptor)
+        if self.done:
+            os.close(self._descriptor)
+        else:
+            self._remove()
         self._descriptor = -1
 
-    def _forget_if_empty(self) -> None:
-        if os.fstat(self._descriptor).st_size == 0:
-            self.path.unlink(missing_ok=True)
-            _remove_directories(self._made)
+    def _remove(self) -> None:
+        close_and_remove(self._descriptor, self.path)
+        _remove_directories(self._made)
 
     def discard(self) -> None:
         """Remove the file: its content is in the published results now."""
-        self.path.unlink(missing_ok=True)
         self.done = 0
         self.close()
+        self.path.unlink(missing_ok=True)
 
     def _offset_table(self) -> IO[bytes]:
         """Return a nameless file of zeros, eight bytes per case."""
         try:
             with ExitStack() as opened:
                 table = opened.enter_context(tempfile.TemporaryFile(dir=self.path.parent))
-                os.posix_fallocate(table.fileno(), 0, 8 * self.total)  # else a full disk is a SIGBUS later
+                for begin in range(0, 8 * self.total, _CHUNK):  # holes of a file on a full disk are a SIGBUS later
+                    table.write(bytes(min(_CHUNK, 8 * self.total - begin)))
+                table.flush()
                 opened.pop_all()  # the caller closes it
         except OSError as error:
             raise OutputError(
@@ -161,9 +165,11 @@ class Journal:
 
     def _lock(self) -> None:
         try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise ScenarioError(f"{self.path} must belong to one sweep at a time, but another is running") from None
+            ours = lock(self._descriptor)
+        except OSError as error:
+            raise OutputError(f"cannot lock {self.path}: {error.strerror}") from None
+        if not ours:
+            raise ScenarioError(f"{self.path} must belong to one sweep at a time, but another is running")
 
     def _read(self, definition: Mapping[str, Any], resume: bool) -> int:
         """Check the header, mark finished cases and return where the next line goes."""
@@ -191,7 +197,7 @@ class Journal:
         os.ftruncate(self._descriptor, 0)
         self._end = 0
         self._write(_line({"format": FORMAT, "definition": definition, "cases": self.total}))
-        _sync_directory(self.path.parent)
+        sync_folder(self.path.parent)
         return self._end
 
     def _check(self, header: Any, wanted: Mapping[str, Any], resume: bool, ours: bool) -> None:
@@ -232,7 +238,7 @@ class Journal:
         try:
             written = 0
             while written < len(data):
-                written += os.pwrite(self._descriptor, data[written:], self._end + written)
+                written += write_at(self._descriptor, data[written:], self._end + written)
             os.fsync(self._descriptor)
         except OSError as error:
             os.ftruncate(self._descriptor, self._end)
@@ -284,7 +290,7 @@ def _opened(path: Path) -> int:
     Raises:
         ScenarioError: there is something else than a plain file.
     """
-    flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+    flags = os.O_RDWR | os.O_CREAT | PLAIN_FILE
     try:
         descriptor = os.open(path, flags, 0o644)
     except OSError as error:
@@ -296,15 +302,6 @@ def _opened(path: Path) -> int:
         os.close(descriptor)
         raise ScenarioError(f"{path} must be the journal of a sweep, but is no plain file of its own: remove it")
     return descriptor
-
-
-def _sync_directory(directory: Path) -> None:
-    """Make a new file's name as durable as its content."""
-    descriptor = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _make_directories(directory: Path) -> list[Path]:

@@ -9,7 +9,6 @@ process is a jail's child; work that runs what is not ours has walls.
 
 import math
 import pickle
-import signal
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from orchestrator.engine.worker import BATCH_TIME, Assignment, finished_cases, r
 from orchestrator.errors import ChildError, SimulationError
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
+from orchestrator.shared.operating_system import KILLED
 
 ATTEMPTS = 2
 KILLS = 5  # SIGKILL comes from others, on a busy or full machine more than once
@@ -117,7 +117,7 @@ class Lane:
                     self._discard()
                 return answer.outcomes
         except ChildError as error:
-            reason, killed = error.reason, error.reason == "signal" and error.code == signal.SIGKILL
+            reason, killed = error.reason, error.reason == "signal" and error.code == KILLED
         except SimulationError:  # it had no memory left to answer with
             reason = "exit"
         place = min(finished_cases(jail.scratch / "tmp"), len(cases) - 1)

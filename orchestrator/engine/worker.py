@@ -5,11 +5,9 @@ The process is a jail's child, so its end of the pipe and its limits are the jai
 a file, so that the case of which a process dies has a name.
 """
 
-import contextlib
 import faulthandler
 import os
 import pickle
-import resource
 import struct
 import time
 from collections.abc import Callable, Sequence
@@ -20,6 +18,7 @@ from typing import Any
 from orchestrator.engine.cases import Case, Outcome, Status, Value
 from orchestrator.engine.work import MESSAGE_LENGTH, Work, evaluate, one_line
 from orchestrator.errors import OrchestratorError, SimulationError
+from orchestrator.shared.operating_system import allocated_memory, set_limits, write_at
 
 ORPHAN_MARGIN = 30.0
 BATCH_TIME = 0.5
@@ -27,7 +26,6 @@ BATCH_TIME = 0.5
 
 _FINISHED = "finished"
 _COUNT = struct.Struct("<Q")
-_PAGE = os.sysconf("SC_PAGE_SIZE")
 _WORDS = frozenset(Status)
 
 
@@ -80,8 +78,9 @@ def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
         raise
     except Exception as error:
         raise SimulationError(f"a worker process cannot be prepared: {one_line(error)}") from None
-    base = _allocated_memory()
-    _limit_memory(base, assignment.memory)
+    base = allocated_memory()
+    if assignment.memory and base:
+        set_limits({"RLIMIT_DATA": base + assignment.memory})
     silence = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silence, 1)
     os.dup2(silence, 2)
@@ -94,10 +93,10 @@ def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
         limit = assignment.time_limit + BATCH_TIME + ORPHAN_MARGIN
         faulthandler.dump_traceback_later(limit, exit=True, file=silence)
         for case in cases:
-            os.pwrite(place, _COUNT.pack(len(found)), 0)
+            write_at(place, _COUNT.pack(len(found)), 0)
             outcome, sound = evaluate(work, prepared, case)
             found.append([outcome.index, outcome.status.value, outcome.message, list(outcome.values)])
-            spent = not sound or (bool(assignment.memory) and _allocated_memory() - base > assignment.memory // 2)
+            spent = not sound or (bool(assignment.memory) and allocated_memory() - base > assignment.memory // 2)
             if spent or time.monotonic() - begin > BATCH_TIME:
                 break
         faulthandler.cancel_dump_traceback_later()
@@ -150,18 +149,3 @@ def _outcome(entry: Any, case: Case, columns: int) -> Outcome | None:
             if len(values) == wanted and all(v is None or isinstance(v, Value) for v in values):
                 return Outcome(index, status, text, tuple(values))
     return None
-
-
-def _allocated_memory() -> int:
-    """Return the bytes of private writable memory of this process (0 where the kernel does not tell)."""
-    try:
-        with open("/proc/self/statm", "rb", buffering=0) as stream:
-            return int(stream.read(200).split()[5]) * _PAGE
-    except (OSError, IndexError):
-        return 0
-
-
-def _limit_memory(base: int, extra: int) -> None:
-    if extra and base:
-        with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(resource.RLIMIT_DATA, (base + extra, resource.getrlimit(resource.RLIMIT_DATA)[1]))

@@ -12,24 +12,78 @@ from functools import cache
 from typing import Any
 from weakref import WeakValueDictionary
 
-OK = 0
+from orchestrator.master.result import RunRemark
+
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+MESSAGES_KEPT = 20
 
 
-class _Inbox:
-    """Where one instance's messages go; kept alive by the instance's callbacks."""
+class Inbox:
+    """What one instance logs beside ``OK``, and how often its calls were answered with a warning.
 
-    def __init__(self, messages: deque[str]) -> None:
-        self.messages = messages
+    Attributes:
+        messages: the newest.
+    """
+
+    def __init__(self) -> None:
+        self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
+        self._logged: dict[int, tuple[str, int]] = {}  # the first text of each status, and how many
+        self._warned, self._call = 0, ""
+
+    def log(self, status: int, text: str) -> None:
+        """Take a message.
+
+        Args:
+            status: with which it was logged.
+            text: of the message.
+        """
+        self.messages.append(text)
+        first, count = self._logged.get(status, (text, 0))
+        self._logged[status] = (first, count + 1)
+
+    def warn(self, call: str, count: int = 1) -> None:
+        """Count calls that were answered with a warning.
+
+        Args:
+            call: the first of them, in words.
+            count: how many.
+        """
+        if not self._warned:
+            self._call = call
+        self._warned += count
+
+    def take_remarks(self, instance: str) -> list[RunRemark]:
+        """Return what a run is to be remembered for, and forget it.
+
+        Args:
+            instance: name of the instance.
+
+        Returns:
+            Warnings, and what was logged while all calls went well.
+        """
+        logged, self._logged = self._logged, {}
+        found = []
+        if self._warned:
+            said, _ = logged.pop(WARNING, ("", 0))
+            found.append(
+                RunRemark(instance, f"{self._call} returned Warning" + (f": {said}" if said else ""), self._warned)
+            )
+        for status, (text, count) in sorted(logged.items()):
+            name = STATUS[status] if 0 <= status < len(STATUS) else str(status)
+            found.append(RunRemark(instance, f"logged {name}, while its calls went well: {text}", count))
+        self._warned, self._call = 0, ""
+        return found
 
 
-_inboxes: "WeakValueDictionary[int, _Inbox]" = WeakValueDictionary()
+_inboxes: "WeakValueDictionary[int, Inbox]" = WeakValueDictionary()
 _numbers = itertools.count(1)
 
 
 def _log(environment: int | None, _instance: bytes, status: int, _category: bytes, message: bytes | None) -> None:
     inbox = _inboxes.get(environment or 0)
     if inbox is not None and status != OK:
-        inbox.messages.append((message or b"").decode("utf-8", "replace").strip())
+        inbox.log(status, (message or b"").decode("utf-8", "replace").strip())
 
 
 @cache
@@ -50,11 +104,11 @@ def _shared() -> tuple[Any, ...]:
     return callbacks, ours, allocate, release
 
 
-def logging_callbacks(messages: deque[str]) -> Any:
-    """Return callbacks for one instance, which append its warnings and worse to ``messages``.
+def logging_callbacks(inbox: Inbox) -> Any:
+    """Return callbacks for one instance, which put its warnings and worse into ``inbox``.
 
     Args:
-        messages: of the instance; it is written by the FMU's calls.
+        inbox: of the instance; it is written by the FMU's calls.
 
     Returns:
         An ``fmi2CallbackFunctions``, which must live as long as the instance.
@@ -65,7 +119,6 @@ def logging_callbacks(messages: deque[str]) -> Any:
     callbacks = fmi2.fmi2CallbackFunctions()
     ctypes.memmove(ctypes.byref(callbacks), ctypes.byref(shared), ctypes.sizeof(shared))
     number = next(_numbers)
-    inbox = _Inbox(messages)
     _inboxes[number] = inbox
     callbacks.componentEnvironment = number
     callbacks.inbox = inbox

@@ -6,11 +6,10 @@ held (``ctypes.PyDLL``): they would take it back at once.
 """
 
 import ctypes
+import math
 import operator
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,56 +17,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import FmuError, SlaveError
+from orchestrator.fmi.batches import FUNCTION_TYPES, VariableBatch, make_batches, shares
 from orchestrator.fmi.extraction import content_hash, extracted, library_of
 from orchestrator.fmi.farewell import ends_cleanly
-from orchestrator.fmi.messages import logging_callbacks
+from orchestrator.fmi.messages import DISCARD, ERROR, FATAL, OK, PENDING, STATUS, WARNING, Inbox, logging_callbacks
 from orchestrator.fmi.model_description import FmuDescription, read_description
+from orchestrator.fmi.shorter_steps import ShorterSteps
 from orchestrator.master.protocol import (
     KINDS,
     ModelInterface,
     NativeCalls,
+    RunEndedError,
     Signals,
     Slave,
     StepDiscardedError,
     Transfer,
     Value,
 )
+from orchestrator.master.result import RunRemark
 
-OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
-STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
-
-MESSAGES_KEPT = 20
 SETS_KEPT = 16
 """Lists of names whose call is kept: runs that differ in values alone set the same names."""
-_C_TYPES: dict[str, Any] = {
-    "Real": ctypes.c_double,
-    "Integer": ctypes.c_int,
-    "Enumeration": ctypes.c_int,
-    "Boolean": ctypes.c_int,
-    "String": ctypes.c_char_p,
-}
-_FUNCTIONS = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
+_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # of fmi2StatusKind
 
 _only_ones: set[str] = set()
-
-
-@dataclass(frozen=True)
-class _Batch:
-    """Variables of one type that are set or read in one call.
-
-    Attributes:
-        positions: of the variables in the list asked for.
-        references: value references as a C array.
-        values: C array that the call reads or fills.
-        call: returns the status.
-        function: its name, for messages.
-    """
-
-    positions: list[int]
-    references: Any
-    values: Any
-    call: Callable[[], int]
-    function: str
 
 
 class FmuSlave(Slave):
@@ -87,12 +60,13 @@ class FmuSlave(Slave):
         self.path = path
         self._description = read_description(path) if description is None else description
         self.model: ModelInterface = self._description.model
-        self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
+        self._inbox = Inbox()
+        self._shorter: ShorterSteps | None = None
         self._worst = OK
         self._closed = False
         self._reached: float | None = None  # s, in a run
         self._once = ""
-        self._sets: dict[tuple[str, ...], tuple[list[_Batch], list[Value]]] = {}
+        self._sets: dict[tuple[str, ...], tuple[list[VariableBatch], list[Value]]] = {}
         self._early: list[Mapping[str, Value]] | None = []  # set before the experiment was set up; None: it is
         self._reserve()
         try:
@@ -142,7 +116,7 @@ class FmuSlave(Slave):
             raise FmuError(f"{self.name}: the binary of {self.path} cannot be loaded: {error}") from None
 
     def _instantiate(self) -> None:
-        callbacks = logging_callbacks(self.messages)
+        callbacks = logging_callbacks(self._inbox)
         try:
             self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
         except Exception:
@@ -150,22 +124,68 @@ class FmuSlave(Slave):
 
     # Calls ---------------------------------------------------------------------------------------------------
 
+    @property
+    def messages(self) -> deque[str]:
+        """The newest messages that it logged beside OK."""
+        return self._inbox.messages
+
     def _said(self) -> str:
         return f": {self.messages[-1]}" if self.messages else ""
 
     def _check(self, status: int, what: str) -> None:
-        """Raise for what is worse than a warning, and remember that the instance must not be called again."""
+        """Count a warning; raise for what is worse, and remember that the instance must not be called again."""
+        moment = "" if self._reached is None else f" at t = {self._reached:g} s"
         if status in (OK, WARNING):
+            if status:
+                self._inbox.warn(f"{what}{moment}")
             return
-        self._worst = max(self._worst, status if status != PENDING else ERROR)
+        self._worst = max(self._worst, status if status != PENDING else FATAL)
         if "KeyboardInterrupt" in self._said():  # Ctrl-C reached the Python inside the FMU
             raise KeyboardInterrupt
         label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
-        moment = "" if self._reached is None else f" at t = {self._reached:g} s"
         text = f"{self.name}: {what}{moment} returned {label}{self._said()}"
+        if status == PENDING:
+            raise SlaveError(f"{text}: it must do its steps while it is called, but goes on by itself")
         if status == DISCARD:
-            raise StepDiscardedError(text)
+            ends = what == "fmi2DoStep" and self._ends_run()
+            raise (RunEndedError if ends else StepDiscardedError)(text, self.name, self._reached or 0.0)
         raise SlaveError(text)
+
+    def _ends_run(self) -> bool:
+        """Whether the FMU wants the run to end, after a step that it discarded."""
+        ends = ctypes.c_int(0)
+        answered = self._library.fmi2GetBooleanStatus(self._component, _TERMINATED, ctypes.byref(ends)) == OK
+        return answered and bool(ends.value)
+
+    def last_successful_time(self) -> float | None:
+        """Return how far the FMU came in a step that it discarded.
+
+        Returns:
+            The time [s]; None where it does not say.
+        """
+        time = ctypes.c_double(math.nan)
+        status = self._library.fmi2GetRealStatus(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(time))
+        return time.value if status == OK and math.isfinite(time.value) else None
+
+    def take_remarks(self) -> list[RunRemark]:
+        """Return warnings and shortened steps since this was last asked.
+
+        Returns:
+            The remarks.
+        """
+        shortened = [] if self._shorter is None else self._shorter.take_remarks()
+        return [*self._inbox.take_remarks(self.name), *shortened]
+
+    def shorten_steps(self) -> bool:
+        """Do steps that the FMU discards in shorter ones, from the next run on.
+
+        Returns:
+            Whether the FMU can, and this is new.
+        """
+        if self._shorter is not None or not self.model.can_vary_step:
+            return False
+        self._shorter = ShorterSteps(self)
+        return True
 
     def _alive(self, what: str) -> None:
         if self._closed or self._worst >= ERROR:
@@ -178,26 +198,9 @@ class FmuSlave(Slave):
         if status:
             self._check(status, function)
 
-    def _batches(self, names: Sequence[str], direction: str, buffer: Signals | None = None) -> list[_Batch]:
-        groups: dict[str, list[int]] = {}
-        for position, name in enumerate(names):
-            groups.setdefault(_FUNCTIONS[self.model.variables[name].type], []).append(position)
-        batches = []
-        for kind, positions in groups.items():
-            variables = [self.model.variables[names[p]] for p in positions]
-            count = len(positions)
-            references = (ctypes.c_uint * count)(*(v.reference for v in variables))
-            values = (_C_TYPES[variables[0].type] * count)()
-            adjacent = positions == list(range(positions[0], positions[0] + count))
-            if buffer is not None and kind == "Real" and adjacent:
-                values = (ctypes.c_double * count).from_buffer(buffer[positions[0] : positions[0] + count].data)
-            function = f"fmi2{direction}{kind}"
-            entry = self._library[function]
-            entry.restype = ctypes.c_int
-            entry.argtypes = None
-            call = partial(entry, self._component, references, ctypes.c_size_t(count), values)
-            batches.append(_Batch(positions, references, values, call, function))
-        return batches
+    def _batches(self, names: Sequence[str], direction: str, buffer: Signals | None = None) -> list[VariableBatch]:
+        variables = [self.model.variables[name] for name in names]
+        return make_batches(self._library, self._component, variables, direction, buffer)
 
     def set(self, values: Mapping[str, Value]) -> None:
         """Set variables of any type by name; what is set before :meth:`begin` is set once more by that."""
@@ -224,7 +227,7 @@ class FmuSlave(Slave):
             if status:
                 self._check(status, self._naming(batch, names))
 
-    def _naming(self, batch: _Batch, names: Sequence[str]) -> str:
+    def _naming(self, batch: VariableBatch, names: Sequence[str]) -> str:
         some = ", ".join(names[p] for p in batch.positions[:3])
         return f"{batch.function} of {some}" + (", ..." if len(batch.positions) > 3 else "")
 
@@ -243,12 +246,12 @@ class FmuSlave(Slave):
     def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
         """Return a call that sets the numeric variables ``names`` from ``buffer``; shape (len(names),)."""
         batches = self._batches(names, "Set", buffer)
-        if len(batches) == 1 and isinstance(batches[0].values, ctypes.Array) and _shares(batches[0].values, buffer):
+        if len(batches) == 1 and isinstance(batches[0].values, ctypes.Array) and shares(batches[0].values, buffer):
             return self._direct(batches[0])
 
         def send() -> None:
             for batch in batches:
-                if not _shares(batch.values, buffer):
+                if not shares(batch.values, buffer):
                     whole = batch.values._type_ is ctypes.c_int
                     for k, position in enumerate(batch.positions):
                         batch.values[k] = int(buffer[position]) if whole else float(buffer[position])
@@ -260,9 +263,9 @@ class FmuSlave(Slave):
     def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
         """Return a call that reads the numeric variables ``names`` into ``buffer``; shape (len(names),)."""
         batches = self._batches(names, "Get", buffer)
-        if len(batches) == 1 and _shares(batches[0].values, buffer):
+        if len(batches) == 1 and shares(batches[0].values, buffer):
             return self._direct(batches[0])
-        converted = [batch for batch in batches if not _shares(batch.values, buffer)]
+        converted = [batch for batch in batches if not shares(batch.values, buffer)]
 
         def receive() -> None:
             for batch in batches:
@@ -274,7 +277,7 @@ class FmuSlave(Slave):
 
         return receive
 
-    def _direct(self, batch: _Batch) -> Transfer:
+    def _direct(self, batch: VariableBatch) -> Transfer:
         call = batch.call
 
         def transfer() -> None:
@@ -311,10 +314,23 @@ class FmuSlave(Slave):
         """Advance from ``time`` to ``time + step`` [s], inputs held."""
         if self._worst >= ERROR:
             self._alive("fmi2DoStep")
+        if self._shorter is not None:
+            self._shorter.do_step(time, step)
+        else:
+            self.try_step(time, step)
+
+    def try_step(self, time: float, step: float) -> None:
+        """Call ``fmi2DoStep`` once; see ``do_step``.
+
+        Args:
+            time: [s].
+            step: [s].
+        """
         status = self._step(self._component, time, step, 1)
-        self._reached = time if status else time + step
+        self._reached = time
         if status:
             self._check(status, "fmi2DoStep")
+        self._reached = time + step
 
     def get_state(self) -> Any:
         """Return a handle of a copy of the whole state."""
@@ -368,7 +384,11 @@ class FmuSlave(Slave):
             The addresses.
         """
         lists = [[self._kind(name) for name in names] for names in (inputs, outputs)]
-        if self._worst >= ERROR or any(kinds != sorted(kinds) or kinds[-1:] == [len(KINDS)] for kinds in lists):
+        if (
+            self._shorter is not None
+            or self._worst >= ERROR
+            or any(kinds != sorted(kinds) or kinds[-1:] == [len(KINDS)] for kinds in lists)
+        ):
             return None
 
         def address(function: str) -> int:
@@ -392,7 +412,17 @@ class FmuSlave(Slave):
 
     def _kind(self, name: str) -> int:
         """Return the place of a variable's type in ``KINDS``; behind the last for Strings."""
-        return (*KINDS, "String").index(_FUNCTIONS[self.model.variables[name].type])
+        return (*KINDS, "String").index(FUNCTION_TYPES[self.model.variables[name].type])
+
+    def warned(self, count: int, function: str, time: float) -> None:
+        """Take warnings that the compiled loop met.
+
+        Args:
+            count: of calls that returned fmi2Warning.
+            function: name of the FMI function that returned the first.
+            time: when [s].
+        """
+        self._inbox.warn(f"{function} at t = {time:g} s", count)
 
     def failed(self, status: int, function: str, time: float) -> None:
         """Raise for a status that the compiled loop met.
@@ -404,8 +434,3 @@ class FmuSlave(Slave):
         """
         self._reached = time
         self._check(status, function)
-
-
-def _shares(values: Any, buffer: Signals) -> bool:
-    first = int(buffer.ctypes.data)
-    return first <= ctypes.addressof(values) < first + max(buffer.nbytes, 1)

@@ -24,7 +24,7 @@ from orchestrator.errors import ConvergenceError, ScenarioError
 from orchestrator.master.algorithms import Adaptive
 from orchestrator.master.layout import Layout
 from orchestrator.master.pieces import CELLS, NODES, piece_times, piece_weights
-from orchestrator.master.protocol import StepDiscardedError
+from orchestrator.master.protocol import RunEndedError, StepDiscardedError
 from orchestrator.master.result import Statistics
 from orchestrator.master.signals import GRID_SLACK, Signal
 from orchestrator.master.waveform import Waveform
@@ -271,6 +271,8 @@ class _Run:
                     restore()
                     return _Attempt(None, first, error, length, end)
                 second = self._sweep(middle, end, whole)
+            except RunEndedError:
+                raise
             except StepDiscardedError:
                 restore()
                 return _Attempt(None, None, math.inf, length, end)

@@ -46,6 +46,9 @@ class _Slave(ctypes.Structure):
         ("first_feed", _Whole),
         ("feeds", _Whole),
         ("whole", _Address),
+        ("warnings", _Whole),
+        ("first_call", _Whole),
+        ("first_step", _Whole),
     )
 
 
@@ -160,6 +163,17 @@ class CompiledWiring:
             table.ctypes.data, record.ctypes.data, out.ctypes.data, len(self._slaves), table.shape[1], len(record),
             start, step, simultaneous,
         )  # fmt: skip
+        for slave in self._slaves:
+            slave.warnings = 0
+        try:
+            self._run(job, out, start, step)
+        finally:
+            for slave, stage in zip(self._slaves, self._wiring.stages, strict=True):
+                if slave.warnings:
+                    warned: Any = stage.slave
+                    warned.warned(slave.warnings, FUNCTIONS[slave.first_call], start + slave.first_step * step)
+
+    def _run(self, job: _Run, out: Array, start: float, step: float) -> None:
         failure = _Failure()
         steps, begin, chunk = len(out) - 1, 0, FIRST_CHUNK
         while begin < steps:

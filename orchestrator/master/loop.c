@@ -28,6 +28,9 @@ typedef struct {
     int64_t first_feed;
     int64_t feeds;
     int *whole; /* as many as the longest list of Integers or Booleans */
+    int64_t warnings; /* calls that returned a warning, and which was the first: call and step as in Failure */
+    int64_t first_call;
+    int64_t first_step;
 } Slave;
 
 /* values[slot] = round_to(quantum, factor * values[source] + offset + table[row]); a source or row below 0 is none. */
@@ -42,7 +45,7 @@ typedef struct {
 } Feed;
 
 typedef struct {
-    const Slave *slaves;
+    Slave *slaves;
     const Feed *feeds;
     double *values;
     const double *table; /* signals x columns: column n + 1 counts in step n */
@@ -91,8 +94,17 @@ static int whole_of(double value)
     return value >= -2147483648.0 && value <= 2147483647.0 ? (int)value : INT32_MIN;
 }
 
+static int noted(Slave *slave, int status, int64_t call, int64_t step)
+{
+    if (status == WARNING && !slave->warnings++) {
+        slave->first_call = call;
+        slave->first_step = step;
+    }
+    return status;
+}
+
 /* Send the inputs and step; `call` is what was called last. */
-static int advance(const Slave *slave, double *values, double time, double length, int64_t *call)
+static int advance(Slave *slave, double *values, double time, double length, int64_t n, int64_t *call)
 {
     const double *inputs = values + slave->first_input;
     for (int kind = 0; kind < KINDS; kind++) {
@@ -101,19 +113,19 @@ static int advance(const Slave *slave, double *values, double time, double lengt
         if (!count)
             continue;
         *call = kind;
-        for (int64_t n = 0; kind && n < count; n++)
-            slave->whole[n] = whole_of(inputs[n]);
+        for (int64_t k = 0; kind && k < count; k++)
+            slave->whole[k] = whole_of(inputs[k]);
         status = slave->set[kind](slave->component, slave->inputs[kind], (size_t)count,
                                   kind ? (const void *)slave->whole : (const void *)inputs);
-        if (status > WARNING)
+        if (noted(slave, status, *call, n) > WARNING)
             return status;
         inputs += count;
     }
     *call = DO_STEP;
-    return slave->step(slave->component, time, length, 1);
+    return noted(slave, slave->step(slave->component, time, length, 1), DO_STEP, n);
 }
 
-static int receive(const Slave *slave, double *values, int64_t *call)
+static int receive(Slave *slave, double *values, int64_t n, int64_t *call)
 {
     double *outputs = values + slave->first_output;
     for (int kind = 0; kind < KINDS; kind++) {
@@ -124,10 +136,10 @@ static int receive(const Slave *slave, double *values, int64_t *call)
         *call = FIRST_GET + kind;
         status = slave->get[kind](slave->component, slave->outputs[kind], (size_t)count,
                                   kind ? (void *)slave->whole : (void *)outputs);
-        if (status > WARNING)
+        if (noted(slave, status, *call, n) > WARNING)
             return status;
-        for (int64_t n = 0; kind && n < count; n++)
-            outputs[n] = slave->whole[n];
+        for (int64_t k = 0; kind && k < count; k++)
+            outputs[k] = slave->whole[k];
         outputs += count;
     }
     return 0;
@@ -141,19 +153,19 @@ static int one_step(const Run *run, int64_t n, Failure *failure)
         for (int64_t k = 0; k < run->slave_count; k++)
             gather(run, run->slaves + k, n + 1);
     for (int64_t k = 0; k < run->slave_count; k++) {
-        const Slave *slave = run->slaves + k;
+        Slave *slave = run->slaves + k;
         failure->slave = k;
         if (!run->simultaneous)
             gather(run, slave, n + 1);
-        status = advance(slave, run->values, time, run->length, &failure->call);
+        status = advance(slave, run->values, time, run->length, n, &failure->call);
         if (status <= WARNING && !run->simultaneous)
-            status = receive(slave, run->values, &failure->call);
+            status = receive(slave, run->values, n, &failure->call);
         if (status > WARNING)
             return status;
     }
     for (int64_t k = 0; run->simultaneous && k < run->slave_count; k++) {
         failure->slave = k;
-        status = receive(run->slaves + k, run->values, &failure->call);
+        status = receive(run->slaves + k, run->values, n, &failure->call);
         if (status > WARNING)
             return status;
     }

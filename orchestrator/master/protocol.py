@@ -1,5 +1,6 @@
 """What the master algorithms know of a slave: its variables and a handful of calls. Nothing here speaks of FMI."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -18,7 +19,20 @@ NUMERIC = frozenset({"Real", "Integer", "Boolean", "Enumeration"})
 
 
 class StepDiscardedError(SlaveError):
-    """A slave could not complete a step, but is well: it may be restored, reset, or asked for a shorter step."""
+    """A slave could not complete a step, but is well: it may be restored, reset, or asked for a shorter step.
+
+    Attributes:
+        instance: name of the slave.
+        time: beginning of the step [s].
+    """
+
+    def __init__(self, text: str, instance: str = "", time: float = math.nan) -> None:
+        super().__init__(text)
+        self.instance, self.time = instance, time
+
+
+class RunEndedError(StepDiscardedError):
+    """A slave asked for the end of the run instead of a step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,6 +239,7 @@ class Slave(Protocol):
 
         Raises:
             StepDiscardedError: the step was not done; the slave is well.
+            RunEndedError: the slave wants the run to end.
         """
 
     def get_state(self) -> Any:

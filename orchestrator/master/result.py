@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.master.values import one_line
+
 LOOPS = PYTHON, MACHINE_CODE = "Python", "machine code"
 
 
@@ -29,6 +31,45 @@ class Statistics:
 
 
 @dataclass(frozen=True)
+class RunRemark:
+    """What is to be known of a run that went on.
+
+    Attributes:
+        instance: whose it is.
+        text: the first of its kind.
+        count: how many there were.
+    """
+
+    instance: str
+    text: str
+    count: int = 1
+
+    def __str__(self) -> str:
+        return f"{self.instance}: {self.text}" + (f" ({self.count} times)" if self.count > 1 else "")
+
+
+MOST_REMARKS, LONGEST_REMARK = 1000, 1000
+"""What is believed of a child process."""
+
+
+def claimed_remarks(claimed: object) -> tuple[RunRemark, ...]:
+    """Return the remarks that a child process sends, as far as they are such.
+
+    Args:
+        claimed: lists of instance, text and count.
+
+    Returns:
+        The remarks, of bounded number and length.
+    """
+    found = []
+    for entry in claimed[:MOST_REMARKS] if isinstance(claimed, list) else ():
+        match entry:
+            case [str() as instance, str() as text, int() as count]:
+                found.append(RunRemark(instance, one_line(text[:LONGEST_REMARK]), count))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
 class Recording:
     """Recorded signals.
 
@@ -38,6 +79,7 @@ class Recording:
         names: ``instance.variable`` of each row.
         units: unit by name; ``None`` where none is declared.
         statistics: what the run took.
+        remarks: warnings of slaves, steps that were shortened, an early end.
     """
 
     time: NDArray[np.float64]
@@ -45,6 +87,7 @@ class Recording:
     names: tuple[str, ...]
     units: Mapping[str, str | None] = field(default_factory=dict)
     statistics: Statistics = field(default_factory=lambda: Statistics(0, 0, {}, 0))
+    remarks: tuple[RunRemark, ...] = ()
 
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """Return the signal ``instance.variable``, shape (n,)."""

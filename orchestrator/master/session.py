@@ -1,5 +1,6 @@
 """Slaves that are made once and run as often as needed."""
 
+import math
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -7,15 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.errors import FmuError, ScenarioError, SimulationError
+from orchestrator.errors import FmuError, ScenarioError, SimulationError, SlaveError
 from orchestrator.master.adaptive import run_adaptive
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
 from orchestrator.master.fixed_step import run_sequential, run_simultaneous
 from orchestrator.master.iterated import backward_slots, initialise, run_iterated
 from orchestrator.master.layout import Layout, lay_out
+from orchestrator.master.own_steps import own_step_remarks
 from orchestrator.master.problems import Problem, raise_problems
-from orchestrator.master.protocol import Slave, Value
-from orchestrator.master.result import MACHINE_CODE, PYTHON, Recording, Statistics
+from orchestrator.master.protocol import RunEndedError, Slave, StepDiscardedError, Value
+from orchestrator.master.result import MACHINE_CODE, PYTHON, Recording, RunRemark, Statistics
 from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, Quantity, System, split
 from orchestrator.master.wiring import Wiring, wire
@@ -116,15 +118,53 @@ class Session:
         table = self._signal_table(signals or {})
         rows = np.empty((self.steps + 1, len(self.record)))
         try:
-            self._initialise(wiring, values, table)
-            self._used.update(self._slaves)
-            statistics = self._go(wiring, table, rows, signals or {})
+            statistics, ended = self._run(wiring, values, table, rows, signals or {})
             for stage in wiring.stages:
                 stage.slave.terminate()
         except SimulationError:
             self.close()
             raise
-        return Recording(self._times.copy(), rows.T, self.record, dict(self._units), statistics)
+        rows = rows[: statistics.steps + 1] if ended else rows
+        remarks = [*ended, *self._remarks(rows)]
+        times = self._times[: len(rows)].copy()
+        return Recording(times, rows.T, self.record, dict(self._units), statistics, tuple(remarks))
+
+    def _run(
+        self,
+        wiring: Wiring,
+        values: Mapping[str, Mapping[str, Value]],
+        table: Array,
+        rows: Array,
+        signals: Mapping[int, Signal],
+    ) -> tuple[Statistics, list[RunRemark]]:
+        """Initialise and run, once more with shorter steps where a slave discards one; also say who ended the run."""
+        while True:
+            self._initialise(wiring, values, table)
+            self._used.update(self._slaves)
+            try:
+                return self._go(wiring, table, rows, signals), []
+            except RunEndedError as error:
+                if isinstance(self.algorithm, Adaptive):  # which has no values on the grid up to there
+                    raise SlaveError(f"{error}: it wants the run to end, which `adaptive` does not do") from None
+                steps = math.floor((error.time - self.start) / self.algorithm.step + 1e-6)
+                text = f"ended the run at t = {self._times[steps]:g} s of {self.stop:g} s (fmi2Discard, terminated)"
+                calls = dict.fromkeys((block.name for block in self.layout.blocks), steps)
+                return Statistics(steps, 0, calls, steps), [RunRemark(error.instance, text)]
+            except StepDiscardedError as error:
+                shorten = getattr(self._slaves[error.instance], "shorten_steps", None)
+                if isinstance(self.algorithm, Adaptive) or shorten is None or not shorten():
+                    raise SlaveError(str(error)) from None
+                self._compiled = None
+
+    def _remarks(self, rows: Array) -> list[RunRemark]:
+        """Return what the slaves have to say, and what the recorded signals show of their own steps."""
+        found: list[RunRemark] = []
+        for slave in self._slaves.values():
+            take = getattr(slave, "take_remarks", None)
+            found += [] if take is None else take()
+        if not isinstance(self.algorithm, Adaptive):
+            found += own_step_remarks(self.system, self.record, rows, self.start, self.algorithm.step)
+        return found
 
     def _signal_table(self, replaced: Mapping[int, Signal]) -> Array:
         """Return the table of signals; what is not replaced is sampled once."""

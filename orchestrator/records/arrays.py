@@ -21,7 +21,7 @@ class Record:
 
     Attributes:
         time: (n,) s, uniform.
-        u: (n,) N.m, requested torque, held from sample to sample.
+        u: (n,) N.m, requested torque, held from sample to sample; all NaN where the log has none.
         theta_m: (n,) rad, motor encoder; NaN: missing.
         theta_l: (n,) rad, load encoder, or None; NaN: missing.
         source: file name or description, for messages and plots.
@@ -59,6 +59,11 @@ class Record:
     def duration(self) -> float:
         """Return the time from the first to the last row [s]."""
         return float(self.time[-1] - self.time[0])
+
+    @property
+    def has_torque(self) -> bool:
+        """Return whether the log has a torque, and not two angles alone."""
+        return bool(np.isfinite(self.u).any())
 
     @property
     def missing(self) -> int:

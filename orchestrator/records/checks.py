@@ -101,7 +101,7 @@ def check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str
     start, stop = _longest_constant(values)
     length, size = stop - start, values.size
     if length == size:
-        if np.ptp(arrays["u"]) > 0.0 or (other is not None and np.ptp(other) > 0.0):
+        if ("u" in arrays and np.ptp(arrays["u"]) > 0.0) or (other is not None and np.ptp(other) > 0.0):
             raise RecordError(
                 f"{source}: column `{label}` must change, but is {values[0]:g} in all {size} rows: "
                 "the encoder is stuck or not connected; name another column (`model`), or log again"

@@ -29,7 +29,8 @@ KINDS = {
 }
 EXAMPLES = {
     "time": "s, ms, us, min",
-    "u": "N.m, mN.m, N, % (with rated_value), A (with torque_constant), V (with resistance and torque_constant)",
+    "u": "N.m, mN.m, N.mm, lbf.in, N, % (with rated_value), A (with torque_constant), "
+    "V (with resistance and torque_constant)",
     "theta_m": "rad, deg, rev, m, mm, counts (with counts_per_rev), rpm, rad/s",
 }
 EXAMPLES["theta_l"] = EXAMPLES["theta_m"]
@@ -86,15 +87,16 @@ def unit_of(name: str, column: Column, written: str, label: str, source: str) ->
         The unit.
 
     Raises:
-        RecordError: the unit is of a kind that the column cannot have.
+        RecordError: the unit is not known, or of a kind that the column cannot have.
     """
     text = column.unit or written
-    unit = parse_unit(text)
-    if unit is None:
-        if column.unit:
-            raise RecordError(f"`[columns.{name}] unit` must be one of {EXAMPLES[name]}, but is {column.unit!r}")
-        return None
-    if unit.kind not in KINDS[name]:
+    unit = parse_unit(text, KINDS[name])
+    if unit is None and text:
+        raise RecordError(
+            f"{source}: column `{label}` must be in a unit that is known ({EXAMPLES[name]}), but is in {text!r}: say "
+            f'`[columns.{name}] unit = "..."` in the model file (`model`), with `factor` where none of these is it'
+        )
+    if unit is not None and unit.kind not in KINDS[name]:
         raise RecordError(
             f"{source}: column `{label}` must be {MEANINGS[name]} ({EXAMPLES[name]}), but is in {text!r}; name "
             f'another by `[columns.{name}] name = "..."`, or mend it by `unit`, in the model file (`model`)'

@@ -81,7 +81,7 @@ def _low_pass(factor: int) -> Array:
 
 def _filled(values: Array) -> Array:
     good = np.isfinite(values)
-    if good.all():
+    if good.all() or not good.any():
         return values
     places = np.arange(values.size)
     return np.interp(places, places[good], values[good])

@@ -36,11 +36,15 @@ class Reading:
         part: first and last time to keep [s], from the first row on; None: all.
         resample: "uniform" (only the stamps jitter), "linear" or "cubic"; None: refuse times that are not uniform.
         rate: samples per second to come down to; None: as in the file.
+        torque_needed: whether a file of two angles without a torque is refused.
+        header: line of the names in a text, from 1; 0: it has none; None: found.
     """
 
     part: tuple[float, float] | None = None
     resample: str | None = None
     rate: float | None = None
+    torque_needed: bool = True
+    header: int | None = None
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ def load(
     Raises:
         RecordError: a column is missing, ambiguous, in a wrong unit, or no number.
     """
-    chosen = chosen_channels(source, columns, str(path))
+    chosen = chosen_channels(source, columns, str(path), reading.torque_needed)
     extra = {name: n for n, head in enumerate(source.heads) for name in further if name in (head.name, head.full)}
     places = sorted({choice.place for choice in chosen.values()} | set(extra.values()))
     values = dict(zip(places, source.load(places), strict=True))
@@ -91,23 +95,30 @@ def load(
     table, more = _same_rows(table, source, chosen, extra, values, path, reading)
     notes += [", ".join(units), *more]
     drive = columns.get("u", Column())
-    unit = parse_unit(drive.unit or source.heads[chosen["u"].place].unit)
+    unit = None
+    if "u" in chosen:
+        unit = parse_unit(drive.unit or source.heads[chosen["u"].place].unit, KINDS["u"])
     if unit is not None and unit.kind == "voltage":
         table["u"] = torque_of_voltage(table["u"], table["theta_m"], table["time"], drive)
         notes.append("torque from the voltage, the winding's resistance and the motor's speed")
+    if "u" not in chosen:
+        notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
     if reading.part is not None:
         table = _part(table, reading.part, path)
     table, more = _resampled(table, reading)
     return Loaded(table, labels, (*notes, *more))
 
 
-def chosen_channels(source: RecordSource, columns: Mapping[str, Column], where: str) -> dict[str, Choice]:
+def chosen_channels(
+    source: RecordSource, columns: Mapping[str, Column], where: str, torque_needed: bool = True
+) -> dict[str, Choice]:
     """Return the channel of each column; the time is one of the motor's raster, or made from a rate.
 
     Args:
         source: the opened file.
         columns: names and units in the file, where the user gave them.
         where: file name, for messages.
+        torque_needed: whether a file of two angles without a torque is refused.
 
     Returns:
         The channel of each column of a record.
@@ -121,7 +132,7 @@ def chosen_channels(source: RecordSource, columns: Mapping[str, Column], where: 
     rated = columns.get("time", Column()).rate is not None or source.rate is not None
     rasters = {head.raster for head in heads}
     if len(rasters) > 1:
-        signals = choose(heads, columns, where, skip=("time",))
+        signals = choose(heads, columns, where, skip=("time",), torque_needed=torque_needed)
         raster = heads[signals["theta_m"].place].raster
         inside = [n for n, head in enumerate(heads) if head.raster == raster]
         taken = {choice.place for choice in signals.values()}
@@ -130,7 +141,7 @@ def chosen_channels(source: RecordSource, columns: Mapping[str, Column], where: 
         return signals | {
             name: Choice(clocks[choice.place], choice.assumed, choice.numbered) for name, choice in found.items()
         }
-    return choose(heads, columns, where, (), rated)
+    return choose(heads, columns, where, (), rated, torque_needed)
 
 
 def _time(

@@ -3,6 +3,7 @@
 A model file is TOML::
 
     fmu = "Drivetrain"
+    header = 12                     # line of the record that holds the names; absent: found
 
     [parameters.J_l]
     value = 5.6
@@ -79,6 +80,7 @@ class Model:
         encoders: what is known of the encoders, by column.
         columns: name and unit of each column in the record's file, where they differ from the default.
         source: file name, for messages.
+        header: line of the record that holds the names, from 1; 0: there are none; None: found.
     """
 
     fmu: str
@@ -86,6 +88,7 @@ class Model:
     encoders: Mapping[str, Encoder] = field(default_factory=dict)
     columns: Mapping[str, Column] = field(default_factory=dict)
     source: str = "default model"
+    header: int | None = None
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -145,6 +148,7 @@ class _Content:
     where: str
     fmu: str
     entries: Mapping[str, Mapping[str, Entry]]
+    header: int | None
 
     def wrong(self, key: str, must: str) -> ScenarioError:
         """Return the error that says what ``key`` must be."""
@@ -190,6 +194,7 @@ def read_model(path: Path | None) -> Model:
         {name: _encoder(name, entry, content) for name, entry in encoders.items()},
         {name: _column(name, entry, content) for name, entry in columns.items()},
         path.name,
+        content.header,
     )
 
 
@@ -213,8 +218,10 @@ def _content(raw: dict[str, Any], where: str) -> _Content:
     """Return the file's content once every key is known and every value is of its kind."""
     fmu = raw.get("fmu", DEFAULT)
     entries = {name: raw.get(name, {}) for name in _ENTRIES}
-    content = _Content(where, fmu, entries)
-    _check_keys(raw, ("fmu", *_ENTRIES), "", content)
+    content = _Content(where, fmu, entries, raw.get("header"))
+    _check_keys(raw, ("fmu", "header", *_ENTRIES), "", content)
+    if content.header is not None and not (type(content.header) is int and content.header >= 0):
+        raise content.wrong("header", f"be a line of the record from 1 on, or 0, but is {content.header!r}")
     _check_kind(fmu, str, "fmu", content)
     for group, kinds in _ENTRIES.items():
         _check_kind(entries[group], dict, group, content)
@@ -301,7 +308,7 @@ def _column(name: str, entry: Entry, content: _Content) -> Column:
     if name not in COLUMNS:
         raise content.wrong(key, f"be one of {', '.join(f'columns.{known}' for known in COLUMNS)}")
     unit = entry.get("unit", "")
-    parsed = parse_unit(unit)
+    parsed = parse_unit(unit, KINDS[name])
     if unit and (parsed is None or parsed.kind not in KINDS[name]):
         raise content.wrong(f"{key}.unit", f"be one of {EXAMPLES[name]}, but is {unit!r}")
     numbers: dict[str, float] = {}

@@ -6,169 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from orchestrator.errors import RecordError
-from orchestrator.records.columns import COLUMNS, MEANINGS, OPTIONAL, Column
+from orchestrator.records import words
+from orchestrator.records.columns import COLUMNS, KINDS, MEANINGS, OPTIONAL, Column
 from orchestrator.records.formats.source import Head
 from orchestrator.records.units import parse_unit
-
-_GREEK = str.maketrans({"θ": " theta ", "φ": " phi ", "ϕ": " phi ", "τ": " tau ", "ω": " omega ", "α": " alpha "})
-_ANGLE = frozenset(
-    [
-        "theta",
-        "th",
-        "phi",
-        "angle",
-        "ang",
-        "pos",
-        "position",
-        "winkel",
-        "lage",
-        "encoder",
-        "enc",
-        "q",
-        "stellung",
-        "istposition",
-    ]
-)
-_MOTOR = frozenset(
-    (
-        "m",
-        "mot",
-        "motor",
-        "drive",
-        "antrieb",
-        "input",
-        "motorside",
-        "primary",
-    )
-)
-_LOAD = frozenset(
-    [
-        "l",
-        "load",
-        "last",
-        "output",
-        "out",
-        "abtrieb",
-        "arm",
-        "link",
-        "joint",
-        "gelenk",
-        "table",
-        "tisch",
-        "loadside",
-        "secondary",
-    ]
-)
-_TORQUE = frozenset(
-    (
-        "u",
-        "torque",
-        "trq",
-        "tq",
-        "moment",
-        "drehmoment",
-        "tau",
-        "drehmomentsollwert",
-        "kraft",
-        "force",
-    )
-)
-_CURRENT = frozenset(
-    (
-        "current",
-        "curr",
-        "strom",
-        "iq",
-    )
-)
-_ASKED = frozenset(
-    [
-        "ref",
-        "set",
-        "cmd",
-        "command",
-        "commanded",
-        "soll",
-        "sollwert",
-        "sp",
-        "setpoint",
-        "target",
-        "demand",
-        "request",
-        "req",
-        "desired",
-    ]
-)
-_FOUND = frozenset(
-    (
-        "act",
-        "actual",
-        "ist",
-        "istwert",
-        "meas",
-        "measured",
-        "fb",
-        "feedback",
-    )
-)
-_SPEED = frozenset(
-    ["speed", "velocity", "vel", "omega", "w", "dq", "rpm", "drehzahl", "geschwindigkeit", "acc", "acceleration"]
-)
-_OTHER = frozenset(
-    [
-        "err",
-        "error",
-        "dev",
-        "deviation",
-        "lag",
-        "temp",
-        "temperature",
-        "limit",
-        "lim",
-        "max",
-        "min",
-        "abs",
-        "std",
-        "raw",
-        "status",
-        "ff",
-    ]
-)
-_TIME = frozenset(
-    [
-        "time",
-        "t",
-        "zeit",
-        "timestamp",
-        "datetime",
-        "date",
-        "uhrzeit",
-        "elapsed",
-        "zeitstempel",
-        "stamp",
-        "timestamps",
-        "seconds",
-    ]
-)
-_SAMPLE = frozenset(
-    [
-        "sample",
-        "samples",
-        "index",
-        "idx",
-        "no",
-        "nr",
-        "k",
-        "n",
-        "counter",
-        "cycle",
-        "row",
-        "samplenumber",
-        "number",
-        "zeile",
-    ]
-)
-_FUSED = re.compile(r"(theta|phi|th|q|pos|angle|ang|winkel|enc)(m|mot|motor|l|load|last)")
+from orchestrator.records.words import words_of
 
 
 @dataclass(frozen=True)
@@ -186,6 +28,7 @@ def choose(
     source: str,
     skip: Sequence[str] = (),
     rated: bool = False,
+    torque_needed: bool = True,
 ) -> dict[str, Choice]:
     """Return the channel of each column of a record: named, of the same name, or recognised without doubt.
 
@@ -195,6 +38,7 @@ def choose(
         source: file name, for messages.
         skip: columns that are not looked for.
         rated: whether a time can be made of the rows, so that none is needed.
+        torque_needed: whether two angles without a torque are refused.
 
     Returns:
         The choice of each column that was found, by name.
@@ -224,8 +68,10 @@ def choose(
             choice = _recognised(name, heads, {c.place for c in found.values()}, source)
             if choice is not None:
                 found[name] = choice
-            elif name not in OPTIONAL and not (name == "time" and rated):
+            elif name not in OPTIONAL and not (name == "time" and rated) and (name != "u" or torque_needed):
                 raise RecordError(_missing(name, heads, source))
+    if "u" in names and "u" not in found and "theta_l" not in found:
+        raise RecordError(_missing("u", heads, source))
     return found
 
 
@@ -239,78 +85,77 @@ def _called(heads: Sequence[Head], name: str) -> list[int]:
 
 
 def _recognised(name: str, heads: Sequence[Head], taken: set[int], source: str) -> Choice | None:
-    scores = {n: _score(name, head) for n, head in enumerate(heads) if n not in taken}
-    best = max(scores.values(), default=0)
-    if best <= 0:
-        return None
-    places = [n for n, score in scores.items() if score == best]
-    if len(places) > 1:
+    """Return the channel that looks most like a column; those in units that are not known come last."""
+    free = [n for n in range(len(heads)) if n not in taken]
+    for known in (True, False):
+        scores = {
+            n: _score(name, heads[n]) for n in free if known == (not heads[n].unit or _kind(heads[n], name) != "")
+        }
+        best = max(scores.values(), default=0)
+        if best <= 0:
+            continue
+        places = [n for n, score in scores.items() if score == best]
+        if len(places) == 1:
+            head = heads[places[0]]
+            return Choice(places[0], f"`{head.full or head.name}` taken as {name}", name == "time" and best == 1)
         if name in OPTIONAL:
             return None
         first, second = (heads[n].full or heads[n].name for n in places[:2])
+        one, other = (first, f"or `{second}`") if first != second else (f"#{places[0] + 1}", f"or `#{places[1] + 1}`")
         raise RecordError(
             f"{source}: `{first}` and `{second}` both look like {MEANINGS[name]}: say `[columns.{name}] name = "
-            f'"{first}"` (or the other) in the model file (`model`)'
+            f'"{one}"` ({other}) in the model file (`model`)'
         )
-    head = heads[places[0]]
-    return Choice(places[0], f"`{head.full or head.name}` taken as {name}", name == "time" and best == 1)
+    return None
 
 
-def _words_of(text: str) -> list[str]:
-    """Return the words of a channel's name, in lower case."""
-    plain = text.translate(_GREEK)
-    plain = re.sub(r"([a-zäöü])([A-Z])", r"\1 \2", plain)
-    words = [word for word in re.split(r"[^A-Za-zäöüÄÖÜß]+", plain.lower()) if word]
-    parts: list[str] = []
-    for word in words:
-        fused = _FUSED.fullmatch(word)
-        parts += fused.groups() if fused is not None else (word,)
-    return parts
+def _kind(head: Head, name: str) -> str:
+    """Return what a channel's unit measures; empty: it has none, or an unknown one."""
+    unit = parse_unit(head.unit, KINDS[name])
+    return "" if unit is None else unit.kind or "other"
 
 
 def _score(name: str, head: Head) -> int:
     """Return how much a channel looks like a column; 0: not at all."""
-    words = set(_words_of(head.name))
-    unit = parse_unit(head.unit)
-    kind = unit.kind if unit is not None else ""
+    found, kind = set(words_of(head.name)), _kind(head, name)
     if head.kind == "stamp":
         return 3 if name == "time" else 0
     if name == "time":
-        return _time_score(words, kind)
-    if words & (_SPEED | _OTHER) or kind in ("time", "speed", "velocity", "voltage") or not head.name:
+        return _time_score(found, kind)
+    if found & (words.SPEED | words.OTHER) or kind in ("time", "speed", "velocity", "voltage") or not head.name:
         return 0
     if name == "u":
-        return _torque_score(words, kind, bool(head.unit))
-    if kind not in ("", "angle", "counts", "length") or (head.unit and not kind) or words & (_ASKED | _TORQUE):
+        return _torque_score(found, kind)
+    if kind not in ("", "angle", "counts", "length") or found & (words.ASKED | words.TORQUE):
         return 0
-    side, other = (_MOTOR, _LOAD) if name == "theta_m" else (_LOAD, _MOTOR)
-    looks = bool(words & _ANGLE) or kind in ("angle", "counts")
-    if not looks or words & (other - side):
+    side, other = (words.MOTOR, words.LOAD) if name == "theta_m" else (words.LOAD, words.MOTOR)
+    looks = bool(found & words.ANGLE) or kind in ("angle", "counts")
+    if not looks or found & (other - side):
         return 0
-    if words & side:
+    if found & side:
         return 3
     return 1 if name == "theta_m" else 0
 
 
-def _time_score(words: set[str], kind: str) -> int:
-    if kind not in ("", "time") or (words & (_ANGLE | _TORQUE | _SPEED | _OTHER)):
+def _time_score(found: set[str], kind: str) -> int:
+    if kind not in ("", "time") or (found & (words.ANGLE | words.TORQUE | words.SPEED | words.OTHER)):
         return 0
-    if words & _TIME or kind == "time":
-        return 3 if words & _TIME else 2
-    return 1 if words and words <= _SAMPLE else 0
+    if found & words.TIME or kind == "time":
+        return 3 if found & words.TIME else 2
+    return 1 if found and found <= words.SAMPLE else 0
 
 
-def _torque_score(words: set[str], kind: str, has_unit: bool) -> int:
-    if kind not in ("", "torque", "force", "share", "current") or (has_unit and not kind) or words & (_LOAD - {"l"}):
+def _torque_score(found: set[str], kind: str) -> int:
+    if kind not in ("", "torque", "force", "share", "current") or found & (words.LOAD - {"l"}):
         return 0
-    torque = bool(words & _TORQUE) or kind in ("torque", "force") or ("m" in words and bool(words & _ASKED))
-    current = bool(words & _CURRENT) or kind in ("current", "share")
+    torque = bool(found & words.TORQUE) or kind in ("torque", "force") or ("m" in found and bool(found & words.ASKED))
+    current = bool(found & words.CURRENT) or kind in ("current", "share")
     if not (torque or current):
         return 0
-    if words & _ANGLE:
+    if found & words.ANGLE:
         return 0
     score = 4 if torque else 1
-    return score + (3 if words & _ASKED else -1 if words & _FOUND else 1 if torque else 0)
+    return score + (3 if found & words.ASKED else -1 if found & words.FOUND else 1 if torque else 0)
 
 
 def _listed(heads: Sequence[Head]) -> str:

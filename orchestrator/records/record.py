@@ -44,9 +44,10 @@ def read_record(
         RecordError: the file is missing or unreadable, or breaks a rule; the message names the place and the cure.
     """
     reading = reading or Reading()
-    with open_source(path) as source:
+    with open_source(path, reading.header) as source:
         loaded = load(source, path, columns or {}, further, reading)
-    check_driven(loaded.table["u"], loaded.labels["u"], path.name)
+    if "u" in loaded.table:
+        check_driven(loaded.table["u"], loaded.labels["u"], path.name)
     record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
     scale = (columns or {}).get("u", Column()).relative_uncertainty
     record = replace(record, u_scale_uncertainty=scale, notes=(*loaded.notes, *record.notes))
@@ -62,6 +63,7 @@ def record_from_columns(
 
     Args:
         table: ``time``, ``u``, ``theta_m``, perhaps ``theta_l``, and further columns; NaN where a sample is missing.
+            With ``theta_l``, ``u`` may be absent.
         source: name used in messages.
         shown: how columns are called in messages, where that differs.
         trust_rows: whether rows are uniform whatever their stamps say.
@@ -83,8 +85,9 @@ def record_from_columns(
     for name, values in arrays.items():
         check_finite(values, label[name], source)
     grid = grid_of(arrays["time"], label["time"], source, trust_rows)
-    if np.isnan(arrays["u"]).all() or np.isnan(arrays["theta_m"]).all():
-        raise RecordError(f"{source}: columns `{label['u']}` and `{label['theta_m']}` must hold numbers, but are empty")
+    for name in ("u", "theta_m"):
+        if name in arrays and np.isnan(arrays[name]).all():
+            raise RecordError(f"{source}: column `{label[name]}` must hold numbers, but is empty")
     for name in ("theta_m", "theta_l"):
         if name in arrays:
             check_range(arrays[name], label[name], source)
@@ -118,7 +121,8 @@ def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: b
             spread[grid.place] = values
             table[name] = spread
         table["time"] = np.asarray(grid.start + timing.step * np.arange(grid.size), dtype=np.float64)
-    u, deviation = _interpolated(table["u"])
+    absent = np.full(table["time"].size, np.nan)
+    u, deviation = _interpolated(table["u"]) if "u" in table else (absent, None)
     rest = {name: lined(values) for name, values in table.items() if name not in COLUMNS}
     record = Record(table["time"], u, table["theta_m"], table.get("theta_l"), source, rest, deviation, 0.0, timing)
     if record.missing:
@@ -160,7 +164,7 @@ def write_record(path: Path, record: Record) -> None:
         path: the file.
         record: in SI units.
     """
-    names = [name for name in COLUMNS if getattr(record, name) is not None]
+    names = [name for name in COLUMNS if getattr(record, name) is not None and (name != "u" or record.has_torque)]
     columns = [getattr(record, name).tolist() for name in names]
     lines = [",".join(names)]
     lines += [

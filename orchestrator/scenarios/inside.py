@@ -34,6 +34,7 @@ def opened(job: UnpackedRun) -> Callable[[Any], list[Any]]:
     def run(start: Any) -> list[Any]:
         result = session.run(start)
         s = result.statistics
-        return [result.values, s.steps, s.rejected, dict(s.do_steps), s.sweeps, s.loop]
+        remarks = [[remark.instance, remark.text, remark.count] for remark in result.remarks]
+        return [result.values, s.steps, s.rejected, dict(s.do_steps), s.sweeps, s.loop, remarks]
 
     return run

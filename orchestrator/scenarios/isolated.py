@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SimulationError
 from orchestrator.fmi.extraction import content_hash
@@ -17,7 +18,7 @@ from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.ours import is_ours
 from orchestrator.master.algorithms import step_count
 from orchestrator.master.compiled import prepare
-from orchestrator.master.result import LOOPS, Recording, Statistics
+from orchestrator.master.result import LOOPS, Recording, Statistics, claimed_remarks
 from orchestrator.master.system import System
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.inside import UnpackedRun
@@ -201,10 +202,22 @@ def _result(answer: Any, scenario: Scenario, shape: tuple[int, int], names: str)
             dict() as calls,
             int() as sweeps,
             str() as loop,
-        ] if values.shape == shape and values.dtype == np.float64 and loop in LOOPS:
+            list() as remarks,
+        ] if _fits(values, shape) and loop in LOOPS:
             counts = {i.name: c for i in scenario.system.instances if isinstance(c := calls.get(i.name), int)}
         case _:
             raise SimulationError(f"{names}: the run must return {shape[0]} signals of {shape[1]} values, but does not")
-    times = scenario.start + scenario.algorithm.step * np.arange(shape[1], dtype=np.float64)
+    times = scenario.start + scenario.algorithm.step * np.arange(values.shape[1], dtype=np.float64)
     units = {name: getattr(scenario.system.unit(name), "name", None) for name in scenario.record}
-    return Recording(times, values, scenario.record, units, Statistics(steps, rejected, counts, sweeps, loop))
+    statistics = Statistics(steps, rejected, counts, sweeps, loop)
+    return Recording(times, values, scenario.record, units, statistics, claimed_remarks(remarks))
+
+
+def _fits(values: NDArray[Any], shape: tuple[int, int]) -> bool:
+    """Whether values are of the recorded signals; a run that an FMU ended has fewer of each."""
+    return (
+        values.dtype == np.float64
+        and values.ndim == 2
+        and values.shape[0] == shape[0]
+        and 1 <= values.shape[1] <= shape[1]
+    )

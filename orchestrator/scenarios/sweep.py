@@ -19,6 +19,10 @@ from orchestrator.scenarios.isolated import foreign_fmus
 from orchestrator.scenarios.scenario import Scenario
 
 SUMMARIES = ("last", "min", "max", "mean", "rms")
+REMARKS = "remarks"
+"""Column of what FMUs had to say of a run that went on: warnings, an early end."""
+
+LONGEST_TEXT = 300
 # So many cases are looked at before a sweep starts; a wrong value beyond them becomes a row.
 CHECKED_CASES = 10_000
 
@@ -66,7 +70,8 @@ def scenario_work(scenario: Scenario, cases: DesignCases, trust: bool = False) -
     prepare()
     files = {i.name: _path(i) for i in scenario.system.instances}
     units = {name: getattr(scenario.system.unit(name), "name", None) or "1" for name in scenario.record}
-    columns = tuple(ResultColumn(f"{name}.{what}", units[name]) for name in scenario.record for what in SUMMARIES)
+    summaries = (ResultColumn(f"{name}.{what}", units[name]) for name in scenario.record for what in SUMMARIES)
+    columns = (*summaries, ResultColumn(REMARKS, "", str))
     bare = replace(scenario.system, instances=())
     starts = {i.name: dict(i.start) for i in scenario.system.instances}
     payload = _Payload(replace(scenario, system=bare), starts)
@@ -99,4 +104,4 @@ def _run(session: Session, case: Case) -> dict[str, Value]:
     for name, values in zip(result.names, result.values, strict=True):
         numbers = (values[-1], values.min(), values.max(), values.mean(), np.sqrt(np.mean(values**2)))
         summary |= {f"{name}.{what}": float(number) for what, number in zip(SUMMARIES, numbers, strict=True)}
-    return summary
+    return summary | {REMARKS: "; ".join(map(str, result.remarks))[:LONGEST_TEXT]}

@@ -7,6 +7,7 @@ folder. Beside each library lies its hash: what was damaged is not loaded, which
 import hashlib
 import importlib.util
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -59,7 +60,7 @@ def compiled_library(source: Path) -> Path | None:
     """
     if not sys.platform.startswith(("linux", "darwin")):
         return None
-    digest = hashlib.sha256(" ".join((sys.platform, os.uname().machine, *FLAGS)).encode())
+    digest = hashlib.sha256(" ".join((sys.platform, platform.machine(), *FLAGS)).encode())
     digest.update(source.read_bytes())
     folder = machine_code_folder()
     target = folder / f"{source.stem}-{digest.hexdigest()[:20]}.so"

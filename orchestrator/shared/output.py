@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.errors import OutputError
-from orchestrator.shared.processes import alive
+from orchestrator.shared.operating_system import alive
 from orchestrator.shared.results import as_plain
 from orchestrator.shared.version import __version__
 

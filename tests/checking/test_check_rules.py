@@ -1,7 +1,6 @@
 """Rules one by one, where no whole FMU is needed."""
 
 import csv
-import re
 from pathlib import Path
 
 import pytest
@@ -14,15 +13,17 @@ from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.checking.description import read_description
 from orchestrator.checking.findings import Finding, FmuFindings, ordered
+from orchestrator.checking.formats.junit import as_junit
+from orchestrator.checking.formats.text import as_lines
 from orchestrator.checking.layered import _read_csv
+from orchestrator.checking.policy import Policy
 from orchestrator.checking.rules import RULES
 from orchestrator.checking.rules_model import check_model
 from orchestrator.checking.rules_variables import check_variables
 from orchestrator.checking.units import dimension_of
-from orchestrator.checking.writing import as_junit, as_lines
+from orchestrator.checking.verdict import judge
 from tests.support.c_fmu import have_compiler, model_description
-
-DOCS = Path(__file__).parents[2] / "docs" / "check.md"
+from tools.rules_page import PAGE, page
 
 
 def rules_of(text: str) -> set[str]:
@@ -149,16 +150,16 @@ def test_errors_come_first_and_repeats_go() -> None:
 
 def test_hostile_names_reach_neither_terminal_nor_junit() -> None:
     report = FmuFindings("x.fmu", (Finding("archive.odd-name", "a\x1b[31m\nfake: no findings", "<&\"'\x00"),))
-    assert all("\x1b" not in line and "\n" not in line for line in as_lines(report))
-    suite = etree.fromstring(as_junit([report]).encode())[0]
-    assert suite.get("tests") == "1"
+    verdict = judge(report, Policy())
+    assert all("\x1b" not in line and "\n" not in line for line in as_lines(verdict))
+    suite = etree.fromstring(as_junit([verdict]).encode())[0]
+    assert suite.get("tests") == str(len(RULES))
     assert suite.get("failures") == "0"
 
 
 def test_the_documentation_lists_every_rule() -> None:
-    rows = re.findall(r"^\| `([a-z0-9.-]+)` \| (\w+) \| (.+?) \| (.+?) \|$", DOCS.read_text(encoding="utf-8"), re.M)
-    written = {name: (severity, expects, advice) for name, severity, expects, advice in rows}
-    assert written == {name: (r.severity, r.expects, r.advice) for name, r in RULES.items()}
+    text = PAGE.read_text(encoding="utf-8")
+    assert text == page(text), "run `python -m tools.rules_page`"
 
 
 @given(st.binary(max_size=300) | st.text(max_size=200).map(lambda t: f"<a b='{t}'/>".encode(errors="replace")))
@@ -181,3 +182,24 @@ def test_any_bytes_are_a_reference_result_or_refused(rows: list[list[str]], tail
         return
     assert result.names == ("x",)
     assert all(len(r) == 2 for r in result.rows)
+
+
+def test_an_outcome_per_rule_says_what_was_run(tmp_path: Path) -> None:
+    if not have_compiler():
+        pytest.skip("the FMU is built with a C compiler")
+    from tests.support.broken_fmus import QUICK, good
+
+    report = check_fmu(good(tmp_path / "good.fmu"), QUICK)
+    assert {o.rule for o in report.outcomes} == {n for n, rule in RULES.items() if "2.0" in rule.versions}
+    assert {o.outcome for o in report.outcomes} == {"passed"}
+    static = check_fmu(tmp_path / "good.fmu", CheckOptions(static=True))
+    not_run = {o.rule for o in static.outcomes if o.outcome == "not run"}
+    assert not_run == {o.rule for o in static.outcomes if RULES[o.rule].stage not in static.stages}
+    assert {o.reason for o in static.outcomes if o.outcome == "not run"} == {"nothing is executed, as was asked"}
+
+
+def test_every_rule_has_a_version_and_its_link() -> None:
+    for rule in RULES.values():
+        assert rule.versions
+        for version in rule.versions:
+            assert rule.link(version).startswith("https://") == bool(rule.anchor[version])

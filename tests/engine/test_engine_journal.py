@@ -1,5 +1,6 @@
 """The durable store: what survives damage, and what it refuses."""
 
+import io
 import json
 import math
 import os
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.engine import Outcome, Status
+from orchestrator.engine import journal as journal_module
 from orchestrator.engine.journal import Journal
 from orchestrator.errors import OutputError, ScenarioError
 
@@ -133,6 +135,14 @@ def test_a_discarded_journal_is_gone_and_its_file_closed(tmp_path):
     assert len(os.listdir("/proc/self/fd")) == before
 
 
+def test_a_journal_is_discarded_after_it_was_closed(tmp_path):
+    with Journal(tmp_path / "j", DEFINITION, 10, resume=False) as journal:
+        journal.append(outcomes([1]))
+    assert list(tmp_path.iterdir())
+    journal.discard()
+    assert not list(tmp_path.iterdir())
+
+
 def test_nothing_is_left_of_a_journal_without_cases(tmp_path):
     with Journal(tmp_path / "a" / "b" / "j", DEFINITION, 10, resume=False):
         assert (tmp_path / "a" / "b" / "j").exists()
@@ -154,14 +164,14 @@ def test_a_disk_that_is_full_from_the_start_leaves_nothing(tmp_path, monkeypatch
     def full(descriptor, data, offset):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(os, "pwrite", full)
+    monkeypatch.setattr(journal_module, "write_at", full)
     with pytest.raises(OutputError, match="0 of 10 cases"):
         Journal(tmp_path / "out" / "j", DEFINITION, 10, resume=False)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failed_write_leaves_the_lines_before_it(tmp_path, monkeypatch):
-    write = os.pwrite
+    write = journal_module.write_at
 
     def half_then_full(descriptor, data, offset):
         if len(data) > 20:
@@ -171,7 +181,7 @@ def test_a_failed_write_leaves_the_lines_before_it(tmp_path, monkeypatch):
     with Journal(tmp_path / "j", DEFINITION, 10, resume=False) as journal:
         journal.append(outcomes([0, 1]))
         before = (tmp_path / "j").read_bytes()
-        monkeypatch.setattr(os, "pwrite", half_then_full)
+        monkeypatch.setattr(journal_module, "write_at", half_then_full)
         with pytest.raises(OutputError, match="No space left on device; 2 of 10 cases are kept"):
             journal.append(outcomes([2]))
         monkeypatch.undo()
@@ -259,16 +269,20 @@ def test_what_a_crash_left_torn_is_cut_off_before_anything_is_added(tmp_path, wh
 
 
 def test_a_disk_without_room_for_the_offsets_is_said_in_words(tmp_path, monkeypatch):
-    """Room is reserved for eight bytes per case: a mapped file that cannot grow ends the process."""
-    asked = []
+    """Eight bytes per case are written before they are mapped: a mapped file that cannot grow ends the process."""
+    written = []
 
-    def full(descriptor, offset, size):
-        asked.append((offset, size))
-        raise OSError(28, "No space left on device")
+    class FullDisk(io.BytesIO):
+        def write(self, data):
+            written.append(bytes(data))
+            return super().write(data)
+
+        def flush(self):
+            raise OSError(28, "No space left on device")
 
     with Journal(tmp_path / "j", DEFINITION, 10, resume=False) as journal:
         journal.append(outcomes([1]))
-        monkeypatch.setattr(os, "posix_fallocate", full)
+        monkeypatch.setattr(journal_module.tempfile, "TemporaryFile", lambda **_: FullDisk())
         with pytest.raises(OutputError, match="No space left on device; 1 of 10 cases are kept"):
             list(journal.outcomes())
-    assert asked == [(0, 80)]
+    assert written == [bytes(80)]

@@ -1,7 +1,7 @@
 """Our FMUs in other people's hosts: the same trajectories under the same scheme.
 
 FMPy is always there; ecos, libcosim and PyFMI are tested when installed, programs when they are on PATH.
-``docs/hosts.md`` says how to get each and what was measured with it.
+``docs/hosts.md`` names them, and what was measured with each.
 """
 
 import csv

@@ -5,10 +5,13 @@ from dataclasses import asdict
 
 import pytest
 
+from orchestrator.checking.findings import Execution
 from orchestrator.checking.findings import Finding as CheckFinding
 from orchestrator.checking.findings import FmuFindings as CheckReport
+from orchestrator.checking.formats.text import as_results
+from orchestrator.checking.policy import Policy
 from orchestrator.checking.rules import RULES
-from orchestrator.checking.writing import as_results
+from orchestrator.checking.verdict import judge
 from orchestrator.cli import main
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.metric import ErrorStatistics
@@ -64,12 +67,13 @@ def test_the_page_of_a_sweep_shows_statistics_estimates_and_failures(sweep):
 def test_the_page_of_a_check_lists_what_was_found(tmp_path):
     rule = next(name for name, rule in RULES.items() if rule.severity == "error")
     found = CheckReport("a/bad.fmu", (CheckFinding(rule, "modelDescription.xml", "A unit must be defined."),))
-    write_result(
-        tmp_path, "check", {}, None, as_results([found, CheckReport("good.fmu", (), True, {"version": "2.0"})])
+    good = CheckReport(
+        "good.fmu", (), "2.0", executions=(Execution("CoSimulation", {"load": ""}),), facts={"version": "2.0"}
     )
+    write_result(tmp_path, "check", {}, None, as_results([judge(report, Policy()) for report in (found, good)]))
     report = report_from_directory(tmp_path)
-    assert report.badge == ("bad", "1 error")
-    assert report.summary.startswith("1 of 2 FMUs have no error.")
+    assert report.badge == ("bad", "1 failed")
+    assert report.summary.startswith("1 of 2 FMUs pass.")
     (findings,) = sections(report, Findings)
     assert (findings.title, findings.items[0].text) == ("bad.fmu", "A unit must be defined.")
     table, facts = sections(report, ReportTable)
@@ -80,7 +84,7 @@ def test_the_page_of_a_check_lists_what_was_found(tmp_path):
 def test_the_page_of_a_check_puts_findings_of_one_rule_together(tmp_path):
     first, second = (name for name, rule in list(RULES.items())[:2] if rule.severity == "error")
     found = [CheckFinding(rule, f"place {n}", f"what {n}") for n, rule in enumerate((first, second, first, first))]
-    write_result(tmp_path, "check", {}, None, as_results([CheckReport("bad.fmu", tuple(found))]))
+    write_result(tmp_path, "check", {}, None, as_results([judge(CheckReport("bad.fmu", tuple(found)), Policy())]))
     (findings,) = sections(report_from_directory(tmp_path), Findings)
     assert [(f.text, f.more) for f in findings.items] == [
         ("what 0", ("place 2: what 2", "place 3: what 3")),

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from orchestrator.checking.archive import ArchiveLimits
 from orchestrator.checking.check import CheckOptions
+from orchestrator.checking.rules import RULES
+from orchestrator.checking.static import STAGES as STATIC_STAGES
 from orchestrator.shared.isolation.limits import Limits
 from tests.support import broken_archives, broken_xml
 from tests.support.c_fmu import LIBRARY, fmu_files, have_compiler, write_fmu
@@ -117,8 +119,12 @@ def corpus() -> list[Broken]:
     found += [Broken(f"archive {n}", rule, make) for n, rule, make in broken_archives.ARCHIVES]
     found.append(Broken("archive large", "archive.too-large", broken_archives.large, _limited(total=2 << 20)))
     found.append(Broken("archive many files", "archive.too-many-files", broken_archives.many, _limited(files=20)))
+    # A fault in what is read may have consequences when the FMU runs, too; test_check_gate.py looks at these.
+    read = {name for name, rule in RULES.items() if rule.stage in STATIC_STAGES}
+    found = [replace(b, options=replace(b.options, static=b.rule in read)) for b in found]
     if have_compiler():
-        found += [Broken(f"binary {n}", rule, _files(change)) for n, rule, change in broken_xml.BINARIES]
+        static = replace(QUICK, static=True)
+        found += [Broken(f"binary {n}", rule, _files(change), static) for n, rule, change in broken_xml.BINARIES]
         found += [
             # Behind walls a process cannot be started, so none can be left.
             Broken(f"behaviour {n}", rule, _behaviour(n), replace(QUICK, trust=rule == "process.left"))

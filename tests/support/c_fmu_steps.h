@@ -44,6 +44,13 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 #ifdef FAULT_error_step
     if (self->s.steps == 5) return refuse(self, "solver failed");
 #endif
+#ifdef FAULT_logs_arguments
+    if (self->s.steps == 5) {
+        self->callbacks.logger(self->callbacks.componentEnvironment, self->name, fmi2Error, "logStatusError",
+            "%s %d %i %#x %lld %-5s%.2f %c %g %d%% %d", "a", 7, -3, 31, 99999999999LL, "tank", 2.5, 'x', 1e-9, 50, 8);
+        return fmi2Error;
+    }
+#endif
 #ifdef FAULT_discard_step
     if (self->s.steps == 5) return fmi2Discard;
 #endif

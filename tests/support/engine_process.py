@@ -5,7 +5,7 @@ import sys
 import time
 from pathlib import Path
 
-from orchestrator.shared.processes import alive
+from orchestrator.shared.operating_system import alive
 
 ROOT = Path(__file__).parents[2]
 # What is waited for comes or does not, however slow the machine; this only ends a test that hangs.

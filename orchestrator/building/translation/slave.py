@@ -22,9 +22,11 @@ _SAMPLED = {
     "predict": ("", False),
     "correct": ("", True),
 }
-# Hooks of a slave with continuous states; those with a kind return it.
-_CONTINUOUS = {"derivatives": "", "indicators": "", "update": ", double time", "observe": ""}
-_ARGUMENTS = {"advance": "time, step", "update": "time"}
+# Hooks of a slave with continuous states, and those that FMI 3.0 wants besides.
+_CONTINUOUS = {"derivatives": "", "indicators": "", "update": ", double time", "observe": "", "begin_exchange": ""}
+_EVENTS = {"advance_to_event": ", double time, double step", "output_rates": ""}
+_ARGUMENTS = {"advance": "time, step", "advance_to_event": "time, step", "update": "time"}
+_TYPES = {"Real": "REAL_VALUE", "Integer": "WHOLE_VALUE", "Enumeration": "CHOICE_VALUE"}
 _CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER", "local": "LOCAL"}
 
 
@@ -39,12 +41,13 @@ class TranslatedSlave:
     tables: str
 
 
-def translate_slave(cls: Any, taken: frozenset[str] = frozenset()) -> TranslatedSlave:
+def translate_slave(cls: Any, taken: frozenset[str] = frozenset(), fmi: int = 2) -> TranslatedSlave:
     """Translate an adapter (a subclass of ``SlaveBase``) and all that it calls.
 
     Args:
         cls: the class; its table holds the start values of this FMU.
         taken: names that the C runtime uses.
+        fmi: version of FMI, 2 or 3.
 
     Returns:
         The slave in C, in parts.
@@ -57,7 +60,7 @@ def translate_slave(cls: Any, taken: frozenset[str] = frozenset()) -> Translated
     sampled = any(base.__name__ == "SampledSlave" for base in cls.__mro__)
     hooks = [_hook(program, name, *hook) for name, hook in (_SAMPLED if sampled else _PLAIN).items()]
     if has_states(cls):
-        hooks.append(_continuous(program, cls))
+        hooks.append(_continuous(program, cls, _CONTINUOUS | (_EVENTS if fmi == 3 else {})))
     program.check_lengths()
     pairs = directional(program, owner) if hasattr(cls, "response") else None
     struct = _struct(program, owner)
@@ -109,14 +112,14 @@ def has_states(cls: Any) -> bool:
     return bool(getattr(cls, "continuous_states", ()))
 
 
-def _continuous(program: Program, cls: Any) -> str:
-    """Return the hooks of model exchange, and where the states are."""
+def _continuous(program: Program, cls: Any, hooks: dict[str, str]) -> str:
+    """Return the hooks of a slave with states, with their parameters, and where the states are."""
     count = len(cls.continuous_states)
     owner = program.owner
     assert owner is not None
     if owner.attributes.get(cls.state_attribute) != Tuple((REAL,) * count):
         raise FmuError(f"`{program.owner_name}.{cls.state_attribute}` must be a tuple of {count} floats")
-    made = {name: program.method(None, None, name) for name in _CONTINUOUS}
+    made = {name: program.method(None, None, name) for name in hooks}
     returned = made["indicators"].returns
     if made["derivatives"].returns != Tuple((REAL,) * count) or not isinstance(returned, Tuple):
         raise FmuError(f"`{program.owner_name}` must return {count} derivatives, and indicators as a tuple of floats")
@@ -129,16 +132,35 @@ def _continuous(program: Program, cls: Any) -> str:
         f"#define STATES(slave) ((slave)->{program.attribute_name(cls.state_attribute)}.v)",
         f"static const double nominals[] = {{{nominals}}};",
     ]
-    return "\n\n".join(["\n".join(lines), *(_state_hook(program, name, function) for name, function in made.items())])
+    if "output_rates" in hooks:
+        lines += _output_rates(program, cls, made["output_rates"])
+    functions = (_state_hook(program, name, hooks[name], function) for name, function in made.items())
+    return "\n\n".join(["\n".join(lines), *functions])
 
 
-def _state_hook(program: Program, name: str, function: Function) -> str:
+def _output_rates(program: Program, cls: Any, function: Function) -> list[str]:
+    """Return the table of outputs that have derivatives."""
+    names = [variable.name for variable in cls.table]
+    references = [names.index(name) for name in cls.response_outputs]
+    if function.returns != Tuple((REAL,) * len(references)):
+        raise FmuError(f"`{program.owner_name}.output_rates` must return a derivative for each of `response_outputs`")
+    return [
+        f"#define OUTPUT_RATES {len(references)}",
+        f"static const Reference rated_outputs[] = {{{', '.join(map(str, references))}}};",
+        f"#define HAS_EVENT(slave) ((slave)->{program.attribute_name('_event')} >= 0)",
+    ]
+
+
+def _state_hook(program: Program, name: str, parameters: str, function: Function) -> str:
     arguments = [a for a in ("self", _ARGUMENTS.get(name), "fault" if function.faults else None) if a]
     call = f"{function.c}({', '.join(arguments)})"
     unused = "" if function.faults else "    (void)fault;\n"
     if function.returns == NOTHING:
-        head = f"static void slave_{name}({program.owner_name} *self{_CONTINUOUS[name]}, Fault *fault)"
+        head = f"static void slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
         return f"{head}\n{{\n{unused}    {call};\n}}"
+    if function.returns == REAL:
+        head = f"static double slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
+        return f"{head}\n{{\n{unused}    return {call};\n}}"
     c = program.names.c(function.returns)
     head = f"static void slave_{name}({program.owner_name} *self, double values[], Fault *fault)"
     return f"{head}\n{{\n{unused}    const {c} found = {call};\n    memcpy(values, found.v, sizeof found.v);\n}}"
@@ -184,7 +206,7 @@ def _variables(cls: Any) -> str:
     rows = []
     for variable in cls.table:
         low, high = variable.bounds
-        kind = "REAL_VALUE" if variable.type == "Real" else "WHOLE_VALUE"
+        kind = _TYPES[variable.type]
         numbers = ", ".join(repr(float(number)) for number in (variable.start or 0.0, low, high))
         rows.append(f'    {{"`{variable.name}`", {kind}, {_CAUSALITIES[variable.causality]}, {numbers}}},')
     return "static const Variable variables[] = {\n" + "\n".join(rows) + "\n};"

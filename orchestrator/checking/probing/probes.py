@@ -1,6 +1,6 @@
 """Probes of one running slave: life cycle, inputs, reference result, memory.
 
-A probe returns whether the ones after it make sense.
+A probe that cannot be carried out on an FMU raises ``SkippedError`` with the reason; the ones after it go on.
 """
 
 from collections.abc import Callable
@@ -65,7 +65,14 @@ class Context:
             self.report("run.inexact", f"{wanted} bit for bit, but {difference}")
 
 
-Probe = Callable[[Context], bool]
+Probe = Callable[[Context], None]
+
+
+class SkippedError(Exception):
+    """A probe does not apply to this FMU; the text says why."""
+
+
+NOT_COMPARABLE = "two equal runs of this FMU differ"
 
 
 def load(library: Library, report: Callable[..., None]) -> None:
@@ -83,14 +90,11 @@ def load(library: Library, report: Callable[..., None]) -> None:
         report("load.platform", f"fmi2GetTypesPlatform must return default, but returns {platform!r}")
 
 
-def life_cycle(context: Context) -> bool:
+def life_cycle(context: Context) -> None:
     """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value.
 
     Args:
         context: the FMU, its job and where findings go.
-
-    Returns:
-        False when nothing else can be probed.
     """
     bench, job = context.bench, context.bench.job
     outputs = job.outputs()
@@ -115,7 +119,6 @@ def life_cycle(context: Context) -> bool:
                 bench.job = replace(job, steps=n + 1)
                 break
         slave.call("fmi2Terminate")
-    return True
 
 
 def _start_values(context: Context, slave: ProbedSlave) -> None:
@@ -161,14 +164,11 @@ def _look(context: Context, outputs: list[ProbedVariable], values: list[Any], wh
         _string(context, v, value)
 
 
-def inputs(context: Context) -> bool:
+def inputs(context: Context) -> None:
     """Run with moving inputs; what is recorded is what the later probes compare with.
 
     Args:
         context: the FMU, its job and where findings go.
-
-    Returns:
-        False when nothing else can be probed.
     """
     bench = context.bench
     refused = None
@@ -184,17 +184,13 @@ def inputs(context: Context) -> bool:
         bench.excited = False
     with bench.instance() as slave:
         context.trace = bench.run(slave)
-    return True
 
 
-def setting(context: Context) -> bool:
+def setting(context: Context) -> None:
     """Set everything that can be set to its start value before initialisation: accepted, and without effect.
 
     Args:
         context: the FMU, its job and where findings go.
-
-    Returns:
-        True: the other probes go on.
     """
     bench, job = context.bench, context.bench.job
     settable = [v for v in job.variables if _settable(v)]
@@ -206,14 +202,13 @@ def setting(context: Context) -> bool:
             except StatusError as error:
                 rule = "value.set" if v.causality in ("input", "parameter") else "value.set-initial"
                 context.report(rule, str(error), v.name)
-                return True
+                return
         if context.trace is None:
-            return True
+            return
         bench.initialise(slave)
         difference = context.compare(context.trace, bench.run(slave))
     if difference is not None:
         context.report_difference("value.set", "a run must not change when start values are set", difference)
-    return True
 
 
 def _settable(v: ProbedVariable) -> bool:
@@ -221,19 +216,19 @@ def _settable(v: ProbedVariable) -> bool:
     return v.start is not None and v.variability != "constant" and (v.initial == "exact" or v.causality == "input")
 
 
-def memory(context: Context) -> bool:
+def memory(context: Context) -> None:
     """Resident memory over instances and over steps.
 
     Args:
         context: the FMU, its job and where findings go.
 
-    Returns:
-        True: the other probes go on.
+    Raises:
+        SkippedError: it does not apply.
     """
     bench, job = context.bench, context.bench.job
     resident = bench.library.resident
     if not resident():
-        return True
+        raise SkippedError("the system does not tell the memory of a process")
     budget = Stopwatch(job.budget)
     cycles, before = 0, None
     for n in range(30):
@@ -258,4 +253,3 @@ def memory(context: Context) -> bool:
     if growth > _LEAK_AT_LEAST and growth / max(job.steps - quarter, 1) > _LEAK_PER_STEP:
         per_step = growth / max(job.steps - quarter, 1) / 1024
         context.report("resources.step-leak", f"memory must not grow with steps, but grows by {per_step:.0f} KiB each")
-    return True

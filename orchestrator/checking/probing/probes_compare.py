@@ -3,21 +3,18 @@
 from typing import Any
 
 from orchestrator.checking.probing.binding import ProbedSlave, StatusError
-from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
 from orchestrator.checking.probing.trajectory import ProbedVariable
 
 _STEP_TOLERANCE = 0.1
 _FEWEST_PAIRS = 10
 
 
-def determinism(context: Context) -> bool:
+def determinism(context: Context) -> None:
     """A second fresh instance must give the same run.
 
     Args:
         context: the FMU, its job and where findings go.
-
-    Returns:
-        True: the other probes go on.
     """
     with context.bench.instance() as slave:
         difference = context.compare(context.trace or [], context.bench.run(slave))
@@ -25,21 +22,22 @@ def determinism(context: Context) -> bool:
         context.report("run.determinism", f"two equal runs must give the same, but {difference}")
         context.report("run.skipped", "instances, reset and state are not checked, because runs cannot be compared")
         context.trace = None
-    return True
 
 
-def instances(context: Context) -> bool:
+def instances(context: Context) -> None:
     """Two instances at once: the one under test must not notice the other.
 
     Args:
         context: the FMU, its job and where findings go.
 
-    Returns:
-        True: the other probes go on.
+    Raises:
+        SkippedError: it does not apply.
     """
     bench, job = context.bench, context.bench.job
-    if context.trace is None or context.single:
-        return True
+    if context.trace is None:
+        raise SkippedError(NOT_COMPARABLE)
+    if context.single:
+        raise SkippedError("canBeInstantiatedOnlyOncePerProcess is true")
     with bench.instance(name="first") as one:
         try:
             with bench.instance(name="second") as other:
@@ -55,27 +53,26 @@ def instances(context: Context) -> bool:
         except StatusError as error:
             context.single = True
             context.report("instances.second", str(error))
-            return True
+            return
     difference = context.compare(context.trace, rows)
     if difference is not None:
         context.report_difference(
             "instances.interference", "a run beside a second instance must be the same", difference
         )
-    return True
 
 
-def reset(context: Context) -> bool:
+def reset(context: Context) -> None:
     """A reset instance must run as a fresh one does, from mid-run and from the end.
 
     Args:
         context: the FMU, its job and where findings go.
 
-    Returns:
-        True: the other probes go on.
+    Raises:
+        SkippedError: it does not apply.
     """
     bench = context.bench
     if context.trace is None:
-        return True
+        raise SkippedError(NOT_COMPARABLE)
     with bench.instance() as slave:
         bench.run(slave, 0, max(bench.job.steps // 2, 1))
         try:
@@ -90,21 +87,22 @@ def reset(context: Context) -> bool:
                 slave.call("fmi2Terminate")
         except StatusError as error:
             context.report("run.reset", str(error))
-    return True
 
 
-def state(context: Context) -> bool:
+def state(context: Context) -> None:
     """Save in mid-run, go on, restore, go on: the rest of the run must be the same.
 
     Args:
         context: the FMU, its job and where findings go.
 
-    Returns:
-        True: the other probes go on.
+    Raises:
+        SkippedError: it does not apply.
     """
     bench, job = context.bench, context.bench.job
-    if context.trace is None or "canGetAndSetFMUstate" not in job.flags:
-        return True
+    if context.trace is None:
+        raise SkippedError(NOT_COMPARABLE)
+    if "canGetAndSetFMUstate" not in job.flags:
+        raise SkippedError("canGetAndSetFMUstate is false")
     half = max(job.steps // 2, 1) if job.steps > 1 else 0
     with bench.instance() as slave:
         bench.run(slave, 0, half)
@@ -118,7 +116,6 @@ def state(context: Context) -> bool:
                 context.report("state.free", "fmi2FreeFMUstate must set the state to null, but does not")
         except StatusError as error:
             context.report("state.status", str(error))
-    return True
 
 
 def _restore(context: Context, slave: ProbedSlave, saved: Any, half: int) -> None:
@@ -157,7 +154,7 @@ def _continues(context: Context, slave: ProbedSlave, half: int, rule: str, wante
     return difference is None
 
 
-def variable_steps(context: Context) -> bool:
+def variable_steps(context: Context) -> None:
     """Uneven communication steps must hardly change what comes out at common times.
 
     The inputs stay at their start values, for what a slave does between two values of an input is its own.
@@ -165,12 +162,14 @@ def variable_steps(context: Context) -> bool:
     Args:
         context: the FMU, its job and where findings go.
 
-    Returns:
-        True: the other probes go on.
+    Raises:
+        SkippedError: it does not apply.
     """
     job = context.bench.job
-    if "canHandleVariableCommunicationStepSize" not in job.flags or job.steps < _FEWEST_PAIRS * 2:
-        return True
+    if "canHandleVariableCommunicationStepSize" not in job.flags:
+        raise SkippedError("canHandleVariableCommunicationStepSize is false")
+    if job.steps < _FEWEST_PAIRS * 2:
+        raise SkippedError("the run has too few steps")
     outputs = [v for v in job.outputs() if v.base == "Real"]
     pairs = job.steps // 2
     even = _run_in_pairs(context, outputs, (1.0, 1.0))
@@ -178,7 +177,7 @@ def variable_steps(context: Context) -> bool:
         uneven = _run_in_pairs(context, outputs, (0.4, 1.0, 0.6))
     except StatusError as error:
         context.report("steps.variable", str(error))
-        return True
+        return
     for i, v in enumerate(outputs):
         a, b = [r[i] for r in even], [r[i] for r in uneven]
         # A signal that hardly moves is held to its size, where a solver's tolerance is.
@@ -188,7 +187,6 @@ def variable_steps(context: Context) -> bool:
             off = f"is off by more than {_STEP_TOLERANCE:.0%} of its range at {far} of {pairs} points with uneven steps"
             message = f"`{v.name}` must hardly depend on the communication step, but {off}"
             context.report("steps.variable", message, v.name)
-    return True
 
 
 def _run_in_pairs(context: Context, outputs: list[ProbedVariable], sizes: tuple[float, ...]) -> list[list[Any]]:

@@ -4,14 +4,11 @@ from orchestrator.checking.probing.binding import OK, WARNING
 from orchestrator.checking.probing.probes import Context
 
 
-def misuse(context: Context) -> bool:
+def misuse(context: Context) -> None:
     """Wrong guid, a step too early, a negative step, an unknown value reference.
 
     Args:
         context: the FMU, its job and where findings go.
-
-    Returns:
-        True: the other probes go on.
     """
     bench, job = context.bench, context.bench.job
     slave = bench.library.instantiate("instance", "{a guid of another model}", job.resources)
@@ -32,4 +29,3 @@ def misuse(context: Context) -> bool:
         if status in (OK, WARNING):
             message = f"fmi2GetReal must refuse the unknown value reference {unknown}, but does not"
             context.report("misuse.value-reference", message)
-    return True

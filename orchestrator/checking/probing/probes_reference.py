@@ -5,7 +5,7 @@ from itertools import pairwise
 from typing import Any
 
 from orchestrator.checking.probing.binding import ProbedSlave, TerminatedError
-from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.probes import Context, SkippedError
 from orchestrator.checking.probing.trajectory import ProbedVariable
 from orchestrator.shared.stopwatch import Stopwatch
 
@@ -46,18 +46,18 @@ class Tube:
             self.worst = (largest, found)
 
 
-def reference(context: Context) -> bool:
+def reference(context: Context) -> None:
     """Simulate what the reference result shows and compare.
 
     Args:
         context: the FMU, its job and where findings go.
 
-    Returns:
-        True: the other probes go on.
+    Raises:
+        SkippedError: it does not apply.
     """
     job = context.bench.job
     if job.reference is None:
-        return True
+        raise SkippedError("the FMU has no reference result")
     names, rows, path = job.reference.names, job.reference.rows, job.reference.path
     by_name = {v.name: v for v in job.variables}
     columns = [(i, by_name[n]) for i, n in enumerate(names, 1) if by_name[n].base != "String"]
@@ -70,7 +70,6 @@ def reference(context: Context) -> bool:
     elif tube.outside > _OUTSIDE * len(rows):
         where = f"{tube.outside} of {len(rows)} points are outside the tube: {tube.worst[1]}"
         context.report("reference.result", f"the reference result must be reproduced, but {where}", path)
-    return True
 
 
 def _simulate(context: Context, rows: Sequence[Row], parameters: Columns, inputs: Columns, tube: Tube) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.estimation.inspection.machine import ROUGH
-from orchestrator.records.columns import COLUMNS, Column
+from orchestrator.records.columns import COLUMNS, KINDS, Column
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
 from orchestrator.records.loading import chosen_channels
@@ -29,12 +29,15 @@ MEANING = {
 }
 
 
-def assumed_columns(path: Path, columns: Mapping[str, Column]) -> tuple[dict[str, Column], tuple[str, ...]]:
+def assumed_columns(
+    path: Path, columns: Mapping[str, Column], header: int | None = None
+) -> tuple[dict[str, Column], tuple[str, ...]]:
     """Return the columns with what their units still need, and a sentence on each assumption.
 
     Args:
         path: of the record.
         columns: what the model file says of columns.
+        header: line of the names in a text; None: found.
 
     Returns:
         Both.
@@ -42,13 +45,13 @@ def assumed_columns(path: Path, columns: Mapping[str, Column]) -> tuple[dict[str
     Raises:
         RecordError: the file cannot be read, or a column is missing or ambiguous.
     """
-    with open_source(path) as source:
+    with open_source(path, header) as source:
         chosen = chosen_channels(source, columns, str(path))
     filled, said = dict(columns), []
     for name, choice in chosen.items():
         column = filled.get(name, Column())
         head = source.heads[choice.place]
-        unit = parse_unit(column.unit or head.unit)
+        unit = parse_unit(column.unit or head.unit, KINDS[name])
         kind = unit.kind if unit is not None else ""
         changed = column
         if kind == "counts" and column.counts_per_rev is None:
@@ -94,7 +97,10 @@ def starter(
         The text, which ``read_model`` takes.
     """
     lines = [f"# A model of the machine that made {record}: look at every line that says ASSUMED or ROUGH.", ""]
-    lines += [f'fmu = "{model.fmu}"', ""]
+    lines += [f'fmu = "{model.fmu}"']
+    if model.header is not None:
+        lines.append(f"header = {model.header}   # line of the record that holds the names")
+    lines.append("")
     for name in COLUMNS:
         if name in columns:
             lines += [f"[columns.{name}]", *_column_lines(columns[name], assumed, name), ""]

@@ -20,12 +20,12 @@ from orchestrator.errors import SimulationError
 from orchestrator.master import session as session_module
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
-from orchestrator.paired.bench.runner import peak_memory
 from orchestrator.paired.bench.scaling import chain
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.scenario import paired_scenario
 from orchestrator.scenarios.sweep import scenario_work
+from orchestrator.shared.operating_system import peak_memory
 
 CASES = (10, 100, 1_000, 10_000)
 CASE_STEPS = 100

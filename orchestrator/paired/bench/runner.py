@@ -14,6 +14,7 @@ from pathlib import Path
 
 from orchestrator.paired.bench.job import read_job
 from orchestrator.paired.bench.tools import TOOLS
+from orchestrator.shared.operating_system import peak_memory
 
 RUNS = 3
 
@@ -45,18 +46,6 @@ def main(arguments: list[str]) -> int:
     result.write_text(json.dumps(found), encoding="utf-8")
     sys.stdout.flush()
     os._exit(0)  # some tools' libraries do not survive the end of the interpreter
-
-
-def peak_memory() -> int:
-    """Return the largest memory of this process [KiB]; ``ru_maxrss`` would start from that of its parent.
-
-    Returns:
-        The memory; 0 where the system does not tell.
-    """
-    for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
-        if line.startswith("VmHWM:"):
-            return int(line.split()[1])
-    return 0
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """Readers of file formats, one module each, behind the interface of :mod:`orchestrator.records.formats.source`."""
 
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,17 +39,19 @@ FORMATS = "CSV, Parquet, MDF4, MAT or NumPy"
 
 
 @contextmanager
-def open_source(path: Path) -> Iterator[RecordSource]:
+def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]:
     """Open a file for a ``with`` statement; its first bytes decide on the reader, not its name.
 
     Args:
         path: the file.
+        header: line of the names in a text, from 1; 0: it has none; None: found.
 
     Yields:
         Its channels, read when they are asked for.
 
     Raises:
-        RecordError: the file is missing, too large, broken, of an unknown format, or its reader is not installed.
+        RecordError: the file is missing, too large, broken, of an unknown format, or its reader is not installed; or
+            ``header`` is given for what is no text.
     """
     head = _first_bytes(path)
     if not head:
@@ -57,13 +60,30 @@ def open_source(path: Path) -> Iterator[RecordSource]:
         if head.startswith(start):
             raise RecordError(f"{path}: must be {FORMATS}, but {what}")
     module = next((name for at, magic, name in _MAGIC if head[at : at + len(magic)] == magic), "text")
+    if module == "text" and _is_mat_4(head):
+        module = "mat"
+    if header is not None and module != "text":
+        raise RecordError(f"{path}: `header` must be left out, but is {header}: it is for text files")
     if module == "text":
-        yield text.open_file(path)
+        yield text.open_file(path, header)
     elif module == "numpy_file":
         yield numpy_file.open_file(path)
     else:
         with opened_apart(module, path) as source:
             yield source
+
+
+def _is_mat_4(head: bytes) -> bool:
+    """Return whether a file begins with the head of a matrix as MATLAB 4 wrote it, which has no magic bytes."""
+    for order, place in (("<", 0), (">", 1000)):
+        if len(head) < 22:
+            return False
+        kind, rows, columns, imaginary, length = struct.unpack(f"{order}5i", head[:20])
+        numbers, texts = divmod(kind - place, 10)
+        name = head[20 : 20 + length]
+        if 0 <= numbers <= 5 and texts <= 2 and min(rows, columns) >= 0 and imaginary in (0, 1) and 1 < length <= 64:
+            return name.endswith(b"\x00") and name[:-1].decode("latin-1").isidentifier()
+    return False
 
 
 def _first_bytes(path: Path) -> bytes:

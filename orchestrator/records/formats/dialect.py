@@ -1,31 +1,20 @@
 """Which CSV a text is: separator, decimal sign, lines before the names, names, units."""
 
-import csv
 import re
-from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.errors import RecordError
+from orchestrator.records.formats.cells import cells_of, is_value
+from orchestrator.records.formats.heading import UNIT_KEYS, Heading
+from orchestrator.records.formats.heads import named
 from orchestrator.records.formats.source import MAXIMUM_CHANNELS, Head
 from orchestrator.records.stamps import is_stamp
-from orchestrator.records.units import parse_unit
 
 SEPARATORS = (";", "\t", ",", "|", " ")
 SPOKEN = {";": "`;`", "\t": "tab", ",": "`,`", "|": "`|`", " ": "blanks"}
-SAMPLE_LINES, SAMPLE_CHARACTERS = 300, 400_000
-LOOK_AHEAD = 5
-_POINT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity)")
-_COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity)")
-_EMPTY = frozenset(("", "-", "--", "n/a", "na", "null"))
-_BRACKETS = re.compile(r"(.+?)\s*[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]\s*")
-_SLASH = re.compile(r"(.+?)\s*(?:\s/\s*|/\s+|,\s+|\s+in\s+)(\S.*)")
-_SUFFIX = re.compile(
-    r"(?i)(.+?)[_ .](ms|us|s|sec|deg|rad|mrad|rev|nm|mnm|rpm|degps|radps|rads|a|ma|v|pct|percent|counts|cnt|inc|mm|hz)"
-)
-_SPELLED = {"degps": "deg/s", "radps": "rad/s", "rads": "rad/s", "nm": "N.m", "mnm": "mN.m", "a": "A", "ma": "mA",
-            "v": "V", "hz": "Hz"}  # fmt: skip
+SAMPLE_LINES, SAMPLE_CHARACTERS = 500, 400_000
+STRAY_ROWS = 4  # of numbers above the names: with more, two records stand in one file
 
 
 @dataclass(frozen=True)
@@ -64,66 +53,126 @@ class Dialect:
         words = ["CSV", f"separator {SPOKEN[self.separator]}", f"decimal {'comma' if self.decimal == ',' else 'point'}"]
         words += [{"utf-8-sig": "UTF-8 with BOM", "cp1252": "Windows-1252"}.get(encoding, encoding.upper())]
         filled = sum(bool(line.strip()) for line in self.preamble)
-        words += [f"{filled} lines before the names"] * (filled > 0) + ["a row of units"] * self.units_row
+        words += [f"{filled} lines besides the names"] * (filled > 0) + ["a row of units"] * self.units_row
+        words += [f"`{key}` above the names not used" for key in self._further_units()]
         return ", ".join(words + ["no names"] * (not self.named))
 
+    def _further_units(self) -> list[str]:
+        """Return the keys of lines that state units of the file's own kind, such as a scope's volts."""
+        keys = [_further(line, self.separator) for line in self.preamble]
+        return [key for key in keys if key and key.lower() not in UNIT_KEYS]
 
-def detect(text: str, path: Path) -> Dialect:
-    """Return the dialect of a text.
+
+def _further(line: str, separator: str) -> str:
+    cells = cells_of(line, separator)
+    return cells[0] if len(cells) > 2 and re.search(r"(?i)unit|einheit", cells[0]) else ""
+
+
+def detect(text: str, path: Path, header: int | None = None) -> Dialect:
+    """Return the dialect of a text: the names are the last line before the longest run of rows of numbers.
 
     Args:
         text: of the whole file.
         path: of the file, for messages.
+        header: line of the names, from 1; 0: there are none; None: found.
 
     Returns:
         The dialect.
 
     Raises:
-        RecordError: no separator makes it a table of numbers.
+        RecordError: no separator makes it a table of numbers, or the line of the names cannot hold them.
     """
-    lines = text[:SAMPLE_CHARACTERS].split("\n")
-    if len(text) > SAMPLE_CHARACTERS:
+    skipped = _start_of(text, header or 0, path)
+    below = text[skipped:]
+    lines = below[:SAMPLE_CHARACTERS].split("\n")
+    if len(below) > SAMPLE_CHARACTERS:
         lines.pop()
     lines = lines[:SAMPLE_LINES]
     found = [entry for s in SEPARATORS for d in (".", ",") if (entry := _block(lines, s, d)) is not None]
     if not found:
         raise _no_table(text, path)
-    # More cells, then more rows, tell the right separator; a decimal point is preferred where both fit.
-    width, _, first, separator, decimal = max(found, key=lambda e: (e[0], e[1], e[4] == "."))
+    # More cells tell the right separator; a decimal point is preferred where both fit.
+    width, _, first, separator, decimal = max(found, key=lambda e: (e[0] * e[1], e[0], e[4] == "."))
     if decimal == "." and separator != "," and _only_commas(lines[first:], text, separator):
         decimal = ","
     if width > MAXIMUM_CHANNELS:
         raise RecordError(f"{path}: a record must have at most {MAXIMUM_CHANNELS} columns, but has {width}")
-    rows = [cells_of(line, separator) for line in lines[first : first + LOOK_AHEAD * 4] if line.strip()]
-    names, units, preamble = _names(lines[:first], separator, decimal, width, path)
+    first = _first_row(lines, first, separator, decimal, width, path)
+    rows = [cells_of(line, separator) for line in lines[first : first + 20] if line.strip()]
+    above = lines[:first]
+    head = Heading(separator, decimal, width, path)
+    if header:
+        above = [text[:skipped].rstrip("\n").rsplit("\n", 1)[-1], *above]
+        names, units, preamble = head.stated(above, header)
+    else:
+        names, units, preamble = (None, [""] * width, above) if header == 0 else head.found(above)
     kinds = ["stamp" if _is_stamp_column(rows, place) else "number" for place in range(width)]
     if names is None:
         heads = [Head(f"#{n + 1}", "", kind) for n, kind in enumerate(kinds)]
     else:
         heads = [_head(name, unit, kind) for name, unit, kind in zip(names, units, kinds, strict=True)]
-    start = sum(len(line) + 1 for line in lines[:first])
+    start = skipped + sum(len(line) + 1 for line in lines[:first])
     has_units = any(units) and names is not None
     return Dialect(separator, decimal, tuple(heads), width, start, tuple(preamble), has_units, names is not None)
 
 
+def _start_of(text: str, line: int, path: Path) -> int:
+    """Return where the line after the given one begins."""
+    at = 0
+    for _ in range(line):
+        at = text.find("\n", at) + 1
+        if at == 0:
+            raise RecordError(
+                f"{path}: `header` must be a line of the file, but is {line} of {text.count(chr(10)) + 1}"
+            )
+    return at
+
+
 def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int, str, str] | None:
-    """Return (width, rows, first line, separator, decimal) of the table that a separator makes, or None."""
-    widths: list[int] = []
-    for line in lines:
+    """Return (width, rows, first line, separator, decimal) of the longest run of rows of numbers, or None."""
+    best: tuple[int, int, int] | None = None
+    width = start = count = 0
+    for n, line in enumerate(lines):
+        if not line.strip():
+            continue
         cells = cells_of(line, separator)
-        good = sum(_is_value(cell, decimal) for cell in cells)
-        numbers = good >= 2 and 2 * good >= sum(cell != "" for cell in cells)
-        widths.append(len(cells) if numbers else 0)
-    counted = Counter(width for width in widths if width >= 2)
-    if not counted:
-        return None
-    width = counted.most_common(1)[0][0]
-    filled = [n for n, line in enumerate(lines) if line.strip()]
-    for at, n in enumerate(filled):
-        ahead = [widths[m] == width for m in filled[at : at + LOOK_AHEAD]]
-        if widths[n] == width and 2 * sum(ahead) > len(ahead):
-            return width, counted[width], n, separator, decimal
-    return None
+        good = sum(is_value(cell, decimal) for cell in cells)
+        now = len(cells) if good >= 2 and 2 * good >= sum(cell != "" for cell in cells) else 0
+        if now != width:
+            width, start, count = now, n, 0
+        count += 1
+        if width >= 2 and (best is None or count * width > best[0] * best[1]):
+            best = width, count, start
+    return None if best is None else (*best, separator, decimal)
+
+
+def _first_row(lines: list[str], first: int, separator: str, decimal: str, width: int, path: Path) -> int:
+    """Return the first row of the table: rows above its longest run belong to it where no names stand between them.
+
+    Raises:
+        RecordError: there are names between rows of numbers, so that a part of them would be lost.
+    """
+    stray: list[int] = []
+    for n in range(first - 1, -1, -1):
+        cells = cells_of(lines[n], separator)
+        if not lines[n].strip():
+            continue
+        if len(cells) == width and all(cell == "" or is_value(cell, decimal) for cell in cells):
+            stray.append(n)
+        elif len(cells) == width and not any(is_value(cell, decimal) for cell in cells):
+            break
+    if stray:
+        return min(stray)
+    lost = [
+        n for n in range(first) if len(c := cells_of(lines[n], separator)) == width
+        and all(is_value(cell, decimal) for cell in c)
+    ]  # fmt: skip
+    if len(lost) > STRAY_ROWS:
+        raise RecordError(
+            f"{path}: must hold one table, but rows of numbers stand above the names, from line {lost[0] + 1} on: cut "
+            "the file, or say `header = LINE` in the model file (`model`)"
+        )
+    return first
 
 
 def _only_commas(lines: list[str], text: str, separator: str) -> bool:
@@ -134,61 +183,6 @@ def _only_commas(lines: list[str], text: str, separator: str) -> bool:
     return "," in text[sum(len(line) + 1 for line in lines[:1]) :] and any(
         "," in cell or cell.isdigit() for cell in cells
     )
-
-
-def _names(
-    lines: list[str], separator: str, decimal: str, width: int, path: Path
-) -> tuple[list[str] | None, list[str], list[str]]:
-    """Return names (None: there are none), units (empty where not in a row of their own) and the lines before."""
-    filled = [n for n, line in enumerate(lines) if line.strip()]
-    none = [""] * width
-    for n in filled if separator == "," and decimal == "." else ():
-        cells = cells_of(lines[n], separator)
-        if 2 < len(cells) < width <= 2 * len(cells) and all(map(_is_word, cells)):
-            raise RecordError(
-                f"{path}: the rows must have the {len(cells)} fields of the header, but have {width}: decimal commas "
-                "cannot be told from separating commas; export with `;` between the columns, or with decimal points"
-            )
-    if not filled:
-        return None, none, []
-    last = _fitting(lines[filled[-1]], separator, width)
-    if last is None:
-        cells = cells_of(lines[filled[-1]], separator)
-        if len(filled) == 1 or len(cells) > 1:
-            shown = lines[filled[-1]].strip()[:60]
-            raise RecordError(
-                f"{path}: the header must have {width} names like the rows below it, but `{shown}` has {len(cells)}"
-            )
-        return None, none, lines
-    if any(_is_value(cell, decimal) and cell for cell in last) and sum(map(_is_word, last)) * 2 < len(last):
-        return None, none, lines
-    if len(filled) > 1 and _are_units(last):
-        above = _fitting(lines[filled[-2]], separator, width)
-        if above is not None and sum(map(_is_word, above)) * 2 > len(above):
-            return above, [cell.strip("[](){} ") for cell in last], lines[: filled[-2]]
-    return last, none, lines[: filled[-1]]
-
-
-def _fitting(line: str, separator: str, width: int) -> list[str] | None:
-    """Return the cells of a line that has as many as the rows, give or take empty ones at its end."""
-    cells = cells_of(line.lstrip("#%") if separator == " " else line, separator)
-    if cells and cells[0].startswith("#"):
-        cells[0] = cells[0].lstrip("# ")
-    while len(cells) > width and not cells[-1]:
-        cells.pop()
-    if len(cells) == width - 1 and separator != " ":
-        cells.append("")
-    return cells if len(cells) == width else None
-
-
-def _are_units(cells: Sequence[str]) -> bool:
-    filled = [cell for cell in cells if cell not in ("", "-", "[-]", "[]")]
-    known = sum(parse_unit(cell) is not None or bool(re.fullmatch(r"\[.*\]|\(.*\)", cell)) for cell in filled)
-    return bool(filled) and 2 * known > len(filled)
-
-
-def _is_word(cell: str) -> bool:
-    return bool(cell) and not is_number(cell, ".") and not is_number(cell, ",")
 
 
 def _is_stamp_column(rows: list[list[str]], place: int) -> bool:
@@ -202,69 +196,6 @@ def _head(text: str, unit: str, kind: str) -> Head:
     if unit:
         return Head(plain, unit, kind, 0, plain)
     return named(plain, "", kind)
-
-
-def named(text: str, unit: str = "", kind: str = "number", raster: int = 0) -> Head:
-    """Return a channel whose unit may be part of its name: ``qm [deg]``, ``M / Nm``, ``speed_rpm``.
-
-    Args:
-        text: the written name.
-        unit: the written unit, where it stands apart.
-        kind: "number" or "stamp".
-        raster: number of the raster that it is sampled in.
-
-    Returns:
-        The channel, with name and unit apart.
-    """
-    if unit:
-        return Head(text, unit, kind, raster, text)
-    bracket = _BRACKETS.fullmatch(text)
-    if bracket is not None and (text.rstrip().endswith("]") or parse_unit(bracket[2]) is not None):
-        return Head(bracket[1].strip(), bracket[2], kind, raster, text)
-    for pattern in (_SLASH, _SUFFIX):
-        found = pattern.fullmatch(text)
-        if found is not None:
-            written = _SPELLED.get(found[2].lower(), found[2]) if pattern is _SUFFIX else found[2]
-            if parse_unit(written) is not None or written == "Hz":
-                return Head(found[1].strip(), written, kind, raster, text)
-    return Head(text, "", kind, raster, text)
-
-
-def cells_of(line: str, separator: str) -> list[str]:
-    """Return the stripped cells of a line; quotes are taken off.
-
-    Args:
-        line: of the file.
-        separator: between cells; a blank stands for any run of blanks.
-
-    Returns:
-        The cells.
-    """
-    if separator == " ":
-        return line.split()
-    if '"' in line:
-        try:
-            return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
-        except csv.Error:
-            return [cell.strip() for cell in line.split(separator)]
-    return [cell.strip() for cell in line.split(separator)]
-
-
-def is_number(cell: str, decimal: str) -> bool:
-    """Return whether a cell is a number with this decimal sign.
-
-    Args:
-        cell: its text.
-        decimal: "." or ",".
-
-    Returns:
-        True when it is.
-    """
-    return (_COMMA if decimal == "," else _POINT).fullmatch(cell.strip()) is not None
-
-
-def _is_value(cell: str, decimal: str) -> bool:
-    return is_number(cell, decimal) or is_stamp(cell)
 
 
 def _no_table(text: str, path: Path) -> RecordError:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.dialect import named
+from orchestrator.records.formats.heads import named
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
     MAXIMUM_CHANNELS,
@@ -52,17 +52,23 @@ class MdfSource(RecordSource):
         out = []
         for place in places:
             group, index = self._at[place]
+            invalid = None
             try:
                 if index is None:
                     values = np.asarray(self._file.get_master(group), dtype=float)
                 else:
                     self._refuse_formula(group, index)
-                    values = np.asarray(self._file.get(group=group, index=index).samples)
+                    signal = self._file.get(group=group, index=index, ignore_invalidation_bits=True)
+                    values = np.asarray(signal.samples)
+                    invalid = signal.invalidation_bits
             except RecordError:
                 raise
             except Exception as error:  # asammdf raises whatever a broken file makes it meet
                 raise _broken(self._path, error) from None
-            out.append(as_numbers(values, self.heads[place].name, self._path))
+            numbers = as_numbers(values, self.heads[place].name, self._path)
+            if invalid is not None and np.any(invalid):  # samples that the file marks, each at its own row
+                numbers[np.asarray(invalid, dtype=bool)] = np.nan if numbers.dtype.kind == "f" else np.datetime64("NaT")
+            out.append(numbers)
         return out
 
     def _refuse_formula(self, group: int, index: int) -> None:

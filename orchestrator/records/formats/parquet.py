@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.dialect import named
+from orchestrator.records.formats.heads import named
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
     MAXIMUM_CHANNELS,

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.dialect import Dialect, cells_of, detect, is_number, is_stamp
+from orchestrator.records.formats.cells import TRUTHS, cells_of, is_number
+from orchestrator.records.formats.dialect import Dialect, detect
 from orchestrator.records.formats.source import Head, RecordSource
 from orchestrator.records.stamps import parse_stamps
 
@@ -99,7 +100,7 @@ class TextSource(RecordSource):
             cells = [row[place].strip() for row in rows]
             if comma:
                 cells = [cell.replace(",", ".") for cell in cells]
-            cells = ["nan" if cell.lower() in MISSING else cell for cell in cells]
+            cells = ["nan" if cell.lower() in MISSING else TRUTHS.get(cell.lower(), cell) for cell in cells]
             try:
                 table[:, n] = np.array(cells, dtype=float)
             except ValueError:
@@ -112,11 +113,12 @@ class TextSource(RecordSource):
         return table
 
 
-def open_file(path: Path) -> TextSource:
+def open_file(path: Path, header: int | None = None) -> TextSource:
     """Return the opened file, its dialect detected.
 
     Args:
         path: the file.
+        header: line of the names, from 1; 0: there are none; None: found.
 
     Returns:
         Its columns, read when they are asked for.
@@ -125,7 +127,7 @@ def open_file(path: Path) -> TextSource:
         RecordError: it is no text, or no table of numbers.
     """
     text, encoding = _decoded(path)
-    return TextSource(path, text, encoding, detect(text, path))
+    return TextSource(path, text, encoding, detect(text, path, header))
 
 
 def _decoded(path: Path) -> tuple[str, str]:
@@ -194,4 +196,4 @@ def short(text: str, length: int = 60) -> str:
     return plain if len(plain) <= length else plain[: length - 3] + "..."
 
 
-__all__ = ["TextSource", "is_stamp", "open_file", "short"]
+__all__ = ["TextSource", "open_file", "short"]

@@ -17,14 +17,14 @@ def build(source: ResultDocument) -> Report:
     results = read(source.results, CheckFound)
     fmus, counts = results.fmus, results.counts
     good = sum(fmu.ok for fmu in fmus)
-    sections: list[Section] = [_overview(fmus), *(_findings(fmu) for fmu in fmus if fmu.findings), *_facts(fmus)]
+    sections: list[Section] = [_overview(fmus), *(_findings(fmu) for fmu in fmus if _new(fmu)), *_facts(fmus)]
     return Report(
         title="FMI compliance check",
         summary=(
-            f"{good} of {len(fmus)} FMUs have no error. In all: {_count(counts['error'], 'error')}, "
+            f"{good} of {len(fmus)} FMUs pass. In all: {_count(counts['error'], 'error')}, "
             f"{_count(counts['warning'], 'warning')}, {_count(counts['info'], 'remark')}."
         ),
-        badge=("good", "no errors") if good == len(fmus) else ("bad", _count(counts["error"], "error")),
+        badge=("good", "passed") if good == len(fmus) else ("bad", f"{len(fmus) - good} failed"),
         sections=tuple(sections),
         origin=source.origin(),
         downloads=source.downloads(),
@@ -32,13 +32,17 @@ def build(source: ResultDocument) -> Report:
 
 
 def _overview(fmus: list[CheckedFmu]) -> ReportTable:
-    columns = ("FMU", "result", "errors", "warnings", "remarks", "executed")
+    columns = (
+        *("FMU", "result", "errors", "warnings", "remarks", "executed"),
+        *("rules passed", "rules failed", "rules not run"),
+    )
     rows = tuple(
         (
             _name(fmu),
-            "no error" if fmu.ok else "errors",
+            "passed" if fmu.ok else "failed",
             *(fmu.counts[s] for s in ("error", "warning", "info")),
-            fmu.executed,
+            f"no: {fmu.not_executed}" if fmu.not_executed else fmu.executed,
+            *(sum(rule.outcome == outcome for rule in fmu.rules) for outcome in ("passed", "failed", "not run")),
         )
         for fmu in fmus
     )
@@ -56,7 +60,7 @@ def _facts(fmus: list[CheckedFmu]) -> list[Section]:
 def _findings(fmu: CheckedFmu) -> Findings:
     """Return the findings of an FMU, those of one rule together."""
     alike: dict[tuple[Severity, str, str], list[FindingFound]] = {}
-    for f in fmu.findings:
+    for f in _new(fmu):
         alike.setdefault((f.severity, f.rule, f.advice), []).append(f)
     items = tuple(
         Remark(
@@ -69,6 +73,10 @@ def _findings(fmu: CheckedFmu) -> Findings:
         for (severity, rule, advice), (first, *others) in alike.items()
     )
     return Findings(_name(fmu), items)
+
+
+def _new(fmu: CheckedFmu) -> list[FindingFound]:
+    return [f for f in fmu.findings if not f.known]
 
 
 def _name(fmu: CheckedFmu) -> str:

@@ -64,7 +64,7 @@ def build(source: ResultDocument) -> Report:
     sections += _provenance(results)
     return Report(
         title="Backlash sweep" if statistics else f"Sweep of {name}" if name else "Sweep",
-        summary=_summary(statistics, total, failed) if statistics else _count(source.document, total, failed),
+        summary=_summary(statistics, total, failed) if statistics else _count(source.document, results),
         badge=_badge(results.trust, failed, total),
         sections=tuple(sections),
         origin=source.origin(),
@@ -79,10 +79,12 @@ def _badge(trust: TrustFound | None, failed: int, total: int) -> tuple[Badge, st
     return trust_badge(trust, f"all {total} cases done", "good")
 
 
-def _count(document: Mapping[str, Any], total: int, failed: int) -> str:
-    """Return how many cases are done, and over what."""
+def _count(document: Mapping[str, Any], results: SweepFound) -> str:
+    """Return how many cases are done, over what, and what FMUs had to say."""
+    total, failed = results.cases, results.failed
     varied = ", ".join(str(text) for text in (document.get("arguments") or {}).get("vary") or ())
-    return f"{total - failed} of {total} cases are done" + (f", over {varied}." if varied else ".")
+    remarks = f" {results.remarked} have remarks; the first: {results.first_remark}." if results.remarked else ""
+    return f"{total - failed} of {total} cases are done" + (f", over {varied}." if varied else ".") + remarks
 
 
 def _summary(statistics: Sequence[Mapping[str, Any]], total: int, failed: int) -> str:

@@ -46,6 +46,7 @@ from orchestrator.shared.isolation.strays import Strays
 from orchestrator.shared.isolation.surroundings import code_folders, environment, launch, system_folders
 from orchestrator.shared.isolation.walls import Walls, support
 from orchestrator.shared.machine_code import machine_code_folder
+from orchestrator.shared.operating_system import collect, kill_group, resident_memory
 
 START_LIMIT = 120.0
 MOST_BYTES = 256 << 20
@@ -176,7 +177,7 @@ class Jail:
         Returns:
             The bytes.
         """
-        return _resident(self.pid)[0]
+        return resident_memory(self.pid)[0]
 
     def printed_bytes(self) -> int:
         """Return how much the child has printed.
@@ -198,10 +199,10 @@ class Jail:
         self._link.close()
         if process.returncode is None:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                _collect(process, _LAST_MOMENTS)
+                collect(process, _LAST_MOMENTS)
         if process.returncode is None:
             self._kill()
-        return _kill_group(process) | self._strays.kill()
+        return kill_group(process) | self._strays.kill()
 
     def interrupt(self) -> None:
         """Kill the child; may be called by any thread, and a ``call`` under way then raises ``ChildError``."""
@@ -260,7 +261,7 @@ class Jail:
 
     def _tick(self) -> None:
         """Look at what the child uses; called every few hundredths of a second."""
-        memory, threads = _resident(self.pid)
+        memory, threads = resident_memory(self.pid)
         if memory > self.limits.memory:
             self._kill()
             raise ChildError(f"the process used more than {self.limits.memory >> 20} MiB of memory", "memory")
@@ -284,7 +285,7 @@ class Jail:
         """Collect the process and say how it ended."""
         assert self._process is not None
         try:
-            peak = _collect(self._process, _LAST_MOMENTS)
+            peak = collect(self._process, _LAST_MOMENTS)
         except subprocess.TimeoutExpired:
             return self._forged("it hung up")
         code = self._process.returncode
@@ -310,60 +311,13 @@ class Jail:
     def _kill(self) -> None:
         process = self._process
         if process is not None and process.returncode is None:
-            _kill_group(process)  # before the process is collected, its number cannot be another's
+            kill_group(process)  # before the process is collected, its number cannot be another's
             process.kill()
             process.wait()
 
 
-def _kill_group(process: "subprocess.Popen[bytes]") -> bool:
-    """Kill the process group of a child; return whether anything was in it."""
-    if os.name != "posix":
-        return False
-    try:
-        os.killpg(process.pid, signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        return False
-    return True
-
-
-def _collect(process: "subprocess.Popen[bytes]", limit: float) -> int:
-    """Wait for a child to end; return its peak of resident memory in bytes, 0 where that may be another's.
-
-    Raises:
-        TimeoutExpired: it does not.
-    """
-    if os.name != "posix":
-        process.wait(limit)
-        return 0
-    import resource
-
-    end = time.monotonic() + limit
-    while True:
-        pid, status, used = os.wait4(process.pid, os.WNOHANG)
-        if pid:
-            break
-        if time.monotonic() > end:
-            raise subprocess.TimeoutExpired(process.args, limit)
-        time.sleep(0.002)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    # Linux counts what the child had between fork and exec, which is the memory of its parent.
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    unit = 1 if sys.platform == "darwin" else 1024
-    return used.ru_maxrss * unit if used.ru_maxrss > own else 0
-
-
 def _is_text(value: object) -> bool:
     return isinstance(value, str)
-
-
-def _resident(pid: int) -> tuple[int, int]:
-    """Resident memory of a process in bytes and its number of threads; 0 where the system does not tell."""
-    try:
-        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
-            fields = file.read().rpartition(")")[2].split()
-        return int(fields[21]) * os.sysconf("SC_PAGE_SIZE"), int(fields[17])
-    except (OSError, IndexError, ValueError):
-        return 0, 0
 
 
 __all__ = ["ChildError", "Jail", "Limits", "OutputError"]

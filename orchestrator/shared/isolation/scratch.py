@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from orchestrator.errors import OutputError
-from orchestrator.shared.processes import alive
+from orchestrator.shared.operating_system import alive, is_own, occupied
 
 PREFIX = "backlash-cosim-"
 _swept: set[str] = set()
@@ -73,12 +73,8 @@ def _remove_abandoned(place: Path) -> None:
         for path in place.glob(f"{PREFIX}*-*"):
             owner = path.name.removeprefix(PREFIX).partition("-")[0]
             info = path.lstat()
-            if owner.isdigit() and stat.S_ISDIR(info.st_mode) and _mine(info.st_uid) and not alive(int(owner)):
+            if owner.isdigit() and stat.S_ISDIR(info.st_mode) and is_own(info) and not alive(int(owner)):
                 remove(path)
-
-
-def _mine(owner: int) -> bool:
-    return os.name != "posix" or owner == os.getuid()
 
 
 def remove(folder: Path) -> None:
@@ -153,7 +149,7 @@ def usage(folder: Path, most_entries: int) -> tuple[int, int]:
         count += len(found)
         for entry in found:
             with contextlib.suppress(OSError):
-                total += entry.stat(follow_symlinks=False).st_blocks * 512 if os.name == "posix" else 0
+                total += occupied(entry.stat(follow_symlinks=False))
                 if entry.is_dir(follow_symlinks=False):
                     waiting.append(entry.path)
     return total, count

@@ -1,6 +1,5 @@
 """What a child process is started with: command, environment, and the files that every Python needs."""
 
-import contextlib
 import importlib.util
 import os
 import re
@@ -14,6 +13,7 @@ from typing import Any
 
 from orchestrator import errors
 from orchestrator.shared.machine_code import VARIABLE, machine_code_folder
+from orchestrator.shared.operating_system import link
 
 _PYTHON = (
     "import sys; sys.path.insert(0, sys.argv[2]); from orchestrator.shared.isolation import inmate; "
@@ -107,7 +107,6 @@ def code_folders(shadow: Path, packages: Sequence[str]) -> list[Path]:
         places = list(spec.submodule_search_locations or ())
         place = Path(places[0] if places else spec.origin or "")
         if place.exists():
-            with contextlib.suppress(FileExistsError):
-                (shadow / place.name).symlink_to(place)
+            link(shadow / place.name, place)
             found.append(place)
     return found

@@ -3,7 +3,6 @@
 Standard library only, and one thread: what is imported or started before the walls are up is outside of them.
 """
 
-import contextlib
 import ctypes
 import os
 import signal
@@ -12,6 +11,7 @@ from dataclasses import dataclass
 
 from orchestrator.shared.isolation import landlock, seccomp
 from orchestrator.shared.isolation.limits import Limits
+from orchestrator.shared.operating_system import set_limits
 
 _SET_DEATH_SIGNAL = 1
 _OWN = ("/proc/self",)
@@ -73,23 +73,16 @@ def bound(limits: Limits) -> None:
     Args:
         limits: memory [bytes], time [s] and so on.
     """
-    if os.name != "posix":
-        return
-    import resource
-
     # Address space is more than what is resident: libraries reserve far more than they touch.
-    pairs = [
-        (resource.RLIMIT_AS, 2 * limits.memory + (1 << 30)),
-        (resource.RLIMIT_CPU, (os.cpu_count() or 1) * int(min(limits.total, _LONGEST) + 1)),
-        (resource.RLIMIT_FSIZE, limits.output),
-        (resource.RLIMIT_NOFILE, limits.open_files),
-        (resource.RLIMIT_CORE, 0),
-    ]
-    for what, value in pairs:
-        _, hard = resource.getrlimit(what)
-        most = value if hard == resource.RLIM_INFINITY else min(value, hard)
-        with contextlib.suppress(ValueError, OSError):
-            resource.setrlimit(what, (most, most))
+    set_limits(
+        {
+            "RLIMIT_AS": 2 * limits.memory + (1 << 30),
+            "RLIMIT_CPU": (os.cpu_count() or 1) * int(min(limits.total, _LONGEST) + 1),
+            "RLIMIT_FSIZE": limits.output,
+            "RLIMIT_NOFILE": limits.open_files,
+            "RLIMIT_CORE": 0,
+        }
+    )
 
 
 def enclose(read: tuple[str, ...], write: tuple[str, ...]) -> Walls:

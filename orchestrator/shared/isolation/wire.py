@@ -3,21 +3,23 @@
 The child is not trusted. Its messages are plain data (numbers, text, bytes, lists, maps, arrays of numbers) that are
 decoded without running anything, of a bounded size, and each must answer the request that is open. What travels to
 the child is pickled.
+
+NumPy is imported where an array comes, not before: a child without arrays does without it.
 """
 
 import math
 import socket
 import struct
+import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
 import msgspec
-import numpy as np
 
 _LENGTH = struct.Struct(">Q")
 _ARRAY = 1
-_KINDS = {b"d": np.float64, b"q": np.int64, b"?": np.bool_}
+_KINDS = {b"d": 8, b"q": 8, b"?": 1}  # bytes of a number, by its kind as NumPy names it
 _MOST_AXES = 8
 SLICE = 0.05
 Tick = Callable[[], None]
@@ -69,6 +71,9 @@ def decode(data: bytes) -> Any:
 
 
 def _packed(value: Any) -> Any:
+    np = sys.modules.get("numpy")  # where it was never imported, nothing is an array
+    if np is None:
+        raise TypeError(f"a message must be plain data, but has a {type(value).__name__}")
     if isinstance(value, np.ndarray) and value.dtype.char in "dlq?":
         kind = {"l": "q"}.get(value.dtype.char, value.dtype.char)
         head = struct.pack(f">cB{value.ndim}Q", kind.encode(), value.ndim, *value.shape)
@@ -86,9 +91,11 @@ def _unpacked(code: int, data: memoryview) -> Any:
         raise ValueError("an unknown kind of array")
     shape = struct.unpack_from(f">{axes}Q", data, 2)
     body = data[2 + 8 * axes :]
-    if math.prod(shape) * np.dtype(_KINDS[kind]).itemsize != len(body):
+    if math.prod(shape) * _KINDS[kind] != len(body):
         raise ValueError("an array of another size than it says")
-    return np.frombuffer(body, _KINDS[kind]).reshape(shape).copy()
+    import numpy as np
+
+    return np.frombuffer(body, kind.decode()).reshape(shape).copy()
 
 
 def send(link: socket.socket, data: bytes, deadline: float = math.inf, tick: Tick = lambda: None) -> None:

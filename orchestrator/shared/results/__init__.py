@@ -101,11 +101,20 @@ class SignalFound(msgspec.Struct, frozen=True):
     largest: str = ""
 
 
+class RemarkFound(msgspec.Struct, frozen=True):
+    """What is to be known of a run that went on: whose it is, the first text, and how often it came."""
+
+    instance: str
+    text: str
+    count: int = 1
+
+
 class SignalsFound(Found, frozen=True, kw_only=True):
-    """``simulate`` of a scenario and ``ssp run``: recorded signals, steps, and the walls around the run."""
+    """``simulate`` of a scenario and ``ssp run``: recorded signals, steps, remarks, and the walls around the run."""
 
     signals: list[SignalFound] = []
     steps: int | None = None
+    remarks: list[RemarkFound] = []
     isolation: WallsFound | None = None
 
 
@@ -150,10 +159,15 @@ class SweptScenario(msgspec.Struct, frozen=True):
 
 
 class SweepFound(Found, frozen=True, kw_only=True):
-    """``sweep``: counts and columns always; of the pair the errors and their origin, of a scenario its name."""
+    """``sweep``: counts and columns always; of the pair the errors and their origin, of a scenario its name.
+
+    ``remarked``: cases with a text in the column ``remarks``; ``first_remark`` is the first of them.
+    """
 
     cases: int
     failed: int
+    remarked: int = 0
+    first_remark: str = ""
     columns: list[ColumnFound] = []
     statistics: list[ErrorsFound] = []
     trust: TrustFound | None = None
@@ -174,10 +188,20 @@ class FindingFound(msgspec.Struct, frozen=True):
     path: str = ""
     message: str = ""
     advice: str = ""
+    fingerprint: str = ""
+    known: bool = False
+
+
+class RuleFound(msgspec.Struct, frozen=True):
+    """What became of a rule on an FMU, with the reason where it was not run."""
+
+    rule: str
+    outcome: Literal["passed", "failed", "not run"]
+    reason: str = ""
 
 
 class CheckedFmu(msgspec.Struct, frozen=True):
-    """An FMU that was checked: counts by severity, and facts by name."""
+    """An FMU that was checked: counts by severity, facts by name, and why nothing was executed."""
 
     fmu: str
     ok: bool
@@ -185,6 +209,8 @@ class CheckedFmu(msgspec.Struct, frozen=True):
     counts: dict[str, int] = {}
     facts: dict[str, str | int | list[str]] = {}
     findings: list[FindingFound] = []
+    not_executed: str = ""
+    rules: list[RuleFound] = []
 
 
 class CheckFound(Found, frozen=True, kw_only=True):

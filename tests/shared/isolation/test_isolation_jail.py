@@ -15,7 +15,7 @@ from orchestrator.errors import ChildError, ScenarioError, SimulationError
 from orchestrator.shared.isolation.jail import Jail, Limits
 from orchestrator.shared.isolation.scratch import PREFIX, Scratch
 from orchestrator.shared.isolation.walls import support
-from orchestrator.shared.processes import alive
+from orchestrator.shared.operating_system import alive
 from tests.support.engine_process import wait_until_gone
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the limits are those of Linux")

@@ -1,7 +1,14 @@
-/* Saved states and the calls that these FMUs do not support; a part of fmi2_slave.h. */
+/* Saved states and directional derivatives; a part of slave_core.h.
+ *
+ * A handle leads to a size and so many bytes: those are what is serialised. They are a header, the slave's fixed part,
+ * then each list as its length and its items. A slave whose hidden state is not in its memory gives it as a text
+ * (HIDDEN_TEXT: slave_hidden, slave_take_hidden), which stands last. */
 
-/* --- Saved states ------------------------------------------------------------------------------------------------------
- * A handle leads to a size and so many bytes: those are what is serialised. */
+typedef struct {
+    char guid[40];
+    uint64_t size;
+    Course course;
+} Saved;
 
 static int64_t length_of(const Instance *s, const List *list)
 {
@@ -18,21 +25,26 @@ static size_t saved_size(const Instance *s)
     return size;
 }
 
-EXPORT Status FMI(fmi2GetFMUstate)(Component c, FmuState *x)
+static Status save_state(Instance *s, void **x)
 {
     Fault fault;
-    ENTER(fmi2GetFMUstate, x != NULL)
+    const char *text = NULL;
+    size_t length = 0;
     fault.kind = NO_FAULT;
     recompute(s, &fault);
+#ifdef HIDDEN_TEXT
+    if (!fault.kind)
+        text = slave_hidden(&s->slave, &length, &fault);
+#endif
     if (fault.kind) {
-        say_fault(s, "fmi2GetFMUstate", &fault);
+        say_fault(s, &fault);
         return s->worst;
     }
-    const size_t size = saved_size(s);
+    const size_t size = saved_size(s) + length;
     Saved header = {GUID, size, s->course};
     char *bytes = malloc(sizeof size + size), *end = bytes;
     if (!bytes) {
-        say(s, ERROR, "fmi2GetFMUstate failed: MemoryError: %i bytes", (int64_t)size);
+        say(s, ERROR, "%s failed: MemoryError: %i bytes", s->function, (int64_t)size);
         return s->worst;
     }
     memcpy(end, &size, sizeof size);
@@ -45,6 +57,8 @@ EXPORT Status FMI(fmi2GetFMUstate)(Component c, FmuState *x)
         memcpy(end += sizeof n, (const char *)&s->slave + list->items, (size_t)n * list->item_size);
         end += (size_t)n * list->item_size;
     }
+    if (length)
+        memcpy(end, text, length);
     free(*x);
     *x = bytes;
     return s->worst;
@@ -77,20 +91,33 @@ static bool is_ours(const char *bytes)
         bytes += sizeof n + (size_t)n * list->item_size;
         left -= (size_t)n * list->item_size;
     }
+#ifdef HIDDEN_TEXT
+    return true;
+#else
     return left == 0;
+#endif
 }
 
-EXPORT Status FMI(fmi2SetFMUstate)(Component c, FmuState x)
+static Status restore_state(Instance *s, const void *x)
 {
-    ENTER(fmi2SetFMUstate, x != NULL)
     const char *bytes = x;
     if (!is_ours(bytes)) {
-        say(s, ERROR, "fmi2SetFMUstate must be given a state of this very FMU, but was not; ignored");
+        say(s, ERROR, "%s must be given a state of this very FMU, but was not; ignored", s->function);
         return s->worst;
     }
     Saved header;
     bytes += sizeof(size_t);
     memcpy(&header, bytes, sizeof header);
+#ifdef HIDDEN_TEXT
+    Fault fault;
+    const size_t before = sizeof header + FIXED_BYTES;
+    fault.kind = NO_FAULT;
+    slave_take_hidden(&s->slave, bytes + before, header.size - before, &fault);
+    if (fault.kind) {
+        say_fault(s, &fault);
+        return s->worst;
+    }
+#endif
     s->course = header.course;
     memcpy(&s->slave, bytes += sizeof header, FIXED_BYTES);
     bytes += FIXED_BYTES;
@@ -101,13 +128,12 @@ EXPORT Status FMI(fmi2SetFMUstate)(Component c, FmuState x)
         memcpy((char *)&s->slave + list->items, bytes += sizeof n, (size_t)n * list->item_size);
         bytes += (size_t)n * list->item_size;
     }
-    s->fresh = 1;
+    s->fresh = true;
     return s->worst;
 }
 
-EXPORT Status FMI(fmi2FreeFMUstate)(Component c, FmuState *x)
+static Status free_state(void **x)
 {
-    ENTER(fmi2FreeFMUstate, 1)
     if (x) {
         free(*x);
         *x = NULL;
@@ -115,33 +141,30 @@ EXPORT Status FMI(fmi2FreeFMUstate)(Component c, FmuState *x)
     return OK;
 }
 
-EXPORT Status FMI(fmi2SerializedFMUstateSize)(Component c, FmuState x, size_t *n)
+static Status serialised_size(const void *x, size_t *n)
 {
-    ENTER(fmi2SerializedFMUstateSize, x != NULL && n != NULL)
     memcpy(n, x, sizeof *n);
     return OK;
 }
 
-EXPORT Status FMI(fmi2SerializeFMUstate)(Component c, FmuState x, char bytes[], size_t n)
+static Status serialise_state(Instance *s, const void *x, char bytes[], size_t n)
 {
     size_t size;
-    ENTER(fmi2SerializeFMUstate, x != NULL && bytes != NULL)
     memcpy(&size, x, sizeof size);
     if (n < size) {
-        say(s, ERROR, "fmi2SerializeFMUstate must be given room for %i bytes, but is for %i", (int64_t)size, (int64_t)n);
+        say(s, ERROR, "%s must be given room for %i bytes, but is for %i", s->function, (int64_t)size, (int64_t)n);
         return s->worst;
     }
     memcpy(bytes, (const char *)x + sizeof size, size);
     return OK;
 }
 
-EXPORT Status FMI(fmi2DeSerializeFMUstate)(Component c, const char bytes[], size_t n, FmuState *x)
+/* What is no state of this FMU is refused when it is set. */
+static Status deserialise_state(Instance *s, const char bytes[], size_t n, void **x)
 {
-    ENTER(fmi2DeSerializeFMUstate, bytes != NULL && x != NULL)
-    /* What is no state of this FMU is refused when it is set. */
     char *copy = malloc(sizeof n + n);
     if (!copy) {
-        say(s, ERROR, "fmi2DeSerializeFMUstate failed: MemoryError: %i bytes", (int64_t)n);
+        say(s, ERROR, "%s failed: MemoryError: %i bytes", s->function, (int64_t)n);
         return s->worst;
     }
     memcpy(copy, &n, sizeof n);
@@ -169,16 +192,15 @@ static bool is_unknown(Reference r)
 }
 
 /* Of derivatives and outputs by states and inputs, in the mode of the moment. */
-EXPORT Status FMI(fmi2GetDirectionalDerivative)(Component c, const Reference unknown[], size_t n, const Reference known[],
-                                                size_t m, const double seed[], double sensitivity[])
+static Status directional_derivative(Instance *s, const Reference unknown[], size_t n, const Reference known[], size_t m,
+                                     const double seed[], double sensitivity[])
 {
     double seeds[VARIABLES] = {0.0}, found[VARIABLES];
     char text[64];
     Fault fault;
-    ENTER(fmi2GetDirectionalDerivative, (n == 0 || (unknown && sensitivity)) && (m == 0 || (known && seed)))
     fault.kind = NO_FAULT;
     if (s->course.phase != INITIALIZING && s->course.phase != STEPPING) {
-        say(s, ERROR, "fmi2GetDirectionalDerivative must not be called %s", phase_names[s->course.phase]);
+        say(s, ERROR, "%s must not be called %s", s->function, phase_names[s->course.phase]);
         return s->worst;
     }
     for (size_t k = 0; k < m; k++) {
@@ -197,7 +219,7 @@ EXPORT Status FMI(fmi2GetDirectionalDerivative)(Component c, const Reference unk
     if (!fault.kind)
         slave_directional(&s->slave, seeds, found, &fault);
     if (fault.kind) {
-        say_fault(s, "fmi2GetDirectionalDerivative", &fault);
+        say_fault(s, &fault);
         return s->worst;
     }
     for (size_t k = 0; k < n; k++)
@@ -205,55 +227,3 @@ EXPORT Status FMI(fmi2GetDirectionalDerivative)(Component c, const Reference unk
     return s->worst;
 }
 #endif
-
-/* --- Not supported ----------------------------------------------------------------------------------------------------- */
-
-#define UNSUPPORTED(status, function, parameters) \
-    EXPORT Status FMI(function) parameters \
-    { \
-        ENTER(function, 1) \
-        say(s, status, "FMI function not supported: %s", #function); \
-        return s->worst; \
-    }
-
-#if defined(__GNUC__)
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-#endif
-#ifndef DIRECTIONAL
-UNSUPPORTED(ERROR, fmi2GetDirectionalDerivative, (Component c, const Reference u[], size_t n, const Reference k[], size_t m,
-                                                  const double dk[], double du[]))
-#endif
-UNSUPPORTED(ERROR, fmi2SetRealInputDerivatives,
-            (Component c, const Reference r[], size_t n, const int o[], const double v[]))
-UNSUPPORTED(ERROR, fmi2GetRealOutputDerivatives, (Component c, const Reference r[], size_t n, const int o[], double v[]))
-UNSUPPORTED(ERROR, fmi2CancelStep, (Component c))
-UNSUPPORTED(ERROR, fmi2GetStatus, (Component c, int kind, Status *v))
-UNSUPPORTED(DISCARD, fmi2GetIntegerStatus, (Component c, int kind, int *v))
-UNSUPPORTED(DISCARD, fmi2GetStringStatus, (Component c, int kind, const char **v))
-#if defined(__GNUC__)
-#pragma GCC diagnostic pop
-#endif
-
-EXPORT Status FMI(fmi2GetRealStatus)(Component c, int kind, double *v)
-{
-    enum { LAST_SUCCESSFUL_TIME = 2 };
-    ENTER(fmi2GetRealStatus, v != NULL)
-    if (kind != LAST_SUCCESSFUL_TIME) {
-        say(s, DISCARD, "Invalid status inquiry for fmi2GetRealStatus");
-        return s->worst;
-    }
-    *v = s->course.time;
-    return OK;
-}
-
-/* A refused step is no wish to end the simulation. */
-EXPORT Status FMI(fmi2GetBooleanStatus)(Component c, int kind, Boolean *v)
-{
-    enum { TERMINATED_STATUS = 3 };
-    ENTER(fmi2GetBooleanStatus, v != NULL)
-    if (kind != TERMINATED_STATUS)
-        return DISCARD;
-    *v = 0;
-    return OK;
-}

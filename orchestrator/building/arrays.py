@@ -1,0 +1,80 @@
+"""Variables of an FMU that form an array: FMI 3.0 has them as one variable, FMI 2.0 one by one."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from pyfmu_sources.fmu_variables import FmuVariable
+
+_ELEMENT = re.compile(r"(.+)\[(\d+(?:,\d+)*)\]")
+
+
+@dataclass(frozen=True)
+class Array:
+    """One variable of FMI 3.0: the variables of a table from ``first`` on, in row-major order.
+
+    Attributes:
+        name: without indices.
+        first: place in the table, which is the value reference.
+        dimensions: sizes; none for a scalar.
+        variables: the elements.
+    """
+
+    name: str
+    first: int
+    dimensions: tuple[int, ...]
+    variables: tuple[FmuVariable, ...]
+
+
+def arrays(table: Sequence[FmuVariable]) -> Iterator[Array]:
+    """Yield the variables of a table as FMI 3.0 has them.
+
+    Variables ``name[1]``, ``name[2]`` and so on that stand in a row, and are whole and alike in causality,
+    variability, type and bounds, are one array; all others are scalars.
+
+    Args:
+        table: of a slave.
+
+    Yields:
+        The variables, in order.
+    """
+    place = 0
+    while place < len(table):
+        dimensions = _dimensions(table, place)
+        count = math.prod(dimensions)
+        name = table[place].name
+        if dimensions:
+            name = name[: name.index("[")]
+        yield Array(name, place, dimensions, tuple(table[place : place + count]))
+        place += count
+
+
+def _dimensions(table: Sequence[FmuVariable], place: int) -> tuple[int, ...]:
+    """Return the dimensions of the array that begins at a place; none where there is no array."""
+    start = _ELEMENT.fullmatch(table[place].name)
+    if start is None:
+        return ()
+    indices: list[tuple[int, ...]] = []
+    for variable in table[place:]:
+        element = _ELEMENT.fullmatch(variable.name)
+        if element is None or element[1] != start[1] or not _alike(variable, table[place]):
+            break
+        indices.append(tuple(int(number) for number in element[2].split(",")))
+    dimensions = indices[-1]
+    return dimensions if indices == list(_row_major(dimensions)) else ()
+
+
+def _alike(a: FmuVariable, b: FmuVariable) -> bool:
+    return (a.causality, a.variability, a.type, a.bounds) == (b.causality, b.variability, b.type, b.bounds)
+
+
+def _row_major(dimensions: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+    if not dimensions:
+        yield ()
+        return
+    for first in range(1, dimensions[0] + 1):
+        for rest in _row_major(dimensions[1:]):
+            yield (first, *rest)

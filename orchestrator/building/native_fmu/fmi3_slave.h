@@ -1,0 +1,248 @@
+/* FMI 3.0 around a slave: its calls, in terms of slave_core.h. The file that includes it defines `counts` too: how many
+ * values there are at each value reference, 0 for the elements of an array behind its first. */
+
+#include "fmi3_types.h"
+#include "slave_core.h"
+
+#define TIME VARIABLES /* value reference of the independent variable */
+
+static void deliver(const Instance *s, Status status, const char *category, const char *text)
+{
+    if (s->host.log)
+        s->host.log(s->host.environment, status, category, text);
+}
+
+/* --- Instances ------------------------------------------------------------------------------------------------------- */
+
+EXPORT const char *FMI(fmi3GetVersion)(void) { return "3.0"; }
+
+EXPORT Component FMI(fmi3InstantiateCoSimulation)(String name, String token, String resources, bool visible, bool logging,
+                                                  bool events, bool early_return, const Reference required[], size_t n,
+                                                  void *environment, LogMessage log, IntermediateUpdate update)
+{
+    const Host host = {log, environment, update, events, early_return};
+    (void)visible;
+    (void)required;
+    (void)n;
+    return instantiate(name, CO_SIMULATION, token, "instantiationToken", &host, logging, open_slave(resources));
+}
+
+EXPORT Component FMI(fmi3InstantiateModelExchange)(String name, String token, String resources, bool visible, bool logging,
+                                                   void *environment, LogMessage log)
+{
+    const Host host = {log, environment, NULL, true, false};
+    const char *problem = "this FMU has no model exchange";
+    (void)visible;
+    (void)resources;
+#ifdef CONTINUOUS_STATES
+    problem = open_slave(resources);
+#endif
+    return instantiate(name, MODEL_EXCHANGE, token, "instantiationToken", &host, logging, problem);
+}
+
+EXPORT Component FMI(fmi3InstantiateScheduledExecution)(String name, String token, String resources, bool visible,
+                                                        bool logging, void *environment, LogMessage log,
+                                                        void (*update)(void *), void (*lock)(void), void (*unlock)(void))
+{
+    const Host host = {log, environment, NULL, false, false};
+    (void)resources;
+    (void)visible;
+    (void)update;
+    (void)lock;
+    (void)unlock;
+    return instantiate(name, CO_SIMULATION, token, "", &host, logging, "this FMU has no scheduled execution");
+}
+
+EXPORT void FMI(fmi3FreeInstance)(Component c) { free_instance(c); }
+
+EXPORT Status FMI(fmi3SetDebugLogging)(Component c, bool on, size_t n, const String categories[])
+{
+    ENTER(fmi3SetDebugLogging, n == 0 || categories)
+    set_logging(s, on, n, categories);
+    return OK;
+}
+
+/* --- Life cycle ------------------------------------------------------------------------------------------------------ */
+
+EXPORT Status FMI(fmi3EnterInitializationMode)(Component c, bool has_tolerance, double tolerance, double start,
+                                               bool has_stop, double stop)
+{
+    ENTER(fmi3EnterInitializationMode, 1)
+    (void)has_tolerance;
+    (void)tolerance;
+    if (!expects(s, INSTANTIATED))
+        return s->worst;
+    set_times(s, start, has_stop, stop);
+    if (s->worst == OK)
+        enter_initialization(s);
+    return s->worst;
+}
+
+EXPORT Status FMI(fmi3ExitInitializationMode)(Component c)
+{
+    ENTER(fmi3ExitInitializationMode, 1)
+    if (exit_initialization(s) <= WARNING)
+        s->course.in_event_mode = s->host.events;
+    return s->worst;
+}
+
+EXPORT Status FMI(fmi3Terminate)(Component c)
+{
+    ENTER(fmi3Terminate, 1)
+    return terminate(s);
+}
+
+EXPORT Status FMI(fmi3Reset)(Component c)
+{
+    ENTER(fmi3Reset, 1)
+    begin_anew(s);
+    return OK;
+}
+
+/* --- Values ------------------------------------------------------------------------------------------------------------ */
+
+#define VALUES_GIVEN ((n == 0 || r) && (total == 0 || v))
+#define COUNT(r) ((r) < VARIABLES ? counts[r] : (r) == TIME)
+
+/* Tell whether the references are of variables of a type, and the values as many as theirs; say so if they are not. */
+static bool fit(Instance *s, const Reference r[], size_t n, size_t total, ValueType type)
+{
+    size_t needed = 0;
+    for (size_t k = 0; k < n; k++) {
+        if (!(HAS(r[k], type) || (r[k] == TIME && type == REAL_VALUE)) || COUNT(r[k]) == 0) {
+            refuse_type(s, r[k]);
+            return false;
+        }
+        needed += COUNT(r[k]);
+    }
+    if (needed != total)
+        say(s, ERROR, "nValues of %s must be %i, but is %i", s->function, (int64_t)needed, (int64_t)total);
+    return needed == total;
+}
+
+static bool bring_up_to_date(Instance *s)
+{
+    Fault fault;
+    fault.kind = NO_FAULT;
+    recompute(s, &fault);
+    if (fault.kind)
+        say_fault(s, &fault);
+    return !fault.kind;
+}
+
+EXPORT Status FMI(fmi3GetFloat64)(Component c, const Reference r[], size_t n, double v[], size_t total)
+{
+    Fault fault;
+    ENTER(fmi3GetFloat64, VALUES_GIVEN)
+    if (!fit(s, r, n, total, REAL_VALUE) || !bring_up_to_date(s))
+        return s->worst;
+    fault.kind = NO_FAULT;
+    for (size_t k = 0; k < n; k++) {
+        if (r[k] != TIME && variables[r[k]].causality == LOCAL)
+            show_states(s, &fault);
+        memcpy(v, r[k] == TIME ? &s->course.time : &s->slave.real[r[k]], COUNT(r[k]) * sizeof *v);
+        v += COUNT(r[k]);
+    }
+    if (fault.kind)
+        say_fault(s, &fault);
+    return s->worst;
+}
+
+EXPORT Status FMI(fmi3SetFloat64)(Component c, const Reference r[], size_t n, const double v[], size_t total)
+{
+    ENTER(fmi3SetFloat64, VALUES_GIVEN)
+    if (!fit(s, r, n, total, REAL_VALUE))
+        return s->worst;
+    s->fresh = false;
+    for (size_t k = 0; k < n; k++) {
+        if (r[k] == TIME) {
+            say(s, ERROR, "%s must not set the time", s->function);
+            return s->worst;
+        }
+        if (!may_set(s, r[k], true))
+            return s->worst;
+        for (size_t m = 0; m < counts[r[k]]; m++)
+            set_real(s, r[k] + (Reference)m, *v++);
+    }
+    return s->worst;
+}
+
+/* Whole numbers: Int32 for those that count, Int64 for the items of an enumeration. */
+#define WHOLE_CALLS(name, number, type) \
+    EXPORT Status FMI(fmi3Get##name)(Component c, const Reference r[], size_t n, number v[], size_t total) \
+    { \
+        ENTER(fmi3Get##name, VALUES_GIVEN) \
+        if (!fit(s, r, n, total, type) || !bring_up_to_date(s)) \
+            return s->worst; \
+        for (size_t k = 0; k < n; k++) \
+            v[k] = s->slave.integer[r[k]]; \
+        return s->worst; \
+    } \
+    EXPORT Status FMI(fmi3Set##name)(Component c, const Reference r[], size_t n, const number v[], size_t total) \
+    { \
+        ENTER(fmi3Set##name, VALUES_GIVEN) \
+        if (!fit(s, r, n, total, type)) \
+            return s->worst; \
+        s->fresh = false; \
+        for (size_t k = 0; k < n && may_set(s, r[k], true); k++) \
+            set_whole(s, r[k], v[k]); \
+        return s->worst; \
+    }
+WHOLE_CALLS(Int32, int32_t, WHOLE_VALUE)
+WHOLE_CALLS(Int64, int64_t, CHOICE_VALUE)
+
+/* --- Saved states ------------------------------------------------------------------------------------------------------ */
+
+EXPORT Status FMI(fmi3GetFMUState)(Component c, FmuState *x)
+{
+    ENTER(fmi3GetFMUState, x != NULL)
+    return save_state(s, x);
+}
+
+EXPORT Status FMI(fmi3SetFMUState)(Component c, FmuState x)
+{
+    ENTER(fmi3SetFMUState, x != NULL)
+    return restore_state(s, x);
+}
+
+EXPORT Status FMI(fmi3FreeFMUState)(Component c, FmuState *x)
+{
+    ENTER(fmi3FreeFMUState, 1)
+    return free_state(x);
+}
+
+EXPORT Status FMI(fmi3SerializedFMUStateSize)(Component c, FmuState x, size_t *n)
+{
+    ENTER(fmi3SerializedFMUStateSize, x != NULL && n != NULL)
+    return serialised_size(x, n);
+}
+
+EXPORT Status FMI(fmi3SerializeFMUState)(Component c, FmuState x, Byte bytes[], size_t n)
+{
+    ENTER(fmi3SerializeFMUState, x != NULL && bytes != NULL)
+    return serialise_state(s, x, (char *)bytes, n);
+}
+
+EXPORT Status FMI(fmi3DeserializeFMUState)(Component c, const Byte bytes[], size_t n, FmuState *x)
+{
+    ENTER(fmi3DeserializeFMUState, bytes != NULL && x != NULL)
+    return deserialise_state(s, (const char *)bytes, n, x);
+}
+
+#ifdef DIRECTIONAL
+EXPORT Status FMI(fmi3GetDirectionalDerivative)(Component c, const Reference unknown[], size_t n, const Reference known[],
+                                                size_t m, const double seed[], size_t seeds, double sensitivity[],
+                                                size_t sensitivities)
+{
+    ENTER(fmi3GetDirectionalDerivative, (n == 0 || (unknown && sensitivity)) && (m == 0 || (known && seed)))
+    if (seeds != m || sensitivities != n) {
+        say(s, ERROR, "nSeed and nSensitivity must be %i and %i, but are %i and %i", (int64_t)m, (int64_t)n, (int64_t)seeds,
+            (int64_t)sensitivities);
+        return s->worst;
+    }
+    return directional_derivative(s, unknown, n, known, m, seed, sensitivity);
+}
+#endif
+
+#include "fmi3_steps.h"
+#include "fmi3_absent.h"

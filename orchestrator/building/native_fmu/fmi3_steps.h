@@ -1,0 +1,229 @@
+/* Steps, events and model exchange of FMI 3.0; a part of fmi3_slave.h. */
+
+#ifdef CONTINUOUS_STATES
+#include "slave_exchange.h"
+#endif
+
+/* Tell whether an instance is in event mode, or in step or continuous-time mode; say so if it is not. */
+static bool in_mode(Instance *s, bool event_mode)
+{
+    if (s->course.phase != STEPPING)
+        say(s, ERROR, "%s must not be called %s", s->function, phase_names[s->course.phase]);
+    else if (!s->course.in_event_mode == event_mode)
+        say(s, ERROR, "%s must %sbe called in event mode", s->function, event_mode ? "" : "not ");
+    return s->worst == OK;
+}
+
+static bool is_type(Instance *s, Type type)
+{
+    if (s->course.type != (int32_t)type)
+        say(s, ERROR, "%s must not be called in %s", s->function, type == CO_SIMULATION ? "model exchange" : "co-simulation");
+    return s->worst == OK;
+}
+
+EXPORT Status FMI(fmi3EnterEventMode)(Component c)
+{
+    ENTER(fmi3EnterEventMode, 1)
+    if (!s->host.events)
+        say(s, ERROR, "%s must not be called by a host that has said that it does not use events", s->function);
+    else if (in_mode(s, false))
+        s->course.in_event_mode = true;
+    return s->worst;
+}
+
+/* The slave settles by itself: one call is enough. */
+EXPORT Status FMI(fmi3UpdateDiscreteStates)(Component c, bool *again, bool *end, bool *nominals_changed, bool *jumped,
+                                            bool *has_next, double *next)
+{
+    ENTER(fmi3UpdateDiscreteStates, again && end && nominals_changed && jumped && has_next && next)
+    *again = *end = *nominals_changed = *jumped = *has_next = false;
+    *next = 0.0;
+    if (!in_mode(s, true))
+        return s->worst;
+#ifdef CONTINUOUS_STATES
+    if (update_slave(s, jumped) <= WARNING)
+        s->course.event_due = false;
+    return s->worst;
+#else
+    return s->worst;
+#endif
+}
+
+static Status leave_event_mode(Instance *s, Type type)
+{
+    if (is_type(s, type) && in_mode(s, true))
+        s->course.in_event_mode = false;
+    return s->worst;
+}
+
+EXPORT Status FMI(fmi3EnterStepMode)(Component c)
+{
+    ENTER(fmi3EnterStepMode, 1)
+    return leave_event_mode(s, CO_SIMULATION);
+}
+
+EXPORT Status FMI(fmi3EnterContinuousTimeMode)(Component c)
+{
+    ENTER(fmi3EnterContinuousTimeMode, 1)
+    return leave_event_mode(s, MODEL_EXCHANGE);
+}
+
+/* --- Steps ------------------------------------------------------------------------------------------------------------- */
+
+/* Advance over a piece of a step, or to the first event in it where the host takes events; return how far. */
+static double advance_piece(Instance *s, double time, double step, Fault *fault)
+{
+#ifdef CONTINUOUS_STATES
+    if (s->host.events && s->host.early_return) {
+        const double taken = slave_advance_to_event(&s->slave, time, step, fault);
+        s->course.event_due = !fault->kind && HAS_EVENT(&s->slave);
+        return taken;
+    }
+#endif
+    advance_slave(s, time, step, fault);
+    return step;
+}
+
+#ifdef CONTINUOUS_STATES
+#include "fmi3_updates.h"
+#endif
+
+EXPORT Status FMI(fmi3DoStep)(Component c, double time, double step, bool no_return, bool *event, bool *end,
+                              bool *early_return, double *reached)
+{
+    Fault fault;
+    double taken = step;
+    ENTER(fmi3DoStep, event && end && early_return && reached)
+    (void)no_return;
+    *event = *end = *early_return = false;
+    *reached = s->course.time;
+    fault.kind = NO_FAULT;
+    if (!may_step(s, time, step))
+        return refuse_step(s, time, step);
+    if (s->course.in_event_mode && !in_mode(s, false))
+        return s->worst;
+    if (s->course.event_due) {
+        say(s, ERROR, "%s must not be called before the event has been handled in event mode", s->function);
+        return s->worst;
+    }
+#ifdef CONTINUOUS_STATES
+    if (s->host.update)
+        taken = advance_with_updates(s, time, step, &fault);
+    else
+#endif
+        taken = advance_piece(s, time, step, &fault);
+    conclude_step(s, taken == step ? time + step : time + taken, &fault);
+    *event = s->course.event_due;
+    *early_return = !fault.kind && taken < step;
+    *reached = s->course.time;
+    return s->worst;
+}
+
+#ifdef CONTINUOUS_STATES
+/* First derivatives, with the inputs held. */
+EXPORT Status FMI(fmi3GetOutputDerivatives)(Component c, const Reference r[], size_t n, const int32_t orders[], double v[],
+                                            size_t total)
+{
+    Fault fault;
+    double rates[OUTPUT_RATES];
+    char text[64];
+    ENTER(fmi3GetOutputDerivatives, n == 0 || (r && orders && v))
+    fault.kind = NO_FAULT;
+    if (!is_type(s, CO_SIMULATION) || !expects(s, STEPPING))
+        return s->worst;
+    slave_output_rates(&s->slave, rates, &fault);
+    if (fault.kind)
+        return concluded(s, &fault);
+    for (size_t k = 0; k < n; k++) {
+        size_t place = 0;
+        while (place < OUTPUT_RATES && rated_outputs[place] != r[k])
+            place++;
+        if (place == OUTPUT_RATES || orders[k] != 1 || k >= total) {
+            say(s, ERROR, "%s must be asked for first derivatives of Float64 outputs, but is for order %i of %s", s->function,
+                (int64_t)orders[k], name_of(r[k], text));
+            return s->worst;
+        }
+        v[k] = rates[place];
+    }
+    return s->worst;
+}
+#endif
+
+/* --- Model exchange ---------------------------------------------------------------------------------------------------- */
+
+EXPORT Status FMI(fmi3SetTime)(Component c, double time)
+{
+    ENTER(fmi3SetTime, 1)
+    if (is_type(s, MODEL_EXCHANGE) && in_mode(s, false))
+        s->course.time = time;
+    return s->worst;
+}
+
+#ifdef CONTINUOUS_STATES
+/* A call that needs room for so many numbers. */
+#define ENTER_NUMBERS(name, numbers, count) \
+    ENTER(name, numbers != NULL) \
+    if (n != (count)) { \
+        say(s, ERROR, "%s must be given room for %i numbers, but is for %i", s->function, (int64_t)(count), (int64_t)n); \
+        return s->worst; \
+    } \
+    if (!is_type(s, MODEL_EXCHANGE)) \
+        return s->worst;
+
+EXPORT Status FMI(fmi3GetNumberOfContinuousStates)(Component c, size_t *n)
+{
+    ENTER(fmi3GetNumberOfContinuousStates, n != NULL)
+    *n = CONTINUOUS_STATES;
+    return OK;
+}
+
+EXPORT Status FMI(fmi3GetNumberOfEventIndicators)(Component c, size_t *n)
+{
+    ENTER(fmi3GetNumberOfEventIndicators, n != NULL)
+    *n = INDICATORS;
+    return OK;
+}
+
+EXPORT Status FMI(fmi3SetContinuousStates)(Component c, const double x[], size_t n)
+{
+    ENTER_NUMBERS(fmi3SetContinuousStates, x, CONTINUOUS_STATES)
+    return in_mode(s, false) ? set_states(s, x) : s->worst;
+}
+
+EXPORT Status FMI(fmi3GetContinuousStates)(Component c, double x[], size_t n)
+{
+    Fault fault;
+    ENTER_NUMBERS(fmi3GetContinuousStates, x, CONTINUOUS_STATES)
+    fault.kind = NO_FAULT;
+    recompute(s, &fault);
+    memcpy(x, STATES(&s->slave), n * sizeof *x);
+    return concluded(s, &fault);
+}
+
+EXPORT Status FMI(fmi3GetNominalsOfContinuousStates)(Component c, double x[], size_t n)
+{
+    ENTER_NUMBERS(fmi3GetNominalsOfContinuousStates, x, CONTINUOUS_STATES)
+    memcpy(x, nominals, n * sizeof *x);
+    return OK;
+}
+
+EXPORT Status FMI(fmi3GetContinuousStateDerivatives)(Component c, double derivatives[], size_t n)
+{
+    ENTER_NUMBERS(fmi3GetContinuousStateDerivatives, derivatives, CONTINUOUS_STATES)
+    return bring_up_to_date(s) ? derivatives_of(s, derivatives) : s->worst;
+}
+
+EXPORT Status FMI(fmi3GetEventIndicators)(Component c, double values[], size_t n)
+{
+    ENTER_NUMBERS(fmi3GetEventIndicators, values, INDICATORS)
+    return bring_up_to_date(s) ? indicators_of(s, values) : s->worst;
+}
+
+EXPORT Status FMI(fmi3CompletedIntegratorStep)(Component c, bool no_return, bool *event, bool *end)
+{
+    ENTER(fmi3CompletedIntegratorStep, event && end)
+    (void)no_return;
+    *event = *end = false;
+    return is_type(s, MODEL_EXCHANGE) && in_mode(s, false) ? completed_step(s, event) : s->worst;
+}
+#endif

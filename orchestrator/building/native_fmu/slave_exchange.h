@@ -1,0 +1,69 @@
+/* Model exchange in terms of the slave: states, derivatives, event indicators, event update; a part of slave_core.h.
+ *
+ * The slave's mode is part of its hidden state: it changes in event mode only, so that between events all is smooth. */
+
+#define ENTER_EXCHANGE(name, condition) \
+    ENTER(name, condition) \
+    if (s->course.type != MODEL_EXCHANGE || s->course.phase != STEPPING) { \
+        say(s, ERROR, "%s must not be called %s", s->function, \
+            s->course.type != MODEL_EXCHANGE ? "in co-simulation" : phase_names[s->course.phase]); \
+        return s->worst; \
+    }
+
+static Status concluded(Instance *s, const Fault *fault)
+{
+    if (fault->kind)
+        say_fault(s, fault);
+    return s->worst;
+}
+
+/* Settle state and mode; the slave does it by itself: one call is enough. Tell whether states have jumped. */
+static Status update_slave(Instance *s, bool *jumped)
+{
+    Fault fault;
+    double before[CONTINUOUS_STATES];
+    fault.kind = NO_FAULT;
+    memcpy(before, STATES(&s->slave), sizeof before);
+    slave_update(&s->slave, s->course.time, &fault);
+    *jumped = memcmp(before, STATES(&s->slave), sizeof before) != 0;
+    s->fresh = true;
+    return concluded(s, &fault);
+}
+
+static Status indicators_of(Instance *s, double values[])
+{
+    Fault fault;
+    fault.kind = NO_FAULT;
+    slave_indicators(&s->slave, values, &fault);
+    return concluded(s, &fault);
+}
+
+static Status completed_step(Instance *s, bool *event)
+{
+    double values[INDICATORS];
+    indicators_of(s, values);
+    *event = false;
+    for (size_t n = 0; n < INDICATORS; n++)
+        *event = *event || values[n] <= 0.0;
+    return s->worst;
+}
+
+static Status set_states(Instance *s, const double x[])
+{
+    for (size_t k = 0; k < CONTINUOUS_STATES; k++)
+        if (!(-LARGEST_REAL <= x[k] && x[k] <= LARGEST_REAL)) {
+            say(s, DISCARD, "continuous states must be finite, but %s is %r", variables[FIRST_STATE + k].shown, x[k]);
+            return s->worst;
+        }
+    memcpy(STATES(&s->slave), x, CONTINUOUS_STATES * sizeof *x);
+    s->fresh = false;
+    return OK;
+}
+
+static Status derivatives_of(Instance *s, double derivatives[])
+{
+    Fault fault;
+    fault.kind = NO_FAULT;
+    slave_derivatives(&s->slave, derivatives, &fault);
+    return concluded(s, &fault);
+}

@@ -1,0 +1,1 @@
+"""Verdicts as text and in the formats that platforms of continuous integration read."""

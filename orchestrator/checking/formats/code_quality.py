@@ -1,0 +1,35 @@
+"""Code Quality JSON, as GitLab reads it."""
+
+from collections.abc import Mapping, Sequence
+
+import msgspec
+
+from orchestrator.checking.formats.text import plain
+from orchestrator.checking.rules import Severity
+from orchestrator.checking.verdict import Verdict, artifact
+
+_SEVERITIES: Mapping[Severity, str] = {"error": "major", "warning": "minor", "info": "info"}
+
+
+def as_code_quality(verdicts: Sequence[Verdict]) -> str:
+    """Write the issues that the baseline does not have.
+
+    Args:
+        verdicts: one for each FMU.
+
+    Returns:
+        The document.
+    """
+    issues = [
+        {
+            "description": plain(f"{issue.finding.message} ({issue.finding.path})"),
+            "check_name": issue.finding.rule,
+            "fingerprint": issue.fingerprint,
+            "severity": _SEVERITIES[issue.severity],
+            "location": {"path": artifact(verdict.fmu), "lines": {"begin": 1}},
+        }
+        for verdict in verdicts
+        for issue in verdict.issues
+        if not issue.known
+    ]
+    return msgspec.json.format(msgspec.json.encode(issues), indent=1).decode() + "\n"

@@ -1,0 +1,1 @@
+"""The rules as data, one a line; ``checking.rules`` reads them."""

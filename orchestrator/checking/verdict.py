@@ -1,0 +1,189 @@
+"""The verdict on an FMU: its findings as the project's policy rates them, and what became of each rule."""
+
+import hashlib
+import re
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from orchestrator.checking.findings import SEVERITIES, Finding, FmuFindings, RuleOutcome
+from orchestrator.checking.policy import Policy
+from orchestrator.checking.rules import Severity
+from orchestrator.errors import InputError
+
+_QUOTED = re.compile(r"(`[^`]*`)")
+_NUMBER = re.compile(r"[-+]?\d+(\.\d+)?([eE][-+]?\d+)?")
+_MOST_BYTES = 64 << 20
+
+
+@dataclass(frozen=True)
+class Issue:
+    """A finding as the policy rates it.
+
+    Attributes:
+        finding: what was found.
+        severity: of its rule, by the policy.
+        fingerprint: 32 hexadecimal digits that stay the same while the finding does, on every machine.
+        known: whether the baseline has it.
+    """
+
+    finding: Finding
+    severity: Severity
+    fingerprint: str
+    known: bool = False
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is made of one FMU.
+
+    Attributes:
+        report: what the checks found.
+        issues: the findings of the rules that count, worst first.
+        outcomes: of all rules of the FMU's version; a rule that does not count is not run.
+        fail_on: the least severity with which an issue fails.
+    """
+
+    report: FmuFindings
+    issues: tuple[Issue, ...]
+    outcomes: tuple[RuleOutcome, ...]
+    fail_on: Severity = "error"
+
+    @property
+    def fmu(self) -> str:
+        """Path of the FMU, as the user gave it."""
+        return self.report.fmu
+
+    @property
+    def ok(self) -> bool:
+        """No issue fails."""
+        return not any(self.fails(issue) for issue in self.issues)
+
+    def fails(self, issue: Issue) -> bool:
+        """Whether an issue fails the check: bad enough, and not known.
+
+        Args:
+            issue: of this verdict.
+
+        Returns:
+            True when it does.
+        """
+        return not issue.known and SEVERITIES.index(issue.severity) <= SEVERITIES.index(self.fail_on)
+
+    def count(self, severity: str) -> int:
+        """Number of issues of one severity that the baseline does not have.
+
+        Args:
+            severity: one of ``SEVERITIES``.
+
+        Returns:
+            Their number.
+        """
+        return sum(issue.severity == severity and not issue.known for issue in self.issues)
+
+
+def judge(report: FmuFindings, policy: Policy, baseline: frozenset[str] = frozenset()) -> Verdict:
+    """Rate the findings on one FMU.
+
+    Args:
+        report: what the checks found.
+        policy: which rules count, and how much.
+        baseline: fingerprints of known findings.
+
+    Returns:
+        The verdict.
+    """
+    severities = policy.severities(report.fmu)
+    issues = []
+    seen: Counter[str] = Counter()
+    for finding in report.findings:
+        if finding.rule in severities:
+            content = _content(report.fmu, finding)
+            seen[content] += 1
+            fingerprint = hashlib.sha256(f"{content}\n{seen[content]}".encode()).hexdigest()[:32]
+            issues.append(Issue(finding, severities[finding.rule], fingerprint, fingerprint in baseline))
+    issues.sort(key=lambda issue: SEVERITIES.index(issue.severity))
+    outcomes = tuple(
+        o if o.rule in severities else RuleOutcome(o.rule, "not run", "the policy ignores it") for o in report.outcomes
+    )
+    return Verdict(report, tuple(issues), outcomes, policy.fail_on)
+
+
+def _content(fmu: str, finding: Finding) -> str:
+    """What makes a finding this one: not its position among others, and no measured number."""
+    parts = _QUOTED.split(finding.message)
+    message = "".join(part if part.startswith("`") else _NUMBER.sub("#", part) for part in parts)
+    path = re.sub(r"\[\d+\]", "", finding.path)
+    return "\n".join((artifact(fmu), finding.rule, path, message))
+
+
+def artifact(fmu: str) -> str:
+    """Return the path of an FMU as platforms want it: relative to the working directory where it is below that.
+
+    Args:
+        fmu: path, as the user gave it.
+
+    Returns:
+        The path, with forward slashes.
+    """
+    path = Path(fmu)
+    if path.is_absolute() and path.is_relative_to(Path.cwd()):
+        path = path.relative_to(Path.cwd())
+    return path.as_posix()
+
+
+class _Known(msgspec.Struct, frozen=True):
+    """An entry of a baseline; only the fingerprint is compared, the rest is for who reads the file."""
+
+    fingerprint: str
+    fmu: str = ""
+    rule: str = ""
+    message: str = ""
+
+
+def read_baseline(path: Path) -> frozenset[str]:
+    """Read the fingerprints of known findings.
+
+    Args:
+        path: of a file that ``write_baseline`` made.
+
+    Returns:
+        The fingerprints.
+
+    Raises:
+        InputError: the file cannot be read, or is no baseline.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(_MOST_BYTES + 1)
+        if len(data) > _MOST_BYTES:
+            raise InputError(f"the baseline {path} must have at most {_MOST_BYTES} bytes, but has more")
+        entries = msgspec.json.decode(data, type=dict[str, list[_Known]])
+    except OSError as error:
+        raise InputError(f"the baseline {path} must be readable, but is not: {error.strerror}") from None
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise InputError(f"the baseline {path} must be one, but: {error}") from None
+    if "known" not in entries:
+        raise InputError(f"the baseline {path} must have the list `known`, but has none")
+    return frozenset(entry.fingerprint for entry in entries["known"])
+
+
+def baseline_of(verdicts: Iterable[Verdict]) -> str:
+    """Write all issues as known ones.
+
+    Args:
+        verdicts: one for each FMU.
+
+    Returns:
+        A JSON document for ``read_baseline``.
+    """
+    known = [
+        _Known(issue.fingerprint, artifact(verdict.fmu), issue.finding.rule, issue.finding.message)
+        for verdict in verdicts
+        for issue in verdict.issues
+    ]
+    data = msgspec.json.format(msgspec.json.encode({"known": known}), indent=1)
+    return data.decode() + "\n"

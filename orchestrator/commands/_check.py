@@ -1,0 +1,192 @@
+"""What ``check`` and the program ``fmu-check`` share: options, what is printed, and the files of reports."""
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import msgspec
+
+from orchestrator.checking.batch import chosen_policy
+from orchestrator.checking.check import CheckOptions
+from orchestrator.checking.findings import SEVERITIES
+from orchestrator.checking.formats.code_quality import as_code_quality
+from orchestrator.checking.formats.github import as_annotations, as_summary
+from orchestrator.checking.formats.junit import as_junit
+from orchestrator.checking.formats.sarif import as_sarif
+from orchestrator.checking.formats.text import as_lines, as_results
+from orchestrator.checking.policy import FILE_NAME, Policy
+from orchestrator.checking.verdict import Verdict, baseline_of
+from orchestrator.commands._trust import add_trust, positive
+from orchestrator.errors import InputError, OutputError
+from orchestrator.shared.isolation.archives import ArchiveLimits
+from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
+from orchestrator.shared.results import as_plain
+
+_REPORTS: dict[str, tuple[str, Callable[[Sequence[Verdict]], str]]] = {
+    "json": ("JSON", lambda verdicts: json.dumps(as_plain(as_results(verdicts)), indent=1) + "\n"),
+    "junit": ("JUnit XML", as_junit),
+    "sarif": ("SARIF 2.1.0", as_sarif),
+    "code-quality": ("Code Quality JSON, as GitLab reads it", as_code_quality),
+}
+_SUMMARY = "GITHUB_STEP_SUMMARY"
+
+
+def add_check_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options.
+
+    Args:
+        parser: of the command or the program.
+    """
+    parser.add_argument("--static", action="store_true", help="execute nothing")
+    add_trust(parser)
+    parser.add_argument(
+        "--policy", type=Path, metavar="FILE.toml",
+        help=f"which rules count, and how much (default: {FILE_NAME} where there is one)",
+    )  # fmt: skip
+    parser.add_argument("--fail-on", choices=SEVERITIES, help="the least severity that fails (default: error)")
+    parser.add_argument("--baseline", type=Path, metavar="FILE", help="known findings, which do not fail")
+    parser.add_argument("--write-baseline", type=Path, metavar="FILE", help="write all findings as known ones")
+    for name, (what, _) in _REPORTS.items():
+        parser.add_argument(f"--{name}", type=Path, metavar="FILE", help=f"also write the findings as {what}")
+    parser.add_argument("--github", action="store_true", help="also print annotations and write the step's summary")
+    limits, archive = Limits(), ArchiveLimits()
+    for name, default, metavar, what in (
+        ("time", limits.time, "S", "wall time that one call may take"),
+        ("memory", limits.memory / MEBIBYTE, "MIB", "memory that the running FMU may take"),
+        ("size", archive.total / MEBIBYTE, "MIB", "size that the unpacked FMU may have"),
+    ):
+        parser.add_argument(
+            f"--{name}-limit", type=positive, default=default, metavar=metavar, help=f"{what} (default: %(default)g)"
+        )
+
+
+def chosen_options(args: argparse.Namespace) -> CheckOptions:
+    """Return how the arguments want FMUs to be checked.
+
+    Args:
+        args: of the command line.
+
+    Returns:
+        The options.
+    """
+    return CheckOptions(
+        static=args.static,
+        trust=args.trust,
+        archive=ArchiveLimits(total=int(args.size_limit * MEBIBYTE)),
+        limits=Limits(time=args.time_limit, memory=int(args.memory_limit * MEBIBYTE)),
+    )
+
+
+def read_arguments(args: argparse.Namespace) -> Policy:
+    """Return the policy that the arguments name, with what they say themselves, after a look at where reports go.
+
+    Args:
+        args: of the command line.
+
+    Returns:
+        The policy.
+
+    Raises:
+        InputError: the file of the policy is wrong.
+        OutputError: a report cannot be written.
+    """
+    for option, target in _targets(args):
+        _require_place(target, option)
+    if args.github and not os.environ.get(_SUMMARY):
+        raise InputError(f"`--github` must be given where {_SUMMARY} names a file, but it names none")
+    usual = Path(FILE_NAME)
+    policy = chosen_policy(args.policy or (usual if usual.is_file() else None))
+    given = {"fail_on": args.fail_on, "baseline": args.baseline and str(args.baseline)}
+    return msgspec.structs.replace(policy, **{name: value for name, value in given.items() if value})
+
+
+@contextmanager
+def verdicts_shown(count: int) -> Iterator[Callable[[Verdict], None]]:
+    """Yield what prints a verdict; on a terminal the number of FMUs that are done stands below.
+
+    Args:
+        count: of FMUs.
+
+    Yields:
+        The function.
+    """
+    shows = sys.stderr.isatty()
+    done = 0
+
+    def progress() -> None:
+        if shows and done < count:
+            sys.stderr.write(f"\r{done} of {count} FMUs checked ...")
+            sys.stderr.flush()
+
+    def clear() -> None:
+        if shows:
+            sys.stderr.write("\r\x1b[K")
+            sys.stderr.flush()
+
+    def shown(verdict: Verdict) -> None:
+        nonlocal done
+        done += 1
+        clear()
+        print("\n".join(as_lines(verdict)), flush=True)
+        progress()
+
+    progress()
+    try:
+        yield shown
+    finally:
+        clear()
+
+
+def write_reports(args: argparse.Namespace, verdicts: Sequence[Verdict]) -> None:
+    """Write the reports that were asked for, each whole or not at all.
+
+    Args:
+        args: of the command line.
+        verdicts: one for each FMU.
+
+    Raises:
+        OutputError: a report cannot be written.
+    """
+    writers = {f"--{name}": writer for name, (_, writer) in _REPORTS.items()} | {"--write-baseline": baseline_of}
+    for option, target in _targets(args):
+        _write(target, writers[option](verdicts), option)
+    if args.github:
+        print("\n".join(as_annotations(verdicts)), flush=True)
+        path = os.environ[_SUMMARY]
+        try:
+            with open(path, "a", encoding="utf-8") as stream:
+                stream.write(as_summary(verdicts))
+        except OSError as error:
+            raise OutputError(f"{_SUMMARY} must name a file that can be written, but: {error.strerror}") from None
+
+
+def _targets(args: argparse.Namespace) -> Iterator[tuple[str, Path]]:
+    for name in (*_REPORTS, "write-baseline"):
+        target = getattr(args, name.replace("-", "_"))
+        if target is not None:
+            yield f"--{name}", target
+
+
+def _require_place(path: Path, option: str) -> None:
+    """Refuse a file that cannot be written before the work starts, not after it."""
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        reason = "a folder" if path.is_dir() else "in no folder that can be written"
+        raise OutputError(f"`{option}` must be a file that can be written, but {path} is {reason}")
+
+
+def _write(path: Path, text: str, option: str) -> None:
+    """Write a file whole or not at all."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text(text, encoding="utf-8", errors="replace")
+        os.replace(partial, path)
+    except OSError as error:
+        with suppress(OSError):
+            partial.unlink()
+        raise OutputError(
+            f"`{option}` must be a file that can be written, but {path} is not: {error.strerror}"
+        ) from None

@@ -1,0 +1,86 @@
+"""What a program makes of the end of its work: one line for an error, and the exit code."""
+
+import io
+import os
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any, TextIO, cast
+
+from orchestrator.commands._lines import folded
+from orchestrator.commands._parser import one_line, worded
+from orchestrator.errors import InputError, OrchestratorError
+
+
+def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
+    """Run a program's work and return its exit code: that of the work, 2 for bad input, 1 for other errors.
+
+    Args:
+        run: the work; what it prints to standard output is dropped once the reader has gone.
+        flags: what ``flags_of`` returned.
+
+    Returns:
+        The exit code; 130 after Ctrl-C.
+
+    Raises:
+        BrokenPipeError: the reader of the standard error stream has gone.
+    """
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of any script, whatever the terminal's encoding
+        sys.stdout = cast(TextIO, ForgivingStream(sys.stdout))
+    try:
+        code = int(run())
+        sys.stdout.flush()
+        return code
+    except OrchestratorError as error:
+        _say(f"error: {one_line(worded(error, flags))}")
+        return 2 if isinstance(error, InputError) else 1
+    except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
+        text = worded(interruption, flags)
+        _say(f"interrupted: {text}" if text else "interrupted")
+        return 130
+    except BrokenPipeError:
+        raise  # whoever read the output has gone: the program ends without a word
+    except (OSError, MemoryError) as error:  # no descriptors, no memory, a full disk behind standard output
+        _say(f"error: {one_line(str(error) or 'out of memory')}")
+        return 1
+
+
+def _say(text: str) -> None:
+    """Write one line to standard error, folded between words on a terminal."""
+    sys.stderr.write(f"{folded(text, sys.stderr)}\n")
+
+
+class ForgivingStream:
+    """Standard output that may close while a command goes on: files count, what is printed after that is dropped."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write ``text``; after the reader has gone away, write nothing.
+
+        Args:
+            text: to be written.
+
+        Returns:
+            The number of characters.
+        """
+        try:
+            return int(self._stream.write(text))
+        except BrokenPipeError:
+            self._drop()
+            return len(text)
+
+    def flush(self) -> None:
+        """Hand on what is buffered; after the reader has gone away, drop it."""
+        try:
+            self._stream.flush()
+        except BrokenPipeError:
+            self._drop()
+
+    def _drop(self) -> None:
+        with open(os.devnull, "wb") as nothing:
+            os.dup2(nothing.fileno(), self._stream.fileno())

@@ -1,0 +1,52 @@
+"""``--trust``, and what is said of walls that are missing."""
+
+import argparse
+import sys
+
+from orchestrator.commands._parser import number
+from orchestrator.shared.isolation.walls import support
+from orchestrator.shared.operating_system import LIMITS
+
+
+def add_trust(parser: argparse.ArgumentParser) -> None:
+    """Add ``--trust``.
+
+    Args:
+        parser: of the command.
+    """
+    parser.add_argument(
+        "--trust", action="store_true", help="run FMUs that are not ours with all rights of the user, without walls"
+    )
+
+
+def positive(text: str) -> float:
+    """Return a positive number of a size that means something.
+
+    Args:
+        text: a word of the command line.
+
+    Returns:
+        The number, below 1e9.
+
+    Raises:
+        ArgumentTypeError: it is none, or out of range.
+    """
+    value = number(text)
+    if not 0 < value < 1e9:
+        raise argparse.ArgumentTypeError(f"must be positive and below 1e9, but is {text}")
+    return value
+
+
+def note_missing_walls() -> None:
+    """Say what this system does not enforce around FMUs that are not ours, where it does not enforce everything."""
+    if support().missing:
+        note(f"FMUs that are not ours run with {LIMITS}, but {support().missing}")
+
+
+def note(text: str) -> None:
+    """Write a line for the user to know, to the standard error stream.
+
+    Args:
+        text: without a line break.
+    """
+    sys.stderr.write(f"note: {text}\n")

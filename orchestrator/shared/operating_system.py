@@ -1,0 +1,296 @@
+"""What not every operating system offers; no other module imports modules of one system, or asks `/proc`.
+
+| | Linux | macOS | elsewhere (Windows) |
+|---|---|---|---|
+| whether a process runs | yes | yes | unknown: it counts as running |
+| memory and threads of a process | yes | unknown: 0 | unknown: 0 |
+| limits of memory, processor time, files | yes | yes | none |
+| peak memory of a child that has ended | yes | yes | unknown: 0 |
+| symbolic links, and removal of an open file | yes | yes | Windows: no |
+| end of a whole process group | yes | yes | the child alone |
+| lock of an open file (filelock) | yes | yes | Windows: yes |
+
+Standard library alone, but for the lock: a child imports it before its walls are up.
+"""
+
+import contextlib
+import errno
+import mmap
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+try:
+    import resource as _resource
+except ImportError:  # Windows
+    _resource = None  # type: ignore[assignment]
+
+KILLED: int | None = getattr(signal, "SIGKILL", None)
+"""Number of the signal that ends a process without a word; ``None`` where there is none."""
+
+LIMITS = "limits" if _resource else "a limit of time alone"
+"""What bounds a child process that has no walls."""
+
+PLAIN_FILE = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+"""Flags of ``os.open``: follow no link, wait for nothing, change no byte."""
+
+
+def alive(pid: int) -> bool:
+    """Return whether a process runs; one that has ended and that nothing has waited for does not.
+
+    Args:
+        pid: Number of the process.
+
+    Returns:
+        Whether it runs, as far as this user may know: a process that cannot be asked counts as running.
+    """
+    if sys.platform == "win32":
+        return True  # there, asking is ending
+    try:
+        os.kill(pid, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:  # no such files here, or it ended meanwhile
+        return True
+    return state.rpartition(")")[2].split()[:1] != ["Z"]
+
+
+def is_own(status: os.stat_result) -> bool:
+    """Return whether a file belongs to the user of this process.
+
+    Args:
+        status: of the file.
+
+    Returns:
+        Whether it does; True where files have no owners.
+    """
+    return not hasattr(os, "getuid") or status.st_uid == os.getuid()
+
+
+def occupied(status: os.stat_result) -> int:
+    """Return the bytes that a file takes on the disk.
+
+    Args:
+        status: of the file.
+
+    Returns:
+        The bytes; its length where the system does not tell.
+    """
+    return status.st_blocks * 512 if hasattr(status, "st_blocks") else status.st_size
+
+
+def resident_memory(pid: int) -> tuple[int, int]:
+    """Return the resident memory of a process and its number of threads.
+
+    Args:
+        pid: number of the process.
+
+    Returns:
+        Bytes and number; zeros where the system does not tell.
+    """
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
+        return int(fields[21]) * mmap.PAGESIZE, int(fields[17])
+    except (OSError, IndexError, ValueError):
+        return 0, 0
+
+
+def allocated_memory() -> int:
+    """Return the private writable memory of this process.
+
+    Returns:
+        Bytes; 0 where the system does not tell.
+    """
+    try:
+        return int(Path("/proc/self/statm").read_bytes().split()[5]) * mmap.PAGESIZE
+    except (OSError, IndexError):
+        return 0
+
+
+def peak_memory() -> int:
+    """Return the largest memory of this process; ``ru_maxrss`` would start from that of its parent.
+
+    Returns:
+        KiB; 0 where the system does not tell.
+    """
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1])
+    return 0
+
+
+def set_limits(limits: Mapping[str, int]) -> None:
+    """Set limits that the kernel keeps for this process, as far as it has and allows them.
+
+    Args:
+        limits: by the names of ``setrlimit``, such as ``RLIMIT_AS``.
+    """
+    if _resource is None:
+        return
+    for name, value in limits.items():
+        with contextlib.suppress(ValueError, OSError, AttributeError):
+            which = getattr(_resource, name)
+            _, hard = _resource.getrlimit(which)
+            most = value if hard == _resource.RLIM_INFINITY else min(value, hard)
+            _resource.setrlimit(which, (most, most))
+
+
+def kill_group(process: "subprocess.Popen[bytes]") -> bool:
+    """Kill the process group that a child leads.
+
+    Args:
+        process: the child, started in a session of its own.
+
+    Returns:
+        Whether anything was in the group; False where there are no groups.
+    """
+    if not hasattr(os, "killpg"):
+        return False
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        return False
+    return True
+
+
+def collect(process: "subprocess.Popen[bytes]", limit: float) -> int:
+    """Wait for a child to end.
+
+    Args:
+        process: the child; its ``returncode`` is set.
+        limit: [s].
+
+    Returns:
+        Its peak of resident memory in bytes; 0 where that may be another's, or the system does not tell.
+
+    Raises:
+        TimeoutExpired: it does not end.
+    """
+    if _resource is None or not hasattr(os, "wait4"):
+        process.wait(limit)
+        return 0
+    end = time.monotonic() + limit
+    while True:
+        pid, status, used = os.wait4(process.pid, os.WNOHANG)
+        if pid:
+            break
+        if time.monotonic() > end:
+            raise subprocess.TimeoutExpired(process.args, limit)
+        time.sleep(0.002)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    # Linux counts what the child had between fork and exec, which is the memory of its parent.
+    own = _resource.getrusage(_resource.RUSAGE_SELF).ru_maxrss
+    unit = 1 if sys.platform == "darwin" else 1024
+    return used.ru_maxrss * unit if used.ru_maxrss > own else 0
+
+
+def lock(descriptor: int) -> bool:
+    """Lock an open file for this process, until it is closed.
+
+    Args:
+        descriptor: of the file.
+
+    Returns:
+        False when another process has locked it. Where the system has no locks, True.
+
+    Raises:
+        OSError: the file cannot be locked.
+    """
+    from filelock import lock_descriptor
+
+    try:
+        return lock_descriptor(descriptor, blocking=False)
+    except OSError as error:
+        if error.errno == errno.ENOSYS:
+            return True
+        raise
+
+
+def write_at(descriptor: int, data: bytes, offset: int) -> int:
+    """Write to a place in an open file.
+
+    Args:
+        descriptor: of the file.
+        data: what to write.
+        offset: in bytes.
+
+    Returns:
+        How many bytes were written.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    if hasattr(os, "pwrite"):
+        return os.pwrite(descriptor, data, offset)
+    before = os.lseek(descriptor, 0, os.SEEK_CUR)
+    os.lseek(descriptor, offset, os.SEEK_SET)
+    try:
+        return os.write(descriptor, data)
+    finally:
+        os.lseek(descriptor, before, os.SEEK_SET)  # copies of the descriptor read on from there
+
+
+def close_and_remove(descriptor: int, path: Path) -> None:
+    """Close a file and remove it; where the system can remove an open file, nobody can lock it in between.
+
+    Args:
+        descriptor: of the open file.
+        path: of the file, which may be gone.
+
+    Raises:
+        OSError: it cannot be removed.
+    """
+    if sys.platform == "win32":
+        os.close(descriptor)
+        path.unlink(missing_ok=True)
+        return
+    try:
+        path.unlink(missing_ok=True)
+    finally:
+        os.close(descriptor)
+
+
+def link(path: Path, target: Path) -> None:
+    """Make a symbolic link, where the system lets users do so.
+
+    Args:
+        path: of the link; what is there already stays.
+        target: where it leads.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    try:
+        path.symlink_to(target)
+    except FileExistsError:
+        return
+    except OSError:
+        if sys.platform != "win32":
+            raise
+
+
+def sync_folder(folder: Path) -> None:
+    """Make the names of a folder's new files as durable as their content, where folders can be opened.
+
+    Args:
+        folder: that holds the files.
+
+    Raises:
+        OSError: it cannot be done.
+    """
+    if sys.platform == "win32":
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

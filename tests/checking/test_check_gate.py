@@ -1,0 +1,96 @@
+"""Formal faults keep no probe from running; what was not executed does not pass."""
+
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from orchestrator.checking.check import check_fmu
+from tests.support.broken_fmus import QUICK
+from tests.support.c_fmu import LIBRARY, fmu_files, have_compiler, write_fmu
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
+)
+XML = "modelDescription.xml"
+Files = dict[str, bytes]
+
+
+def _edited(old: str, new: str) -> Callable[[Files], Files]:
+    def change(files: Files) -> Files:
+        text, count = re.subn(old, new, files[XML].decode(), count=1)
+        assert count == 1
+        return files | {XML: text.encode()}
+
+    return change
+
+
+FORMAL = {
+    "date with milliseconds": ("model.date", _edited("00:00Z", "00:00.125Z")),
+    "date of a time zone": ("model.date", _edited("00:00Z", "00:00-05:00")),
+    "no date at all": ("schema.invalid", _edited('generationDateAndTime="[^"]*"', 'generationDateAndTime="today"')),
+    "Latin-1": ("xml.encoding", _edited("UTF-8", "ISO-8859-1")),
+    "initial unknown missing": ("structure.initial-unknowns", _edited("(?s)<InitialUnknowns>.*</InitialUnknowns>", "")),
+    "an attribute of a vendor": ("schema.invalid", _edited("<CoSimulation", '<CoSimulation vendorFlag="1"')),
+    "unit unknown": ("type.unit", _edited('unit="m"', 'unit="ell"')),
+    "another platform without library": (
+        "binary.missing",
+        lambda files: files | {"binaries/win64/other.dll": b"MZ"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FORMAL)
+def test_a_formal_fault_is_found_and_the_fmu_runs_all_the_same(name: str, tmp_path: Path) -> None:
+    rule, change = FORMAL[name]
+    report = check_fmu(write_fmu(tmp_path / "formal.fmu", change(fmu_files())), QUICK)
+    assert {f.rule for f in report.findings} == {rule}
+    assert report.executed
+    assert set(report.executions[0].stages.values()) == {""}
+
+
+def test_a_fault_of_behaviour_is_seen_behind_a_formal_one(tmp_path: Path) -> None:
+    files = _edited("00:00Z", "00:00.5Z")(fmu_files("crash_step"))
+    report = check_fmu(write_fmu(tmp_path / "both.fmu", files), QUICK)
+    assert {f.rule for f in report.findings} == {"model.date", "run.crash", "run.skipped"}
+    assert {o.rule for o in report.outcomes if o.outcome == "failed"} == {"model.date", "run.crash", "run.skipped"}
+
+
+@pytest.mark.parametrize(
+    ("change", "rule"),
+    [
+        (lambda files: files | {LIBRARY: b"hello\n"}, "binary.format"),
+        (lambda files: {k: v for k, v in files.items() if k != LIBRARY}, "binary.none"),
+        (_edited('modelIdentifier="[^"]*"', 'modelIdentifier="Other"'), "binary.missing"),
+        (lambda files: {k.replace("linux64", "darwin64").replace(".so", ".dylib"): v for k, v in files.items()}, None),
+    ],
+    ids=["text as library", "neither binary nor source", "another identifier", "another platform"],
+)
+def test_what_was_not_executed_does_not_pass(
+    change: Callable[[Files], Files], rule: str | None, tmp_path: Path
+) -> None:
+    path = write_fmu(tmp_path / "idle.fmu", change(fmu_files()))
+    report = check_fmu(path, QUICK)
+    assert not report.ok
+    assert not report.executed
+    assert report.not_executed
+    assert (rule or "binary.format") in {f.rule for f in report.findings}
+
+
+def test_an_fmu_without_a_library_for_this_machine_passes_when_only_reading_is_asked_for(tmp_path: Path) -> None:
+    files = fmu_files()
+    del files[LIBRARY]
+    path = write_fmu(tmp_path / "sources.fmu", files | {"sources/model.c": b"int x;\n"})
+    report = check_fmu(path, QUICK)
+    assert {f.rule for f in report.findings} == {"binary.not-here", "run.not-executed"}
+    assert not report.ok
+    assert check_fmu(path, replace(QUICK, static=True)).ok
+
+
+def test_messages_have_their_arguments(tmp_path: Path) -> None:
+    report = check_fmu(write_fmu(tmp_path / "logs.fmu", fmu_files("logs_arguments")), QUICK)
+    (finding,) = (f for f in report.findings if f.rule == "run.status")
+    assert "(a 7 -3 0x1f 99999999999 tank 2.50 x 1e-09 50% 8)" in finding.message

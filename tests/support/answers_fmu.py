@@ -1,0 +1,65 @@
+"""A co-simulation FMU in C whose answers a test chooses: warnings, discarded steps, an early end, a step of its own."""
+
+import subprocess
+import zipfile
+from pathlib import Path
+
+import fmpy
+
+HERE = Path(__file__).parent
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="Answers" guid="{{answers}}" generationTool="by hand"
+    generationDateAndTime="2026-01-01T00:00:00Z" variableNamingConvention="flat" numberOfEventIndicators="0">
+  <CoSimulation modelIdentifier="Answers" {attributes}/>
+  <ModelVariables>{variables}
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="2" dependencies=""/><Unknown index="5" dependencies=""/></Outputs>
+    <InitialUnknowns><Unknown index="2"/><Unknown index="5"/></InitialUnknowns>
+  </ModelStructure>
+</fmiModelDescription>
+"""
+
+
+def _variable(reference: int, name: str, causality: str, variability: str, kind: str, start: str | None) -> str:
+    given = "" if start is None else f' start="{start}"'
+    attributes = f'name="{name}" valueReference="{reference}" causality="{causality}" variability="{variability}"'
+    return f"\n    <ScalarVariable {attributes}><{kind}{given}/></ScalarVariable>"
+
+
+def build_answers_fmu(
+    folder: Path, *macros: str, saves: bool = False, varies: bool = True, parameters: bool = False, more: str = ""
+) -> Path:
+    """Compile the FMU into ``folder`` and return its path.
+
+    Args:
+        folder: where to.
+        macros: of ``answers_fmu.c``, such as ``WARNS_FROM=0.5``.
+        saves, varies: capabilities that it declares: it saves its state, it takes steps of any length.
+        parameters: whether ``mode`` (Integer) and ``on`` (Boolean) are fixed parameters, not inputs.
+        more: attributes of CoSimulation.
+    """
+    library = folder / "Answers.so"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    defined = [f"-D{macro}" for macro in macros]
+    command = ["cc", "-shared", "-fPIC", "-Wall", "-I", str(headers), *defined, str(HERE / "answers_fmu.c"), "-o"]
+    subprocess.run([*command, str(library), "-lm"], check=True, capture_output=True)
+    attributes = f'canHandleVariableCommunicationStepSize="{str(varies).lower()}" {more}'
+    attributes += f' canGetAndSetFMUstate="{str(saves).lower()}"'
+    mode, held = ("parameter", "fixed") if parameters else ("input", "discrete")
+    variables = (
+        _variable(0, "u", "input", "continuous", "Real", "0"),
+        _variable(1, "x", "output", "continuous", "Real", None),
+        _variable(2, "gain", "parameter", "fixed", "Real", "2"),
+        _variable(0, "mode", mode, held, "Integer", "0"),
+        _variable(1, "steps", "output", "discrete", "Integer", None),
+        _variable(0, "on", mode, held, "Boolean", "false"),
+        _variable(0, "label", "parameter", "fixed", "String", ""),
+    )
+    path = folder / "Answers.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(
+            "modelDescription.xml", DESCRIPTION.format(attributes=attributes, variables="".join(variables))
+        )
+        archive.write(library, "binaries/linux64/Answers.so")
+    return path
