@@ -1,4 +1,6 @@
-"""The diagnosis of records of one machine, once through: data, model, search, grades, what is left, test data, verdict."""
+"""The diagnosis of records of one machine, once through: data, model, search, grades, what is left, test data,
+verdict.
+"""
 
 import time
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,6 @@
-"""One row of a bank of effects: its parameters in the plant's table, where a search starts, which values a machine can have."""
+"""One row of a bank of effects: its parameters in the plant's table, where a search starts, which values a machine
+can have.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,10 @@
-"""A record as the torque balances need it: uniform signals at the rate of the analysis, and the band that says something.
+"""A record as the torque balances need it: uniform signals at the rate of the analysis, and the band that says
+something.
 
-A second difference of samples is the average of the acceleration over two intervals, weighted by a triangle, exactly. All
-terms of a balance are brought under the same average: a torque that is held over a sample gives ``(u[k-1] + u[k])/2``,
-what is smooth gives ``(x[k-1] + 10 x[k] + x[k+1])/12`` (Numerov's weights). No term then depends on the sample time.
+A second difference of samples is the average of the acceleration over two intervals, weighted by a triangle, exactly.
+All terms of a balance are brought under the same average: a torque that is held over a sample gives ``(u[k-1] +
+u[k])/2``, what is smooth gives ``(x[k-1] + 10 x[k] + x[k+1])/12`` (Numerov's weights). No term then depends on the
+sample time.
 """
 
 from dataclasses import dataclass
@@ -96,7 +98,8 @@ def prepare_signals(
 def motion_band(angle: Array, step: float, settings: BandSettings) -> float:
     """Return the highest frequency [Hz] of a body's balance: where its motion ends, or the encoder's noise begins.
 
-    The noise of an angle is white; its level is read where the spectrum of the second difference is highest in frequency.
+    The noise of an angle is white; its level is read where the spectrum of the second difference is highest in
+    frequency.
 
     Args:
         angle: (n,) [rad].

@@ -1,8 +1,8 @@
 """Test data: the part of the records that no fit, no score and no choice ever sees.
 
-Only :mod:`orchestrator.diagnosis.report.open_test_data` reads what a :class:`TestData` holds; a test walks the imports and
-the syntax trees of the room and fails where anything else does. What the report finds there may lower the trust in a
-result. It chooses nothing.
+Only :mod:`orchestrator.diagnosis.report.open_test_data` reads what a :class:`TestData` holds; a test walks the
+imports and the syntax trees of the room and fails where anything else does. What the report finds there may lower the
+trust in a result. It chooses nothing.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,8 @@
 """Damped least squares on whitened residuals, and the score of a fitted model on blocks left out.
 
-With the derivatives J at the fit, leaving block B out moves the values by ``-(N - N_B)^-1 (g - g_B)``, N being ``J'J`` and
-g ``J'r``: all blocks cost one set of normal equations each (blocked cross-validation, Roberts et al., 2017). Two models
-are compared by the paired difference over blocks and its standard error.
+With the derivatives J at the fit, leaving block B out moves the values by ``-(N - N_B)^-1 (g - g_B)``, N being
+``J'J`` and g ``J'r``: all blocks cost one set of normal equations each (blocked cross-validation, Roberts et al.,
+2017). Two models are compared by the paired difference over blocks and its standard error.
 """
 
 from collections.abc import Sequence

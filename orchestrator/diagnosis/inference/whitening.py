@@ -5,8 +5,9 @@ Residuals of a model that lacks nothing have the spectrum
     S(f) = G(f) diag(r) G(f)* + B(f) diag(q) B(f)*
 
 with encoders' noise ``r`` through ``G`` and unknown torques ``q`` through ``B``. Both levels are those with the largest
-likelihood (Whittle, 1953). The weights are the inverse Cholesky factor of S at each frequency, cut off at the band's end.
-With q small a whitened residual is the misfit of a free run, with q large that of a regression of torque on motion.
+likelihood (Whittle, 1953). The weights are the inverse Cholesky factor of S at each frequency, cut off at the band's
+end. With q small a whitened residual is the misfit of a free run, with q large that of a regression of torque on
+motion.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """Accelerations that a plant's own equations give along a measured motion, compiled.
 
-Angles and speeds of the bodies are those that were measured; states that no encoder shows (the angle of an added inertia,
-the memory of a shaft) are integrated beside them by classical Runge-Kutta steps, one a sample.
+Angles and speeds of the bodies are those that were measured; states that no encoder shows (the angle of an added
+inertia, the memory of a shaft) are integrated beside them by classical Runge-Kutta steps, one a sample.
 """
 
 from functools import cache
@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 
 @njit(error_model="numpy", nogil=True, **ALGEBRA)
 def slide_bristle(steps: Array, width: float, out: Array) -> None:
-    """Fill the deflection (n,) of a bristle, in shares of its ``width`` [rad]: it follows the motion up to 1, then slides.
+    """Fill the deflection (n,) of a bristle, in shares of its ``width`` [rad]: it follows the motion up to 1, then
+    slides.
 
     The noise of an encoder below the width does not turn it round (Prandtl's element).
 
@@ -39,7 +40,8 @@ def acceleration_kernel(plant: Plant, p: Array) -> Any:
     """Return ``fill(motion, signs, p, step, hidden, out)``, compiled.
 
     ``motion`` (n, 4) are angle and speed of the first and the second body, ``signs`` (n, 2) the directions of dry
-    friction, ``hidden`` whether hidden states move, ``out`` (n, 2) the accelerations [rad/s2] without the drive's torque.
+    friction, ``hidden`` whether hidden states move, ``out`` (n, 2) the accelerations [rad/s2] without the drive's
+    torque.
 
     Args:
         plant: whose equations it has.
@@ -100,11 +102,12 @@ def _kernel(plant: Plant, usual: bool) -> Any:
 
 
 def hidden_load_kernel(plant: Plant, p: Array) -> Any:
-    """Return ``fill(motor, width, p, step, substeps, bristle, motion, signs, out)``, compiled: the load is not measured.
+    """Return ``fill(motor, width, p, step, substeps, bristle, motion, signs, out)``, compiled: the load is not
+    measured.
 
-    The second body, its dry friction and the other hidden states are integrated along the motor's measured angle and speed
-    ``motor`` (n, 2), from rest without twist. ``width`` [rad] is that of the load's friction, ``bristle`` (n,) the
-    direction of the motor's; ``motion`` (n, 2), the load's
+    The second body, its dry friction and the other hidden states are integrated along the motor's measured angle and
+    speed ``motor`` (n, 2), from rest without twist. ``width`` [rad] is that of the load's friction, ``bristle`` (n,)
+    the direction of the motor's; ``motion`` (n, 2), the load's
     angle and speed, ``signs`` (n,) of its friction and ``out`` (n,), the motor's acceleration, are filled.
 
     Args:

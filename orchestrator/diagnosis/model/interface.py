@@ -1,4 +1,6 @@
-"""The narrow interface between any model and the analysis: what is fitted, which effects may be missing, residuals, noise."""
+"""The narrow interface between any model and the analysis: what is fitted, which effects may be missing, residuals,
+noise.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +22,8 @@ class UncertainParameter:
         nominal: value before the record; the fit moves in shares of it.
         spread: how far it may be off, as a share: the prior is log-normal with standard deviation ``log(1 + spread)``.
         unit: of the value.
-        local: it belongs to one record alone, may have any value, and ``nominal`` is only its scale; the prior is normal
+        local: it belongs to one record alone, may have any value, and ``nominal`` is only its scale; the prior is
+            normal
             about zero.
     """
 

@@ -4,14 +4,14 @@ At each body, the torque that its measured acceleration needs is compared with t
 
     motor   r_m = T - J_m (a_m - f_m)          load   r_l = -J_l (a_l - f_l)
 
-``T`` is the drive's torque, ``a`` the measured acceleration and ``f`` the acceleration that the plant's own equations give
-at the measured angles and speeds without ``T`` (Gautier and Khalil's inverse dynamic model). All terms stand under the
-triangle average of :mod:`orchestrator.diagnosis.data.signals`.
+``T`` is the drive's torque, ``a`` the measured acceleration and ``f`` the acceleration that the plant's own equations
+give at the measured angles and speeds without ``T`` (Gautier and Khalil's inverse dynamic model). All terms stand
+under the triangle average of :mod:`orchestrator.diagnosis.data.signals`.
 
 Residuals are scaled by ``sqrt(J0 / J)``, half-way between a regression of torque on motion, which is right where a
 controller holds the path, and one of motion on torque, which is right where the motion is free: either alone explains a
-record by an inertia of zero or of infinity. The load's balance has no measured torque in it and counts as an acceleration.
-An effect that takes torque away from the drive is charged for it: no torque at all would explain best.
+record by an inertia of zero or of infinity. The load's balance has no measured torque in it and counts as an
+acceleration. An effect that takes torque away from the drive is charged for it: no torque at all would explain best.
 """
 
 from collections.abc import Mapping, Sequence

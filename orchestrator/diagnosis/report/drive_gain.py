@@ -1,7 +1,7 @@
 """The gain of the drive: what all re-fitted values that carry a torque are off by together.
 
-A record does not tell a drive that delivers a tenth more from a machine whose inertias, stiffnesses and frictions all are a
-tenth smaller: the motion is the same. Many values that are off by one factor are less likely than one gain.
+A record does not tell a drive that delivers a tenth more from a machine whose inertias, stiffnesses and frictions all
+are a tenth smaller: the motion is the same. Many values that are off by one factor are less likely than one gain.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Sizes of effects and parameters with their errors, from a fitted model.
 
-Standard errors are the larger of what white residuals say and what blocks differ by (delete-one-block jackknife); intervals
-are those of Student's distribution with as many degrees of freedom as there are blocks, less one.
+Standard errors are the larger of what white residuals say and what blocks differ by (delete-one-block jackknife);
+intervals are those of Student's distribution with as many degrees of freedom as there are blocks, less one.
 """
 
 from collections.abc import Callable, Mapping

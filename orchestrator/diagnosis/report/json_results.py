@@ -55,7 +55,8 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
             StepFound(
                 step.before.labels,
                 step.taken,
-                tuple(TriedFound(one.label, _finite(one.comparison.gain), _finite(one.comparison.t)) for one in step.tried),
+                tuple(TriedFound(one.label, _finite(one.comparison.gain), _finite(one.comparison.t)) for one in
+                step.tried),
             )
             for step in diagnosis.workings.search.steps
         ),
@@ -98,8 +99,8 @@ def _effect(effect: GradedEffect) -> EffectFound:
 
 def _values(parameters: Mapping[str, ValueEstimate]) -> dict[str, ValueFound]:
     return {
-        name: ValueFound(one.value, _finite(one.standard_error), (_finite(one.interval[0]), _finite(one.interval[1])), one.unit)
-        for name, one in parameters.items()
+        name: ValueFound(one.value, _finite(one.standard_error), (_finite(one.interval[0]), _finite(one.interval[1])),
+        one.unit) for name, one in parameters.items()
     }
 
 

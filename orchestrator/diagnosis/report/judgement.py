@@ -47,7 +47,9 @@ def form_verdict(
 
 
 def _explains(found: SearchResult, cost: float) -> bool:
-    """Tell whether the nominal model explains the record as well as re-fitted parameters do: by two for each of them."""
+    """Tell whether the nominal model explains the record as well as re-fitted parameters do: by two for each of
+    them.
+    """
     return cost - found.final.cost < 2.0 * len(found.problem.shared)
 
 

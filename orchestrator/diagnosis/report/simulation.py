@@ -124,7 +124,9 @@ def simulate(plant: Plant, p: Array, start: Array, signals: RunSignals, part: sl
 
 
 def _requests(u: Array, begin: int, count: int, first: int) -> Array:
-    """Return the requests at ``count`` samples from ``begin`` on; there were none before ``first``, the last one stays."""
+    """Return the requests at ``count`` samples from ``begin`` on; there were none before ``first``, the last one
+    stays.
+    """
     rows = np.arange(begin, begin + count)
     found = u[np.clip(rows, 0, u.size - 1)]
     found[rows < first] = u[0] if first == 0 else 0.0

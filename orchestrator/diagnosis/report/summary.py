@@ -1,4 +1,6 @@
-"""A diagnosis in the words of a drive engineer: what is missing, how sure, what it does, what is left, what to do next."""
+"""A diagnosis in the words of a drive engineer: what is missing, how sure, what it does, what is left, what to do
+next.
+"""
 
 from collections.abc import Iterator, Sequence
 

@@ -43,7 +43,8 @@ def _signals_of(workings: Workings, record: Record) -> RunSignals:
 def torque_left(
     part: Record, workings: Workings, model: Model, settings: DiagnosisSettings
 ) -> tuple[float, ...]:
-    """Return the share of the torque that each model leaves at the driven body: rms of the balance over that of the torque.
+    """Return the share of the torque that each model leaves at the driven body: rms of the balance over that of the
+    torque.
 
     Args:
         part: rows that nothing was fitted to.

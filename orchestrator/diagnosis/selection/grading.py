@@ -1,4 +1,6 @@
-"""How sure a named effect is: evidence for it, and the rules that lower its grade from certain to likely or possible."""
+"""How sure a named effect is: evidence for it, and the rules that lower its grade from certain to likely or
+possible.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -310,8 +312,8 @@ def size_over_error(problem: FitProblem, fitted: FittedModel, label: str) -> flo
 def recorded_inertia(problem: FitProblem, fitted: FittedModel) -> tuple[float, float, float]:
     """Return the inertia that the record asks for by itself, in units of the nominal one, its error and its spread.
 
-    The priors are off, and torque is regressed on motion: an inertia far from the model file's tells that the record is of
-    another machine.
+    The priors are off, and torque is regressed on motion: an inertia far from the model file's tells that the record
+    is of another machine.
 
     Args:
         problem: of the fit.

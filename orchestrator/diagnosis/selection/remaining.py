@@ -135,9 +135,9 @@ def _fit_curve(found: SearchResult, argument: LawArgument) -> Dependence | None:
     left = final.residual + whole @ step
     share = 1.0 - float(left @ left) / float(final.residual @ final.residual)
     return Dependence(
-        argument.name, argument.site, argument.unit, argument.torque_unit, tuple(knots.tolist()), tuple(values.tolist()),
-        tuple(deviations.tolist()), _compared(base, errors), max(share, 0.0), formula_of(knots, values, deviations),
-        changes, argument.code,
+        argument.name, argument.site, argument.unit, argument.torque_unit, tuple(knots.tolist()),
+        tuple(values.tolist()), tuple(deviations.tolist()), _compared(base, errors), max(share, 0.0),
+        formula_of(knots, values, deviations), changes, argument.code,
     )  # fmt: skip
 
 

@@ -132,7 +132,8 @@ class Screening:
 def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[np.complex128]:
     """Return the inner products (k,) of values with ``exp(i c phase)``, of all cycles c at once.
 
-    Values are gathered in bins of the phase, a thirty-second of the shortest wave wide; a Fourier transform does the rest.
+    Values are gathered in bins of the phase, a thirty-second of the shortest wave wide; a Fourier transform does the
+    rest.
 
     Args:
         values: (n,).

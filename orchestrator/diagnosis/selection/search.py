@@ -1,8 +1,8 @@
 """The search: forward by the cross-validated score with one look-ahead, then backward.
 
-In each step every effect is screened, the most promising are fitted in full, and the best is taken if it gains more than
-the settings ask for. Effects that are not told apart from it, block by block, are its family; of those of its kind the one
-with the fewest values enters. Then each earlier effect that no longer pays is taken out.
+In each step every effect is screened, the most promising are fitted in full, and the best is taken if it gains more
+than the settings ask for. Effects that are not told apart from it, block by block, are its family; of those of its kind
+the one with the fewest values enters. Then each earlier effect that no longer pays is taken out.
 """
 
 from collections.abc import Callable, Sequence

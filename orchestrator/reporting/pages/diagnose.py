@@ -1,4 +1,6 @@
-"""The page of ``diagnose``: what the model lacks and how sure, how far the misfit shrinks on test data, what is left."""
+"""The page of ``diagnose``: what the model lacks and how sure, how far the misfit shrinks on test data, what is
+left.
+"""
 
 from collections.abc import Mapping, Sequence
 

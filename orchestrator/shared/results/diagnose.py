@@ -36,9 +36,9 @@ class ExplainedFound(msgspec.Struct, frozen=True):
 class EffectFound(msgspec.Struct, frozen=True):
     """An effect that the model lacks.
 
-    ``grade`` is certain, likely or possible; ``lowered_by`` names the rules that lowered it. ``gain`` is the share of the
-    squared error of blocks left out that it takes, ``t`` that gain over its standard error. ``family`` are effects that
-    this record does not tell from it, ``block_values`` what each block by itself says of a parameter.
+    ``grade`` is certain, likely or possible; ``lowered_by`` names the rules that lowered it. ``gain`` is the share of
+    the squared error of blocks left out that it takes, ``t`` that gain over its standard error. ``family`` are
+    effects that this record does not tell from it, ``block_values`` what each block by itself says of a parameter.
     """
 
     name: str
@@ -74,7 +74,8 @@ class SignalMisfitFound(msgspec.Struct, frozen=True):
 class TestFound(msgspec.Struct, frozen=True):
     """Test data of one record: the misfit of each signal, and whether the final model does worse than re-fitted values.
 
-    ``r_squared`` is of the final model's free runs; ``torque_left`` the share of torque that each of the three models leaves.
+    ``r_squared`` is of the final model's free runs; ``torque_left`` the share of torque that each of the three models
+    leaves.
     """
 
     __test__ = False
@@ -125,8 +126,8 @@ class LawExportFound(msgspec.Struct, frozen=True):
 class LearnedFound(msgspec.Struct, frozen=True):
     """A learned law: knots and values with the 95 % band (its low and its high ends), and what it is worth.
 
-    ``gain`` is the share of the squared error of blocks left out that it takes, ``exported`` what the corrected FMU makes
-    of it, where that was asked for.
+    ``gain`` is the share of the squared error of blocks left out that it takes, ``exported`` what the corrected FMU
+    makes of it, where that was asked for.
     """
 
     site: str
