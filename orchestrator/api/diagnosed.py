@@ -25,6 +25,7 @@ from orchestrator.records.record import Record
 from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound
 from orchestrator.shared.trust import Trust
 
+STAGES = ("nominal", "parameters", "final", "noise")
 SHOWN = 5  # effects of a step that the table shows
 
 
@@ -223,15 +224,16 @@ def _tables(found: DiagnosisResult) -> Iterator[Block]:
     ]
     if rows:
         yield table("What was tried", ("on top of", "effect", "gain [%]", "over its error", ""), rows)
-    for title, tests in (("Misfit on test data", found.test), ("Misfit on the other record", (found.validation,))):
-        signals = [(test, one) for test in tests if test is not None for one in test.signals]
+    for title, shown in (("Misfit on test data", found.test), ("Misfit on the other record", (found.validation,))):
+        signals = [(test, one) for test in shown if test is not None for one in test.signals]
         rows = [
-            [test.source, one.signal, *(f"{v:.4g}" for v in (one.nominal, one.parameters, one.final, one.noise)), one.unit]
+            [test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit]
             for test, one in signals
         ]
         if rows:
             yield table(title, ("record", "signal", "as given", "re-fitted", "with effects", "noise", "unit"), rows)
-    torque = [(test.source, test.torque) for test in (*found.test, found.validation) if test is not None and test.torque]
+    tests = [test for test in (*found.test, found.validation) if test is not None]
+    torque = [(test.source, test.torque) for test in tests if test.torque]
     if torque:
         rows = [[source, *(f"{100.0 * share:.2f} %" for share in shares)] for source, shares in torque]
         yield table("Torque that is left", ("record", "as given", "re-fitted", "with effects"), rows)

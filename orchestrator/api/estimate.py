@@ -18,6 +18,8 @@ from orchestrator.api.live import fitted_live
 from orchestrator.api.methods import HEAD, MethodResult, described, method_entry, method_row
 from orchestrator.api.numerics import fitting
 from orchestrator.api.shown import Block, Result, table
+from orchestrator.diagnosis.report.summary import play_of
+from orchestrator.diagnosis.selection.grading import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation import cramer_rao
 from orchestrator.estimation.methods import maximum_likelihood
@@ -137,7 +139,7 @@ class EstimateResult(Result):
 
     def _play(self) -> Play:
         """Return the best half-gap with the gear ratio that was fitted beside it."""
-        corrected = None if self.diagnosis is None else self.diagnosis.diagnosis.play
+        corrected = None if self.diagnosis is None else play_of(self.diagnosis.diagnosis)
         return corrected or Play(self.alpha, self._ratio(self.best))
 
     def blocks(self) -> Sequence[Block]:
@@ -326,7 +328,7 @@ def _diagnosed(
 
 def _of_diagnosis(found: DiagnosisResult) -> tuple[MethodResult, ...]:
     """Return the half-gap of the corrected model, where one is named among what the model misses."""
-    gap = next((e.parameters["alpha"] for e in found.effects if e.name == "backlash"), None)
+    gap = next((e.parameters["alpha"] for e in found.diagnosis.graded(Grade.LIKELY) if e.name == "backlash"), None)
     if gap is None:
         return ()
     estimate = Estimate(DIAGNOSIS, gap.value, gap.standard_error, gap.interval)

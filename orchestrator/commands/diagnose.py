@@ -43,13 +43,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with an FMU: write a first map.toml from its units and causality, and stop",
     )
     parser.add_argument("--validate", type=Path, metavar="OTHER", help="a second record, to show the misfit on")
-    parser.add_argument("--test", type=Path, metavar="OTHER", help="a record that is test data, in place of the last rows")
+    parser.add_argument(
+        "--test", type=Path, metavar="OTHER", help="a record that is test data, in place of the last rows"
+    )
     parser.add_argument(
         "--no-search", action="store_true", help="re-fit and judge the model as it stands (a corrected.toml)"
     )
-    parser.add_argument(
-        "--time-limit", type=float, metavar="SECONDS", help="end the search then, with what it has"
-    )
+    parser.add_argument("--time-limit", type=float, metavar="SECONDS", help="end the search then, with what it has")
     parser.add_argument(
         "--with-law",
         action="store_true",
@@ -82,7 +82,8 @@ def run(args: argparse.Namespace) -> int:
     records = [comparable_record(path, model, **reading) for path in args.records]
     other = None if args.validate is None else comparable_record(args.validate, model, **reading)
     tested = None if args.test is None else comparable_record(args.test, model, **reading)
-    files = {"test": args.test, "record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}
+    files = {"record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}
+    files["test"] = args.test
     given = {name: path and str(path) for name, path in files.items()}
     with staged(args.out) as folder:
         with _shown(sum(record.size for record in records)) as progress:

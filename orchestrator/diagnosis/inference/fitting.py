@@ -105,7 +105,7 @@ def _damped_step(
     damping: float,
 ) -> tuple[ModelPoint, Array, float]:  # fmt: skip
     diagonal = np.diag(normal)
-    step = -np.linalg.lstsq(normal + np.diag(damping * diagonal + 1e-12), gradient, rcond=None)[0]
+    step = np.asarray(-np.linalg.lstsq(normal + np.diag(damping * diagonal + 1e-12), gradient, rcond=None)[0], float)
     moved = problem.moved(point, coordinates, step)
     (residual,) = problem.whitened([moved])
     prior, _ = problem.prior(moved, coordinates)

@@ -265,9 +265,7 @@ def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:
     return float(np.log(ratio)) / deviation, 1.0 / ratio / deviation
 
 
-def fit_problem(
-    models: Sequence[ResidualModel], settings: FitSettings, first: ModelPoint | None = None
-) -> FitProblem:
+def fit_problem(models: Sequence[ResidualModel], settings: FitSettings, first: ModelPoint | None = None) -> FitProblem:
     """Return the problem of some records, whitened by what the first model leaves.
 
     Args:

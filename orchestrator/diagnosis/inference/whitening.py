@@ -11,6 +11,7 @@ motion.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,7 +177,7 @@ def spectral_matrix(model: ResidualModel, frequencies: Array, measurement: Array
     return _matrix(sources.measurement, measurement) + _matrix(sources.process, process, RIDGE)
 
 
-def _matrix(transfer: Complex, levels: Array, ridge: float = 0.0) -> Complex:
+def _matrix(transfer: Any, levels: Array, ridge: float = 0.0) -> Any:
     found = np.einsum("fcm,m,fdm->fcd", transfer, levels, np.conj(transfer))
     if ridge:
         count = found.shape[1]

@@ -163,9 +163,9 @@ class NoiseSources:
         floors: (k,) least spectral densities of these.
     """
 
-    measurement: Array
+    measurement: NDArray[np.complex128]
     levels: Array
-    process: Array
+    process: NDArray[np.complex128]
     floors: Array
 
 

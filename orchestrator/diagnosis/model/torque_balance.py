@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import (
     Signals,
-    prepare_signals,
     first_derivative,
+    prepare_signals,
     second_derivative,
     second_difference_gain,
     smooth,
@@ -123,8 +123,8 @@ class TorqueBalance:
             resolutions={"motor": resolutions[0], "load": resolutions[-1]},
             acceleration=rms(triangle_average(accelerations[-1])),
             inertia=plant.value(self.nominal, plant.bodies[-1].inertia),
-            stiffness=plant.value(self.nominal, plant.shaft.stiffness) if plant.shaft else 0.0, ratio=ratio, twist=twist,
-            twist_is_measured=not self.hides_load, angular=self.angular,
+            stiffness=plant.value(self.nominal, plant.shaft.stiffness) if plant.shaft else 0.0, ratio=ratio,
+            twist=twist, twist_is_measured=not self.hides_load, angular=self.angular,
         )  # fmt: skip
 
     # --- residuals -----------------------------------------------------------------------------------------
@@ -250,7 +250,7 @@ class TorqueBalance:
 
     def _motion(self, p: Array) -> tuple[list[Array], list[Array], list[Array]]:
         """Return angles, speeds and accelerations of the bodies, from how the log has them."""
-        offsets = [plant_offset for plant_offset in (p[self.plant.index(name)] for name in self.plant.offsets)]
+        offsets = [float(p[self.plant.index(name)]) for name in self.plant.offsets]
         angles = [angle - offset for angle, offset in zip(self._angles, offsets, strict=False)]
         speeds, accelerations = list(self._speeds), list(self._accelerations)
         late = self.plant.value(p, SHIFT.name) if SHIFT.name in self.plant.names else 0.0

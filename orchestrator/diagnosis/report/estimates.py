@@ -67,8 +67,8 @@ def effect_estimates(
         moved = names((*values[:place], values[place] + step, *values[place + 1 :]))
         slopes[:, n] = [(_wrapped(name, moved[name] - centre[name])) / 1e-4 for name in centre]
     found = {}
-    for row, (name, value) in zip(slopes, centre.items(), strict=True):
-        error = float(np.sqrt(max(row @ covariance @ row, 0.0)))
+    variances = np.einsum("pc,cd,pd->p", slopes, covariance, slopes)
+    for error, (name, value) in zip(np.sqrt(np.maximum(variances, 0.0)).tolist(), centre.items(), strict=True):
         found[name] = ValueEstimate(value, error, (value - width * error, value + width * error), units[name])
     return found
 

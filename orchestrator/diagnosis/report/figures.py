@@ -82,7 +82,7 @@ def _draw_candidates(path: Path, diagnosis: Diagnosis) -> None:
     for axis, step in zip(axes, steps, strict=True):
         shown = step.tried[:SHOWN][::-1]
         gains = [100.0 * one.comparison.gain for one in shown]
-        errors = [abs(2.0 * gain / one.comparison.t) if one.comparison.t else 0.0 for gain, one in zip(gains, shown, strict=True)]
+        errors = [abs(200.0 * one.comparison.gain / (one.comparison.t or np.inf)) for one in shown]
         colours = [BLUE if one.label == step.taken else GREY for one in shown]
         axis.barh([effect_words(one.label) for one in shown], gains, xerr=errors, color=colours, ecolor="black",
                   error_kw={"linewidth": 0.8})  # fmt: skip
@@ -106,7 +106,8 @@ def _draw_blocks(path: Path, diagnosis: Diagnosis) -> None:
         values, estimate = np.array(effect.block_values[name]), effect.parameters[name]
         axis.axhspan(*estimate.interval, color=BLUE, alpha=0.2, label="95 % interval of all")
         axis.axhline(estimate.value, color=BLUE, linewidth=1.0)
-        axis.plot(1 + np.arange(values.size), values, "o", color=ORANGE, markersize=4.0, label="of each block by itself")
+        blocks = 1 + np.arange(values.size)
+        axis.plot(blocks, values, "o", color=ORANGE, markersize=4.0, label="of each block by itself")
         axis.set_ylabel(f"{name} [{estimate.unit}]".replace("_", " "))
         axis.set_title(f"{effect_words(effect.label)}: {effect.grade.word}", fontsize=9)
     axes[-1].set_xlabel("block of the record")
@@ -183,7 +184,7 @@ def _abscissa(diagnosis: Diagnosis, effect: GradedEffect, channel: int) -> tuple
         return scales.angles[site], f"load position [{unit}]"
     if effect.site == "shaft" and scales.twist.size:
         return scales.twist, "twist [rad]"
-    return balance.step * np.arange(balance.size), "time [s]"
+    return np.asarray(balance.step * np.arange(balance.size)), "time [s]"
 
 
 def _draw_law(path: Path, diagnosis: Diagnosis) -> None:

@@ -55,8 +55,9 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
             StepFound(
                 step.before.labels,
                 step.taken,
-                tuple(TriedFound(one.label, _finite(one.comparison.gain), _finite(one.comparison.t)) for one in
-                step.tried),
+                tuple(
+                    TriedFound(one.label, _finite(one.comparison.gain), _finite(one.comparison.t)) for one in step.tried
+                ),
             )
             for step in diagnosis.workings.search.steps
         ),
@@ -99,8 +100,10 @@ def _effect(effect: GradedEffect) -> EffectFound:
 
 def _values(parameters: Mapping[str, ValueEstimate]) -> dict[str, ValueFound]:
     return {
-        name: ValueFound(one.value, _finite(one.standard_error), (_finite(one.interval[0]), _finite(one.interval[1])),
-        one.unit) for name, one in parameters.items()
+        name: ValueFound(
+            one.value, _finite(one.standard_error), (_finite(one.interval[0]), _finite(one.interval[1])), one.unit
+        )
+        for name, one in parameters.items()
     }
 
 
@@ -117,7 +120,8 @@ def _law(law: Dependence) -> LearnedFound:
         for side in (-1.0, 1.0)
     )
     return LearnedFound(
-        law.site, law.argument, law.argument_unit, law.unit, f"of what is left at the {law.site}, {law.words}", law.knots,
+        law.site, law.argument, law.argument_unit, law.unit, f"of what is left at the {law.site}, {law.words}",
+        law.knots,
         law.values, (low, high), law.formula, _finite(law.comparison.gain), _finite(law.comparison.t),
     )  # fmt: skip
 

@@ -30,7 +30,8 @@ def form_verdict(
         settings: thresholds.
 
     Returns:
-        "effects": one at least is likely; "unknown": something is missing and nothing is likely; "none" or "parameters":
+        "effects": one at least is likely; "unknown": something is missing and nothing is likely; "none" or
+        "parameters":
         the model explains the record as given, or re-fitted.
     """
     if any(effect.grade >= Grade.LIKELY for effect in effects):
@@ -76,8 +77,8 @@ def judge_trust(
         red.append("something is missing in the model, and no effect of the library is likely")
     if record.inertia_is_off(settings.selection.prior_deviations):
         red.append(
-            f"the record by itself asks for {record.inertia:.2g} times the inertia of the model file: an inertia, a unit "
-            "or the torque's scale may be wrong"
+            f"the record by itself asks for {record.inertia:.2g} times the inertia of the model file: an inertia, "
+            "a unit or the torque's scale may be wrong"
         )
     for one in test:
         if one.is_worse(settings.report.worse, settings.report.of_noise):
@@ -85,8 +86,8 @@ def judge_trust(
         for signal in one.signals:
             if signal.final > NOTABLE * signal.noise:
                 amber.append(
-                    f"free runs on the test part of {one.source} miss {signal.signal} by {signal.final / signal.noise:.3g} "
-                    "times its noise"
+                    f"free runs on the test part of {one.source} miss {signal.signal} by "
+                    f"{signal.final / signal.noise:.3g} times its noise"
                 )
     if any(effect.grade is Grade.LIKELY for effect in effects):
         amber.append("at least one effect is likely, not certain")

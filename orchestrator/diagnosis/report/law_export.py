@@ -105,7 +105,8 @@ def describe_law(diagnosis: Diagnosis, law: Dependence) -> dict[str, Any]:
         if after[n] != before[n] and entry.name not in plant.enumerations
     }
     return {
-        "form": law.code, "words": f"{law.argument} at the {law.site}", "unit": law.argument_unit, "value_unit": law.unit,
+        "form": law.code, "words": f"{law.argument} at the {law.site}", "unit": law.argument_unit,
+        "value_unit": law.unit,
         "knots": list(law.knots), "values": list(law.values), "changes": changes,
     }  # fmt: skip
 

@@ -96,7 +96,15 @@ def motion_misfit(
     variance = np.mean([np.var(signals.angles[part], axis=0) for part in parts], axis=0)
     explained = 1.0 - rms[-1] ** 2 / np.maximum(variance, 1e-300)
     rows = tuple(
-        SignalMisfit(name, unit, float(signals.noise[n]), *(float(values[n]) for values in rms), float(explained[n]))
+        SignalMisfit(
+            name,
+            unit,
+            float(signals.noise[n]),
+            float(rms[0][n]),
+            float(rms[1][n]),
+            float(rms[2][n]),
+            float(explained[n]),
+        )
         for n, name in enumerate(plant.encoders[: signals.channels])
     )
     return TestMisfit(source, signals.size - first, rows)

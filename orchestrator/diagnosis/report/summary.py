@@ -165,7 +165,8 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
 
 def _reasons(effect: GradedEffect) -> str:
     evidence = effect.evidence
-    text = f"on data left out it takes {100.0 * evidence.gain:.0f} % of the error, {evidence.t:.1f} times its uncertainty"
+    text = f"on data left out it takes {100.0 * evidence.gain:.0f} % of the error, "
+    text += f"{evidence.t:.1f} times its uncertainty"
     rules = {rule.name: rule.reason for rule in GRADE_RULES}
     lowered = [rules[name] for name in effect.lowered_by if rules[name] != "the same"]
     if evidence.family:
@@ -196,7 +197,9 @@ def nuisance_words(nuisance: Nuisance) -> str:
 
 
 def _left(found: Diagnosis) -> str:
-    parts = [f"{100.0 * share:.2g} % of the torque's power at {BODIES.get(name, name)}" for name, share in found.left.items()]
+    parts = [
+        f"{100.0 * share:.2g} % of the torque's power at {BODIES.get(name, name)}" for name, share in found.left.items()
+    ]
     text = f"What is left: {' and '.join(parts)}"
     strongest = [f"at {BODIES.get(one.site, one.site)} {one.words}" for one in found.remaining[:2]]
     return f"{text}; {'; '.join(strongest)}." if strongest else f"{text}; it follows no signal."
@@ -209,7 +212,8 @@ def _motion(found: Diagnosis) -> Iterator[str]:
             f"(noise {one.noise:.2g})"
             for one in test.signals
         ]
-        yield f"Test data of {test.source} ({test.rows} rows that nothing was fitted to), rms of free runs: {'; '.join(parts)}."
+        rows = f"{test.rows} rows that nothing was fitted to"
+        yield f"Test data of {test.source} ({rows}), rms of free runs: {'; '.join(parts)}."
 
 
 def _experiments(found: Diagnosis) -> Iterator[str]:

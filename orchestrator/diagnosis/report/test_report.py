@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.data.signals import smooth
 from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.model.torque_balance import balance_of
+from orchestrator.diagnosis.model.units import in_metres
 from orchestrator.diagnosis.report.motion_misfit import motion_misfit, run_misfit
 from orchestrator.diagnosis.report.open_test_data import open_test_data
 from orchestrator.diagnosis.report.run_signals import RunSignals, run_signals
-from orchestrator.diagnosis.model.units import in_metres
 from orchestrator.diagnosis.result import Diagnosis, TestMisfit, Workings
 from orchestrator.diagnosis.settings import DiagnosisSettings
-from orchestrator.records.model_file import Model
 from orchestrator.plants.effects import rms
+from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
 Array = NDArray[np.float64]
@@ -40,9 +40,7 @@ def _signals_of(workings: Workings, record: Record) -> RunSignals:
     return run_signals(record, len(balance.channels), 3.0 * max(balance.cutoffs))
 
 
-def torque_left(
-    part: Record, workings: Workings, model: Model, settings: DiagnosisSettings
-) -> tuple[float, ...]:
+def torque_left(part: Record, workings: Workings, model: Model, settings: DiagnosisSettings) -> tuple[float, ...]:
     """Return the share of the torque that each model leaves at the driven body: rms of the balance over that of the
     torque.
 

@@ -220,9 +220,9 @@ class _Search:
         rising: list[tuple[float, FitProblem, list[TriedEffect]]] = []
         for one in tried[: self.settings.look_ahead]:
             own, fitted = settle(problem, one.fitted)
-            _, (again,) = self._compared(own, model, [replace(one, fitted=fitted)])
-            if again.comparison.gain > one.comparison.gain:
-                rising.append((again.comparison.gain, own, [again]))
+            _, found = self._compared(own, model, [replace(one, fitted=fitted)])
+            if found[0].comparison.gain > one.comparison.gain:
+                rising.append((found[0].comparison.gain, own, found))
         if not rising:
             return None
         gain, own, leading = max(rising, key=lambda one: one[0])

@@ -52,7 +52,8 @@ VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "unknown": ("bad", "unexplained", "Something is missing in the model, and no effect of the library is likely."),
 }
 MISSING = "For each effect: the torque that the model misses without it, and how much of that its law accounts for."
-BLOCKS = "The size of each effect as every block of the record by itself says it. Blocks that agree make an effect certain."
+BLOCKS = "The size of each effect as every block of the record by itself says it. Where blocks agree, a size is sure."
+TAKES = "error of left out data that it takes [%]"
 TEST = "Root mean square of free runs minus measured, on data that nothing was fitted to and nothing was chosen by."
 
 
@@ -171,14 +172,13 @@ def effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
         for e in effects
     )  # fmt: skip
     titles = (
-        "effect", "grade", "error of left out data that it takes [%]", "over its uncertainty",
-        "explains of the missing torque [%]", "of the motion's misfit [%]", "not told from", "rules that lower the grade",
+        "effect", "grade", TAKES, "over its uncertainty", "explains of the missing torque [%]",
+        "of the motion's misfit [%]", "not told from", "rules that lower the grade",
     )  # fmt: skip
-    note = (
-        "Certain, likely or possible. A possible effect is no answer: it is shown, and it is part of the corrected model."
-    )
+    columns = tuple(map(TableColumn, ("effect", "grade", "quantity", "value")))
+    note = "Certain, likely or possible. A possible effect is no answer, yet it is part of the corrected model."
     return [
-        ReportTable("What the model lacks", tuple(map(TableColumn, ("effect", "grade", "quantity", "value"))), sizes, note),
+        ReportTable("What the model lacks", columns, sizes, note),
         ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons),
     ]
 
@@ -189,7 +189,9 @@ def _label_words(label: str) -> str:
 
 
 def _nuisances(nuisances: Sequence[NuisanceFound]) -> list[Section]:
-    rows = tuple((words(n.name), n.grade, words(name), quantity(p)) for n in nuisances for name, p in n.parameters.items())
+    rows = tuple(
+        (words(n.name), n.grade, words(name), quantity(p)) for n in nuisances for name, p in n.parameters.items()
+    )
     columns = tuple(map(TableColumn, ("property", "grade", "quantity", "value")))
     return [ReportTable("What the log has, and the machine has not", columns, rows)] if rows else []
 
@@ -264,7 +266,7 @@ def _remaining(remaining: RemainingFound) -> list[Section]:
     facts = tuple((f"torque's power at the {site} [%]", _percent(share)) for site, share in remaining.torque.items())
     made: list[Section] = [Facts("What is left", facts)] if facts else []
     if remaining.follows:
-        columns = ("at", "follows", "share [%]", "error of left out data that it takes [%]", "over its uncertainty", "like")
+        columns = ("at", "follows", "share [%]", TAKES, "over its uncertainty", "like")
         rows = tuple(
             (d.site, d.argument, _percent(d.share), _percent(d.gain), d.t, d.formula or None) for d in remaining.follows
         )
@@ -339,7 +341,7 @@ def candidate_table(steps: Sequence[StepFound]) -> list[Section]:
         ]
     if not rows:
         return []
-    columns = ("step", "on top of", "tried", "error of left out data that it takes [%]", "over its uncertainty", "")
+    columns = ("step", "on top of", "tried", TAKES, "over its uncertainty", "")
     return [ReportTable("What was tried", tuple(TableColumn(c, "", 3) for c in columns), tuple(rows), limit=200)]
 
 
