@@ -106,7 +106,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     )
     remaining = find_dependences(found, arguments, settings.selection.least_t)
     verdict = form_verdict(found, graded, remaining, record, settings)
-    trust = judge_trust(verdict, graded, record, test, parameters, model, settings)
+    trust = judge_trust(verdict, graded, record, test, parameters, model.uncertain, settings)
     left = torque_shares(found.problem, found.final.point)
     return Diagnosis(
         verdict=verdict, effects=effects, nuisances=_nuisances(found, graded, parameters, model, settings),

@@ -145,7 +145,7 @@ class Workings:
     """
 
     records: tuple[Record, ...]
-    test_data: TestData = field(repr=False)
+    test_data: TestData[Record] = field(repr=False)
     search: SearchResult = field(repr=False)
     balances: tuple[TorqueBalance, ...] = field(repr=False)
     nominal: Array = field(repr=False)

@@ -7,12 +7,32 @@ trust in a result. It chooses nothing.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
 
-from orchestrator.records.record import Record
+
+class Rows(Protocol):
+    """A record of rows: one of a plant of ours, or the columns that a map names."""
+
+    @property
+    def size(self) -> int:
+        """Return the number of rows."""
+
+    def part(self: "R", first: int, end: int) -> "R":
+        """Return some rows.
+
+        Args:
+            first, end: the first of them, and the first after them.
+
+        Returns:
+            The part.
+        """
+
+
+R = TypeVar("R", bound=Rows)
 
 
 @dataclass(frozen=True, eq=False)
-class TestData:
+class TestData(Generic[R]):
     """Records of which some rows are test data.
 
     Attributes:
@@ -22,13 +42,13 @@ class TestData:
 
     __test__ = False  # it is no test case
 
-    _records: tuple[Record, ...]
+    _records: tuple[R, ...]
     _first_rows: tuple[int, ...]
 
 
 def split_records(
-    records: Sequence[Record], share: float, other: Record | None = None
-) -> tuple[tuple[Record, ...], TestData]:
+    records: Sequence[R], share: float, other: R | None = None
+) -> tuple[tuple[R, ...], TestData[R]]:
     """Return the parts of records that are fitted, and the test data.
 
     Args:

@@ -1,7 +1,7 @@
 """A record as a map names its columns, and a model: values of parameters, effects, and their values."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -43,6 +43,27 @@ class Data:
     def sizes(self) -> Array:
         """Return the root mean square of each input, (inputs,): every run with an effect at a port asks for it."""
         return np.asarray(np.sqrt(np.mean(self.driven**2, axis=0)))
+
+    @property
+    def size(self) -> int:
+        """Return the number of rows."""
+        return len(self.time)
+
+    def part(self, first: int, end: int) -> "Data":
+        """Return some rows.
+
+        Args:
+            first, end: the first of them, and the first after them.
+
+        Returns:
+            The part.
+        """
+        rows = slice(first, end)
+        held = None if self.held is None else self.held[first * self.factor : end * self.factor]
+        signals = self.signals[rows] if len(self.signals) else self.signals
+        return replace(
+            self, time=self.time[rows], inputs=self.inputs[rows], outputs=self.outputs[rows], signals=signals, held=held
+        )
 
     @property
     def step(self) -> float:

@@ -54,9 +54,9 @@ class FmuResiduals:
         self.parameters = _parameters(problem, len(self._start))
         self._nominal = self._nominal_point()
         self._responses[self._nominal.parameters, ()] = reads, responses
-        self._motions = port_motions(problem, reads)
+        self.motions = port_motions(problem, reads)
         self._placed = place_effects(
-            effects_of(problem, reads), {name: m.x for name, m in self._motions.items()}, self._effort_gradient,
+            effects_of(problem, reads), {name: m.x for name, m in self.motions.items()}, self._effort_gradient,
             problem.settings.place.starts_off, self.is_linear,
         )  # fmt: skip
         self.effects: Mapping[str, CandidateEffect] = {k: placed.candidate for k, placed in self._placed.items()}
@@ -79,12 +79,24 @@ class FmuResiduals:
         found = [self._placed[label].at(values) for label, values in point.effects.items()]
         return BoxModel(p, tuple(effect for effect, _ in found), tuple(values for _, values in found))
 
+    def placed_effect(self, label: str, values: Values) -> tuple[BoxEffect, Array]:
+        """Return an effect and its values as the bank has them.
+
+        Args:
+            label: of the effect.
+            values: as the analysis has them.
+
+        Returns:
+            Effect and values.
+        """
+        return self._placed[label].at(values)
+
     def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
         """Return the residuals (outputs, n) at each of some points; see :class:`ResidualModel`."""
         runs = self._runs([self.box_model(point) for point in points])
         measured = self.problem.data.outputs
         failed = np.broadcast_to(FAILED * np.ptp(measured, axis=0)[:, None], measured.T.shape)
-        starts = [np.tensordot(point.parameters[len(self._order) :], self._start, 1) for point in points]
+        starts = [self.start_change(point, self.size) for point in points]
         return [
             failed if y is None else np.ascontiguousarray((measured - y).T) - start
             for y, start in zip(runs, starts, strict=True)
@@ -101,6 +113,18 @@ class FmuResiduals:
             del self._kept[key]
         return runs
 
+    def start_change(self, point: ModelPoint, rows: int) -> Array:
+        """Return what the state at the start changes of the outputs.
+
+        Args:
+            point: values of the model.
+            rows: of the result, a quarter more than those of the record at most.
+
+        Returns:
+            Shape (outputs, rows).
+        """
+        return np.asarray(np.tensordot(point.parameters[len(self._order) :], self._start[:, :, :rows], 1))
+
     def is_possible(self, label: str, values: Values) -> bool:
         """Tell whether a machine can have an effect of such values; see :class:`ResidualModel`."""
         effect, given = self._placed[label].at(values)
@@ -114,6 +138,19 @@ class FmuResiduals:
     def inertia_shares(self) -> Mapping[str, float]:
         """Return nothing: no parameter of an FMU must show in every record; see :class:`ResidualModel`."""
         return {}
+
+    def without_start(self) -> "FmuResiduals":
+        """Return the model with the start as the FMU has it.
+
+        Returns:
+            A copy.
+        """
+        other = copy(self)
+        other._start = self._start[:0]
+        other.parameters = self.parameters[: len(self._order)]
+        other._nominal = other._nominal_point()
+        other._responses = {(other._nominal.parameters, ()): self._measured_responses(self._nominal)}
+        return other
 
     def without_priors(self, spread: float) -> "FmuResiduals":
         """Return the model with every parameter unknown; see :class:`ResidualModel`."""
@@ -172,7 +209,7 @@ class FmuResiduals:
         if effect.kind.where == CUT:
             return self._push_at_cut(effect, values, reads)
         place = runner.inputs.index(problem.map.ports[effect.place].input)
-        effort = efforts_along(self._motions[effect.place], effect.kind.law, tuple(values), self.step)
+        effort = efforts_along(self.motions[effect.place], effect.kind.law, tuple(values), self.step)
         push[:-1] = -problem.sign.get(effect.place, 1.0) * 0.5 * (effort[:-1] + effort[1:])
         return place, push
 
@@ -192,6 +229,22 @@ class FmuResiduals:
         change = np.zeros((len(self.channels), self.size))
         change[channel] = y - at_output(effect, y, self.step, float(values[0]), 1)
         return change
+
+    def respond_to_effort(self, port: str, effort: Array) -> Array:
+        """Return what an effort against the motion at a port changes of the residuals, by the nominal responses.
+
+        Args:
+            port: of the map.
+            effort: (n,) in its unit.
+
+        Returns:
+            Shape (outputs, n).
+        """
+        problem = self.problem
+        _, responses = self._measured_responses(self._nominal)
+        push = np.zeros((1, self.size))
+        push[0, :-1] = -problem.sign.get(port, 1.0) * 0.5 * (effort[:-1] + effort[1:])
+        return -responses.changes(push, problem.runner.inputs.index(problem.map.ports[port].input))[0]
 
     def _effort_gradient(self, port: str, by_residuals: Array) -> Array:
         _, responses = self._measured_responses(self._nominal)

@@ -165,21 +165,22 @@ def start_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int])
         places: of the inputs.
 
     Returns:
-        Shape (changes, outputs, n), each as large at most as the settings grant.
+        Shape (changes, outputs, rows), each as large at most as the settings grant, a quarter longer than the record.
     """
     own = problem.settings.response
     reach = max(problem.n // 4, 8)
-    _, runs = problem.pulse_runs(model, (0,), places, reach)
+    rows = problem.n + reach
+    _, runs = problem.pulse_runs(model, (0,), places, 2 * reach)
     lags = np.unique(np.geomspace(1, reach, own.start_lags).astype(int))
     found = []
     for (change,) in runs:
         if change is not None and float(np.max(np.abs(change))) > 0.0:
             scaled = change / problem.noise / float(np.max(np.abs(change / problem.noise)))
-            found += [scaled[lag : lag + problem.n].T.ravel() for lag in lags]
+            found += [scaled[lag : lag + rows].T.ravel() for lag in lags]
     if not found:
-        return np.zeros((0, len(problem.outputs), problem.n))
+        return np.zeros((0, len(problem.outputs), rows))
     left, sizes, _ = np.linalg.svd(np.array(found).T, full_matrices=False)
     kept = left[:, : own.start_states][:, sizes[: own.start_states] > own.start_least * sizes[0]].T
-    kept = kept.reshape(len(kept), len(problem.outputs), problem.n)
+    kept = kept.reshape(len(kept), len(problem.outputs), rows)
     kept = kept / np.max(np.abs(kept), axis=(1, 2), keepdims=True)
     return np.asarray(own.start_spread * kept * problem.noise[:, None])

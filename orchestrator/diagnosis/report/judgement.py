@@ -10,7 +10,7 @@ from orchestrator.diagnosis.selection.grading import Grade, RecordEvidence
 from orchestrator.diagnosis.selection.remaining import Dependence
 from orchestrator.diagnosis.selection.search import SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
-from orchestrator.records.model_file import Model
+from orchestrator.records.model_file import ModelParameter
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
 NOTABLE = 3.0  # times the noise: a misfit of free runs that an engineer sees
@@ -56,7 +56,7 @@ def _explains(found: SearchResult, cost: float) -> bool:
 
 def judge_trust(
     verdict: str, effects: Sequence[GradedEffect], record: RecordEvidence, test: Sequence[TestMisfit],
-    parameters: dict[str, ParameterEstimate], model: Model, settings: DiagnosisSettings,
+    parameters: dict[str, ParameterEstimate], uncertain: Sequence[ModelParameter], settings: DiagnosisSettings,
 ) -> Trust:  # fmt: skip
     """Return how far the corrected model can be trusted.
 
@@ -66,7 +66,7 @@ def judge_trust(
         record: evidence of the whole record.
         test: misfits on test data.
         parameters: estimates by name.
-        model: that the record was compared with.
+        uncertain: parameters as the model file or the map has them.
         settings: thresholds.
 
     Returns:
@@ -93,7 +93,7 @@ def judge_trust(
         amber.append("at least one effect is likely, not certain")
     if record.left > 0.1:
         amber.append(f"{100.0 * record.left:.0f} % of the torque's power is left unexplained")
-    for known in model.uncertain:
+    for known in uncertain:
         if known.name in parameters and _is_far(parameters[known.name], known.uncertainty):
             amber.append(
                 f"`{known.name}` lies outside the range that the model file states: its value, or a unit, may be wrong"

@@ -1,10 +1,9 @@
 """The one place that reads test data."""
 
-from orchestrator.diagnosis.data.test_data import TestData
-from orchestrator.records.record import Record
+from orchestrator.diagnosis.data.test_data import R, TestData
 
 
-def open_test_data(data: TestData) -> list[tuple[Record, int]]:
+def open_test_data(data: TestData[R]) -> list[tuple[R, int]]:
     """Return each record with the first row of its test part.
 
     Args:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.blackbox.model import Data
-from orchestrator.diagnosis.blackbox.rate import decimated, factor_of
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxRateSettings, BoxSettings
+from orchestrator.diagnosis.fmu.model import Data
+from orchestrator.diagnosis.fmu.rate import decimated, factor_of
+from orchestrator.diagnosis.fmu.settings import DEFAULT, RateSettings, FmuSettings
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 
@@ -48,7 +48,7 @@ def test_a_saturation_between_the_rows_that_are_looked_at_is_found_to_its_size(t
     domain, rng = DOMAINS[0], np.random.default_rng(8)
     case = record(domain, ("input_saturation",), rng, 1300)
     fmu, map_path = write_fmu(tmp_path / "Spring.fmu", domain), write_map(tmp_path / "map.toml", domain)
-    settings = BoxSettings(rate=BoxRateSettings(rows=400, per_band=2.1, most_above=0.3))
+    settings = FmuSettings(rate=RateSettings(rows=400, per_band=2.1, most_above=0.3))
     found = diagnose(write_record(tmp_path / "r.csv", case), fmu, map_path, settings=settings)
     found.close()
     assert found.outcome.problem.data.factor == 3

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.blackbox.deliver import deliver, parts_of
-from orchestrator.diagnosis.blackbox.problem import series_of
+from orchestrator.diagnosis.fmu.deliver import deliver, parts_of
+from orchestrator.diagnosis.fmu.problem import series_of
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.blackbox.noise import noise_of, third_differences
-from orchestrator.diagnosis.blackbox.settings import DEFAULT
+from orchestrator.diagnosis.fmu.noise import noise_of, third_differences
+from orchestrator.diagnosis.fmu.settings import DEFAULT
 
 TRUE = 2e-3
 N = 1500

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from orchestrator.diagnosis.blackbox import series
-from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
-from orchestrator.diagnosis.blackbox.passed import at_input
+from orchestrator.diagnosis.fmu import series
+from orchestrator.diagnosis.fmu.bank import BANK, BoxEffect, Surroundings
+from orchestrator.diagnosis.fmu.passed import at_input
 from pyfmu_sources.attachment import SERIES, AttachedEffect
 
 STEP = 0.01

@@ -7,8 +7,8 @@ import pytest
 
 import orchestrator as oc
 from orchestrator.cli import main
-from orchestrator.diagnosis.blackbox.mapping import read_map
-from orchestrator.diagnosis.blackbox.subject import subject_of
+from orchestrator.diagnosis.fmu.mapping import read_map
+from orchestrator.diagnosis.fmu.subject import subject_of
 from orchestrator.errors import InputError
 from pyfmu_sources import port_laws as laws
 from tests.support.box_fmu import DOMAINS, changing_record, coupled_record, write_fmu, write_map, write_scenario

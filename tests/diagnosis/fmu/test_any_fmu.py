@@ -12,14 +12,14 @@ from orchestrator.api.any_fmu import draft_map
 from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
-from orchestrator.diagnosis.blackbox.bank import PORT
-from orchestrator.diagnosis.blackbox.deliver import deliver
-from orchestrator.diagnosis.blackbox.diagnose import prepared
-from orchestrator.diagnosis.blackbox.mapping import read_map
-from orchestrator.diagnosis.blackbox.reading import read_data
-from orchestrator.diagnosis.blackbox.settings import BoxSettings, FitterSettings, ProcessSettings
-from orchestrator.diagnosis.blackbox.sites import effects_of
-from orchestrator.diagnosis.blackbox.subject import subject_of
+from orchestrator.diagnosis.fmu.bank import PORT
+from orchestrator.diagnosis.fmu.deliver import deliver
+from orchestrator.diagnosis.fmu.diagnose import prepared
+from orchestrator.diagnosis.fmu.mapping import read_map
+from orchestrator.diagnosis.fmu.reading import read_data
+from orchestrator.diagnosis.fmu.settings import FmuSettings, FitterSettings, ProcessSettings
+from orchestrator.diagnosis.fmu.sites import effects_of
+from orchestrator.diagnosis.fmu.subject import subject_of
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.shared.results import read
@@ -215,7 +215,7 @@ def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault):
         assert found.verdict == "unknown"
         return
     with pytest.raises(OrchestratorError) as caught:
-        diagnose(*files, settings=BoxSettings(process=ProcessSettings(loading=8.0)))
+        diagnose(*files, settings=FmuSettings(process=ProcessSettings(loading=8.0)))
     assert "\n" not in str(caught.value)
     assert "Spring.fmu" in str(caught.value)
 
@@ -224,7 +224,7 @@ def test_an_fmu_that_cannot_be_used_is_refused_in_one_line(made, fault):
 def test_an_fmu_that_hangs_is_ended(made, fault):
     _, *files = made(SPRING, rows=300, fault=fault)
     with pytest.raises(OrchestratorError, match="hangs"):
-        diagnose(*files, settings=BoxSettings(process=ProcessSettings(loading=3.0, patience=2.0, most_lost=1)))
+        diagnose(*files, settings=FmuSettings(process=ProcessSettings(loading=3.0, patience=2.0, most_lost=1)))
 
 
 def test_a_run_whose_fed_back_effort_runs_away_is_given_up_before_the_fmu_meets_it(made):
@@ -263,7 +263,7 @@ def test_a_run_that_hangs_is_given_up_soon_and_others_go_on(made):
     _, record_path, fmu, map_path = made(SPRING, rows=300, fault="hangs_without_a_push")
     subject = subject_of(fmu)
     given = read_map(map_path, subject)
-    settings = BoxSettings(process=ProcessSettings(known=3.0, again=1.0, patience=300.0))
+    settings = FmuSettings(process=ProcessSettings(known=3.0, again=1.0, patience=300.0))
     problem, _ = prepared(subject, given, read_data(record_path, given), workers=1, settings=settings)
     try:
         zone = next(
@@ -332,7 +332,7 @@ def test_the_clock_of_an_fmu_that_rests_at_first_is_seen(made):
 
 def test_steps_are_finer_where_they_shift_what_is_well_known(made):
     case, *files = made(CIRCUIT, ("input_delay",))
-    coarse = diagnose(*files, settings=BoxSettings(fit=FitterSettings(halvings=0)))
+    coarse = diagnose(*files, settings=FmuSettings(fit=FitterSettings(halvings=0)))
     found = diagnose(*files)
     coarse.close(), found.close()
     assert found.outcome.problem.m > coarse.outcome.problem.m

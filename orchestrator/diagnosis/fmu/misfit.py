@@ -1,0 +1,91 @@
+"""How models of an FMU do on test data: free runs over whole records, and what they miss of their test parts."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.diagnosis.fmu.clock import compared_later
+from orchestrator.diagnosis.fmu.problem import BoxProblem
+from orchestrator.diagnosis.fmu.result import FmuWorkings
+from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.model.interface import ModelPoint
+from orchestrator.diagnosis.report.open_test_data import open_test_data
+from orchestrator.diagnosis.result import SignalMisfit, TestMisfit
+
+Array = NDArray[np.float64]
+
+
+def test_problems(workings: FmuWorkings) -> list[tuple[BoxProblem, int]]:
+    """Return the FMU beside each record that holds test data, and the first row of the test part.
+
+    Args:
+        workings: of the diagnosis.
+
+    Returns:
+        One entry for each record.
+    """
+    problem = workings.problem
+    return [
+        (replace(problem, data=compared_later(data, problem.late)), first)
+        for data, first in open_test_data(workings.test_data)
+    ]
+
+
+def misfit_on_test_data(workings: FmuWorkings) -> tuple[TestMisfit, ...]:
+    """Return the misfit of the nominal, the re-fitted and the final model on test data.
+
+    Args:
+        workings: of the diagnosis.
+
+    Returns:
+        One for each record; nan where a run failed.
+    """
+    found, search = [], workings.search
+    points = (search.problem.start, search.base.point, search.final.point)
+    for number, (problem, first) in enumerate(test_problems(workings)):
+        stages = [_misses(workings, point, problem, first, number) for point in points]
+        signals = tuple(
+            SignalMisfit(name, problem.units.get(name, ""), float(problem.noise[k]), *(float(one[k]) for one in stages))
+            for k, name in enumerate(problem.outputs)
+        )
+        found.append(TestMisfit(problem.data.source, problem.n - first, signals))
+    return tuple(found)
+
+
+def motion_shares(workings: FmuWorkings, test: Sequence[TestMisfit], labels: Sequence[str]) -> dict[str, float]:
+    """Return the share of the misfit on test data that comes back when one effect is left out and the rest re-fitted.
+
+    Args:
+        workings: of the diagnosis.
+        test: misfits of the final model.
+        labels: of the effects.
+
+    Returns:
+        Label -> one minus final over without, in squares and in units of the noise; nan where runs fail.
+    """
+    search, shares = workings.search, {}
+    final = sum((one.final / one.noise) ** 2 for record in test for one in record.signals)
+    for label in labels:
+        without = fit_model(search.problem, search.final.point.without_effects([label]), 3)
+        left_out = sum(
+            float(np.sum((_misses(workings, without.point, problem, first, number) / problem.noise) ** 2))
+            for number, (problem, first) in enumerate(test_problems(workings))
+        )
+        shares[label] = 1.0 - final / left_out if np.isfinite(left_out) and left_out > 0.0 else float("nan")
+    return shares
+
+
+def _misses(workings: FmuWorkings, point: ModelPoint, problem: BoxProblem, first: int, number: int) -> Array:
+    """Return the rms (outputs,) that a run misses from a row on; nan where it fails."""
+    fitted = first > 0  # the record's own start is known from the rows before
+    residuals = workings.residuals[number if fitted else 0]
+    seen = workings.search.problem.record_points(point)[number if fitted else 0]
+    y = problem.simulate([residuals.box_model(seen)])[0]
+    if y is None:
+        return np.full(len(problem.outputs), np.nan)
+    if fitted:
+        change = residuals.start_change(seen, problem.n).T
+        y[: len(change)] += change
+    return np.asarray(np.sqrt(np.mean((problem.data.outputs - y)[first:] ** 2, axis=0)))
