@@ -217,14 +217,14 @@ def smooth(values: Array, step: float, frequency: float) -> Array:
     Args:
         values: (n,).
         step: sample time [s].
-        frequency: of the third-order low-pass, passed forwards and backwards.
+        frequency: of the sixth-order low-pass, passed forwards and backwards: a third of it passes to 1e-5.
 
     Returns:
         The smoothed values; unchanged where the frequency is near that of the samples.
     """
     if frequency * step > 0.4:
         return values
-    return np.asarray(sosfiltfilt(butter(3, 2.0 * frequency * step, output="sos"), values))
+    return np.asarray(sosfiltfilt(butter(6, 2.0 * frequency * step, output="sos"), values))
 
 
 def _spectrum(values: Array, step: float, most: int, detrend: str | bool = False) -> tuple[Array, Array]:

@@ -196,17 +196,25 @@ def _most_likely_levels(
     reach = np.array([np.mean(np.diagonal(through, axis1=1, axis2=2)[:, min(n, through.shape[1] - 1)])
                       for n in range(sources.process.shape[2])])  # fmt: skip
     scale = np.array([power[min(n, power.size - 1)] for n in range(reach.size)]) / np.maximum(reach, 1e-300)
-    best = (np.inf, sources.levels, scale)
-    for share in settings.measurement_levels:
-        at_encoders = _matrix(sources.measurement[shared], share * sources.levels)
-        for part in settings.process_levels:
-            process = np.maximum(part * scale, sources.floors)
-            matrix = at_encoders + _matrix(sources.process[shared], process, RIDGE)
-            sign, determinant = np.linalg.slogdet(matrix)
-            cost = float(np.sum(determinant + np.einsum("fcd,fdc->f", np.linalg.inv(matrix), measured[shared]).real))
-            if np.all(sign.real > 0) and cost < best[0]:
-                best = (cost, share * sources.levels, process)
-    return best[1], best[2]
+    transfer, response, spectra = sources.measurement[shared], sources.process[shared], measured[shared]
+
+    def cost(measurement: float, process: Array) -> float:
+        levels = np.maximum(process * scale, sources.floors)
+        matrix = _matrix(transfer, measurement * sources.levels) + _matrix(response, levels, RIDGE)
+        sign, determinant = np.linalg.slogdet(matrix)
+        if not np.all(sign.real > 0):
+            return np.inf
+        return float(np.sum(determinant + np.einsum("fcd,fdc->f", np.linalg.inv(matrix), spectra).real))
+
+    shares = settings.process_levels
+    ones = np.ones(scale.size)
+    pairs = [(share, part) for share in settings.measurement_levels for part in shares]
+    measurement, common = min(pairs, key=lambda pair: cost(pair[0], pair[1] * ones))
+    process = common * ones
+    for n in range(scale.size if scale.size > 1 else 0):  # torques at one body need not be those at another
+        trials = [np.where(np.arange(scale.size) == n, part, process) for part in shares]
+        process = min(trials, key=lambda one: cost(measurement, one))
+    return measurement * sources.levels, np.maximum(process * scale, sources.floors)
 
 
 def _taper(model: ResidualModel) -> Array:

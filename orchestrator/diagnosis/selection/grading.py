@@ -115,7 +115,7 @@ class GradeRule:
 def _explains_enough(effect: EffectEvidence, s: GradeSettings) -> bool:
     share = {"wave": s.wave_share, "limit": s.limit_share}.get(effect.kind, s.likely_share)
     gain = s.shape_gain if effect.kind in ("wave", "limit") else s.likely_gain
-    return effect.share >= share or effect.gain > gain
+    return effect.share >= share or (effect.share > 0.0 and effect.gain > gain)
 
 
 GRADE_RULES: tuple[GradeRule, ...] = (
@@ -214,6 +214,8 @@ def record_evidence(found: SearchResult) -> RecordEvidence:
     problem = found.problem
     left, before = torque_shares(problem, found.final.point), torque_shares(problem, found.base.point)
     inertia, error, spread = recorded_inertia(problem, found.final)
+    if len(problem.models[0].channels) > 1:  # bodies share the torque: what they ask for together is no single number
+        spread = np.inf
     return RecordEvidence(float(left.max()), float(left[0] / max(before[0], 1e-300)), inertia, error, spread)
 
 

@@ -132,7 +132,7 @@ class Screening:
 def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[np.complex128]:
     """Return the inner products (k,) of values with ``exp(i c phase)``, of all cycles c at once.
 
-    Values are gathered in bins of the phase, a thirty-second of the shortest wave wide; a Fourier transform does the
+    Values are gathered in bins of the phase, a sixty-fourth of the shortest wave wide; a Fourier transform does the
     rest.
 
     Args:
@@ -146,7 +146,7 @@ def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[n
     if cycles.size < 2:
         return np.exp(1j * np.outer(cycles, phase)) @ values
     spacing = float(cycles[1] - cycles[0])
-    count = int(np.ceil(32.0 * (cycles[-1] + spacing) / spacing))
+    count = int(np.ceil(64.0 * (cycles[-1] + spacing) / spacing))
     width = 2.0 * np.pi / (spacing * count)
     place = np.floor((phase - phase.min()) / width).astype(int)
     shift = np.exp(1j * cycles[0] * (phase - phase.min()))  # the grid begins at its first cycles, not at none

@@ -1,0 +1,61 @@
+"""Fits, blocks left out and comparisons, on a model that is linear: what they must be is worked out by hand."""
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.inference.fitting import compare, fit_model
+from orchestrator.diagnosis.selection.search import settle
+from tests.support.linear_model import linear_problem
+
+LABEL = "drag@motor"
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    problem = linear_problem({LABEL: 0.4})
+    return problem, fit_model(problem, problem.start.with_effect(LABEL, (0.0,)))
+
+
+def test_a_fit_finds_parameter_and_size(fitted):
+    problem, model = fitted
+    assert model.point.parameters[0] == pytest.approx(1.1, abs=0.01)
+    assert model.point.effects[LABEL][0] == pytest.approx(0.4, abs=0.01)
+    gradient = model.jacobian.T @ model.residual
+    prior, slopes = problem.prior(model.point, model.coordinates)
+    assert np.max(np.abs(gradient + prior * slopes)) < 1e-3 * np.sqrt(model.cost * np.max(np.diag(model.jacobian.T @ model.jacobian)))
+
+
+def test_errors_of_blocks_are_those_of_fits_without_them(fitted):
+    problem, model = fitted
+    block = 7
+    rows = problem.blocks != block
+    prior, slopes = problem.prior(model.point, model.coordinates)
+    J, r = model.jacobian, model.residual
+    normal = J[rows].T @ J[rows] + np.diag(slopes**2)
+    shift = -np.linalg.solve(normal, J[rows].T @ r[rows] + slopes * prior)
+    left_out = r[~rows] + J[~rows] @ shift
+    assert model.block_errors[block] == pytest.approx(left_out @ left_out, rel=1e-6)
+    np.testing.assert_allclose(model.block_shifts[block], shift, rtol=1e-5, atol=1e-9)
+
+
+def test_errors_of_values_are_those_of_repeated_records():
+    sizes, stated, jackknifed = [], [], []
+    for seed in range(40):
+        problem = linear_problem({LABEL: 0.4}, seed=seed, size=800)
+        problem, model = settle(problem, fit_model(problem, problem.start.with_effect(LABEL, (0.0,))))
+        scale = problem.effects[LABEL].scales[0]
+        sizes.append(model.point.effects[LABEL][0])
+        stated.append(scale * np.sqrt(model.covariance[1, 1]))
+        jackknifed.append(scale * np.sqrt(model.jackknife[1, 1]))
+    assert np.median(stated) == pytest.approx(np.std(sizes), rel=0.4)
+    assert np.median(jackknifed) == pytest.approx(np.std(sizes), rel=0.4)
+
+
+def test_a_true_effect_gains_and_chance_does_not():
+    problem = linear_problem({LABEL: 0.1, "nothing@motor": 0.0})
+    base = fit_model(problem, problem.start)
+    true, chance = (fit_model(problem, problem.start.with_effect(name, (0.0,))) for name in problem.effects)
+    assert compare(base, true).t > 5.0
+    assert compare(base, true).gain > 0.3
+    assert compare(base, chance).gain < 0.01
+    assert compare(true, base).t < -3.0

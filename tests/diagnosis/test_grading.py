@@ -1,0 +1,51 @@
+"""Grades: each rule lowers a grade by itself, and one that is off lowers none."""
+
+from dataclasses import replace
+
+import msgspec
+import pytest
+
+from orchestrator.diagnosis.selection.grading import GRADE_RULES, EffectEvidence, Grade, RecordEvidence, grade_effect
+from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.shared.settings import described
+
+SETTINGS = DiagnosisSettings()
+EFFECT = EffectEvidence("friction@motor", "friction", 20.0, 0.9, 0.5, 30.0, (), False, True)
+RECORD = RecordEvidence(0.01, 0.01, 1.0, 0.02, 0.05)
+
+BROKEN = {
+    "surely better": ({"t": 4.0}, {}),
+    "better": ({"t": 2.6, "size_t": 4.5}, {}),
+    "large share": ({"share": 0.05, "gain": 0.3}, {}),
+    "enough share": ({"share": 0.01, "gain": 0.05}, {}),
+    "large gain": ({"gain": 0.1}, {}),
+    "sure size": ({"size_t": 3.5}, {}),
+    "size": ({"size_t": 2.0}, {}),
+    "explained": ({}, {"left": 0.7}),
+    "inertia seen": ({}, {"inertia_error": 0.5}),
+    "same machine": ({}, {"inertia": 3.0}),
+    "alone of its kind": ({"foreign_family": True}, {}),
+    "possible size": ({"possible": False}, {}),
+    "timing follows": ({"kind": "timing"}, {"left": 0.3}),
+    "limit explains": ({"kind": "limit"}, {"left": 0.2, "left_of_base": 0.6}),
+}
+
+
+def test_what_breaks_no_rule_is_certain():
+    assert grade_effect(EFFECT, RECORD, SETTINGS) == (Grade.CERTAIN, ())
+
+
+@pytest.mark.parametrize("rule", GRADE_RULES, ids=lambda rule: rule.name)
+def test_each_rule_lowers_the_grade_and_can_be_off(rule):
+    effect, record = (replace(one, **changes) for one, changes in zip((EFFECT, RECORD), BROKEN[rule.name], strict=True))
+    grade, lowered = grade_effect(effect, record, SETTINGS)
+    assert rule.name in lowered
+    assert grade <= rule.highest
+    off = msgspec.structs.replace(SETTINGS, disabled=tuple(lowered))
+    assert grade_effect(effect, record, off)[0] is Grade.CERTAIN
+
+
+def test_thresholds_of_rules_are_settings():
+    names = {name for name, _, _ in described(DiagnosisSettings)}
+    assert {rule.setting for rule in GRADE_RULES if rule.setting} <= names
+    assert all(rule.reason and rule.statistic for rule in GRADE_RULES)

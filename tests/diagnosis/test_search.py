@@ -1,0 +1,70 @@
+"""The search on a model whose effects are known columns: what is there is found, once, and what does as well is its family."""
+
+import numpy as np
+import pytest
+
+from orchestrator.diagnosis.inference.problem import fit_problem
+from orchestrator.diagnosis.selection.screening import products_with_waves
+from orchestrator.diagnosis.selection.search import search_effects
+from orchestrator.diagnosis.settings import FitSettings, SelectionSettings
+from tests.support.linear_model import LinearModel, linear_problem
+
+SETTINGS = SelectionSettings()
+NAMES = [f"effect{n}@motor" for n in range(8)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_effects_that_are_there_are_found(seed):
+    problem = linear_problem({name: (0.3 if n in (1, 4) else 0.0) for n, name in enumerate(NAMES)}, seed=seed)
+    found = search_effects(problem, SETTINGS)
+    assert sorted(found.final.labels) == ["effect1@motor", "effect4@motor"]
+    assert found.complete
+    assert [step.taken for step in found.steps][-1] == ""
+
+
+def test_chance_is_rarely_found():
+    counts = [len(search_effects(linear_problem(dict.fromkeys(NAMES, 0.0), seed=s), SETTINGS).final.labels) for s in range(12)]
+    assert sum(counts) <= 1
+
+
+def test_two_columns_that_are_alike_are_a_family():
+    problem = linear_problem({"a@motor": 0.4, "b@motor": 0.0}, alike={"b@motor": "a@motor"})
+    found = search_effects(problem, SETTINGS)
+    assert len(found.final.labels) == 1
+    assert set(found.steps[0].family) | set(found.final.labels) == {"a@motor", "b@motor"}
+
+
+def test_no_more_effects_than_the_settings_allow():
+    problem = linear_problem(dict.fromkeys(NAMES, 0.3))
+    none = SelectionSettings(most_effects=0)
+    assert search_effects(problem, none).final.labels == ()
+    assert len(search_effects(problem, SelectionSettings(most_effects=2)).final.labels) == 2
+
+
+def test_time_that_runs_out_is_said():
+    problem = linear_problem(dict.fromkeys(NAMES, 0.3))
+    found = search_effects(problem, SETTINGS, out_of_time=lambda: True)
+    assert not found.complete
+    assert found.final.labels == ()
+
+
+def test_several_records_share_sizes():
+    rng = np.random.default_rng(2)
+    models = []
+    for _ in range(2):
+        ramp, column, other = rng.standard_normal((3, 500))
+        data = 1.1 * ramp + 0.1 * column + 0.2 * rng.standard_normal(500)
+        models.append(LinearModel(data, ramp, {"a@motor": column, "b@motor": other}, 0.2))
+    together = search_effects(fit_problem(models, FitSettings()), SETTINGS)
+    assert together.final.labels == ("a@motor",)
+    blocks = together.problem.blocks
+    assert set(blocks[: blocks.size // 2]).isdisjoint(blocks[blocks.size // 2 :])
+
+
+def test_products_with_waves_are_those_of_sums():
+    rng = np.random.default_rng(0)
+    phase, values = np.cumsum(rng.normal(size=3000)) * 0.05, rng.normal(size=3000)
+    cycles = np.arange(0.7, 40.0, 0.05)
+    found = products_with_waves(values, phase, cycles)
+    exact = np.exp(1j * np.outer(cycles, phase)) @ values
+    assert np.max(np.abs(np.abs(found) - np.abs(exact))) < 0.03 * np.max(np.abs(exact))
