@@ -26,7 +26,7 @@ EFFECTS = {
     "input_delay@actuator": {"effects.input_delay.delay": 0.0123},
     "drive_filter@actuator": {"effects.drive_filter.time_constant": 0.03},
     "torque_saturation@actuator": {"effects.torque_saturation.limit": 30.0},
-    "rate_limit@actuator": {"effects.rate_limit.rate": 400.0},
+    "rate_limit@actuator": {"effects.rate_limit.rate": 120.0},
     "hardening_stiffness@shaft": {"effects.hardening_stiffness.cubic": 3e6},
     "torque_ripple@motor": {
         "effects.torque_ripple.amplitude": 1.0, "effects.torque_ripple.cycles_per_rev": 6.0, "effects.torque_ripple.phase": 0.4,

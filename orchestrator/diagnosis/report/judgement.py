@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, TestMisfit
 from orchestrator.diagnosis.selection.grading import Grade, RecordEvidence
 from orchestrator.diagnosis.selection.remaining import Dependence
@@ -42,16 +42,18 @@ def form_verdict(
     )
     if effects or strong or not found.complete or record.left > settings.grades.timing_left:
         return "unknown"
-    problem = found.problem
-    nominal = fit_model(problem, problem.start, 0)
-    return "none" if _explains(found, nominal.cost) else "parameters"
+    return "none" if _nominal_explains(found) else "parameters"
 
 
-def _explains(found: SearchResult, cost: float) -> bool:
-    """Tell whether the nominal model explains the record as well as re-fitted parameters do: by two for each of
-    them.
+def _nominal_explains(found: SearchResult) -> bool:
+    """Tell whether the nominal model explains the record as well as re-fitted parameters do: by three for each of them.
+
+    What a record begins with is no property of the model, and stays as it was fitted.
     """
-    return cost - found.final.cost < 2.0 * len(found.problem.shared)
+    problem, count = found.problem, len(found.problem.shared)
+    start = ModelPoint((*problem.start.parameters[:count], *found.final.point.parameters[count:]))
+    (nominal,) = problem.whitened([start])
+    return float(nominal @ nominal) - found.final.cost < 3.0 * count
 
 
 def judge_trust(
