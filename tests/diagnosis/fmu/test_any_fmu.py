@@ -17,9 +17,9 @@ from orchestrator.diagnosis.fmu.deliver import deliver
 from orchestrator.diagnosis.fmu.diagnose import prepared
 from orchestrator.diagnosis.fmu.mapping import read_map
 from orchestrator.diagnosis.fmu.reading import read_data
-from orchestrator.diagnosis.fmu.settings import FmuSettings, FitterSettings, ProcessSettings
 from orchestrator.diagnosis.fmu.sites import effects_of
 from orchestrator.diagnosis.fmu.subject import subject_of
+from orchestrator.diagnosis.fmu_settings import FitterSettings, FmuSettings, ProcessSettings
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.shared.results import read

@@ -6,7 +6,7 @@ import pytest
 from orchestrator.api.diagnose import diagnose
 from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.rate import decimated, factor_of
-from orchestrator.diagnosis.fmu.settings import DEFAULT, RateSettings, FmuSettings
+from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings, RateSettings
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 
