@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.any_fmu_plants import INSIDE, PLANTS, Case, Maker, Plant
 from orchestrator.api.any_fmu import FmuDiagnosisResult
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.blackbox.deliver import deliver
+from orchestrator.diagnosis.fmu.deliver import deliver
 from orchestrator.errors import OrchestratorError
 from tests.support.box_fmu import DOMAINS, coupled_record, record, write_fmu, write_map, write_record, write_scenario
 

@@ -22,7 +22,7 @@ from pathlib import Path
 ROOMS = {
     "record": ("records",),
     "model": ("records/model_file.py", "records/columns.py"),
-    "map_file": ("diagnosis/blackbox/mapping.py",),
+    "map_file": ("diagnosis/fmu/mapping.py",),
     "scenario": ("scenarios/scenario.py", "scenarios/definition.py"),
     "ssp": ("scenarios/ssp/read.py", "scenarios/ssp/common.py", "shared/isolation/archives.py"),
     "ssd": ("scenarios/ssp/read.py", "scenarios/ssp/common.py"),

@@ -38,7 +38,7 @@ LAYERS = (
     {"paired", "estimation"},
     {"estimation.inspection", "estimation.methods", "paired.bench"},
     {"diagnosis"},
-    {"diagnosis.blackbox"},
+    {"diagnosis.fmu"},
     {"reporting"},
     {"api"},
     {"commands"},

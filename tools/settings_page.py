@@ -5,7 +5,6 @@ python -m tools.settings_page
 
 from pathlib import Path
 
-from orchestrator.diagnosis.blackbox.settings import BoxSettings
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.paired.settings import MapSettings
@@ -14,7 +13,6 @@ from orchestrator.shared.settings import Settings, described
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
 WORKFLOWS: tuple[tuple[str, str, type[Settings]], ...] = (
     ("Diagnosis", "diagnose", DiagnosisSettings),
-    ("Diagnosis of any FMU", "diagnose --fmu", BoxSettings),
     ("Estimation", "estimate", EstimationSettings),
     ("Calibration", "sweep", MapSettings),
 )

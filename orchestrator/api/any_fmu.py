@@ -1,6 +1,7 @@
-"""What any FMU misses, from a measured record."""
+"""What any FMU misses, from measured records."""
 
 import csv
+import time
 import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,220 +12,217 @@ import numpy as np
 
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.diagnosis.blackbox.deliver import Delivered, deliver
-from orchestrator.diagnosis.blackbox.diagnose import diagnose as diagnosing
-from orchestrator.diagnosis.blackbox.draft import drafted
-from orchestrator.diagnosis.blackbox.estimates import FoundEffect, OutputMisfit, ValueEstimate, validated
-from orchestrator.diagnosis.blackbox.judged import BoxOutcome
-from orchestrator.diagnosis.blackbox.mapping import read_map
-from orchestrator.diagnosis.blackbox.rate import decimated, factor_of
-from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
-from orchestrator.diagnosis.blackbox.steps import counted
-from orchestrator.diagnosis.blackbox.subject import subject_of
-from orchestrator.diagnosis.blackbox.trust import SECOND, doubts, harm, statement
+from orchestrator.diagnosis.fmu.deliver import Delivered, deliver
+from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnosing
+from orchestrator.diagnosis.fmu.draft import drafted
+from orchestrator.diagnosis.fmu.mapping import Map, read_map
+from orchestrator.diagnosis.fmu.misfit import misfit_on_record, stage_runs
+from orchestrator.diagnosis.fmu.model import Data
+from orchestrator.diagnosis.fmu.rate import decimated, factor_of
+from orchestrator.diagnosis.fmu.reading import columns_of, read_data
+from orchestrator.diagnosis.fmu.result import FmuDiagnosis
+from orchestrator.diagnosis.fmu.subject import subject_of
+from orchestrator.diagnosis.fmu.summary import summarise_fmu
+from orchestrator.diagnosis.report.json_results import dependence_found, effect_found, steps_found, test_found
+from orchestrator.diagnosis.result import GradedEffect, TestMisfit
+from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.shared.isolation.walls import support
-from orchestrator.shared.results.any_fmu import BoxDiagnosisFound, BoxStepFound, BoxTriedFound, LeftFound, OutputFound
-from orchestrator.shared.results.diagnose import EffectFound, ParameterFound, ValueFound
+from orchestrator.shared.results.any_fmu import FmuDiagnosisFound, FmuRemainingFound
+from orchestrator.shared.results.diagnose import ParameterFound
 from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Trust
 
 Progress = Callable[[str], None]
-
-
-def fitted_values(estimates: Sequence[ValueEstimate]) -> dict[str, ParameterFound]:
-    """Return re-fitted parameters as result files have them.
-
-    Args:
-        estimates: of the parameters.
-
-    Returns:
-        The parameters by name.
-    """
-    return {e.name: ParameterFound(e.nominal, e.value, e.standard_error, e.interval, e.unit) for e in estimates}
-
-
-def _effect(f: FoundEffect) -> EffectFound:
-    values = {e.name: ValueFound(e.value, e.standard_error, e.interval, e.unit) for e in f.estimates}
-    return EffectFound(f.effect.kind.name, f.effect.place, values, f.gain, family=tuple(f.family))
-
-
-def _outputs(misfit: Sequence[OutputMisfit]) -> dict[str, OutputFound]:
-    return {m.output: OutputFound(m.nominal, m.refitted, m.corrected, m.noise, m.unit) for m in misfit}
+SHOWN = 5  # effects of a step that the table shows
 
 
 @dataclass(frozen=True, repr=False)
 class FmuDiagnosisResult(Result):
-    """What a record says of an FMU.
+    """What records say of an FMU.
 
     Attributes:
-        outcome: verdict, effects, parameters, misfit and what is left.
-        delivered: the corrected system, once it has been written.
-        validation: misfit on a second record, if one was given.
-        settings: thresholds that were used.
+        diagnosis: verdict, graded effects, parameters, misfits and what is left.
+        validation: how the models do on another record, or None.
+        seconds: wall time of the diagnosis [s].
         arguments: what was asked for.
+        delivered: the corrected system, once it has been written.
     """
 
     command: ClassVar[str] = "diagnose"
     replaces: ClassVar[tuple[str, ...]] = ("corrected.ssp",)
-    outcome: BoxOutcome
+    diagnosis: FmuDiagnosis
+    validation: TestMisfit | None
+    seconds: float
     arguments: Mapping[str, Any] = field(default_factory=dict)
     delivered: list[Delivered] = field(default_factory=list)
-    validation: tuple[OutputMisfit, ...] = ()
-    settings: BoxSettings = DEFAULT
 
     @property
     def verdict(self) -> str:
         """One of "none", "parameters", "effects" and "unknown"."""
-        return self.outcome.verdict
+        return self.diagnosis.verdict
 
     @property
-    def effects(self) -> tuple[FoundEffect, ...]:
-        """The effects that are missing: where, how large, and what cannot be told from them."""
-        return self.outcome.effects
+    def effects(self) -> tuple[GradedEffect, ...]:
+        """The effects around the FMU, surest first: grade, and parameters with intervals and units."""
+        return self.diagnosis.effects
 
     @property
-    def harm(self) -> tuple[str, ...]:
-        """Sentences: on which outputs of the second record the corrected model is worse than without effects."""
-        return harm(self.validation, SECOND, self.settings.rest) if self.effects else ()
+    def test(self) -> tuple[TestMisfit, ...]:
+        """Misfits on test data, which nothing was fitted to: of the nominal, the re-fitted and the final model."""
+        return self.diagnosis.test
 
     @property
-    def statement(self) -> str:
-        """What explains the record, and to what: a sentence without a full stop."""
-        return statement(self.verdict, self.outcome.rest)
+    def notes(self) -> tuple[str, ...]:
+        """What to bear in mind, a sentence each."""
+        return self.diagnosis.notes
 
     @property
     def trust(self) -> Trust:
         """How far the result can be trusted."""
-        o = self.outcome
-        return doubts(o.verdict, o.effects, o.rest, o.misfit, self.validation, o.late, self.settings.rest)
+        return self.diagnosis.trust
+
+    def summary(self) -> Iterator[str]:
+        """Yield what was found, one sentence a line.
+
+        Yields:
+            Verdict, effects, what is left, notes and trust.
+        """
+        yield from summarise_fmu(self.diagnosis)
+        yield from (f"Note: {note}" for note in self.notes)
+        yield f"Trust: {self.trust.level.word}"
+        yield from (f"  {reason}" for reason in self.trust.reasons)
 
     def blocks(self) -> Sequence[Block]:
-        """Return the verdict, the effects and the misfit."""
-        o = self.outcome
-        lines: list[Block] = [f"Verdict: {o.verdict}: {self.statement}"]
-        for found in o.effects:
-            values = ", ".join(
-                f"{e.name} = {e.value:.5g} +- {e.standard_error:.2g} {'' if e.unit == '1' else e.unit}".rstrip()
-                for e in found.estimates
-            )
-            lines.append(f"  {found.effect.kind.name} at {found.effect.place}: {values}")
-            if found.family:
-                lines.append(f"    this record does not tell it from {', '.join(found.family)}")
-        lines += [f"  nearest, and not it: {name}" for name in o.suspects]
-        lines += [f"Where: {text}" for text in o.where]
-        lines += [f"Note: {text}" for text in o.warnings]
-        trust = self.trust
-        lines.append(f"Trust: {trust.level.word}")
-        lines += [f"  {reason}" for reason in trust.reasons]
-        rows = [(e.name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.standard_error:.2g}", e.unit) for e in o.parameters]
-        lines.append(table("Parameters", ("name", "nominal", "re-fitted", "standard error", "unit"), rows))
-        shown = [("held-out quarter", o.misfit)] + [("second record", self.validation)] * bool(self.validation)
-        for which, misfit in shown:
-            cells = [
-                (m.output, *(f"{v:.3f}" for v in (m.nominal, m.refitted, m.corrected)), f"{m.noise:.3g} {m.unit}")
-                for m in misfit
-            ]
-            head = ("output", "nominal", "re-fitted", "corrected", "noise")
-            lines.append(table(f"Misfit over noise, {which}", head, cells))
+        """Return the summary, and the tables of parameters, candidates and misfits."""
+        lines: list[Block] = [*self.summary(), *_tables(self)]
         for d in self.delivered:
             lines.append(f"Corrected system: {d.path.name}; differs from the fit by {d.difference:.2g} of the noise")
         return lines
 
-    def results(self, place: Path) -> BoxDiagnosisFound:
+    def results(self, place: Path) -> FmuDiagnosisFound:
         """Return what goes into ``diagnose.json``."""
-        o = self.outcome
-        share = o.rest.share if o.rest.disturbed else None
-        return BoxDiagnosisFound(
-            verdict=o.verdict,
-            statement=self.statement,
-            trust=self.trust.found(),
-            effects=tuple(_effect(f) for f in o.effects),
-            suspects=tuple(o.suspects),
-            parameters=fitted_values(o.parameters),
-            misfit=_outputs(o.misfit),
-            validation=_outputs(self.validation),
-            remainder=LeftFound(o.rest.explained, share, o.rest.reasons, tuple(map(tuple, o.rest.blocks.tolist()))),
-            where=tuple(o.where),
-            warnings=(*o.warnings, *self.harm),
-            settings=as_tables(self.settings),
-            candidates=tuple(self._candidates()),
+        d, report = self.diagnosis, self.diagnosis.settings.report
+        return FmuDiagnosisFound(
+            verdict=d.verdict,
+            trust=d.trust.found(),
+            effects=tuple(effect_found(effect) for effect in d.effects),
+            parameters=parameters_found(d),
+            test=tuple(test_found(test, report) for test in d.test),
+            validation=None if self.validation is None else test_found(self.validation, report),
+            remaining=FmuRemainingFound(dict(d.left), tuple(dependence_found(one) for one in d.remaining)),
+            notes=d.notes,
+            settings=as_tables(d.settings),
+            candidates=steps_found(d.workings.search),
             model=None if not self.delivered else str(place / self.delivered[0].path.name),
-            delivery=tuple(d.found() for d in self.delivered),
-            step_cost=o.probe.step_cost,
+            delivery=tuple(one.found() for one in self.delivered),
+            step_cost=d.workings.probe.step_cost,
             walls=support().in_words,
-            runs=o.runs,
-            seconds=o.seconds,
+            runs=d.workings.problem.runner.runs,
+            summary=tuple(summarise_fmu(d)),
+            seconds=self.seconds,
         )
 
-    def _candidates(self) -> Iterator[BoxStepFound]:
-        search = self.outcome.search
-        if search is None:
-            return
-        for step in search.steps:
-            tried = tuple(
-                BoxTriedFound(
-                    fit.model.effects[-1].label,
-                    search.score(fit) - search.score(step.before),
-                    tuple(fit.model.values[-1].tolist()),
-                    fit.decided - step.before.decided,
-                    counted(fit.model),
-                )
-                for fit in step.tried
-            )
-            yield BoxStepFound(tuple(e.label for e in step.before.model.effects), step.accepted, tried)
-
     def write_files(self, folder: Path) -> None:
-        """Write the held-out part, a figure and the corrected system."""
-        from orchestrator.diagnosis.blackbox.figures import draw_signals
+        """Write measured and simulated outputs, a figure and the corrected system."""
+        from orchestrator.diagnosis.fmu.figures import draw_signals
 
-        write_signals(folder / "diagnose.csv", self.outcome)
-        draw_signals(folder / "diagnose_signals.png", self.outcome)
-        if self.outcome.verdict != "unknown":
-            self.delivered[:] = [deliver(folder / "corrected.ssp", self.outcome)]
+        problem, stages, test = stage_runs(self.diagnosis.workings)
+        header, columns = ["time", *problem.inputs], [problem.data.time, *problem.data.inputs.T]
+        for k, name in enumerate(problem.outputs):
+            header += [name, *(f"{name}_{stage}" for stage in stages)]
+            columns += [problem.data.outputs[:, k], *(y[:, k] for y in stages.values())]
+        with (folder / "diagnose.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(header)
+            writer.writerows([f"{v:.9g}" for v in row] for row in np.column_stack(columns))
+        draw_signals(folder / "diagnose_signals.png", problem, stages, test)
+        if self.verdict != "unknown":
+            workings = self.diagnosis.workings
+            self.delivered[:] = [deliver(folder / "corrected.ssp", workings.problem, workings.final)]
 
     def close(self) -> None:
         """End the child processes now; else they end with the result."""
-        self.outcome.problem.runner.close()
+        self.diagnosis.workings.close()
 
 
-def write_signals(path: Path, outcome: BoxOutcome) -> None:
-    """Write measured and simulated outputs of all rows.
+def parameters_found(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
+    """Return re-fitted parameters as result files have them.
 
     Args:
-        path: the CSV file.
-        outcome: of the diagnosis.
+        diagnosis: of the records.
+
+    Returns:
+        The parameters by name.
     """
-    problem = outcome.problem
-    data = problem.data
-    header = ["time", *problem.inputs]
-    columns = [data.time, *data.inputs.T]
-    for k, name in enumerate(problem.outputs):
-        header += [name, f"{name}_nominal", f"{name}_refitted", f"{name}_corrected"]
-        columns += [data.outputs[:, k], *(y[:, k] for y in outcome.stages)]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows([f"{v:.9g}" for v in row] for row in np.column_stack(columns))
+    return {
+        name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
+        for name, one in diagnosis.parameters.items()
+    }
 
 
-def of_a_box(
-    record: Path | str,
+def _tables(found: FmuDiagnosisResult) -> Iterator[Block]:
+    d = found.diagnosis
+    rows = [
+        (name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.standard_error:.2g}", e.unit)
+        for name, e in d.parameters.items()
+    ]
+    if rows:
+        yield table("Parameters", ("name", "nominal", "re-fitted", "standard error", "unit"), rows)
+    tried = [
+        (", ".join(step.before.labels) or "parameters", one.label, f"{100.0 * one.comparison.gain:.1f}",
+         f"{one.comparison.t:.1f}", "added" if one.label == step.taken else "")
+        for step in d.workings.search.steps for one in step.tried[:SHOWN]
+    ]  # fmt: skip
+    if tried:
+        yield table("What was tried", ("on top of", "effect", "gain [%]", "over its error", ""), tried)
+    for title, tests in (("Misfit on test data", found.test), ("Misfit on the other record", (found.validation,))):
+        cells: list[tuple[str, ...]] = [
+            (test.source, one.signal, *(f"{v:.4g}" for v in (one.nominal, one.parameters, one.final, one.noise)), one.unit)
+            for test in tests if test is not None for one in test.signals
+        ]  # fmt: skip
+        if cells:
+            yield table(title, ("record", "output", "as given", "re-fitted", "with effects", "noise", "unit"), cells)
+
+
+def read_records(records: Sequence[Path | str], given: Map, settings: DiagnosisSettings) -> tuple[list[Data], int]:
+    """Return the columns of records that a map names, at the rate that the first one asks for.
+
+    Args:
+        records: paths of the logs.
+        given: the map.
+        settings: of reading and rate.
+
+    Returns:
+        The records, and how many rows of the files come to one.
+    """
+    found = [read_data(Path(path), given, settings.fmu.read) for path in records]
+    factor = factor_of(found[0], settings.fmu.rate)
+    return [decimated(data, factor) for data in found], factor
+
+
+def diagnose_fmu(
+    record: Path | str | Sequence[Path | str],
     fmu: Path | str,
     map: Path | str,  # noqa: A002 - as on the command line
     *,
     validate: Path | str | None = None,
-    settings: BoxSettings | Path | str | None = None,
+    test: Path | str | None = None,
+    settings: DiagnosisSettings | Path | str | None = None,
+    search: bool = True,
+    time_limit: float | None = None,
     progress: Progress = lambda what: None,
 ) -> FmuDiagnosisResult:
-    """Return what a record says of an FMU, and which effects are missing around it.
+    """Return what records say of an FMU, and which effects are missing around it.
 
     Args:
-        record: CSV file with the columns that the map names.
+        record: CSV file with the columns that the map names, or several of one machine.
         fmu: any FMI 2.0 co-simulation FMU, or a scenario file of several; they run in a child process.
         map: TOML file: columns, uncertain parameters, ports.
-        validate: a second record of the same columns, to show the misfit on; nothing is fitted to it.
+        validate: another record of the same columns, to show the misfit on; nothing is fitted to it.
+        test: a record that is test data as a whole; None: the last part of each record is.
         settings: thresholds, or the path of a TOML file of them.
+        search: False: the FMU is re-fitted and judged as it stands.
+        time_limit: seconds after which the search ends with what it has; None: the map's budget.
         progress: called with what is being done.
 
     Returns:
@@ -234,24 +232,28 @@ def of_a_box(
         InputError: record, FMU, map or settings cannot be used.
         SimulationError: the FMU fails again and again.
     """
-    used = chosen_settings(settings, BoxSettings)
+    begun = time.monotonic()
+    used = chosen_settings(settings, DiagnosisSettings)
     subject = subject_of(Path(fmu))
     given = read_map(Path(map), subject)
-    data = read_data(Path(record), given, used.read)
-    factor = factor_of(data, used.rate)
-    data = decimated(data, factor)
-    second = None if validate is None else decimated(read_data(Path(validate), given, used.read), factor)
-    outcome = diagnosing(subject, given, data, used, progress)
+    paths = [record] if isinstance(record, (Path, str)) else list(record)
+    others = [path for path in (validate, test) if path is not None]
+    read, _ = read_records([*paths, *others], given, used)
+    further = dict(zip([name for name, path in (("validate", validate), ("test", test)) if path is not None],
+                       read[len(paths) :], strict=True))  # fmt: skip
+    found = diagnosing(
+        subject, given, read[: len(paths)], used, test=further.get("test"), search=search, time_limit=time_limit,
+        progress=progress,
+    )  # fmt: skip
     try:
-        models = (outcome.problem.nominal, outcome.refitted, outcome.model)
-        shown = () if second is None else validated(outcome.problem, models, second)
+        second = misfit_on_record(found.workings, further["validate"]) if "validate" in further else None
     except BaseException:
-        outcome.problem.runner.close()
+        found.workings.close()
         raise
-    files = {"record": record, "fmu": fmu, "map": map, "validate": validate}
+    files = {"record": paths[0], "fmu": fmu, "map": map, "validate": validate, "test": test}
     arguments = {name: str(path) for name, path in files.items() if path is not None}
-    result = FmuDiagnosisResult(outcome, arguments, validation=shown, settings=used)
-    weakref.finalize(result, outcome.problem.runner.close)  # child processes end with the result, or at exit
+    result = FmuDiagnosisResult(found, second, time.monotonic() - begun, arguments)
+    weakref.finalize(result, found.workings.close)  # child processes end with the result, or at exit
     return result
 
 

@@ -1,26 +1,26 @@
 """The parameters of any FMU, from a measured record."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestrator.api.any_fmu import Progress, fitted_values
+from orchestrator.api.any_fmu import Progress, parameters_found, read_records
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.shown import Block, Result, table
-from orchestrator.diagnosis.blackbox.calibrate import BoxCalibration
-from orchestrator.diagnosis.blackbox.calibrate import calibrate as calibrating
-from orchestrator.diagnosis.blackbox.mapping import read_map
-from orchestrator.diagnosis.blackbox.rate import decimated, factor_of
-from orchestrator.diagnosis.blackbox.reading import read_data
-from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
-from orchestrator.diagnosis.blackbox.subject import subject_of
-from orchestrator.diagnosis.blackbox.trust import calibration_doubts
+from orchestrator.diagnosis.fmu.calibrate import FmuCalibration, calibrate_fmu
+from orchestrator.diagnosis.fmu.mapping import read_map
+from orchestrator.diagnosis.fmu.subject import subject_of
+from orchestrator.diagnosis.report.json_results import test_found
+from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 from orchestrator.shared.isolation.walls import support
-from orchestrator.shared.results.any_fmu import BoxCalibrationFound, CalibratedOutputFound, LearnedParameterFound
+from orchestrator.shared.results.any_fmu import FmuCalibrationFound, LearnedParameterFound
 from orchestrator.shared.settings import as_tables
-from orchestrator.shared.trust import Trust
+from orchestrator.shared.trust import Level, Reason, Trust, trust_of
+
+MISSING = "something that is no parameter is missing: the values are biased"
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,72 +29,81 @@ class CalibrationResult(Result):
 
     Attributes:
         calibration: values, intervals, what the record does not determine, misfit.
+        seconds: wall time [s].
         arguments: what was asked for.
-        settings: thresholds that were used.
     """
 
     command: ClassVar[str] = "calibrate"
-    calibration: BoxCalibration
+    calibration: FmuCalibration
+    seconds: float
     arguments: Mapping[str, Any] = field(default_factory=dict)
-    settings: BoxSettings = DEFAULT
 
     @property
     def trust(self) -> Trust:
         """How far the result can be trusted."""
-        return calibration_doubts(self.calibration, self.settings.rest)
+        trust = self.calibration.diagnosis.trust
+        if self.calibration.explained:
+            return trust
+        return trust_of([Reason(Level.RED, MISSING), *(Reason(trust.level, text) for text in trust.reasons)])
 
     def blocks(self) -> Sequence[Block]:
         """Return parameters and misfit."""
-        c = self.calibration
+        c, d = self.calibration, self.calibration.diagnosis
         rows = [
-            (e.name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.interval[0]:.6g} to {e.interval[1]:.6g}",
-             f"{100.0 * c.learned[e.name]:.0f} %", e.unit)
-            for e in c.parameters
+            (name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.interval[0]:.6g} to {e.interval[1]:.6g}",
+             f"{100.0 * c.learned[name]:.0f} %", e.unit)
+            for name, e in d.parameters.items()
         ]  # fmt: skip
         head = ("name", "nominal", "value", "95 % interval", "learned", "unit")
         lines: list[Block] = [f"Parameters {'explain' if c.explained else 'do not explain'} the record to its noise"]
         lines.append(table("Parameters", head, rows))
-        lines += [f"Note: {text}" for text in c.warnings]
+        lines += [f"Note: {text}" for text in c.notes]
         trust = self.trust
         lines.append(f"Trust: {trust.level.word}")
         lines += [f"  {reason}" for reason in trust.reasons]
-        found = [(m.output, f"{m.nominal:.3f}", f"{m.refitted:.3f}", f"{m.noise:.3g} {m.unit}") for m in c.misfit]
-        lines.append(table("Misfit over noise, held-out quarter", ("output", "nominal", "calibrated", "noise"), found))
+        cells = [
+            (test.source, one.signal, *(f"{v:.4g}" for v in (one.nominal, one.final, one.noise)), one.unit)
+            for test in d.test
+            for one in test.signals
+        ]
+        lines.append(
+            table("Misfit on test data", ("record", "output", "nominal", "calibrated", "noise", "unit"), cells)
+        )
         return lines
 
-    def results(self, place: Path) -> BoxCalibrationFound:
+    def results(self, place: Path) -> FmuCalibrationFound:
         """Return what goes into ``calibrate.json``."""
         del place
-        c = self.calibration
+        c, d = self.calibration, self.calibration.diagnosis
         parameters = {
             name: LearnedParameterFound(p.nominal, p.value, p.standard_error, p.interval, p.unit, c.learned[name])
-            for name, p in fitted_values(c.parameters).items()
+            for name, p in parameters_found(d).items()
         }
-        return BoxCalibrationFound(
+        return FmuCalibrationFound(
             explained=c.explained,
             trust=self.trust.found(),
             parameters=parameters,
             not_told_apart=c.confounded,
-            misfit={m.output: CalibratedOutputFound(m.nominal, m.refitted, m.noise, m.unit) for m in c.misfit},
-            warnings=c.warnings,
-            settings=as_tables(self.settings),
-            seconds=c.seconds,
+            test=tuple(test_found(test, d.settings.report) for test in d.test),
+            notes=c.notes,
+            settings=as_tables(d.settings),
+            seconds=self.seconds,
             walls=support().in_words,
         )
 
 
 def calibrate(
-    record: Path | str,
+    record: Path | str | Sequence[Path | str],
     fmu: Path | str,
     map: Path | str,  # noqa: A002 - as on the command line
     *,
-    settings: BoxSettings | Path | str | None = None,
+    settings: DiagnosisSettings | Path | str | None = None,
     progress: Progress = lambda what: None,
 ) -> CalibrationResult:
     """Return the parameters of an FMU that explain a record, with intervals.
 
     Args:
-        record: path of the log.
+        record: path of the log, or several of one machine.
         fmu: path of the FMU, or of a scenario of several.
         map: path of the map.
         settings: thresholds, or the path of a TOML file of them.
@@ -109,15 +118,18 @@ def calibrate(
 
     Example:
         >>> fit = oc.calibrate("axis.csv", "axis.fmu", "axis_map.toml")
-        >>> [p.name for p in fit.calibration.parameters], fit.trust.level.word
+        >>> [*fit.calibration.diagnosis.parameters], fit.trust.level.word
         (['J', 'b'], 'red')
     """
-    used = chosen_settings(settings, BoxSettings)
+    begun = time.monotonic()
+    used = chosen_settings(settings, DiagnosisSettings)
     subject = subject_of(Path(fmu))
     if not isinstance(map, (Path, str)):
         raise ScenarioError("`map` must be the path of a TOML file, but is not", "map")
     given = read_map(Path(map), subject)
-    data = read_data(Path(record), given, used.read)
-    data = decimated(data, factor_of(data, used.rate))
-    found = calibrating(subject, given, data, progress, used)
-    return CalibrationResult(found, {"record": str(record), "fmu": str(fmu), "map": str(map)}, used)
+    paths = [record] if isinstance(record, (Path, str)) else list(record)
+    read, _ = read_records(paths, given, used)
+    found = calibrate_fmu(subject, given, read, used, progress)
+    found.diagnosis.workings.close()
+    arguments = {"record": str(paths[0]), "fmu": str(fmu), "map": str(map)}
+    return CalibrationResult(found, time.monotonic() - begun, arguments)

@@ -42,12 +42,15 @@ def diagnose(
 
 @overload
 def diagnose(
-    record: Path | str,
+    record: Path | str | Sequence[Path | str],
     model: Path | str,
     map: Path | str,
     *,
     validate: Path | str | None = None,
+    test: Path | str | None = None,
     settings: DiagnosisSettings | Path | str | None = None,
+    search: bool = True,
+    time_limit: float | None = None,
     progress: Callable[[int, int, str], None] = lambda done, expected, what: None,
 ) -> "FmuDiagnosisResult":
     """Of an FMU of others."""
@@ -107,7 +110,8 @@ def diagnose(
             raise ScenarioError(
                 "`with_law` must be left out with an FMU of others, of which no law is learned", "with_law"
             )
-        return _of_a_box(record, model, map, validate, settings, search, progress)
+        options = {"validate": validate, "test": test, "settings": settings, "search": search, "time_limit": time_limit}
+        return _of_an_fmu(record, model, map, options, progress)
     model = read_model(None) if model is None else model
     chosen = chosen_settings(settings, DiagnosisSettings)
     records = [record] if isinstance(record, (Record, Path, str)) else list(record)
@@ -132,23 +136,22 @@ def diagnose(
     return DiagnosisResult(found, measured, validated, seconds, given, tuple(more), has_law)
 
 
-def _of_a_box(
-    record: Any, fmu: Any, given: Path | str | None, validate: Any, settings: Any, search: bool,
-    progress: Callable[[int, int, str], None],
-) -> "FmuDiagnosisResult":  # fmt: skip
-    """Return what a record says of an FMU, its arguments checked."""
+def _of_an_fmu(
+    record: Any, fmu: Any, given: Path | str | None, options: dict[str, Any], progress: Callable[[int, int, str], None]
+) -> "FmuDiagnosisResult":
+    """Return what records say of an FMU, its arguments checked."""
     if not isinstance(fmu, (Path, str)) or given is None:
         raise ScenarioError("`map` must come with the path of an FMU as `model`, and the path with a `map`", "map")
-    if not isinstance(record, (Path, str)) or not isinstance(validate, (Path, str, type(None))):
-        raise ScenarioError("`record` and `validate` must be paths with an FMU, but are not", "record", "validate")
-    if not search:
-        raise ScenarioError("`search` must be left as it is with an FMU: `calibrate` searches none", "search")
+    records = [record] if isinstance(record, (Path, str)) else list(record) if isinstance(record, Sequence) else [record]
+    others = [options[name] for name in ("validate", "test") if options[name] is not None]
+    if not records or not all(isinstance(path, (Path, str)) for path in (*records, *others)):
+        raise ScenarioError(
+            "`record`, `validate` and `test` must be paths with an FMU, but are not", "record", "validate", "test"
+        )
     from orchestrator.api.any_fmu import diagnose_fmu  # which takes its time to import
 
     done = itertools.count()
-    return diagnose_fmu(
-        record, fmu, given, validate=validate, settings=settings, progress=lambda what: progress(next(done), 0, what)
-    )
+    return diagnose_fmu(records, fmu, given, progress=lambda what: progress(next(done), 0, what), **options)
 
 
 def comparable_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:

@@ -187,7 +187,7 @@ class DiagnosisResult(Result):
             learned_law=law_found(found.learned_law, self.law_run, self.test[0].signals[0].unit),
             model=str(place / self.fmu_name),
             cosimulation=DifferenceFound(self.runs.difference, "rad"),
-            validation=None if self.validation is None else test_found(self.validation, self.diagnosis),
+            validation=None if self.validation is None else test_found(self.validation, self.diagnosis.settings.report),
             live=corrected_live(self.diagnosis, self.runs),
             seconds=self.seconds,
         )

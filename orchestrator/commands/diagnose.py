@@ -109,24 +109,17 @@ def _any_fmu(args: argparse.Namespace) -> int:
     """Diagnose an FMU that is not ours, or several, or draft the map."""
     from orchestrator.api.any_fmu import FmuDiagnosisResult, draft_map
 
-    if len(args.records) > 1:
-        raise ScenarioError("`records` must be one with an FMU of others", "records")
-    (path,) = args.records
     if args.scenario is not None and (args.fmu is not None or args.scenario.suffix.lower() != ".toml"):
         raise ScenarioError("`scenario` must be a TOML file, without `fmu`, but is not", "scenario", "fmu")
     fmu = args.fmu if args.scenario is None else args.scenario
-    for name in ("model", "test", "time_limit", "part", "resample", "rate", "header"):
+    for name in ("model", "part", "resample", "rate", "header"):
         if getattr(args, name) is not None:
             raise ScenarioError(f"`{name}` must be left out with an FMU of others", name)
-    if args.no_search:
-        raise ScenarioError(
-            "`no_search` must be left out with an FMU of others: `calibrate` searches none", "no_search"
-        )
     if args.with_law:
         raise ScenarioError("`with_law` must be left out with an FMU of others, of which no law is learned", "with_law")
     note_missing_walls()
     if args.draft_map:
-        text = draft_map(path, fmu)
+        text = draft_map(args.records[0], fmu)
         with staged(args.out) as folder:
             (folder / "map.toml").write_text(text, encoding="utf-8")
         print_blocks([f"Written to {args.out / 'map.toml'}: look it over, and give it with --map"])
@@ -135,8 +128,8 @@ def _any_fmu(args: argparse.Namespace) -> int:
         raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
     with staged(args.out, FmuDiagnosisResult.replaces) as folder:
         found = diagnose(
-            path, fmu, args.map, validate=args.validate, settings=args.settings,
-            progress=lambda done, expected, what: say(what),
+            args.records, fmu, args.map, validate=args.validate, test=args.test, settings=args.settings,
+            search=not args.no_search, time_limit=args.time_limit, progress=lambda done, expected, what: say(what),
         )  # fmt: skip
         try:
             found.write(folder, args.out)

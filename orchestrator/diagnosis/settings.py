@@ -5,6 +5,7 @@
 
 from typing import Annotated
 
+from orchestrator.diagnosis.fmu_settings import FmuSettings
 from orchestrator.shared.settings import Settings, note, setting, share
 
 
@@ -127,3 +128,4 @@ class DiagnosisSettings(Settings, frozen=True):
     selection: SelectionSettings = SelectionSettings()
     grades: GradeSettings = GradeSettings()
     report: ReportSettings = ReportSettings()
+    fmu: FmuSettings = FmuSettings()

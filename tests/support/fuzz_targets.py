@@ -16,8 +16,8 @@ import numpy as np
 
 from orchestrator.api.ssp import export_ssp
 from orchestrator.checking.check import CheckOptions, check_fmu
-from orchestrator.diagnosis.blackbox.mapping import read_map
-from orchestrator.diagnosis.blackbox.subject import subject_of
+from orchestrator.diagnosis.fmu.mapping import read_map
+from orchestrator.diagnosis.fmu.subject import subject_of
 from orchestrator.errors import OrchestratorError
 from orchestrator.fmi.model_description import read_description
 from orchestrator.records.model_file import read_model

@@ -9,7 +9,6 @@ from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu
 from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.result import FmuDiagnosis
-from orchestrator.diagnosis.fmu.settings import FmuSettings
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.diagnosis.report.estimates import value_covariance
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -44,7 +43,6 @@ def calibrate_fmu(
     given: Map,
     records: Sequence[Data],
     settings: DiagnosisSettings,
-    fmu_settings: FmuSettings | None = None,
     progress: Callable[[str], None] = lambda what: None,
 ) -> FmuCalibration:
     """Return the parameters of an FMU, or of several, that explain records.
@@ -53,8 +51,7 @@ def calibrate_fmu(
         subject: the FMU, or several.
         given: the map.
         records: of one machine.
-        settings: thresholds of the analysis.
-        fmu_settings: those of what runs the FMU.
+        settings: thresholds.
         progress: called with what is being done.
 
     Returns:
@@ -67,7 +64,7 @@ def calibrate_fmu(
     """
     if not given.uncertain:
         raise ScenarioError(f"{given.source}: $.parameters must give an uncertainty to at least one, but gives none")
-    found = diagnose_fmu(subject, given, records, settings, fmu_settings, search=False, progress=progress)
+    found = diagnose_fmu(subject, given, records, settings, search=False, progress=progress)
     problem, fitted = found.workings.search.problem, found.workings.search.final
     covariance = value_covariance(problem, fitted)
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))

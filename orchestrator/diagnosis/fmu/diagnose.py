@@ -18,7 +18,6 @@ from orchestrator.diagnosis.fmu.problem import BoxProblem
 from orchestrator.diagnosis.fmu.remaining_arguments import port_arguments
 from orchestrator.diagnosis.fmu.residual_model import FmuResiduals
 from orchestrator.diagnosis.fmu.result import FmuDiagnosis, FmuWorkings
-from orchestrator.diagnosis.fmu.settings import FmuSettings
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.diagnosis.fmu.units import effect_units, named_values
 from orchestrator.diagnosis.inference.fitting import fit_model
@@ -48,7 +47,6 @@ def diagnose_fmu(
     given: Map,
     records: Sequence[Data],
     settings: DiagnosisSettings = DEFAULT_SETTINGS,
-    fmu_settings: FmuSettings | None = None,
     *,
     test: Data | None = None,
     search: bool = True,
@@ -62,8 +60,7 @@ def diagnose_fmu(
         subject: the FMU, or several.
         given: the map.
         records: at one sample time.
-        settings: every threshold of the analysis.
-        fmu_settings: those of what runs the FMU.
+        settings: every threshold.
         test: a record that is test data as a whole; None: the last rows of each record are.
         search: False: parameters are re-fitted and the model is judged as it stands.
         time_limit: seconds after which the search ends with what it has; None: the map's budget.
@@ -80,7 +77,7 @@ def diagnose_fmu(
     until = time.monotonic() + (given.options.budget if time_limit is None else time_limit)
     fitted, test_data = split_records(tuple(records), settings.test_share, test)
     progress("probing")
-    problems, probe = prepare_problems(subject, given, fitted, workers, progress, fmu_settings or FmuSettings())
+    problems, probe = prepare_problems(subject, given, fitted, workers, progress, settings.fmu)
     try:
         with np.errstate(all="ignore"):
             problem = problem_of(problems, settings)

@@ -10,6 +10,9 @@ from orchestrator.diagnosis.fmu.bank import REMEMBERS, BoxEffect
 from orchestrator.diagnosis.model.interface import CandidateEffect, Values, WaveScan
 
 Array = NDArray[np.float64]
+COMBS = 4
+"""Combs that look for a quantum, one within the other."""
+
 AT_REST = "at_rest"
 """Name of a value that is not fitted: 1 where a signal was zero before the record, 0 where it had its first value."""
 
@@ -104,6 +107,7 @@ def _candidate(
         starts=tuple((*start, *flag) for start in starts for flag in flags), amplitudes=amplitudes,
         fitted=tuple(range(count)), sizes=amplitudes or (0,),
         lower=(*(kind.lower or (-np.inf,) * count), *((0.0,) if remembers else ())), positive=positive, wave=wave,
+        comb=COMBS if SORTS[kind.name] == "resolution" else 0,
         contains=(simpler,) if simpler else (), excludes=excludes,
     )  # fmt: skip
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.clock import compared_later
+from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.problem import BoxProblem
 from orchestrator.diagnosis.fmu.result import FmuWorkings
 from orchestrator.diagnosis.inference.fitting import fit_model
@@ -46,12 +47,48 @@ def misfit_on_test_data(workings: FmuWorkings) -> tuple[TestMisfit, ...]:
     points = (search.problem.start, search.base.point, search.final.point)
     for number, (problem, first) in enumerate(test_problems(workings)):
         stages = [_misses(workings, point, problem, first, number) for point in points]
-        signals = tuple(
-            SignalMisfit(name, problem.units.get(name, ""), float(problem.noise[k]), *(float(one[k]) for one in stages))
-            for k, name in enumerate(problem.outputs)
-        )
-        found.append(TestMisfit(problem.data.source, problem.n - first, signals))
+        found.append(_misfit(problem, first, stages))
     return tuple(found)
+
+
+def _misfit(problem: BoxProblem, first: int, stages: Sequence[Array]) -> TestMisfit:
+    signals = tuple(
+        SignalMisfit(name, problem.units.get(name, ""), float(problem.noise[k]), *(float(one[k]) for one in stages))
+        for k, name in enumerate(problem.outputs)
+    )
+    return TestMisfit(problem.data.source, problem.n - first, signals)
+
+
+def misfit_on_record(workings: FmuWorkings, data: Data) -> TestMisfit:
+    """Return the misfit of the three models on another record, to which nothing was fitted.
+
+    Args:
+        workings: of the diagnosis.
+        data: the record.
+
+    Returns:
+        The misfit; nan where a run failed.
+    """
+    problem, search = replace(workings.problem, data=compared_later(data, workings.problem.late)), workings.search
+    points = (search.problem.start, search.base.point, search.final.point)
+    return _misfit(problem, 0, [_misses(workings, point, problem, 0, 0) for point in points])
+
+
+def stage_runs(workings: FmuWorkings) -> tuple[BoxProblem, dict[str, Array], int]:
+    """Return the runs of the three models over the first record as a whole, for figures.
+
+    Args:
+        workings: of the diagnosis.
+
+    Returns:
+        FMU and record, outputs (n, outputs) by the model's name, and the first row of the test part.
+    """
+    first = next(((problem, row) for problem, row in test_problems(workings) if row > 0), None)
+    problem, row = (workings.problem, workings.problem.n) if first is None else first
+    models = {"nominal": workings.nominal, "refitted": workings.base, "corrected": workings.final}
+    runs = problem.simulate(list(models.values()))
+    empty = np.full(problem.data.outputs.shape, np.nan)
+    return problem, {name: empty if y is None else y for name, y in zip(models, runs, strict=True)}, row
 
 
 def motion_shares(workings: FmuWorkings, test: Sequence[TestMisfit], labels: Sequence[str]) -> dict[str, float]:

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.model import Data
-from orchestrator.diagnosis.fmu.probe_settings import ProbeSettings
 from orchestrator.diagnosis.fmu.problem import BoxProblem
+from orchestrator.diagnosis.fmu_probe_settings import ProbeSettings
 
 Array = NDArray[np.float64]
 

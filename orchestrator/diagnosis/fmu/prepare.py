@@ -10,8 +10,8 @@ from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.noise import begins_elsewhere, lone_rows, noise_of
 from orchestrator.diagnosis.fmu.probing import Probe, opened, reduced
 from orchestrator.diagnosis.fmu.problem import BoxProblem
-from orchestrator.diagnosis.fmu.settings import DEFAULT, FmuSettings
 from orchestrator.diagnosis.fmu.subject import Subject
+from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings
 
 Progress = Callable[[str], None]
 

@@ -13,9 +13,9 @@ from orchestrator.diagnosis.fmu.model import BoxModel, Data
 from orchestrator.diagnosis.fmu.noise import noise_of
 from orchestrator.diagnosis.fmu.problem import BoxProblem, series_of
 from orchestrator.diagnosis.fmu.runner import Plan, Runner
-from orchestrator.diagnosis.fmu.settings import DEFAULT, FmuSettings
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.diagnosis.fmu.wire import Through
+from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings
 from orchestrator.errors import FmuError
 
 Array = NDArray[np.float64]

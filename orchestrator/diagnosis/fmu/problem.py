@@ -12,8 +12,8 @@ from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.model import BoxModel, Data
 from orchestrator.diagnosis.fmu.passed import at_input, at_output
 from orchestrator.diagnosis.fmu.runner import Plan, Runner
-from orchestrator.diagnosis.fmu.settings import DEFAULT, FmuSettings
 from orchestrator.diagnosis.fmu.wire import Feedback, Guide
+from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings
 from orchestrator.errors import SlaveError
 from pyfmu_sources.port_laws import COMPLIANCE
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.model import Data
-from orchestrator.diagnosis.fmu.settings import DEFAULT, RateSettings
+from orchestrator.diagnosis.fmu_settings import DEFAULT, RateSettings
 from orchestrator.shared.inference.decimation import content_band
 from orchestrator.shared.inference.noise import residual_noise
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.model import Data
-from orchestrator.diagnosis.fmu.settings import DEFAULT, ReadSettings
+from orchestrator.diagnosis.fmu_settings import DEFAULT, ReadSettings
 from orchestrator.errors import RecordError
 
 Array = NDArray[np.float64]

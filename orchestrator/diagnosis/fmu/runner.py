@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.fmu.settings import DEFAULT, ProcessSettings
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.diagnosis.fmu.wire import Batch, Feedback, Guide, Job, Load, Through, Wire
+from orchestrator.diagnosis.fmu_settings import DEFAULT, ProcessSettings
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack

@@ -72,6 +72,8 @@ class CandidateEffect:
         positive: places of amplitudes that must be positive.
         prior: place -> (mean, standard deviation).
         wave: how its cycles are looked for; None: it repeats with nothing.
+        comb: times that its best start is looked for anew between the neighbours, each time more finely: an effect that
+            acts in steps has so many minima that no derivative leads to its value.
         contains: labels of simpler effects that it stands for, which leave a model that it enters.
         excludes: labels that it is not tried beside.
         takes_drive: it takes torque away from the drive.
@@ -91,6 +93,7 @@ class CandidateEffect:
     positive: tuple[int, ...] = ()
     prior: Mapping[int, tuple[float, float]] = field(default_factory=dict)
     wave: WaveScan | None = None
+    comb: int = 0
     contains: tuple[str, ...] = ()
     excludes: tuple[str, ...] = ()
     takes_drive: bool = False

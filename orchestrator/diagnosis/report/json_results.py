@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from orchestrator.diagnosis.report.summary import play_of, summarise
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit, ValueEstimate
 from orchestrator.diagnosis.selection.remaining import Dependence
+from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.settings import ReportSettings
 from orchestrator.shared.results.diagnose import (
     AnalysisFound,
     DependenceFound,
@@ -37,45 +39,54 @@ def diagnosis_found(diagnosis: Diagnosis) -> DiagnoseFound:
     play, law = play_of(diagnosis), diagnosis.law
     return DiagnoseFound(
         verdict=diagnosis.verdict,
-        effects=tuple(_effect(effect) for effect in diagnosis.effects),
+        effects=tuple(effect_found(effect) for effect in diagnosis.effects),
         play=None if play is None else play.found(),
         nuisances=tuple(NuisanceFound(n.name, n.grade.word, _values(n.parameters)) for n in diagnosis.nuisances),
         parameters={
             name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
             for name, one in diagnosis.parameters.items()
         },
-        test=tuple(test_found(test, diagnosis) for test in diagnosis.test),
-        remaining=RemainingFound(dict(diagnosis.left), tuple(_dependence(one) for one in diagnosis.remaining)),
+        test=tuple(test_found(test, diagnosis.settings.report) for test in diagnosis.test),
+        remaining=RemainingFound(dict(diagnosis.left), tuple(dependence_found(one) for one in diagnosis.remaining)),
         learned_law=None if law is None else _law(law),
         analysis=_analysis(diagnosis),
         trust=diagnosis.trust.found(),
         notes=diagnosis.notes,
         settings=as_tables(diagnosis.settings),
-        candidates=tuple(
-            StepFound(
-                step.before.labels,
-                step.taken,
-                tuple(
-                    TriedFound(one.label, _finite(one.comparison.gain), _finite(one.comparison.t)) for one in step.tried
-                ),
-            )
-            for step in diagnosis.workings.search.steps
-        ),
+        candidates=steps_found(diagnosis.workings.search),
         summary=tuple(summarise(diagnosis)),
     )
 
 
-def test_found(test: TestMisfit, diagnosis: Diagnosis) -> TestFound:
+def steps_found(search: SearchResult) -> tuple[StepFound, ...]:
+    """Return the steps of a search as results have them.
+
+    Args:
+        search: that was made.
+
+    Returns:
+        The steps.
+    """
+    return tuple(
+        StepFound(
+            step.before.labels,
+            step.taken,
+            tuple(TriedFound(one.label, _finite(one.comparison.gain), _finite(one.comparison.t)) for one in step.tried),
+        )
+        for step in search.steps
+    )
+
+
+def test_found(test: TestMisfit, report: ReportSettings) -> TestFound:
     """Return how the models do on test data of one record.
 
     Args:
         test: misfits.
-        diagnosis: whose settings say what is worse.
+        report: settings that say what is worse.
 
     Returns:
         The results.
     """
-    report = diagnosis.settings.report
     misfit = {
         one.signal: SignalMisfitFound(
             _finite(one.nominal), _finite(one.parameters), _finite(one.final), _finite(one.noise), one.unit
@@ -88,7 +99,15 @@ def test_found(test: TestMisfit, diagnosis: Diagnosis) -> TestFound:
     return TestFound(test.source, test.rows, misfit, test.is_worse(report.worse, report.of_noise), r_squared, left)
 
 
-def _effect(effect: GradedEffect) -> EffectFound:
+def effect_found(effect: GradedEffect) -> EffectFound:
+    """Return a graded effect as results have it.
+
+    Args:
+        effect: that was found.
+
+    Returns:
+        The result.
+    """
     evidence = effect.evidence
     return EffectFound(
         effect.name, effect.site, effect.grade.word, _values(effect.parameters),
@@ -107,7 +126,15 @@ def _values(parameters: Mapping[str, ValueEstimate]) -> dict[str, ValueFound]:
     }
 
 
-def _dependence(one: Dependence) -> DependenceFound:
+def dependence_found(one: Dependence) -> DependenceFound:
+    """Return what is left and follows a signal as results have it.
+
+    Args:
+        one: the dependence.
+
+    Returns:
+        The result.
+    """
     comparison = one.comparison
     return DependenceFound(
         one.site, one.argument, _finite(one.share), _finite(comparison.gain), _finite(comparison.t), one.formula

@@ -154,7 +154,7 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
     play = play_of(found)
     if effect.name == "backlash" and play is not None:
         yield f"    {play}"
-    yield f"    How sure: {CERTAINTY[effect.grade]}; {_reasons(effect)}"
+    yield f"    How sure: {CERTAINTY[effect.grade]}; {grade_reasons(effect)}"
     shares = [f"{100.0 * max(effect.evidence.share, 0.0):.0f} % of the missing torque"]
     if effect.motion_share == effect.motion_share:
         shares.append(f"{100.0 * max(effect.motion_share, 0.0):.0f} % of the motion's misfit on test data")
@@ -163,7 +163,15 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
         yield f"    In the motion: {MOTION[effect.name]}"
 
 
-def _reasons(effect: GradedEffect) -> str:
+def grade_reasons(effect: GradedEffect) -> str:
+    """Return why an effect is as sure as it is, as part of a sentence.
+
+    Args:
+        effect: that was found.
+
+    Returns:
+        The words.
+    """
     evidence = effect.evidence
     text = f"on data left out it takes {100.0 * evidence.gain:.0f} % of the error, "
     text += f"{evidence.t:.1f} times its uncertainty"

@@ -12,6 +12,7 @@ from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, 
 from orchestrator.diagnosis.settings import SelectionSettings
 
 Array = NDArray[np.float64]
+TEETH = 15  # values of a comb
 WHOLE = 0.25  # of an effect tried as it is: below this share of it in the fit, its gain counts by that share
 
 
@@ -58,7 +59,26 @@ class Screening:
             found = self._gain(effect, values, columns)
             if found is not None and (effect.label not in best or found.gain > best[effect.label].gain):
                 best[effect.label] = found
-        return sorted(best.values(), key=lambda one: -one.gain)
+        combed = [self._combed(effect, best[effect.label]) for effect in effects if effect.label in best]
+        return sorted(combed, key=lambda one: -one.gain)
+
+    def _combed(self, effect: CandidateEffect, best: ScreenedEffect) -> ScreenedEffect:
+        """Return the best start of an effect between the neighbours of one, where its residuals have many minima."""
+        if not effect.comb:
+            return best
+        place = effect.fitted[0]
+        grid = sorted({start[place] for start in effect.starts})
+        at = grid.index(best.values[place])
+        low, high = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
+        for _ in range(effect.comb):
+            teeth = np.linspace(low, high, TEETH)
+            trials = [(effect, (*best.values[:place], float(n), *best.values[place + 1 :])) for n in teeth]
+            pairs = zip(trials, self._changes(trials), strict=True)
+            gains = [self._gain(effect, values, columns) for (_, values), columns in pairs]
+            best = max([best, *(one for one in gains if one is not None)], key=lambda one: one.gain)
+            width = 1.5 * (high - low) / (TEETH - 1)
+            low, high = max(best.values[place] - width, low), min(best.values[place] + width, high)
+        return best
 
     def _starts(self, effect: CandidateEffect) -> Sequence[Values]:
         if effect.wave is None:

@@ -225,7 +225,7 @@ class _Search:
                 rising.append((found[0].comparison.gain, own, found))
         if not rising:
             return None
-        gain, own, leading = max(rising, key=lambda one: one[0])
+        gain, own, leading = max(rising, key=lambda entry: entry[0])
         others = [one for one in tried[: self.settings.look_ahead] if one.label != leading[0].label]
         for _ in range(self.settings.most_effects):
             quieter, fitted = settle(own, leading[0].fitted)

@@ -9,7 +9,7 @@ from orchestrator.reporting.pages.generic import sections_of
 from orchestrator.reporting.source import ResultDocument, table_of, words
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
-from orchestrator.shared.results.any_fmu import BoxDiagnosisFound, DeliveredFound, LeftFound
+from orchestrator.shared.results.any_fmu import DeliveredFound, FmuDiagnosisFound, FmuRemainingFound
 from orchestrator.shared.results.diagnose import EffectFound
 
 VERDICTS: Mapping[str, tuple[Badge, str]] = {
@@ -18,7 +18,7 @@ VERDICTS: Mapping[str, tuple[Badge, str]] = {
     "effects": ("neutral", "effects are missing"),
     "unknown": ("bad", "unexplained"),
 }
-KNOWN = frozenset(BoxDiagnosisFound.__struct_fields__)
+KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
 
 
 def build(source: ResultDocument) -> Report:
@@ -33,15 +33,13 @@ def build(source: ResultDocument) -> Report:
     Raises:
         ValueError: the results are not those of `diagnose` for any FMU.
     """
-    found = read(source.results, BoxDiagnosisFound)
+    found = read(source.results, FmuDiagnosisFound)
     badge, label = VERDICTS.get(found.verdict, ("neutral", found.verdict))
-    said = found.statement or label  # files of older versions have none
-    sentence = f"{said[:1].upper()}{said[1:]}."
-    names = ", ".join(f"{words(e.name)} at {e.site}" for e in found.effects)
+    sentence = found.summary[0].partition(". ")[2] if found.summary else f"{label[:1].upper()}{label[1:]}."
     made = (("walls", found.walls), ("runs of the FMU", found.runs), ("time taken [s]", found.seconds))
     return Report(
         title="Diagnosis of an FMU",
-        summary=f"{sentence} It lacks {names}." if names else sentence,
+        summary=sentence,
         badge=trust_badge(found.trust, label, badge),
         sections=(
             *trust_section(found.trust),
@@ -55,15 +53,13 @@ def build(source: ResultDocument) -> Report:
     )
 
 
-def _said(found: BoxDiagnosisFound) -> list[Section]:
-    """Return the effects, the suspects, and what is said in sentences."""
+def _said(found: FmuDiagnosisFound) -> list[Section]:
+    """Return the effects, and what is said in sentences."""
     sections: list[Section] = []
     if found.effects:
         sections.append(table_of("What is missing", [row for effect in found.effects for row in _rows(effect)]))
-    if found.suspects:
-        sections.append(Text("Nearest, and not it", found.suspects))
     reasons = () if found.trust is None else found.trust.reasons
-    for title, texts in (("Where", found.where), ("Take note", found.warnings)):
+    for title, texts in (("In words", found.summary[1:]), ("Take note", found.notes)):
         lines = tuple(text for text in texts if text not in reasons)
         if lines:
             sections.append(Text(title, lines))
@@ -75,6 +71,7 @@ def _rows(effect: EffectFound) -> list[dict[str, object]]:
         {
             "effect": words(effect.name),
             "at": effect.site,
+            "grade": effect.grade,
             "parameter": name,
             "value": value.value,
             "95 % interval": "" if value.interval is None else "{:.6g} to {:.6g}".format(*value.interval),
@@ -85,43 +82,52 @@ def _rows(effect: EffectFound) -> list[dict[str, object]]:
     ]
 
 
-def _misfit(found: BoxDiagnosisFound, source: ResultDocument) -> list[Section]:
+def _misfit(found: FmuDiagnosisFound, source: ResultDocument) -> list[Section]:
     """Return the misfit as a table and as a picture."""
-    rows = [{"output": name, **msgspec.structs.asdict(values)} for name, values in found.misfit.items()]
-    sections: list[Section] = [table_of("Misfit over noise on the held-out quarter", rows)]
+    rows = [
+        {"record": test.source, "output": name, **msgspec.structs.asdict(values)}
+        for test in (*found.test, *([found.validation] if found.validation else []))
+        for name, values in test.misfit.items()
+    ]
+    sections: list[Section] = [table_of("Misfit of runs on data that nothing was fitted to", rows)] if rows else []
     picture = source.directory / "diagnose_signals.png"
     if picture.is_file():
-        sections.append(Picture("Measured and simulated", picture, "Shaded: the held-out quarter."))
+        sections.append(Picture("Measured and simulated", picture, "Shaded: test data."))
     return sections
 
 
-def _searched(found: BoxDiagnosisFound) -> list[Section]:
+def _searched(found: FmuDiagnosisFound) -> list[Section]:
     """Return parameters, candidates, what is left, and the corrected system."""
     sections: list[Section] = []
     parameters = [{"parameter": name, **msgspec.structs.asdict(p)} for name, p in found.parameters.items()]
     if parameters:
         sections.append(table_of("Parameters", parameters))
     tried = [
-        {"on top of": ", ".join(step.on_top_of) or "parameters", "effect": c.effect, "gain": c.gain}
+        {
+            "on top of": ", ".join(step.on_top_of) or "parameters",
+            "effect": c.effect,
+            "gain": c.gain,
+            "over its error": c.t,
+        }
         for step in found.candidates
         for c in step.tried[:5]
     ]
     if tried:
         sections.append(table_of("Candidates", tried))
-    return [*sections, *_left(found.remainder), *_delivered(found.delivery)]
+    return [*sections, *_left(found.remaining), *_delivered(found.delivery)]
 
 
-def _left(remainder: LeftFound | None) -> list[Section]:
-    """Return what the final model leaves, in the words of the statement above it."""
-    if remainder is None:
-        return []
-    if remainder.explained:
-        return [Facts("What is left", (("kind", "measurement noise"),))]
-    if remainder.disturbance:
-        share = ("disturbance, share of the drive [%]", 100.0 * remainder.disturbance)
-        return [Facts("What is left", (("kind", "measurement noise and a disturbance"), share))]
-    why: list[tuple[str, Cell]] = [("why", "; ".join(remainder.reasons))] if remainder.reasons else []
-    return [Facts("What is left", (("kind", "more than noise"), *why))]
+def _left(remaining: FmuRemainingFound) -> list[Section]:
+    """Return what the final model leaves of each output, and what that follows."""
+    facts: list[tuple[str, Cell]] = [
+        (f"share of the power of {name} [%]", None if share is None else 100.0 * share)
+        for name, share in remaining.outputs.items()
+    ]
+    facts += [
+        (f"follows the {one.argument} [%]", None if one.share is None else 100.0 * one.share)
+        for one in remaining.follows
+    ]
+    return [Facts("What is left", tuple(facts))] if facts else []
 
 
 def _delivered(files: tuple[DeliveredFound, ...]) -> list[Section]:

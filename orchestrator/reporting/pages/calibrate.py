@@ -4,7 +4,7 @@ from orchestrator.reporting.model import Report, ReportTable, Section, TableColu
 from orchestrator.reporting.source import ResultDocument
 from orchestrator.reporting.trust import trust_badge, trust_section
 from orchestrator.shared.results import read
-from orchestrator.shared.results.any_fmu import BoxCalibrationFound
+from orchestrator.shared.results.any_fmu import FmuCalibrationFound
 
 
 def build(source: ResultDocument) -> Report:
@@ -19,7 +19,7 @@ def build(source: ResultDocument) -> Report:
     Raises:
         ValueError: the results are not those of `calibrate`.
     """
-    found = read(source.results, BoxCalibrationFound)
+    found = read(source.results, FmuCalibrationFound)
     label = "the parameters explain the record"
     summary = "With these parameters the FMU explains the record to its noise."
     if not found.explained:
@@ -27,7 +27,7 @@ def build(source: ResultDocument) -> Report:
         summary = "No parameters make the FMU explain the record: something else is missing, so the values are biased."
     sections: list[Section] = trust_section(found.trust)
     reasons = () if found.trust is None else found.trust.reasons
-    notes = tuple(f"{text[:1].upper()}{text[1:]}." for text in found.warnings if text not in reasons)
+    notes = tuple(f"{text[:1].upper()}{text[1:]}." for text in found.notes if text not in reasons)
     if notes:
         sections.append(Text("Take note", notes))
     sections += [_parameters(found), _misfit(found)]
@@ -36,7 +36,7 @@ def build(source: ResultDocument) -> Report:
     return Report("Calibration of an FMU", summary, tuple(sections), badge, origin, source.downloads())
 
 
-def _parameters(found: BoxCalibrationFound) -> ReportTable:
+def _parameters(found: FmuCalibrationFound) -> ReportTable:
     columns = (
         TableColumn("parameter"),
         TableColumn("nominal", "", 6),
@@ -63,8 +63,12 @@ def _parameters(found: BoxCalibrationFound) -> ReportTable:
     return ReportTable("Parameters", columns, rows, note)
 
 
-def _misfit(found: BoxCalibrationFound) -> ReportTable:
-    columns = tuple(TableColumn(head) for head in ("output", "nominal", "calibrated", "noise", "unit"))
-    rows = tuple((name, m.nominal, m.calibrated, m.noise, m.unit) for name, m in found.misfit.items())
-    note = "Nominal and calibrated: root mean square of the residual over the noise, on the held-out quarter."
-    return ReportTable("Misfit over noise", columns, rows, note)
+def _misfit(found: FmuCalibrationFound) -> ReportTable:
+    columns = tuple(TableColumn(head) for head in ("record", "output", "nominal", "calibrated", "noise", "unit"))
+    rows = tuple(
+        (test.source, name, m.nominal, m.final, m.noise, m.unit)
+        for test in found.test
+        for name, m in test.misfit.items()
+    )
+    note = "Nominal and calibrated: root mean square that runs miss on test data, to which nothing was fitted."
+    return ReportTable("Misfit on test data", columns, rows, note)

@@ -5,44 +5,14 @@ from typing import Any, Literal
 import msgspec
 
 from orchestrator.shared.results import Found, TrustFound
-from orchestrator.shared.results.diagnose import EffectFound, ParameterFound
+from orchestrator.shared.results.diagnose import DependenceFound, EffectFound, ParameterFound, StepFound, TestFound
 
 
-class OutputFound(msgspec.Struct, frozen=True):
-    """Rms of simulated minus measured of one output over its noise, of each model; ``noise`` in ``unit``."""
+class FmuRemainingFound(msgspec.Struct, frozen=True):
+    """What no effect explains: the share of each output's power that is left, noise included, and what it follows."""
 
-    nominal: float | None
-    refitted: float | None
-    corrected: float | None
-    noise: float | None
-    unit: str = ""
-
-
-class BoxTriedFound(msgspec.Struct, frozen=True):
-    """A candidate: its effect, values, gain in log-likelihood, that on the deciding part, and fitted numbers."""
-
-    effect: str
-    gain: float | None
-    values: tuple[float | None, ...] = ()
-    decided: float | None = None
-    parameters: int | None = None
-
-
-class BoxStepFound(msgspec.Struct, frozen=True):
-    """A step of the search: the effects before it, whether one was taken, and all that were tried, the best first."""
-
-    on_top_of: tuple[str, ...]
-    accepted: bool
-    tried: tuple[BoxTriedFound, ...]
-
-
-class LeftFound(msgspec.Struct, frozen=True):
-    """What the final model leaves: noise alone or not, a disturbance's share of the drive, why, power by part."""
-
-    explained: bool
-    disturbance: float | None = None
-    reasons: tuple[str, ...] = ()
-    power: tuple[tuple[float | None, ...], ...] = ()
+    outputs: dict[str, float | None] = {}
+    follows: tuple[DependenceFound, ...] = ()
 
 
 class PartFound(msgspec.Struct, frozen=True):
@@ -62,55 +32,46 @@ class DeliveredFound(msgspec.Struct, frozen=True):
     note: str = ""
 
 
-class BoxDiagnosisFound(Found, frozen=True, kw_only=True):
-    """``diagnose`` of any FMU: verdict, effects, misfit, what was delivered, and how it was found."""
+class FmuDiagnosisFound(Found, frozen=True, kw_only=True):
+    """``diagnose`` of any FMU: graded effects, misfit on test data, what was delivered, and how it was found."""
 
+    schema_version: int = 3
     kind: Literal["fmu"] = "fmu"
     verdict: str
-    statement: str = ""
     trust: TrustFound | None = None
     effects: tuple[EffectFound, ...] = ()
-    suspects: tuple[str, ...] = ()
     parameters: dict[str, ParameterFound] = msgspec.field(default_factory=dict)
-    misfit: dict[str, OutputFound] = msgspec.field(default_factory=dict)
-    validation: dict[str, OutputFound] = msgspec.field(default_factory=dict)
-    remainder: LeftFound | None = None
-    where: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    test: tuple[TestFound, ...] = ()
+    validation: TestFound | None = None
+    remaining: FmuRemainingFound = FmuRemainingFound()
+    notes: tuple[str, ...] = ()
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
-    candidates: tuple[BoxStepFound, ...] = ()
+    candidates: tuple[StepFound, ...] = ()
     model: str | None = None
     delivery: tuple[DeliveredFound, ...] = ()
     step_cost: float | None = None
     walls: str = ""
     runs: int | None = None
+    summary: tuple[str, ...] = ()
     seconds: float | None = None
 
 
 class LearnedParameterFound(ParameterFound, frozen=True):
-    """A calibrated parameter; ``learned`` is the share of its stated uncertainty that the record removes."""
+    """A calibrated parameter; ``learned`` is the share of its stated uncertainty that the records remove."""
 
     learned: float | None = None
 
 
-class CalibratedOutputFound(msgspec.Struct, frozen=True):
-    """Rms of simulated minus measured of one output over its noise, before and after; ``noise`` in ``unit``."""
+class FmuCalibrationFound(Found, frozen=True, kw_only=True):
+    """``calibrate``: parameters, what the records do not tell apart, and the misfit on test data."""
 
-    nominal: float | None
-    calibrated: float | None
-    noise: float | None
-    unit: str = ""
-
-
-class BoxCalibrationFound(Found, frozen=True, kw_only=True):
-    """``calibrate``: parameters, what the record does not tell apart, and the misfit."""
-
+    schema_version: int = 3
     explained: bool
     trust: TrustFound | None = None
     parameters: dict[str, LearnedParameterFound] = msgspec.field(default_factory=dict)
     not_told_apart: tuple[tuple[str, str], ...] = ()
-    misfit: dict[str, CalibratedOutputFound] = msgspec.field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    test: tuple[TestFound, ...] = ()
+    notes: tuple[str, ...] = ()
     settings: dict[str, Any] = msgspec.field(default_factory=dict)
     seconds: float | None = None
     walls: str = ""

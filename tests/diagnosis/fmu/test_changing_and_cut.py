@@ -41,16 +41,16 @@ def test_a_stiffness_that_follows_a_temperature_is_named(tmp_path):
     found = oc.diagnose(*changing(tmp_path, slope=0.2))
     found.close()
     (effect,) = found.effects
-    assert effect.effect.label == "parameter_dependence@k(T)"
-    assert effect.estimates[0].value == pytest.approx(0.2, rel=0.02)
-    assert effect.estimates[0].unit == "N/m/T"
+    assert effect.label == "parameter_dependence@k(T)"
+    assert effect.parameters["slope"].value == pytest.approx(0.2, rel=0.02)
+    assert effect.parameters["slope"].unit == "N/m/T"
 
 
 def test_a_parameter_that_is_read_once_is_not_looked_at_for_drift(tmp_path):
     found = oc.diagnose(*changing(tmp_path, fault="read_once", rate=0.5))
     found.close()
     assert not any(f.name == "parameter_drift" for f in found.effects)
-    assert any("does not change within a run" in note for note in found.outcome.warnings)
+    assert any("does not change within a run" in note for note in found.notes)
 
 
 def test_what_made_up_for_coarse_steps_is_not_named_beside_a_gap(tmp_path):
@@ -59,8 +59,8 @@ def test_what_made_up_for_coarse_steps_is_not_named_beside_a_gap(tmp_path):
     found = oc.diagnose(record, loop, map_path)
     found.close()
     (effect,) = found.effects
-    assert effect.effect.label == "backlash@coupling"
-    low, high = effect.estimates[0].interval
+    assert effect.label == "backlash@coupling"
+    low, high = effect.parameters["width"].interval
     assert low < 0.006 < high
 
 
@@ -80,8 +80,8 @@ def test_a_compliance_between_two_fmus_is_named(tmp_path):
     loop, map_path = write_scenario(tmp_path)
     found = oc.diagnose(coupled_record(tmp_path / "r.csv", np.random.default_rng(3), 600, soft=0.0015), loop, map_path)
     found.close()
-    assert [f.effect.label for f in found.effects] == ["compliance@coupling"]
-    assert found.effects[0].estimates[0].value == pytest.approx(0.0015, rel=0.06)
+    assert [effect.label for effect in found.effects] == ["compliance@coupling"]
+    assert found.effects[0].parameters["compliance"].value == pytest.approx(0.0015, rel=0.06)
 
 
 @pytest.mark.parametrize(

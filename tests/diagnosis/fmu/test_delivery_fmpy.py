@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from orchestrator.api.diagnose import diagnose
-from orchestrator.diagnosis.fmu.deliver import deliver, parts_of
+from orchestrator.diagnosis.fmu.deliver import deliver
+from orchestrator.diagnosis.fmu.parts import parts_of
 from orchestrator.diagnosis.fmu.problem import series_of
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
@@ -23,19 +24,20 @@ def test_fmpy_reproduces_the_fit_within_a_tenth_of_the_noise(tmp_path):
     fmu = write_fmu(tmp_path / "Spring.fmu", domain)
     found = diagnose(write_record(tmp_path / "r.csv", case), fmu, write_map(tmp_path / "m.toml", domain))
     try:
-        problem, outcome = found.outcome.problem, found.outcome
-        assert [f.effect.kind.name for f in outcome.effects] == ["quadratic_drag"]
+        workings = found.diagnosis.workings
+        problem, model = workings.problem, workings.final
+        assert [effect.name for effect in found.effects] == ["quadratic_drag"]
         path = tmp_path / "corrected.ssp"
-        deliver(path, outcome)
-        fitted = problem.simulate([outcome.model])[0]
+        deliver(path, problem, model)
+        fitted = problem.simulate([model])[0]
         coarse = problem.h / problem.m
         step = coarse / FINER
         held = series_of(problem, problem.n)[:, 0]
         values = [
             SimpleNamespace(name=f"plant.{u.name}", value=v)
-            for u, v in zip(problem.map.uncertain, outcome.model.p, strict=True)
+            for u, v in zip(problem.map.uncertain, model.p, strict=True)
         ]
-        for part in parts_of(outcome):
+        for part in parts_of(problem, model):
             given = part.values | {"lead": 1.5}
             given.pop("has_velocity")
             values += [SimpleNamespace(name=f"{part.name}.{name}", value=value) for name, value in given.items()]

@@ -6,7 +6,8 @@ import pytest
 from orchestrator.api.diagnose import diagnose
 from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.rate import decimated, factor_of
-from orchestrator.diagnosis.fmu.settings import DEFAULT, RateSettings, FmuSettings
+from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings, RateSettings
+from orchestrator.diagnosis.settings import DiagnosisSettings
 from tests.support.box_fmu import DOMAINS, record, write_fmu, write_map, write_record
 from tests.support.c_fmu import have_compiler
 
@@ -48,15 +49,16 @@ def test_a_saturation_between_the_rows_that_are_looked_at_is_found_to_its_size(t
     domain, rng = DOMAINS[0], np.random.default_rng(8)
     case = record(domain, ("input_saturation",), rng, 1300)
     fmu, map_path = write_fmu(tmp_path / "Spring.fmu", domain), write_map(tmp_path / "map.toml", domain)
-    settings = FmuSettings(rate=RateSettings(rows=400, per_band=2.1, most_above=0.3))
+    settings = DiagnosisSettings(fmu=FmuSettings(rate=RateSettings(rows=400, per_band=2.1, most_above=0.3)))
     found = diagnose(write_record(tmp_path / "r.csv", case), fmu, map_path, settings=settings)
     found.close()
-    assert found.outcome.problem.data.factor == 3
-    assert found.outcome.problem.m == 6  # at least four in a sample, a whole number a row of the file
+    assert found.diagnosis.workings.problem.data.factor == 3
+    assert found.diagnosis.workings.problem.m == 6  # at least four in a sample, a whole number a row of the file
     (effect,) = found.effects
-    assert effect.effect.kind.name == "input_saturation"
-    assert effect.estimates[0].value == pytest.approx(case.sizes[0], rel=0.01)
-    assert found.outcome.misfit[0].corrected < 1.1
+    assert effect.name == "input_saturation"
+    assert effect.parameters["limit"].value == pytest.approx(case.sizes[0], rel=0.01)
+    (output,) = found.test[0].signals
+    assert output.final < 1.1 * output.noise
 
 
 def test_all_rows_of_a_short_record_stay():

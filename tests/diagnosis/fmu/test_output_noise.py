@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.fmu.noise import noise_of, third_differences
-from orchestrator.diagnosis.fmu.settings import DEFAULT
+from orchestrator.diagnosis.fmu_settings import DEFAULT
 
 TRUE = 2e-3
 N = 1500

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from orchestrator.diagnosis.fmu.probe_settings import ProbeSettings
+from orchestrator.diagnosis.fmu_probe_settings import ProbeSettings
 from orchestrator.shared.settings import Settings, note, setting, share
 
 
