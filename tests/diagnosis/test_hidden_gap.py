@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis import model_of
+from benchmarks.simulated import model_of
 from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.diagnosis.fit.reference import Reference
 from orchestrator.diagnosis.fit.together import series
