@@ -4,8 +4,8 @@
     python -m benchmarks.diagnosis --singles 200 --none 100 --doubles 40 --torque-noise --shifts --gain --seed 81000
     python -m benchmarks.diagnosis --one-encoder 60 --seed 82000    # a gap behind the motor's encoder alone
 
-One line a record as it goes, in two processes; the figures at the end, and ``figures.json``. Three machines take turns. An
-interrupted run goes on where it stopped (``--out`` keeps its lines). Seeds below 70000 were used in development.
+One line a record as it goes, in two processes; the figures at the end, and ``figures.json``. Three machines take turns.
+An interrupted run goes on where it stopped (``--out`` keeps its lines). Seeds below 70000 were used in development.
 """
 
 import argparse

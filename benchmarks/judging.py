@@ -128,8 +128,13 @@ def grade_table(rows: Sequence[Row]) -> str:
     Returns:
         The table.
     """
-    counts = Counter((effect.grade, row.judgement.verdicts[label]) for row in rows for label, effect in row.outcome.names.items())
-    lines = ["| grade | names | right | allowed | wrong | of them untested | share right |", "|---|---|---|---|---|---|---|"]
+    counts = Counter(
+        (effect.grade, row.judgement.verdicts[label]) for row in rows for label, effect in row.outcome.names.items()
+    )
+    lines = [
+        "| grade | names | right | allowed | wrong | of them untested | share right |",
+        "|---|---|---|---|---|---|---|",
+    ]
     for grade in GRADES:
         right, allowed, untested = (counts[grade, verdict] for verdict in ("right", "allowed", "untested"))
         wrong = counts[grade, "wrong"] + untested
@@ -152,7 +157,8 @@ def size_line(rows: Sequence[Row]) -> str:
         return "sizes: none"
     off, inside = np.abs([size[2] for size in sizes]), np.array([size[3] for size in sizes])
     return (
-        f"sizes: {len(sizes)}, off by {100.0 * np.median(off):.1f} % (median), {100.0 * np.quantile(off, 0.9):.1f} % (90 %), "
+        f"sizes: {len(sizes)}, off by {100.0 * np.median(off):.1f} % (median), "
+        f"{100.0 * np.quantile(off, 0.9):.1f} % (90 %), "
         f"within their 95 % interval {100.0 * inside.mean():.1f} %"
     )
 
@@ -167,4 +173,7 @@ def seconds_line(rows: Sequence[Row]) -> str:
         The line.
     """
     seconds = [row.outcome.seconds for row in rows]
-    return f"processor time of a record: median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s, total {sum(seconds):.0f} s"
+    return (
+        f"processor time of a record: median {np.median(seconds):.1f} s, longest {max(seconds):.1f} s, "
+        f"total {sum(seconds):.0f} s"
+    )

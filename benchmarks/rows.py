@@ -22,12 +22,27 @@ class Task(Protocol):
 T = TypeVar("T", bound=Task)
 
 
+def show_row(row: Row) -> str:
+    """Return one line: ok, miss or WRONG, which record, what was hidden, each name with its grade.
+
+    Args:
+        row: the record.
+
+    Returns:
+        The line.
+    """
+    mark = "WRONG" if row.wrong() else "ok" if row.is_right() else "miss"
+    names = ", ".join(f"{label} ({effect.grade})" for label, effect in row.outcome.names.items())
+    said = f"refused: {row.outcome.refused}" if row.outcome.refused else names or "no name"
+    return f"{mark:>5} {row.key} {row.hidden}: {said}, {row.outcome.seconds:.1f} s"
+
+
 def run_tasks(
     tasks: Sequence[T],
     work: Callable[[T], Row],
     lines: Path,
     processes: int = 2,
-    show: Callable[[Row], str] = lambda row: show_row(row),
+    show: Callable[[Row], str] = show_row,
 ) -> list[Row]:
     """Return the rows of some tasks, in their order, and print each new one as it comes.
 
@@ -64,18 +79,3 @@ def read_rows(lines: Path) -> list[Row]:
     """
     text = lines.read_bytes() if lines.exists() else b""
     return [msgspec.json.decode(line, type=Row) for line in text.splitlines() if line]
-
-
-def show_row(row: Row) -> str:
-    """Return one line: ok, miss or WRONG, which record, what was hidden, each name with its grade.
-
-    Args:
-        row: the record.
-
-    Returns:
-        The line.
-    """
-    mark = "WRONG" if row.wrong() else "ok" if row.is_right() else "miss"
-    names = ", ".join(f"{label} ({effect.grade})" for label, effect in row.outcome.names.items())
-    said = f"refused: {row.outcome.refused}" if row.outcome.refused else names or "no name"
-    return f"{mark:>5} {row.key} {row.hidden}: {said}, {row.outcome.seconds:.1f} s"

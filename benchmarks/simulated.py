@@ -82,7 +82,9 @@ class Counts:
     one_encoder: int = 0
 
 
-def simulated_tasks(counts: Counts, seed: int, ways: Ways, machines: Sequence[str] = tuple(MACHINES)) -> list[SimulatedTask]:
+def simulated_tasks(
+    counts: Counts, seed: int, ways: Ways, machines: Sequence[str] = tuple(MACHINES)
+) -> list[SimulatedTask]:
     """Return records in a random order; kinds and machines take turns.
 
     Args:
@@ -94,17 +96,17 @@ def simulated_tasks(counts: Counts, seed: int, ways: Ways, machines: Sequence[st
     Returns:
         The tasks.
     """
-    pairs = [pair for pair in itertools.combinations(SINGLE, 2) if not _are_relatives(*pair)]
+    pairs: list[tuple[str, ...]] = [pair for pair in itertools.combinations(SINGLE, 2) if not _are_relatives(*pair)]
     np.random.default_rng(seed).shuffle(pairs)
     kinds: dict[str, list[tuple[str, ...]]] = {
-        "none": [()], "single": [(kind,) for kind in SINGLE], "double": pairs, "unknown": [(kind,) for kind in UNKNOWN],
+        "none": [()], "single": [(kind,) for kind in SINGLE], "double": list(pairs), "unknown": [(kind,) for kind in UNKNOWN],
         "one_encoder": [("backlash",)],
     }  # fmt: skip
-    tasks = [
-        SimulatedTask(group, kinds[group][n % len(kinds[group])], seed + 1000 * place + n, replace(ways, machine=machines[n % len(machines)]))
-        for place, group in enumerate(kinds)
-        for n in range(getattr(counts, group))
-    ]  # fmt: skip
+    tasks = []
+    for place, (group, hidden) in enumerate(kinds.items()):
+        for n in range(getattr(counts, group)):
+            machine = replace(ways, machine=machines[n % len(machines)])
+            tasks.append(SimulatedTask(group, hidden[n % len(hidden)], seed + 1000 * place + n, machine))
     return [tasks[n] for n in np.random.default_rng(seed + 1).permutation(len(tasks))]
 
 
@@ -123,7 +125,7 @@ def truth_of(case: Case) -> Truth:
     """
     motor, load = case.truth["shifts"]
     # Angles that are all late are a dead time to one record; the log's own lateness is named as a nuisance.
-    allowed = ("input_delay", "drive_filter", "early_torque") if motor else ()
+    allowed: tuple[str, ...] = ("input_delay", "drive_filter", "early_torque") if motor else ()
     allowed += ("late_load",) if load != motor else ()
     sizes: dict[str, dict[str, tuple[float, float]]] = {}
     for short, value in case.truth["effects"].items():

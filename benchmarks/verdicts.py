@@ -95,11 +95,13 @@ def outcome_of(result: Any) -> Outcome:
         The outcome.
     """
     diagnosis = result.diagnosis
-    names = {
-        f"{effect.name}@{effect.site}": NamedEffect(_grade(effect, diagnosis), _values(effect.parameters), tuple(effect.family))
-        for effect in (*diagnosis.effects, *diagnosis.nuisances)
-        if effect.name != "drive_gain"
-    }  # fmt: skip
+    names = {}
+    for effect in (*diagnosis.effects, *diagnosis.nuisances):
+        if (
+            effect.name != "drive_gain"
+        ):  # never more than a remark: it cannot be told from the values that carry a torque
+            values = _values(effect.parameters)
+            names[f"{effect.name}@{effect.site}"] = NamedEffect(_grade(effect, diagnosis), values, tuple(effect.family))
     parameters = _values({name: one for name, one in diagnosis.parameters.items() if one.value is not None})
     misfit = {one.signal: (one.best_before, one.after) for one in diagnosis.misfit}
     return Outcome(names, parameters, misfit)

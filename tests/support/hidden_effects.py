@@ -70,13 +70,14 @@ MACHINES: dict[str, tuple[dict[str, float], float]] = {
 }
 GAPS = (0.3, 3.0)  # half-gaps of the records with one encoder, in typical (rms) twists
 
-# Unit of each size, in powers of a record's (torque, load torque, motor speed, load speed, load angle, twist): on another
-# machine than the thesis's, sizes are as much larger as these are.
+# Unit of each size, in powers of a record's torque, load torque, speeds, load angle and twist: on another machine than
+# the thesis's, sizes are as much larger as these are.
 UNITS: dict[str, dict[str, int]] = {
     **{name: {"torque": 1} for name in ("Fc_m", "Fs_m", "rip", "late_Fc")},
     **{name: {"load": 1} for name in ("Fc_l", "Fs_l", "T0", "grav", "bw", "knock")},
     **{name: {"twist": 1} for name in ("alpha", "hard", "ecc", "bw_x")},
-    "vs": {"speed_m": 1}, "vs_l": {"speed_l": 1}, "dv_m": {"torque": 1, "speed_m": -1}, "dv_l": {"load": 1, "speed_l": -1},
+    "vs": {"speed_m": 1}, "vs_l": {"speed_l": 1},
+    "dv_m": {"torque": 1, "speed_m": -1}, "dv_l": {"load": 1, "speed_l": -1},
     "qd": {"load": 1, "speed_l": -2}, "ks": {"load": 1, "angle_l": -1}, "stop_k": {"load": 1, "angle_l": -1},
     "stop": {"angle_l": 1}, "kspeed": {"speed_l": -1}, "J3": {"load": 1, "speed_l": -1},
 }  # fmt: skip
@@ -112,7 +113,9 @@ class Ways:
         changed = {}
         for name, value in effects.items():
             powers = UNITS.get(name, {})
-            changed[name] = value * float(np.prod([(here[unit] / there[unit]) ** power for unit, power in powers.items()]))
+            changed[name] = value * float(
+                np.prod([(here[unit] / there[unit]) ** power for unit, power in powers.items()])
+            )
         return changed
 
 
@@ -123,7 +126,14 @@ def _magnitudes(machine: str) -> dict[str, float]:
     _, truth = make_record({}, 0, 10.0, substeps=25, **ways.plant)
     nominal, (theta_m, omega_m, theta_l, omega_l, torque) = MACHINES[machine][0], truth["states"][:, :5].T
     twist = theta_m / nominal["i"] - theta_l
-    sizes = {"torque": torque, "load": nominal["k"] * twist, "speed_m": omega_m, "speed_l": omega_l, "angle_l": theta_l - theta_l.mean(), "twist": twist}
+    sizes = {
+        "torque": torque,
+        "load": nominal["k"] * twist,
+        "speed_m": omega_m,
+        "speed_l": omega_l,
+        "angle_l": theta_l - theta_l.mean(),
+        "twist": twist,
+    }
     return {name: float(np.sqrt(np.mean(values**2))) for name, values in sizes.items()}
 
 
@@ -314,7 +324,14 @@ def _case(
     shifts = shifts_of(seed) if ways.shifts else (0.0, 0.0)
     gain = gain_of(seed) if ways.gain else 1.0
     columns, truth = make_record(
-        effects, seed, duration, excitation=excitation, torque_noise=noise, shifts=shifts, torque_gain=gain, **ways.plant
+        effects,
+        seed,
+        duration,
+        excitation=excitation,
+        torque_noise=noise,
+        shifts=shifts,
+        torque_gain=gain,
+        **ways.plant,
     )
     truth |= {"torque_noise": noise, "shifts": shifts, "gain": gain}
     if "delay" in effects:
