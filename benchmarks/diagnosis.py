@@ -22,17 +22,18 @@ from benchmarks.verdicts import GRADES, NAMED, diagnose_record
 from tests.support.hidden_effects import MACHINES, Ways
 
 
-def diagnose_task(task: SimulatedTask) -> Row:
+def diagnose_task(task: SimulatedTask, settings: Any = None) -> Row:
     """Return what a diagnosis says of one record, and what of that is right.
 
     Args:
         task: the record.
+        settings: of the diagnosis; None: the default.
 
     Returns:
         The row.
     """
     case = task.make()
-    outcome = diagnose_record(case.record, model_of(case))
+    outcome = diagnose_record(case.record, model_of(case), settings)
     hidden = ", ".join(f"{name} {value:.3g}" for name, value in case.truth["effects"].items())
     kind = "+".join(task.kinds) or "none"
     return Row(task.key, task.group, kind, outcome, judge(outcome, truth_of(case)), hidden)

@@ -3,8 +3,9 @@
     python -m benchmarks.measured FOLDER [--only MACHINE ...] [--out DIR]
 
 ``FOLDER`` holds one folder a machine, each with CSV records, ``model.toml`` and ``reference.json``: under ``records``,
-for each file, ``told`` (name -> ``value``, ``error``, ``gain`` in R2, ``family``), ``allowed`` and ``excluded`` (names),
-``r2_parameters`` and ``r2`` (without laws, with them). One line a record with its reference beside it, then recall, names by grade and sizes.
+for each file, ``told`` (name -> ``value``, ``error``, ``gain`` in R2, ``family``), the names ``allowed`` and
+``excluded``, and ``r2_parameters`` and ``r2`` (without laws, with them). One line a record with its reference beside
+it, then recall, names by grade and sizes.
 """
 
 import argparse
@@ -81,17 +82,18 @@ def truth_of(reference: dict[str, Any]) -> Truth:
     return Truth(expected, tuple(reference["allowed"]), sizes, tested)
 
 
-def diagnose_task(task: MeasuredTask) -> Row:
+def diagnose_task(task: MeasuredTask, settings: Any = None) -> Row:
     """Return what a diagnosis says of one record, and what of that is right.
 
     Args:
         task: the record.
+        settings: of the diagnosis; None: the default.
 
     Returns:
         The row.
     """
     reference, model = task.reference, read_model(Path(task.folder) / "model.toml")
-    outcome = diagnose_record(read_record(Path(task.folder) / task.name, model.columns), model)
+    outcome = diagnose_record(read_record(Path(task.folder) / task.name, model.columns), model, settings)
     return Row(
         task.key, "measured", Path(task.folder).name, outcome, judge(outcome, truth_of(reference)), describe(reference)
     )

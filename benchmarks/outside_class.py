@@ -4,8 +4,8 @@
 
 Six kinds, each with two encoders (``Drivetrain``) and one (``ServoAxis``): a displacement that is prescribed, two
 resonances more than the model has, electrical dynamics, a broken channel, channels of different machines, someone who
-pushes. One line a record, in two processes, then what was named under which grade by kind. ``NEAR`` holds names that are
-not wrong: relatives of what is there. An interrupted run goes on where it stopped.
+pushes. One line a record, in two processes, then what was named under which grade by kind. ``NEAR`` holds names that
+are not wrong: relatives of what is there. An interrupted run goes on where it stopped.
 """
 
 import argparse
@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -268,11 +269,12 @@ def outside_tasks(records: int, seed: int) -> list[OutsideTask]:
     return [OutsideTask(list(KINDS)[n % kinds], seed + n // kinds, (n // kinds) % 2 == 0) for n in range(records)]
 
 
-def diagnose_task(task: OutsideTask) -> Row:
+def diagnose_task(task: OutsideTask, settings: Any = None) -> Row:
     """Return what a diagnosis says of one record.
 
     Args:
         task: the record.
+        settings: of the diagnosis; None: the default.
 
     Returns:
         The row.
@@ -283,7 +285,9 @@ def diagnose_task(task: OutsideTask) -> Row:
     noisy = log.angles + rng.standard_normal(log.angles.shape) * 2e-4 * np.ptp(log.angles, axis=0)
     columns = {"time": np.arange(log.u.size) / machine.rate, "u": log.u, "theta_m": noisy[:, 0]}
     columns |= {"theta_l": noisy[:, 1]} if task.two else {}
-    outcome = diagnose_record(record_from_columns(columns, f"{task.kind}-{task.seed}"), model_of(machine, spread))
+    outcome = diagnose_record(
+        record_from_columns(columns, f"{task.kind}-{task.seed}"), model_of(machine, spread), settings
+    )
     return Row(task.key, "outside", task.kind, outcome, judge(outcome, Truth(allowed=NEAR.get(task.kind, ()))))
 
 

@@ -99,8 +99,8 @@ def simulated_tasks(
     pairs: list[tuple[str, ...]] = [pair for pair in itertools.combinations(SINGLE, 2) if not _are_relatives(*pair)]
     np.random.default_rng(seed).shuffle(pairs)
     kinds: dict[str, list[tuple[str, ...]]] = {
-        "none": [()], "single": [(kind,) for kind in SINGLE], "double": list(pairs), "unknown": [(kind,) for kind in UNKNOWN],
-        "one_encoder": [("backlash",)],
+        "none": [()], "single": [(kind,) for kind in SINGLE], "double": list(pairs),
+        "unknown": [(kind,) for kind in UNKNOWN], "one_encoder": [("backlash",)],
     }  # fmt: skip
     tasks = []
     for place, (group, hidden) in enumerate(kinds.items()):

@@ -97,21 +97,33 @@ def outcome_of(result: Any) -> Outcome:
     diagnosis = result.diagnosis
     names = {}
     for effect in (*diagnosis.effects, *diagnosis.nuisances):
-        if (
-            effect.name != "drive_gain"
-        ):  # never more than a remark: it cannot be told from the values that carry a torque
-            values = _values(effect.parameters)
-            names[f"{effect.name}@{effect.site}"] = NamedEffect(_grade(effect, diagnosis), values, tuple(effect.family))
+        if effect.name == "drive_gain":  # never more than a remark: values that carry a torque take its place
+            continue
+        site = getattr(effect, "site", "")
+        label = f"{effect.name}@{site}" if site else effect.name
+        names[label] = NamedEffect(_grade(effect, diagnosis), _values(effect.parameters), _family(effect))
     parameters = _values({name: one for name, one in diagnosis.parameters.items() if one.value is not None})
-    misfit = {one.signal: (one.best_before, one.after) for one in diagnosis.misfit}
-    return Outcome(names, parameters, misfit)
+    return Outcome(names, parameters, _misfit(diagnosis))
 
 
 def _grade(effect: Any, diagnosis: Any) -> str:
-    grade = getattr(effect, "grade", None)
-    if grade is not None:
-        return str(getattr(grade, "word", grade))
+    if hasattr(effect, "grade"):
+        return str(effect.grade.word)
     return {"green": "certain", "amber": "likely"}.get(diagnosis.trust.level.word, "possible")
+
+
+def _family(effect: Any) -> tuple[str, ...]:
+    return tuple(effect.evidence.family if hasattr(effect, "evidence") else getattr(effect, "family", ()))
+
+
+def _misfit(diagnosis: Any) -> dict[str, tuple[float, float]]:
+    if hasattr(diagnosis, "test"):
+        return {
+            f"{n}:{one.signal}": (one.parameters, one.final)
+            for n, part in enumerate(diagnosis.test)
+            for one in part.signals
+        }
+    return {one.signal: (one.best_before, one.after) for one in diagnosis.misfit}
 
 
 def _values(estimates: Mapping[str, Any]) -> dict[str, Estimate]:
