@@ -62,6 +62,7 @@ class FmuDiagnosisResult(Result):
         delivered: the corrected system, once it has been written.
         validation: misfit on a second record, if one was given.
         settings: thresholds that were used.
+        notes: what was detected and filled when the record was read.
         arguments: what was asked for.
     """
 
@@ -72,6 +73,7 @@ class FmuDiagnosisResult(Result):
     delivered: list[Delivered] = field(default_factory=list)
     validation: tuple[OutputMisfit, ...] = ()
     settings: BoxSettings = DEFAULT
+    notes: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -102,7 +104,8 @@ class FmuDiagnosisResult(Result):
     def blocks(self) -> Sequence[Block]:
         """Return the verdict, the effects and the misfit."""
         o = self.outcome
-        lines: list[Block] = [f"Verdict: {o.verdict}: {self.statement}"]
+        lines: list[Block] = [f"Record: {'; '.join(self.notes)}"] * bool(self.notes)
+        lines.append(f"Verdict: {o.verdict}: {self.statement}")
         for found in o.effects:
             values = ", ".join(
                 f"{e.name} = {e.value:.5g} +- {e.standard_error:.2g} {'' if e.unit == '1' else e.unit}".rstrip()
@@ -146,7 +149,7 @@ class FmuDiagnosisResult(Result):
             validation=_outputs(self.validation),
             remainder=LeftFound(o.rest.explained, share, o.rest.reasons, tuple(map(tuple, o.rest.blocks.tolist()))),
             where=tuple(o.where),
-            warnings=(*o.warnings, *self.harm),
+            warnings=(*self.notes[2:], *o.warnings, *self.harm),
             settings=as_tables(self.settings),
             candidates=tuple(self._candidates()),
             model=None if not self.delivered else str(place / self.delivered[0].path.name),
@@ -238,6 +241,7 @@ def of_a_box(
     subject = subject_of(Path(fmu))
     given = read_map(Path(map), subject)
     data = read_data(Path(record), given, used.read)
+    notes = data.notes
     factor = factor_of(data, used.rate)
     data = decimated(data, factor)
     second = None if validate is None else decimated(read_data(Path(validate), given, used.read), factor)
@@ -250,7 +254,7 @@ def of_a_box(
         raise
     files = {"record": record, "fmu": fmu, "map": map, "validate": validate}
     arguments = {name: str(path) for name, path in files.items() if path is not None}
-    result = FmuDiagnosisResult(outcome, arguments, validation=shown, settings=used)
+    result = FmuDiagnosisResult(outcome, arguments, validation=shown, settings=used, notes=notes)
     weakref.finalize(result, outcome.problem.runner.close)  # child processes end with the result, or at exit
     return result
 

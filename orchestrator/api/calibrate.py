@@ -31,12 +31,14 @@ class CalibrationResult(Result):
         calibration: values, intervals, what the record does not determine, misfit.
         arguments: what was asked for.
         settings: thresholds that were used.
+        notes: what was detected and filled when the record was read.
     """
 
     command: ClassVar[str] = "calibrate"
     calibration: BoxCalibration
     arguments: Mapping[str, Any] = field(default_factory=dict)
     settings: BoxSettings = DEFAULT
+    notes: tuple[str, ...] = ()
 
     @property
     def trust(self) -> Trust:
@@ -52,7 +54,8 @@ class CalibrationResult(Result):
             for e in c.parameters
         ]  # fmt: skip
         head = ("name", "nominal", "value", "95 % interval", "learned", "unit")
-        lines: list[Block] = [f"Parameters {'explain' if c.explained else 'do not explain'} the record to its noise"]
+        lines: list[Block] = [f"Record: {'; '.join(self.notes)}"] * bool(self.notes)
+        lines.append(f"Parameters {'explain' if c.explained else 'do not explain'} the record to its noise")
         lines.append(table("Parameters", head, rows))
         lines += [f"Note: {text}" for text in c.warnings]
         trust = self.trust
@@ -76,7 +79,7 @@ class CalibrationResult(Result):
             parameters=parameters,
             not_told_apart=c.confounded,
             misfit={m.output: CalibratedOutputFound(m.nominal, m.refitted, m.noise, m.unit) for m in c.misfit},
-            warnings=c.warnings,
+            warnings=(*self.notes[2:], *c.warnings),
             settings=as_tables(self.settings),
             seconds=c.seconds,
             walls=support().in_words,
@@ -118,6 +121,5 @@ def calibrate(
         raise ScenarioError("`map` must be the path of a TOML file, but is not", "map")
     given = read_map(Path(map), subject)
     data = read_data(Path(record), given, used.read)
-    data = decimated(data, factor_of(data, used.rate))
-    found = calibrating(subject, given, data, progress, used)
-    return CalibrationResult(found, {"record": str(record), "fmu": str(fmu), "map": str(map)}, used)
+    found = calibrating(subject, given, decimated(data, factor_of(data, used.rate)), progress, used)
+    return CalibrationResult(found, {"record": str(record), "fmu": str(fmu), "map": str(map)}, used, data.notes)

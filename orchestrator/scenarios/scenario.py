@@ -26,6 +26,7 @@ from orchestrator.master.system import Connection, Instance, Quantity, SignalSou
 from orchestrator.master.values import one_line, typed_value
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.isolated import Safety, run_safely
+from orchestrator.scenarios.tables import read_table
 
 MAXIMUM_BYTES = 16 * 2**20
 
@@ -118,6 +119,7 @@ class _Table(_Source, tag="table", frozen=True, kw_only=True):
     column: str
     time: str = "time"
     hold: bool | None = None
+    header: int | None = None
 
 
 _AnySource = _Constant | _Step | _Sine | _Square | _Noise | _Table
@@ -312,9 +314,13 @@ class _Reader:
             self._bounded(source, "seed", path, lambda x: x >= 0, "not negative")
             self._bounded(source, "period", path, lambda x: 0.0 < x < math.inf, "finite and positive")
             if len(self.problems) == before:
-                signal = self._signal(source, step, start, path, variable)
+                unit: str | None = source.unit
+                if isinstance(source, _Table):
+                    signal, unit = self._table(source, path, variable)
+                else:
+                    signal = self._signal(source, step, start, path, variable)
                 if signal is not None:
-                    found.append(SignalSource(source.target, signal, source.unit, source.at))
+                    found.append(SignalSource(source.target, signal, unit, source.at))
         return tuple(found)
 
     def _bounded(self, source: Any, name: str, path: str, holds: Callable[[float], bool], expected: str) -> None:
@@ -337,8 +343,7 @@ class _Reader:
             case _Noise():
                 period = step if source.period is None else source.period
                 return signals.Noise(source.deviation, source.seed, period, start)
-            case _Table():
-                return self._table(source, path, variable)
+        return None
 
     def _constant(self, value: float | bool | str, path: str, variable: Variable | None) -> signals.Signal | None:
         if not isinstance(value, str):
@@ -356,15 +361,22 @@ class _Reader:
         assert isinstance(number, int)
         return signals.Constant(float(number))
 
-    def _table(self, source: _Table, path: str, variable: Variable | None) -> signals.Signal | None:
-        """Return a table; into an input that is not Real it is held where the file does not say."""
+    def _table(
+        self, source: _Table, path: str, variable: Variable | None
+    ) -> tuple[signals.Signal | None, str | None]:
+        """Return a table, and its unit: the source's, else the file's.
+
+        Into an input that is not Real it is held where the file does not say.
+        """
         discrete = variable is not None and variable.type != "Real"
         hold = discrete if source.hold is None else source.hold
         if "\0" in source.file:
             self.problems.append(Problem(f"{path}.file", f"must be a path, but is {source.file!r}"))
-            return None
+            return None, None
         try:
-            return signals.read_table(self.path.parent / source.file, source.column, source.time, hold)
+            file = self.path.parent / source.file
+            signal, unit = read_table(file, source.column, source.time, hold, source.header)
         except ScenarioError as error:
             self.problems.append(Problem(f"{path}.file", str(error)))
-            return None
+            return None, None
+        return signal, source.unit or unit or None

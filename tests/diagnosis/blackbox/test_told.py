@@ -10,7 +10,7 @@ from orchestrator.diagnosis.blackbox.bank import BANK, BoxEffect, Surroundings
 from orchestrator.diagnosis.blackbox.estimates import ValueEstimate, as_told, errors_of
 from orchestrator.diagnosis.blackbox.fitting import Fitter
 from orchestrator.diagnosis.blackbox.likelihood import BoxFit
-from orchestrator.diagnosis.blackbox.mapping import Options
+from orchestrator.diagnosis.blackbox.mapping import InputEntry, Options, OutputEntry
 from orchestrator.diagnosis.blackbox.model import BoxModel
 from orchestrator.diagnosis.blackbox.noise import begins_elsewhere, lone_rows
 from orchestrator.diagnosis.blackbox.reading import _unevenness, read_data
@@ -154,8 +154,8 @@ def test_a_step_that_is_no_number_is_none():
 def test_times_in_milliseconds_are_read_as_seconds(tmp_path):
     rows = "\n".join(f"{5 * k},{k % 7},{k % 5}" for k in range(400))
     (tmp_path / "r.csv").write_text(f"ms,u,y\n{rows}\n")
-    entry = SimpleNamespace(column="u", factor=1.0), SimpleNamespace(column="y", factor=1.0)
     given = SimpleNamespace(
-        options=Options(time="ms", time_factor=1e-3), inputs={"u": entry[0]}, outputs={"y": entry[1]}, signals={}
-    )
+        options=Options(time="ms", time_factor=1e-3), inputs={"u": InputEntry("u")}, outputs={"y": OutputEntry("y")},
+        signals={}, units={},
+    )  # fmt: skip
     assert read_data(tmp_path / "r.csv", given).step == pytest.approx(5e-3)
