@@ -361,9 +361,7 @@ class _Reader:
         assert isinstance(number, int)
         return signals.Constant(float(number))
 
-    def _table(
-        self, source: _Table, path: str, variable: Variable | None
-    ) -> tuple[signals.Signal | None, str | None]:
+    def _table(self, source: _Table, path: str, variable: Variable | None) -> tuple[signals.Signal | None, str | None]:
         """Return a table, and its unit: the source's, else the file's.
 
         Into an input that is not Real it is held where the file does not say.
