@@ -1,18 +1,22 @@
-"""Benchmark of the diagnosis on single axes that a controller leads: right, missed and wrong names by what is hidden.
+"""Single axes that a controller leads: right, missed and wrong names by what is hidden.
 
     python -m benchmarks.led_axes --records 80 --seed 0
 
 A controller hides from predictions what acts on an axis, and its torque is measured with noise. Records are of the
-independent simulation in ``tests/support/led_axis.py``. One line a record as it goes, the count at the end.
+independent simulation in ``tests/support/led_axis.py``. One line a record, in two processes, the counts at the end.
 """
 
 import argparse
 import tempfile
-import time
-from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import orchestrator as oc
+from benchmarks.judging import Row, Truth, grade_table, judge, seconds_line, size_line
+from benchmarks.measured import SIZE
+from benchmarks.rows import run_tasks
+from benchmarks.verdicts import diagnose_record
+from orchestrator.records.model_file import Model, read_model
 from tests.support.led_axis import LedAxis, led_axis
 
 MODEL = """fmu = "ServoAxis"
@@ -23,52 +27,68 @@ relative_uncertainty = 0.6
 value = {1!r}
 relative_uncertainty = 0.9
 """
+RELATIVES = {"coulomb_friction": ("stribeck_friction",)}  # the one contains the other
 
 
-def judged(case: LedAxis, found: "oc.DiagnosisResult") -> str:
-    """Return "right", "missed" or "wrong"; an effect that the record cannot tell from a right one is right."""
-    families = [{effect.name, *(label.partition("@")[0] for label in effect.family)} for effect in found.effects]
-    families = [one | {"coulomb_friction"} if "stribeck_friction" in one else one for one in families]  # it contains it
-    if any(not family & case.right for family in families):
-        return "wrong"
-    if case.hidden == "none":
-        return "right" if found.verdict in ("none", "parameters") else "missed"
-    return "right" if all(any(name in family for family in families) for name in case.right) else "missed"
+@dataclass(frozen=True)
+class LedTask:
+    """One axis that is led."""
+
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """Return what tells it from every other record."""
+        return f"led:{self.seed}"
 
 
-def sizes(case: LedAxis, found: "oc.DiagnosisResult") -> dict[str, float]:
-    """Return the relative error of each right effect's size."""
-    errors = {}
-    for effect in found.effects:
-        true = case.truth.get(effect.name, 0.0)
-        if true:
-            errors[effect.name] = abs(next(iter(effect.parameters.values())).value) / true - 1.0
-    return errors
+def diagnose_task(task: LedTask, settings: Any = None) -> Row:
+    """Return what a diagnosis says of one record, and what of that is right.
+
+    Args:
+        task: the record.
+        settings: of the diagnosis; None: the default.
+
+    Returns:
+        The row.
+    """
+    case = led_axis(task.seed)
+    outcome = diagnose_record(case.record, model_of(case), settings)
+    expected = tuple((name, *RELATIVES.get(name, ())) for name in sorted(case.right))
+    sizes = {name: {SIZE[name]: (case.truth[name], 0.0)} for name in case.right if case.truth.get(name)}
+    return Row(task.key, "led", case.hidden, outcome, judge(outcome, Truth(expected, sizes=sizes)), case.hidden)
+
+
+def model_of(case: LedAxis) -> Model:
+    """Return the model that a data sheet states.
+
+    Args:
+        case: the axis.
+
+    Returns:
+        The model.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "axis.toml"
+        path.write_text(MODEL.format(*case.stated), encoding="utf-8")
+        return read_model(path)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--records", type=int, default=80)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("results/led_axes"))
     args = parser.parse_args()
-    count: Counter[tuple[str, str]] = Counter()
-    for seed in range(args.seed, args.seed + args.records):
-        case, begun = led_axis(seed), time.process_time()
-        with tempfile.TemporaryDirectory() as folder:
-            model = Path(folder) / "axis.toml"
-            model.write_text(MODEL.format(*case.stated), encoding="utf-8")
-            found = oc.diagnose(case.record, model=model)
-        said = judged(case, found)
-        count[case.hidden, said] += 1
-        errors = {name: f"{100.0 * error:.1f} %" for name, error in sizes(case, found).items()}
-        names = [effect.name for effect in found.effects]
-        print(
-            f"{said:>6} {seed} {case.hidden}: {found.verdict}, {found.trust.level.word}, {names} {errors}, noise "
-            f"{case.truth['noise']}, size {case.truth['size']:.2f}, {time.process_time() - begun:.0f} s",
-            flush=True,
-        )
-    for hidden in dict.fromkeys(kind for kind, _ in count):
-        print(f"{hidden:>22}", {said: count[hidden, said] for said in ("right", "missed", "wrong")})
+    tasks = [LedTask(seed) for seed in range(args.seed, args.seed + args.records)]
+    rows = run_tasks(tasks, diagnose_task, args.out / f"rows-{args.seed}.jsonl", args.processes)
+    for kind in dict.fromkeys(row.kind for row in rows):
+        chosen = [row for row in rows if row.kind == kind]
+        right, wrong = sum(row.is_right() for row in chosen), sum(bool(row.wrong()) for row in chosen)
+        print(f"{kind:>22}: {len(chosen)} records, {right} right, {wrong} with a wrong name")
+    if rows:
+        print(grade_table(rows), size_line(rows), seconds_line(rows), sep="\n")
 
 
 if __name__ == "__main__":

@@ -1,34 +1,27 @@
-"""Records of machines outside the class of the models: nothing confident may be said of them.
+"""Records of machines outside the class of the models: nothing sure may be said of them.
 
     python -m benchmarks.outside_class [--records 60] [--seed 1] [--only KIND] [--out DIR]
 
 Six kinds, each with two encoders (``Drivetrain``) and one (``ServoAxis``): a displacement that is prescribed, two
 resonances more than the model has, electrical dynamics, a broken channel, channels of different machines, someone who
-pushes by hand. Linear machines, discretised by scipy; no code is shared with the library. One line a record, then the
-count by verdict and colour, wrong names, and harm. An interrupted run goes on where it stopped.
-
-Good is a refusal, "unknown", or amber without a wrong name. ``NEAR`` says which names are none: relatives of what
-is there.
+pushes. One line a record, in two processes, then what was named under which grade by kind. ``NEAR`` holds names that
+are not wrong: relatives of what is there. An interrupted run goes on where it stopped.
 """
 
 import argparse
-import json
 import tempfile
-import time
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 
-from benchmarks.harm import counted, harmed
-from orchestrator.diagnosis.diagnose import diagnose
-from orchestrator.errors import OrchestratorError
+from benchmarks.judging import Row, Truth, grade_table, judge, seconds_line
+from benchmarks.rows import run_tasks
+from benchmarks.verdicts import GRADES, diagnose_record
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.record import record_from_columns
 
@@ -36,9 +29,9 @@ Array = NDArray[np.float64]
 Random = np.random.Generator
 FINER = 10  # steps of the simulation in a sample
 SECONDS = 10.0  # of a record
-NEAR = {
-    "resonances": {"extra_resonance@load"},
-    "electrical": {"drive_filter@actuator", "input_delay@actuator"},
+NEAR: dict[str, tuple[str, ...]] = {
+    "resonances": ("extra_resonance@load",),
+    "electrical": ("drive_filter@actuator", "input_delay@actuator"),
 }
 
 
@@ -248,46 +241,54 @@ KINDS: dict[str, Callable[[Random, Machine], tuple[Log, float]]] = {
 }  # fmt: skip
 
 
-def row_of(kind: str, seed: int, two: bool) -> dict[str, Any]:
-    """Return what a diagnosis says of one record."""
-    rng = np.random.default_rng([seed, sorted(KINDS).index(kind), two])
-    machine = (bench if two else axis)(rng)
-    log, spread = KINDS[kind](rng, machine)
-    time_ = np.arange(log.u.size) / machine.rate
+@dataclass(frozen=True)
+class OutsideTask:
+    """One record of a machine outside the class, with two encoders or one."""
+
+    kind: str
+    seed: int
+    two: bool
+
+    @property
+    def key(self) -> str:
+        """Return what tells it from every other record."""
+        return f"{self.kind}:{self.seed}:{'two' if self.two else 'one'}"
+
+
+def outside_tasks(records: int, seed: int) -> list[OutsideTask]:
+    """Return the records: kinds take turns, then seeds and numbers of encoders.
+
+    Args:
+        records: how many.
+        seed: first one.
+
+    Returns:
+        The tasks.
+    """
+    kinds = len(KINDS)
+    return [OutsideTask(list(KINDS)[n % kinds], seed + n // kinds, (n // kinds) % 2 == 0) for n in range(records)]
+
+
+def diagnose_task(task: OutsideTask, settings: Any = None) -> Row:
+    """Return what a diagnosis says of one record.
+
+    Args:
+        task: the record.
+        settings: of the diagnosis; None: the default.
+
+    Returns:
+        The row.
+    """
+    rng = np.random.default_rng([task.seed, sorted(KINDS).index(task.kind), task.two])
+    machine = (bench if task.two else axis)(rng)
+    log, spread = KINDS[task.kind](rng, machine)
     noisy = log.angles + rng.standard_normal(log.angles.shape) * 2e-4 * np.ptp(log.angles, axis=0)
-    columns = {"time": time_, "u": log.u, "theta_m": noisy[:, 0]} | ({"theta_l": noisy[:, 1]} if two else {})
-    row: dict[str, Any] = {"kind": kind, "seed": seed, "two": two, "named": [], "harm": {}, "trust": "red"}
-    begun = time.process_time()
-    try:
-        found = diagnose(record_from_columns(columns, f"{kind}-{seed}"), model_of(machine, spread))
-    except OrchestratorError as error:
-        return row | {"verdict": "refused", "wrong": [], "why": str(error), "seconds": time.process_time() - begun}
-    named = [f"{effect.name}@{effect.site}" for effect in found.effects]
-    return row | {
-        "verdict": found.verdict, "trust": found.trust.level.word, "named": named,
-        "wrong": [label for label in named if label not in NEAR.get(kind, set())],
-        "harm": harmed(found), "reasons": msgspec.to_builtins(found.trust.reasons),
-        "seconds": time.process_time() - begun,
-        "sizes": {label: {short: e.value for short, e in effect.parameters.items()}
-                  for label, effect in zip(named, found.effects, strict=True)},
-        "over_noise": [m.after / m.noise for m in found.misfit],
-    }  # fmt: skip
-
-
-def report(rows: list[dict[str, Any]]) -> None:
-    """Print the count by kind, verdict and colour, wrong names and harm."""
-    for kind in KINDS:
-        counts = Counter((row["verdict"], row["trust"], "wrong name" if row["wrong"] else "")
-                         for row in rows if row["kind"] == kind)  # fmt: skip
-        print(f"{kind:>13}: " + "; ".join(f"{n} {' '.join(filter(None, key))}" for key, n in sorted(counts.items())))
-    unsure = sum(row["trust"] != "green" for row in rows)
-    print(f"unknown, refused or amber: {unsure} of {len(rows)}")
-    for colour in ("green", "amber"):
-        print(f"{colour} with a wrong name: {sum(bool(r['wrong']) and r['trust'] == colour for r in rows)}")
-    print(counted(rows))
-    print(
-        f"processor time: {sum(row['seconds'] for row in rows):.0f} s, longest {max(r['seconds'] for r in rows):.0f} s"
+    columns = {"time": np.arange(log.u.size) / machine.rate, "u": log.u, "theta_m": noisy[:, 0]}
+    columns |= {"theta_l": noisy[:, 1]} if task.two else {}
+    outcome = diagnose_record(
+        record_from_columns(columns, f"{task.kind}-{task.seed}"), model_of(machine, spread), settings
     )
+    return Row(task.key, "outside", task.kind, outcome, judge(outcome, Truth(allowed=NEAR.get(task.kind, ()))))
 
 
 def main() -> None:
@@ -295,23 +296,18 @@ def main() -> None:
     parser.add_argument("--records", type=int, default=60)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", choices=tuple(KINDS))
+    parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--out", type=Path, default=Path("results/outside_class"))
     args = parser.parse_args()
-    args.out.mkdir(parents=True, exist_ok=True)
-    lines = args.out / f"rows-{args.seed}.jsonl"
-    rows = [json.loads(line) for line in lines.read_text().splitlines()] if lines.exists() else []
-    done = {(row["kind"], row["seed"]) for row in rows}
-    for n in range(args.records):
-        kind, seed = list(KINDS)[n % len(KINDS)], args.seed + n // len(KINDS)
-        if (kind, seed) in done or args.only not in (None, kind):
-            continue
-        row = row_of(kind, seed, (n // len(KINDS)) % 2 == 0)
-        rows.append(row)
-        with lines.open("a") as file:
-            file.write(json.dumps(row) + "\n")
-        print(row["verdict"], row["trust"], kind, seed, row["named"], row.get("why", ""), row.get("sizes", ""),
-              f"{row['seconds']:.0f} s", flush=True)  # fmt: skip
-    report(rows)
+    tasks = [task for task in outside_tasks(args.records, args.seed) if args.only in (None, task.kind)]
+    rows = run_tasks(tasks, diagnose_task, args.out / f"rows-{args.seed}.jsonl", args.processes)
+    for kind in dict.fromkeys(row.kind for row in rows):
+        chosen = [row for row in rows if row.kind == kind]
+        wrong = ", ".join(f"{sum(bool(row.wrong((grade,))) for row in chosen)} {grade}" for grade in GRADES)
+        refused = sum(bool(row.outcome.refused) for row in chosen)
+        print(f"{kind:>13}: {len(chosen)} records, {refused} refused, with a wrong name: {wrong}")
+    if rows:
+        print(grade_table(rows), seconds_line(rows), sep="\n")
 
 
 if __name__ == "__main__":

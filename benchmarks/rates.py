@@ -1,6 +1,6 @@
-"""One record at several rates: the verdict must be one, and sizes must lie in each other's intervals.
+"""One record at several rates: names must be the same, and sizes must lie in each other's intervals.
 
-    python -m benchmarks.rates FOLDER/RECORD.csv ... [--out DIR]
+    python -m benchmarks.rates FOLDER/RECORD.csv ...
 
 Each record (``model.toml`` beside it) is diagnosed at its own rate, at 500, 200 and 100 Hz where those are lower
 (torque averaged over the new sample, angles taken at its start), and with rows interpolated to twice its own rate.
@@ -8,18 +8,15 @@ One line each, then whether they agree.
 """
 
 import argparse
-import json
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.harm import counted, harmed
-from orchestrator.diagnosis.diagnose import diagnose
-from orchestrator.records.model_file import Model, read_model
+from benchmarks.verdicts import Outcome, diagnose_record
+from orchestrator.records.model_file import read_model
 from orchestrator.records.record import Record, read_record
 
 RATES = (500.0, 200.0, 100.0)
@@ -56,60 +53,56 @@ def versions(record: Record) -> Iterator[tuple[str, Record]]:
     yield f"{2.0 * own:.4g} Hz, interpolated", doubled(record)
 
 
-def row_of(name: str, record: Record, model: Model) -> dict[str, Any]:
-    """Return what a diagnosis says of one version."""
-    begun = time.process_time()
-    found = diagnose(record, model)
-    sizes = {
-        f"{effect.name}@{effect.site}": {short: [e.value, *e.interval] for short, e in effect.parameters.items()}
-        for effect in found.effects
-    }
-    return {
-        "version": name, "verdict": found.verdict, "trust": found.trust.level.word, "named": list(sizes),
-        "sizes": sizes, "nuisances": {n.name: e.value for n in found.nuisances for e in n.parameters.values()},
-        "analysed": found.analysis.rate, "harm": harmed(found), "warnings": list(found.warnings),
-        "parameters": {n: [v.value, *(v.interval or ())] for n, v in found.parameters.items()},
-        "seconds": time.process_time() - begun,
-    }  # fmt: skip
+def disagreements(outcomes: Sequence[tuple[str, Outcome]]) -> list[str]:
+    """Return in words where versions disagree with the first: names, or sizes outside both intervals.
 
+    Args:
+        outcomes: version and what was said of it, the record's own rate first.
 
-def disagreements(rows: list[dict[str, Any]]) -> list[str]:
-    """Return in words where versions disagree with the first: verdict, names, or sizes outside both intervals."""
-    first, found = rows[0], list[str]()
-    for row in rows[1:]:
-        if (row["verdict"], row["named"]) != (first["verdict"], first["named"]):
-            found.append(f"{row['version']}: {row['verdict']} {row['named']}")
+    Returns:
+        The differences.
+    """
+    first, found = outcomes[0][1], list[str]()
+    for version, outcome in outcomes[1:]:
+        if set(outcome.labels()) != set(first.labels()):
+            found.append(f"{version}: {', '.join(outcome.labels()) or 'no name'}")
             continue
-        for label, sizes in row["sizes"].items():
-            for short, (value, low, high) in sizes.items():
-                own, least, most = first["sizes"][label][short]
-                if not (least <= value <= most or low <= own <= high):
-                    found.append(f"{row['version']}: {label} {short} {value:.4g} against {own:.4g}")
+        for label in first.labels():
+            for name, own in first.names[label].values.items():
+                other = outcome.names[label].values[name]
+                if not (own.low <= other.value <= own.high or other.low <= own.value <= other.high):
+                    found.append(f"{version}: {label} {name} {other.value:.4g} against {own.value:.4g}")
     return found
+
+
+def describe(outcome: Outcome) -> str:
+    """Return in words what was said of a version.
+
+    Args:
+        outcome: of the version.
+
+    Returns:
+        The line.
+    """
+    names = []
+    for label, effect in outcome.names.items():
+        values = (f"{name} {v.value:.4g} ({v.low:.4g} to {v.high:.4g})" for name, v in effect.values.items())
+        names.append(f"{label} ({effect.grade}): {', '.join(values)}")
+    return outcome.refused or "; ".join(names) or "no name"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("records", type=Path, nargs="+")
-    parser.add_argument("--out", type=Path, default=Path("results/rates"))
     args = parser.parse_args()
-    args.out.mkdir(parents=True, exist_ok=True)
-    everything: list[dict[str, Any]] = []
     for path in args.records:
-        model, rows = read_model(path.parent / "model.toml"), list[dict[str, Any]]()
+        model, outcomes = read_model(path.parent / "model.toml"), list[tuple[str, Outcome]]()
         for name, record in versions(read_record(path, model.columns)):
-            row = {"record": f"{path.parent.name}/{path.name}"} | row_of(name, record, model)
-            rows.append(row)
-            shown = {label: {n: "{:.4g} [{:.4g}, {:.4g}]".format(*v) for n, v in sizes.items()}
-                     for label, sizes in row["sizes"].items()}  # fmt: skip
-            print(row["record"], name, f"(analysed at {row['analysed']:.4g} Hz)", row["verdict"], row["trust"], shown,
-                  row["nuisances"] or "", f"{row['seconds']:.0f} s", flush=True)  # fmt: skip
-        everything += rows
-        (args.out / "rates.json").write_text(json.dumps(everything, indent=1) + "\n")
-        print(
-            "   one answer" if not disagreements(rows) else f"   differ: {'; '.join(disagreements(rows))}", flush=True
-        )
-    print(counted(everything))
+            outcomes.append((name, diagnose_record(record, model)))
+            said = outcomes[-1][1]
+            print(f"{path.parent.name}/{path.name} at {name}: {describe(said)}, {said.seconds:.0f} s", flush=True)
+        found = disagreements(outcomes)
+        print("   one answer" if not found else f"   differ: {'; '.join(found)}", flush=True)
 
 
 if __name__ == "__main__":

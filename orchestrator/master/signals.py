@@ -4,12 +4,9 @@ Every signal has ``sample(times)``, which returns its values right-continuously,
 instants in between at which it jumps or bends: an error-controlled master ends its steps there.
 """
 
-import csv
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -147,22 +144,27 @@ class Square(Signal):
 
 @dataclass(frozen=True, slots=True)
 class Table(Signal):
-    """Values at given times [s], straight lines (or, with ``hold``, steps) in between, constant outside."""
+    """Values at given times [s], straight lines (or, with ``hold``, steps) in between, constant outside.
+
+    Of two values at one time the second holds from then on: a jump.
+    """
 
     times: tuple[float, ...]
     values: tuple[float, ...]
     hold: bool = False
 
     def sample(self, times: Array) -> Array:
-        if not self.hold:
-            return np.interp(times, self.times, self.values)
-        knots = np.asarray(self.times)
-        slack = GRID_SLACK * (np.diff(knots).min() if len(knots) > 1 else 1.0)
-        index = np.searchsorted(knots, times + slack, side="right") - 1
-        return np.asarray(self.values)[np.clip(index, 0, None)]
+        knots, values = np.asarray(self.times), np.asarray(self.values)
+        steps = np.diff(knots)
+        slack = GRID_SLACK * float(steps[steps > 0.0].min(initial=1.0))
+        index = np.clip(np.searchsorted(knots, times + slack, side="right") - 1, 0, None)
+        if self.hold:
+            return values[index]
+        lines = np.interp(times, knots, values)
+        return np.where(np.abs(times - knots[index]) <= slack, values[index], lines)  # a jump has happened
 
     def breaks(self, start: float, stop: float) -> list[float]:
-        return [t for t in self.times if start < t < stop]
+        return sorted({t for t in self.times if start < t < stop})
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,48 +227,3 @@ class Noise(Signal):
     def breaks(self, start: float, stop: float) -> list[float]:
         last = math.ceil((stop - self.start) / self.period)
         return Samples(np.zeros(max(last, 1)), self.period, self.start).breaks(start, stop)
-
-
-def read_table(path: Path, column: str, time: str = "time", hold: bool = False) -> Table:
-    """Read a ``Table`` from two named columns of a CSV file with a header.
-
-    Args:
-        path: the file.
-        column: name of the values' column.
-        time: name of the times' column [s].
-        hold: whether values are held rather than joined by lines.
-
-    Returns:
-        The signal.
-
-    Raises:
-        ScenarioError: the file cannot be read, lacks a column, holds what is no number, or its times do not rise.
-    """
-    try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.DictReader(stream))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or "it is no UTF-8 CSV file"
-        raise ScenarioError(f"`file` must be a readable CSV file, but {path} is not: {reason}") from None
-    if not rows:
-        raise ScenarioError(f"`file` must hold a header and at least one row, but {path} does not")
-    columns = []
-    for name in (time, column):
-        if name not in rows[0]:
-            raise ScenarioError(f"`file` must have a column {name!r}, but {path} has {', '.join(map(str, rows[0]))}")
-        columns.append([_number(row[name], path, line, name) for line, row in enumerate(rows, start=2)])
-    times = columns[0]
-    for line, (earlier, later) in enumerate(itertools.pairwise(times), start=3):
-        if not later > earlier:
-            raise ScenarioError(f"column {time!r} must rise, but {path} line {line} has {later!r} after {earlier!r}")
-    return Table(tuple(times), tuple(columns[1]), hold)
-
-
-def _number(text: str | None, path: Path, line: int, column: str) -> float:
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ScenarioError(f"column {column!r} must hold finite numbers, but {path} line {line} has {text!r}")
-    return value

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from orchestrator.master import units
+from orchestrator.master.discrete import discrete_problem
 from orchestrator.master.graph import components
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import NUMERIC, READABLE, ModelInterface, Slave, Unit, Value, Variable
@@ -324,7 +325,17 @@ class System:
         variable = self.variable(source.target)
         assert variable is not None
         if variable.type != "Real":
-            found.append(Problem(f"{path}.to", f"must be a Real input, but {source.target} has type {variable.type}"))
+            text = discrete_problem(variable, source.signal)
+            if text is not None:
+                found.append(Problem(f"{path}", text))
+            if source.unit is not None:
+                text = f"must be left out, but is given, and {source.target} has type {variable.type}"
+                found.append(Problem(f"{path}.unit", text))
+            others = [c.target for c in self.connections] + [s.target for s in self.sources[:k]]
+            if source.target in others:
+                found.append(
+                    Problem(f"{path}.to", f"must be fed once, but {source.target} is fed by something else too")
+                )
         elif source.unit is not None and self._converted(source.target, Quantity(0.0, source.unit)) is None:
             own = variable.unit or "no unit"
             found.append(
@@ -341,7 +352,10 @@ class System:
             text = f"must be an {causality}, but {address} is of causality {variable.causality}"
             return [Problem(path, text, mismatch=True)]
         if variable.type not in NUMERIC:
-            return [Problem(path, f"must be numeric, but {address} has type {variable.type}", mismatch=True)]
+            text = f"must be numeric, but {address} has type {variable.type}"
+            if causality == "input":
+                text += ": give its value under `parameters` of its instance"
+            return [Problem(path, text, mismatch=True)]
         return []
 
     def _order_problems(self) -> list[Problem]:

@@ -1,37 +1,9 @@
 """Whether two units measure the same quantity, and the conversion between them."""
 
-import math
 from collections.abc import Mapping
 
 from orchestrator.master.protocol import Unit
-
-_NONE = (0, 0, 0, 0, 0, 0, 0, 0)
-_ANGLE = (0, 0, 0, 0, 0, 0, 0, 1)
-_SPEED = (0, 0, -1, 0, 0, 0, 0, 1)
-_TORQUE = (1, 2, -2, 0, 0, 0, 0, 0)
-_TIME = (0, 0, 1, 0, 0, 0, 0, 0)
-_INERTIA = (1, 2, 0, 0, 0, 0, 0, 0)
-
-KNOWN = {
-    unit.name: unit
-    for unit in (
-        Unit("1", _NONE),
-        Unit("%", _NONE, 0.01),
-        Unit("rad", _ANGLE),
-        Unit("mrad", _ANGLE, 1e-3),
-        Unit("deg", _ANGLE, math.pi / 180.0),
-        Unit("rad/s", _SPEED),
-        Unit("deg/s", _SPEED, math.pi / 180.0),
-        Unit("rpm", _SPEED, math.pi / 30.0),
-        Unit("N.m", _TORQUE),
-        Unit("mN.m", _TORQUE, 1e-3),
-        Unit("kN.m", _TORQUE, 1e3),
-        Unit("kg.m2", _INERTIA),
-        Unit("g.cm2", _INERTIA, 1e-7),
-        Unit("s", _TIME),
-        Unit("ms", _TIME, 1e-3),
-    )
-}
+from orchestrator.shared.units import parse_unit
 
 
 def resolve(name: str, declared: Mapping[str, Unit]) -> Unit:
@@ -46,8 +18,16 @@ def resolve(name: str, declared: Mapping[str, Unit]) -> Unit:
     """
     unit = declared.get(name)
     if unit is None or unit.exponents is None:
-        return KNOWN.get(name, Unit(name))
+        return _well_known(name)
     return unit
+
+
+def _well_known(name: str) -> Unit:
+    """Return a unit of the list of spellings; counts, which FMI does not know, and others are mere names."""
+    known = parse_unit(name)
+    if known is None or known.dimension[-1]:
+        return Unit(name)
+    return Unit(name, known.dimension[:-1], known.factor, known.offset)
 
 
 def conversion(source: Unit | None, target: Unit | None) -> tuple[float, float] | None:

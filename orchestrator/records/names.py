@@ -50,7 +50,7 @@ def choose(
     names = [name for name in COLUMNS if name not in skip]
     for name in names:
         wanted = columns.get(name, Column()).name
-        places = _called(heads, wanted or name)
+        places = find_named(heads, wanted or name)
         if len(places) > 1:
             raise RecordError(
                 f"{source}: column `{wanted or name}` must appear once, but appears {len(places)} times: say "
@@ -61,7 +61,7 @@ def choose(
         elif wanted:
             raise RecordError(
                 f"{source}: column `{wanted}` of `[columns.{name}] name` must be there, but is not; there is "
-                f"{_listed(heads)}{_near(wanted, heads)}"
+                f"{listed(heads)}{near(wanted, heads)}"
             )
     for name in names:
         if name not in found:
@@ -75,13 +75,40 @@ def choose(
     return found
 
 
-def _called(heads: Sequence[Head], name: str) -> list[int]:
-    """Return the places of channels called ``name``; ``#3`` is the third."""
+def find_named(heads: Sequence[Head], name: str) -> list[int]:
+    """Return the places of channels called ``name``; ``#3`` is the third.
+
+    Args:
+        heads: channels of a file.
+        name: with or without the unit in it.
+
+    Returns:
+        The places.
+    """
     if re.fullmatch(r"#\d{1,6}", name) and not any(head.name == name for head in heads):
         place = int(name[1:]) - 1
         return [place] if 0 <= place < len(heads) else []
-    exact = [n for n, head in enumerate(heads) if name in (head.full, head.name)]
+    exact = [n for n, head in enumerate(heads) if head.full == name] or [
+        n for n, head in enumerate(heads) if head.name == name
+    ]
     return exact or [n for n, head in enumerate(heads) if head.full.lower() == name.lower() != ""]
+
+
+def recognised_time(heads: Sequence[Head], source: str) -> int | None:
+    """Return the place of the time, recognised by name or unit; None: there is none, or only a sample number.
+
+    Args:
+        heads: channels of a file.
+        source: file name, for messages.
+
+    Returns:
+        The place.
+
+    Raises:
+        RecordError: two channels look like it.
+    """
+    choice = _recognised("time", heads, set(), source)
+    return None if choice is None or choice.numbered else choice.place
 
 
 def _recognised(name: str, heads: Sequence[Head], taken: set[int], source: str) -> Choice | None:
@@ -119,7 +146,7 @@ def _score(name: str, head: Head) -> int:
     """Return how much a channel looks like a column; 0: not at all."""
     found, kind = set(words_of(head.name)), _kind(head, name)
     if head.kind == "stamp":
-        return 3 if name == "time" else 0
+        return 4 if name == "time" else 0
     if name == "time":
         return _time_score(found, kind)
     if found & (words.SPEED | words.OTHER) or kind in ("time", "speed", "velocity", "voltage") or not head.name:
@@ -158,13 +185,30 @@ def _torque_score(found: set[str], kind: str) -> int:
     return score + (3 if found & words.ASKED else -1 if found & words.FOUND else 1 if torque else 0)
 
 
-def _listed(heads: Sequence[Head]) -> str:
+def listed(heads: Sequence[Head]) -> str:
+    """Return the names of channels for a message, as far as there is room.
+
+    Args:
+        heads: channels of a file.
+
+    Returns:
+        The names in backquotes.
+    """
     names = ",".join(head.full or head.name for head in heads)
     plain = "".join(c if c.isprintable() else "?" for c in names)
     return f"`{plain if len(plain) <= 100 else plain[:97] + '...'}`"
 
 
-def _near(name: str, heads: Sequence[Head]) -> str:
+def near(name: str, heads: Sequence[Head]) -> str:
+    """Return the question whether a name like this one was meant, or nothing.
+
+    Args:
+        name: that is not there.
+        heads: channels of a file.
+
+    Returns:
+        The end of a message.
+    """
     close = difflib.get_close_matches(name, [head.full or head.name for head in heads], 1, 0.6)
     return f"; did you mean `{close[0]}`?" if close else ""
 
@@ -178,6 +222,6 @@ def _missing(name: str, heads: Sequence[Head], source: str) -> str:
         )
     rate = ", or `rate = ...` [Hz] where rows are uniform and there is none" if name == "time" else ""
     return (
-        f"{source}: column `{name}` must be there ({MEANINGS[name]}), but the file has {_listed(heads)}: say "
+        f"{source}: column `{name}` must be there ({MEANINGS[name]}), but the file has {listed(heads)}: say "
         f'`[columns.{name}] name = "..."`{rate} in the model file (`model`)'
     )

@@ -1,10 +1,32 @@
 """A scenario: which FMUs run, how they are connected, what is fed in, which master runs them, what is recorded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from orchestrator.master.algorithms import Algorithm
+from orchestrator.master.result import Recording
 from orchestrator.master.session import Session
 from orchestrator.master.system import System
+
+
+@dataclass(frozen=True)
+class Derived:
+    """A signal that follows from a recorded one: ``factor * source + offset``.
+
+    Attributes:
+        name: of the signal.
+        source: ``instance.variable``, recorded.
+        factor: see above.
+        offset: see above.
+        unit: of the signal; None where none is stated.
+    """
+
+    name: str
+    source: str
+    factor: float
+    offset: float
+    unit: str | None
 
 
 @dataclass(frozen=True)
@@ -19,6 +41,7 @@ class Scenario:
         start: beginning [s].
         name: for titles.
         origin: the file that describes it, for messages.
+        derived: signals that are recorded beside those of ``record``.
     """
 
     system: System
@@ -28,6 +51,23 @@ class Scenario:
     start: float = 0.0
     name: str = "scenario"
     origin: str = ""
+    derived: tuple[Derived, ...] = ()
+
+    def with_derived(self, recording: Recording) -> Recording:
+        """Return a recording with the derived signals.
+
+        Args:
+            recording: of this scenario.
+
+        Returns:
+            The recording, those of ``derived`` behind the others.
+        """
+        if not self.derived:
+            return recording
+        more = [d.factor * recording[d.source] + d.offset for d in self.derived]
+        names = (*recording.names, *(d.name for d in self.derived))
+        units = {**recording.units, **{d.name: d.unit for d in self.derived}}
+        return replace(recording, values=np.vstack([recording.values, *more]), names=names, units=units)
 
     def session(self) -> Session:
         """Return a session that runs this scenario as often as needed; to be closed.

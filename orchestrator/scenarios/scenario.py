@@ -20,12 +20,13 @@ from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master import signals
 from orchestrator.master.algorithms import ALGORITHMS, Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
 from orchestrator.master.problems import Problem, raise_problems
-from orchestrator.master.protocol import Value
+from orchestrator.master.protocol import Value, Variable
 from orchestrator.master.result import Recording
 from orchestrator.master.system import Connection, Instance, Quantity, SignalSource, System
-from orchestrator.master.values import one_line
+from orchestrator.master.values import one_line, typed_value
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.isolated import Safety, run_safely
+from orchestrator.scenarios.tables import read_table
 
 MAXIMUM_BYTES = 16 * 2**20
 
@@ -45,7 +46,7 @@ def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
         SimulationError: the run went wrong, or its result is not finite.
     """
     try:
-        return run_safely(scenario, safety or Safety())
+        return scenario.with_derived(run_safely(scenario, safety or Safety()))
     except FmuError as error:  # of what only comes out when an FMU is unpacked or loaded
         raise FmuError(f"{scenario.origin}: {error}" if scenario.origin else str(error)) from None
 
@@ -84,13 +85,13 @@ class _Source(_Strict, tag_field="kind", frozen=True, kw_only=True):
 
 
 class _Constant(_Source, tag="constant", frozen=True, kw_only=True):
-    value: float
+    value: float | bool | str
 
 
 class _Step(_Source, tag="step", frozen=True, kw_only=True):
-    after: float
+    after: float | bool
     time: float = 0.0
-    before: float = 0.0
+    before: float | bool = 0.0
 
 
 class _Sine(_Source, tag="sine", frozen=True, kw_only=True):
@@ -117,7 +118,8 @@ class _Table(_Source, tag="table", frozen=True, kw_only=True):
     file: str
     column: str
     time: str = "time"
-    hold: bool = False
+    hold: bool | None = None
+    header: int | None = None
 
 
 _AnySource = _Constant | _Step | _Sine | _Square | _Noise | _Table
@@ -178,7 +180,7 @@ def load_scenario(path: Path) -> Scenario:
     algorithm, order = reader.master(top)
     instances = reader.instances(top.instances)
     connections = reader.connections(top.connections)
-    sources = reader.sources(top.sources, algorithm.step if algorithm else math.nan, top.start)
+    sources = reader.sources(top.sources, instances, algorithm.step if algorithm else math.nan, top.start)
     if algorithm is not None:
         try:
             step_count(top.start, top.stop, algorithm.step)
@@ -290,13 +292,21 @@ class _Reader:
                 found.append(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit))
         return tuple(found)
 
-    def sources(self, tables: list[Any], step: float, start: float) -> tuple[SignalSource, ...]:
+    @staticmethod
+    def _variable(instances: tuple[Instance, ...], target: str) -> Variable | None:
+        """The variable that a source feeds, if there is one."""
+        return System(instances).variable(target)
+
+    def sources(
+        self, tables: list[Any], instances: tuple[Instance, ...], step: float, start: float
+    ) -> tuple[SignalSource, ...]:
         found = []
         for k, table in enumerate(tables):
             path = f"$.sources[{k}]"
             source = _converted(table, _AnySource, path, self.problems)
             if source is None:
                 continue
+            variable = self._variable(instances, source.target)
             before = len(self.problems)
             for name in ("value", "after", "time", "before", "amplitude", "frequency", "phase", "offset", "delay"):
                 self._bounded(source, name, path, math.isfinite, "finite")
@@ -304,9 +314,13 @@ class _Reader:
             self._bounded(source, "seed", path, lambda x: x >= 0, "not negative")
             self._bounded(source, "period", path, lambda x: 0.0 < x < math.inf, "finite and positive")
             if len(self.problems) == before:
-                signal = self._signal(source, step, start, path)
+                unit: str | None = source.unit
+                if isinstance(source, _Table):
+                    signal, unit = self._table(source, path, variable)
+                else:
+                    signal = self._signal(source, step, start, path, variable)
                 if signal is not None:
-                    found.append(SignalSource(source.target, signal, source.unit, source.at))
+                    found.append(SignalSource(source.target, signal, unit, source.at))
         return tuple(found)
 
     def _bounded(self, source: Any, name: str, path: str, holds: Callable[[float], bool], expected: str) -> None:
@@ -314,12 +328,14 @@ class _Reader:
         if isinstance(value, (int, float)) and not holds(value):
             self.problems.append(Problem(f"{path}.{name}", f"must be {expected}, but is {value!r}"))
 
-    def _signal(self, source: _AnySource, step: float, start: float, path: str) -> signals.Signal | None:
+    def _signal(
+        self, source: _AnySource, step: float, start: float, path: str, variable: Variable | None
+    ) -> signals.Signal | None:
         match source:
             case _Constant():
-                return signals.Constant(source.value)
+                return self._constant(source.value, path, variable)
             case _Step():
-                return signals.Step(source.time, source.after, source.before)
+                return signals.Step(source.time, float(source.after), float(source.before))
             case _Sine():
                 return signals.Sine(source.amplitude, source.frequency, source.phase, source.offset)
             case _Square():
@@ -327,15 +343,38 @@ class _Reader:
             case _Noise():
                 period = step if source.period is None else source.period
                 return signals.Noise(source.deviation, source.seed, period, start)
-            case _Table():
-                return self._table(source, path)
+        return None
 
-    def _table(self, source: _Table, path: str) -> signals.Signal | None:
+    def _constant(self, value: float | bool | str, path: str, variable: Variable | None) -> signals.Signal | None:
+        if not isinstance(value, str):
+            return signals.Constant(float(value))
+        if variable is None or variable.type != "Enumeration":
+            kind = (
+                "a number, true or false" if variable is None or variable.type != "String" else "left to `parameters`"
+            )
+            self.problems.append(Problem(f"{path}.value", f"must be {kind}, but is {value!r}"))
+            return None
+        number, text = typed_value(variable, value)
+        if text is not None:
+            self.problems.append(Problem(f"{path}.value", text))
+            return None
+        assert isinstance(number, int)
+        return signals.Constant(float(number))
+
+    def _table(self, source: _Table, path: str, variable: Variable | None) -> tuple[signals.Signal | None, str | None]:
+        """Return a table, and its unit: the source's, else the file's.
+
+        Into an input that is not Real it is held where the file does not say.
+        """
+        discrete = variable is not None and variable.type != "Real"
+        hold = discrete if source.hold is None else source.hold
         if "\0" in source.file:
             self.problems.append(Problem(f"{path}.file", f"must be a path, but is {source.file!r}"))
-            return None
+            return None, None
         try:
-            return signals.read_table(self.path.parent / source.file, source.column, source.time, source.hold)
+            file = self.path.parent / source.file
+            signal, unit = read_table(file, source.column, source.time, hold, source.header)
         except ScenarioError as error:
             self.problems.append(Problem(f"{path}.file", str(error)))
-            return None
+            return None, None
+        return signal, source.unit or unit or None

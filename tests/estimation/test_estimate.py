@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.diagnosis import model_of
+from benchmarks.simulated import model_of
 from orchestrator.cli import main
 from orchestrator.errors import DesignError
 from orchestrator.estimation import cramer_rao

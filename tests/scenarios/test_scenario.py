@@ -208,10 +208,11 @@ def test_table_and_noise_sources(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        ("time,u\n0,0\n0,5\n", "must rise"),
-        ("time,v\n0,0\n", "must have a column 'u'"),
-        ("time,u\n0,x\n", "must hold finite numbers"),
-        ("", "must hold a header"),
+        ("time,u\n1,0\n0,5\n", "must not go back"),
+        ("time,v\n0,0\n", "no such column: 'u' of `time,v`"),
+        ("time,u\n0,0\n1,x\n2,0\n3,0\n", "row 2, column `u` must be a number, but is `x`"),
+        ("time,u\n0,0\n1,\n2,0\n", "must hold finite numbers"),
+        ("", "must have a header and rows"),
     ],
 )
 def test_bad_tables(tmp_path: Path, content: str, expected: str) -> None:

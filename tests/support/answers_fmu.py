@@ -11,6 +11,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="Answers" guid="{{answers}}" generationTool="by hand"
     generationDateAndTime="2026-01-01T00:00:00Z" variableNamingConvention="flat" numberOfEventIndicators="0">
   <CoSimulation modelIdentifier="Answers" {attributes}/>
+  {units}
   <ModelVariables>{variables}
   </ModelVariables>
   <ModelStructure>
@@ -21,14 +22,23 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def _variable(reference: int, name: str, causality: str, variability: str, kind: str, start: str | None) -> str:
-    given = "" if start is None else f' start="{start}"'
+def _variable(
+    reference: int, name: str, causality: str, variability: str, kind: str, start: str | None, unit: str | None = None
+) -> str:
+    given = ("" if start is None else f' start="{start}"') + (f' unit="{unit}"' if unit else "")
     attributes = f'name="{name}" valueReference="{reference}" causality="{causality}" variability="{variability}"'
     return f"\n    <ScalarVariable {attributes}><{kind}{given}/></ScalarVariable>"
 
 
 def build_answers_fmu(
-    folder: Path, *macros: str, saves: bool = False, varies: bool = True, parameters: bool = False, more: str = ""
+    folder: Path,
+    *macros: str,
+    saves: bool = False,
+    varies: bool = True,
+    parameters: bool = False,
+    more: str = "",
+    unit: str | None = None,
+    name: str = "Answers",
 ) -> Path:
     """Compile the FMU into ``folder`` and return its path.
 
@@ -38,6 +48,8 @@ def build_answers_fmu(
         saves, varies: capabilities that it declares: it saves its state, it takes steps of any length.
         parameters: whether ``mode`` (Integer) and ``on`` (Boolean) are fixed parameters, not inputs.
         more: attributes of CoSimulation.
+        unit: of ``u`` and ``x``: "K", or none.
+        name: stem of the file.
     """
     library = folder / "Answers.so"
     headers = Path(fmpy.__file__).parent / "c-code"
@@ -48,18 +60,19 @@ def build_answers_fmu(
     attributes += f' canGetAndSetFMUstate="{str(saves).lower()}"'
     mode, held = ("parameter", "fixed") if parameters else ("input", "discrete")
     variables = (
-        _variable(0, "u", "input", "continuous", "Real", "0"),
-        _variable(1, "x", "output", "continuous", "Real", None),
+        _variable(0, "u", "input", "continuous", "Real", "0", unit),
+        _variable(1, "x", "output", "continuous", "Real", None, unit),
         _variable(2, "gain", "parameter", "fixed", "Real", "2"),
         _variable(0, "mode", mode, held, "Integer", "0"),
         _variable(1, "steps", "output", "discrete", "Integer", None),
         _variable(0, "on", mode, held, "Boolean", "false"),
         _variable(0, "label", "parameter", "fixed", "String", ""),
     )
-    path = folder / "Answers.fmu"
+    units = '<UnitDefinitions><Unit name="K"><BaseUnit K="1"/></Unit></UnitDefinitions>' if unit else ""
+    path = folder / f"{name}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(
-            "modelDescription.xml", DESCRIPTION.format(attributes=attributes, variables="".join(variables))
+            "modelDescription.xml", DESCRIPTION.format(attributes=attributes, units=units, variables="".join(variables))
         )
         archive.write(library, "binaries/linux64/Answers.so")
     return path

@@ -7,6 +7,7 @@ without it, in the encoder that shows it better.
 """
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,6 @@ from orchestrator.records.record import Record, record_from_columns
 from tests.support.independent_plant import NOISE, NOMINAL, SUBSTEPS, make_record
 
 TIMES_NOISE = 3.0
-TORQUE_NOISE = False  # set by the benchmark: half of the cases have a coloured torque noise
-SHIFTS = False  # the same: half have signals that are late by up to two samples
-GAIN = False  # the same: half have a drive whose torque is up to 10 % off
 RATE = 200.0  # samples per second
 REACHED = ("sat", "slew", "stop")  # sizes of what acts only where it is reached
 LIMITS = {"saturation", "rate_limit", "end_stops"}  # a loop that is closed need not reach them
@@ -72,6 +70,72 @@ MACHINES: dict[str, tuple[dict[str, float], float]] = {
 }
 GAPS = (0.3, 3.0)  # half-gaps of the records with one encoder, in typical (rms) twists
 
+# Unit of each size, in powers of a record's torque, load torque, speeds, load angle and twist: on another machine than
+# the thesis's, sizes are as much larger as these are.
+UNITS: dict[str, dict[str, int]] = {
+    **{name: {"torque": 1} for name in ("Fc_m", "Fs_m", "rip", "late_Fc")},
+    **{name: {"load": 1} for name in ("Fc_l", "Fs_l", "T0", "grav", "bw", "knock")},
+    **{name: {"twist": 1} for name in ("alpha", "hard", "ecc", "bw_x")},
+    "vs": {"speed_m": 1}, "vs_l": {"speed_l": 1},
+    "dv_m": {"torque": 1, "speed_m": -1}, "dv_l": {"load": 1, "speed_l": -1},
+    "qd": {"load": 1, "speed_l": -2}, "ks": {"load": 1, "angle_l": -1}, "stop_k": {"load": 1, "angle_l": -1},
+    "stop": {"angle_l": 1}, "kspeed": {"speed_l": -1}, "J3": {"load": 1, "speed_l": -1},
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Ways:
+    """How records are made: the machine, and which nuisances half of them have.
+
+    Attributes:
+        machine: one of ``MACHINES``.
+        torque_noise: half have a coloured torque noise.
+        shifts: half have signals that are late by up to two samples.
+        gain: half have a drive whose torque is up to 10 % off.
+    """
+
+    machine: str = "thesis"
+    torque_noise: bool = False
+    shifts: bool = False
+    gain: bool = False
+
+    @property
+    def plant(self) -> dict[str, Any]:
+        """Return what the simulator must know of the machine."""
+        nominal, torque = MACHINES[self.machine]
+        return {} if self.machine == "thesis" else {"nominal": nominal, "torque": torque}
+
+    def sized(self, effects: dict[str, float]) -> dict[str, float]:
+        """Return effects of the thesis's machine as large on this one."""
+        if self.machine == "thesis":
+            return dict(effects)
+        here, there = _magnitudes(self.machine), _magnitudes("thesis")
+        changed = {}
+        for name, value in effects.items():
+            powers = UNITS.get(name, {})
+            changed[name] = value * float(
+                np.prod([(here[unit] / there[unit]) ** power for unit, power in powers.items()])
+            )
+        return changed
+
+
+@cache
+def _magnitudes(machine: str) -> dict[str, float]:
+    """Return rms of torque, load torque, speeds, load angle and twist of a record without effects."""
+    ways = Ways(machine)
+    _, truth = make_record({}, 0, 10.0, substeps=25, **ways.plant)
+    nominal, (theta_m, omega_m, theta_l, omega_l, torque) = MACHINES[machine][0], truth["states"][:, :5].T
+    twist = theta_m / nominal["i"] - theta_l
+    sizes = {
+        "torque": torque,
+        "load": nominal["k"] * twist,
+        "speed_m": omega_m,
+        "speed_l": omega_l,
+        "angle_l": theta_l - theta_l.mean(),
+        "twist": twist,
+    }
+    return {name: float(np.sqrt(np.mean(values**2))) for name, values in sizes.items()}
+
 
 @dataclass(frozen=True)
 class Case:
@@ -85,44 +149,45 @@ class Case:
     times_noise: float = 0.0
 
 
-def none_case(seed: int, duration: float = 30.0) -> Case:
+def none_case(seed: int, duration: float = 30.0, ways: Ways = Ways()) -> Case:
     """Return a record with nothing hidden beside parameters that are off by up to 5 %."""
     rng = np.random.default_rng([seed, 1])
-    return _case("none", seed, {}, (), str(rng.choice(EXCITATIONS)), duration)
+    return _case("none", seed, {}, (), str(rng.choice(EXCITATIONS)), duration, ways)
 
 
-def single_case(kind: str, seed: int, duration: float = 30.0) -> Case:
+def single_case(kind: str, seed: int, duration: float = 30.0, ways: Ways = Ways()) -> Case:
     """Return a record with one effect, its size drawn log-uniformly from three times the noise to large."""
     rng = np.random.default_rng([seed, 2])
     effects, size, right = SINGLE[kind]
-    effects = _varied(effects, rng)
+    effects = ways.sized(_varied(effects, rng))
     excitation = str(rng.choice(EXCITATIONS[:3] if kind in LIMITS else EXCITATIONS))
-    chosen, ratio = draw_size(effects, size, seed, excitation, rng, duration)
-    return _case(kind, seed, chosen, (right,), excitation, duration, ratio)
+    chosen, ratio = draw_size(effects, size, seed, excitation, rng, duration, ways=ways)
+    return _case(kind, seed, chosen, (right,), excitation, duration, ways, ratio)
 
 
-def double_case(kinds: tuple[str, str], seed: int, duration: float = 30.0) -> Case:
+def double_case(kinds: tuple[str, str], seed: int, duration: float = 30.0, ways: Ways = Ways()) -> Case:
     """Return a record with two effects, each drawn from ten times the noise to half of the largest size."""
     rng = np.random.default_rng([seed, 3])
     excitation = str(rng.choice(EXCITATIONS[:3] if LIMITS & set(kinds) else EXCITATIONS))
     both: dict[str, float] = {}
     for kind in kinds:
         effects, size, _ = SINGLE[kind]
-        chosen, _ = draw_size(_varied(effects, rng), size, seed, excitation, rng, duration, 10.0, 0.5)
+        effects = ways.sized(_varied(effects, rng))
+        chosen, _ = draw_size(effects, size, seed, excitation, rng, duration, 10.0, 0.5, ways)
         both |= chosen
-    return _case("+".join(kinds), seed, both, tuple(SINGLE[kind][2] for kind in kinds), excitation, duration)
+    return _case("+".join(kinds), seed, both, tuple(SINGLE[kind][2] for kind in kinds), excitation, duration, ways)
 
 
-def unknown_case(kind: str, seed: int, duration: float = 30.0) -> Case:
+def unknown_case(kind: str, seed: int, duration: float = 30.0, ways: Ways = Ways()) -> Case:
     """Return a record with an effect that the library does not hold."""
     rng = np.random.default_rng([seed, 4])
     effects = {
         name: value * (rng.uniform(0.7, 1.5) if name not in ("bw_x",) else 1.0) for name, value in UNKNOWN[kind].items()
     }
-    return _case(kind, seed, effects, (), str(rng.choice(EXCITATIONS)), duration)
+    return _case(kind, seed, ways.sized(effects), (), str(rng.choice(EXCITATIONS)), duration, ways)
 
 
-def one_encoder_case(seed: int, duration: float = 30.0) -> Case:
+def one_encoder_case(seed: int, duration: float = 30.0, torque_noise: bool = False) -> Case:
     """Return a record of the motor's encoder alone with a gap of 0.3 to 3 times the typical twist.
 
     Machines take turns, and so do excitations; ``truth`` has the machine's nominal parameters.
@@ -136,7 +201,7 @@ def one_encoder_case(seed: int, duration: float = 30.0) -> Case:
     states = plain["states"]
     typical = float(np.sqrt(np.mean((states[:, 0] / nominal["i"] - states[:, 2]) ** 2)))
     share = float(np.exp(rng.uniform(*np.log(GAPS))))
-    noise = torque_noise_of(seed) if TORQUE_NOISE else 0.0
+    noise = torque_noise_of(seed) if torque_noise else 0.0
     columns, truth = make_record({"alpha": share * typical}, seed, duration, torque_noise=noise, **ways)
     record = record_from_columns(columns, f"{machine}-{excitation}-{seed}").without_load_encoder()
     truth |= {"torque_noise": noise, "shifts": (0.0, 0.0), "gain": 1.0}
@@ -165,19 +230,19 @@ def gain_of(seed: int) -> float:
 
 def draw_size(
     effects: dict[str, float], size: str, seed: int, excitation: str, rng: np.random.Generator, duration: float,
-    least: float = TIMES_NOISE, largest: float = 1.0,
+    least: float = TIMES_NOISE, largest: float = 1.0, ways: Ways = Ways(),
 ) -> tuple[dict[str, float], float]:  # fmt: skip
     """Return the effects at a size between ``least`` times the noise and ``largest``, and the drawn times-noise."""
-    plain = _raw({}, seed, excitation, duration)
+    plain = _raw({}, seed, excitation, duration, ways)
     if size == "off_m":
         return scaled(effects, size, least * NOISE[0] / effects[size] * float(np.exp(rng.uniform(0.0, 3.0)))), 0.0
 
     def change(share: float) -> float:
-        return times_noise(plain, _raw(scaled(effects, size, share), seed, excitation, duration))
+        return times_noise(plain, _raw(scaled(effects, size, share, ways), seed, excitation, duration, ways))
 
     share = 1.0
     for _ in range(2 if size not in REACHED else 0):
-        share = min(max(share * least / max(change(share), 1e-3), 1e-4), 1.0)
+        share = min(max(share * least / max(change(share), 1e-3), 1e-4), 10.0)
     if size in REACHED:
         inside, outside = 1.0, 0.0
         for _ in range(6):
@@ -186,19 +251,19 @@ def draw_size(
         share = inside
     low, high = np.log(share), max(np.log(largest), np.log(share))
     drawn = float(np.exp(rng.uniform(low, high)))
-    chosen = scaled(effects, size, drawn)
+    chosen = scaled(effects, size, drawn, ways)
     return chosen, change(drawn)
 
 
-def scaled(effects: dict[str, float], size: str, share: float) -> dict[str, float]:
+def scaled(effects: dict[str, float], size: str, share: float, ways: Ways = Ways()) -> dict[str, float]:
     """Return the effects with their size at ``share`` of the largest."""
     changed = dict(effects)
     if size == "sat":
-        # Largest torque of the records is 259 N.m; the share is what is cut off of it.
-        changed["sat"] = 259.0 * (1.0 - effects["sat"] * share)
+        # Largest torque of the thesis's records is 259 N.m; the share is what is cut off of it.
+        changed["sat"] = 259.0 * MACHINES[ways.machine][1] * (1.0 - effects["sat"] * share)
     elif size == "slew":
-        # The request of the records changes by up to 9000 N.m/s.
-        changed["slew"] = 9000.0 * (1.0 - effects["slew"] * share)
+        # The request of the thesis's records changes by up to 9000 N.m/s.
+        changed["slew"] = 9000.0 * MACHINES[ways.machine][1] * (1.0 - effects["slew"] * share)
     elif size == "stop":
         changed["stop"] = effects["stop"] / share  # the farther out, the less it is reached
     elif size == "hard":
@@ -240,11 +305,12 @@ def _varied(effects: dict[str, float], rng: np.random.Generator) -> dict[str, fl
     return changed
 
 
-def _raw(effects: dict[str, float], seed: int, excitation: str, duration: float) -> np.ndarray:
+def _raw(effects: dict[str, float], seed: int, excitation: str, duration: float, ways: Ways) -> np.ndarray:
     """Return the true encoder angles (n, 2), offsets included; closed loops are compared open, by the same torque."""
     _, truth = make_record(
-        effects, seed, duration, excitation="multisine" if excitation == "closed_loop" else excitation, substeps=25
-    )
+        effects, seed, duration, excitation="multisine" if excitation == "closed_loop" else excitation, substeps=25,
+        **ways.plant,
+    )  # fmt: skip
     angles = truth["states"][:, [0, 2]].copy()
     angles[:, 0] += effects.get("off_m", 0.0)
     return angles
@@ -252,13 +318,20 @@ def _raw(effects: dict[str, float], seed: int, excitation: str, duration: float)
 
 def _case(
     kind: str, seed: int, effects: dict[str, float], right: tuple[tuple[str, ...], ...], excitation: str,
-    duration: float, ratio: float = 0.0,
+    duration: float, ways: Ways, ratio: float = 0.0,
 ) -> Case:  # fmt: skip
-    noise = torque_noise_of(seed) if TORQUE_NOISE else 0.0
-    shifts = shifts_of(seed) if SHIFTS else (0.0, 0.0)
-    gain = gain_of(seed) if GAIN else 1.0
+    noise = torque_noise_of(seed) if ways.torque_noise else 0.0
+    shifts = shifts_of(seed) if ways.shifts else (0.0, 0.0)
+    gain = gain_of(seed) if ways.gain else 1.0
     columns, truth = make_record(
-        effects, seed, duration, excitation=excitation, torque_noise=noise, shifts=shifts, torque_gain=gain
+        effects,
+        seed,
+        duration,
+        excitation=excitation,
+        torque_noise=noise,
+        shifts=shifts,
+        torque_gain=gain,
+        **ways.plant,
     )
     truth |= {"torque_noise": noise, "shifts": shifts, "gain": gain}
     if "delay" in effects:

@@ -32,7 +32,8 @@ import msgspec
 
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.errors import ScenarioError
-from orchestrator.master.protocol import Variable
+from orchestrator.master.protocol import Unit, Variable
+from orchestrator.master.units import resolve
 from orchestrator.records.model_file import ModelParameter
 
 MAXIMUM_BYTES = 1 << 24
@@ -44,6 +45,7 @@ class InputEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     column: str = ""
     hold: str = "zero"
     factor: float = 1.0
+    unit: str = ""
 
 
 class OutputEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,6 +54,7 @@ class OutputEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     column: str = ""
     noise: float | None = None
     factor: float = 1.0
+    unit: str = ""
 
 
 class ParameterEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -75,6 +78,7 @@ class SignalEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     column: str = ""
     reference: float = 0.0
     factor: float = 1.0
+    unit: str = ""
 
 
 class CutEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -91,7 +95,9 @@ class Options(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tolerance: float | None = None
     time: str = "time"
     time_factor: float = 1.0
-    """Seconds in a unit of that column: 1e-3 for milliseconds."""
+    """Seconds in a unit of that column: 1e-3 for milliseconds; 1: what the file states, else seconds."""
+    header: int | None = None
+    """Line of a text that holds the names, from 1; 0: there are none; None: found."""
     substeps: int = 4
     """Communication steps in a sample."""
     budget: float = 600.0
@@ -121,6 +127,7 @@ class Map(msgspec.Struct, frozen=True):
         tunable: those of what is re-fitted that their FMU says may change within a run.
         initial: those of what is re-fitted that one record begins with.
         source: file name, for messages.
+        units: of inputs and outputs, where the FMU states them.
     """
 
     inputs: dict[str, InputEntry]
@@ -134,6 +141,7 @@ class Map(msgspec.Struct, frozen=True):
     cuts: dict[str, CutEntry] = {}
     tunable: tuple[str, ...] = ()
     initial: tuple[str, ...] = ()
+    units: dict[str, Unit] = {}
 
 
 def read_map(path: Path, subject: Subject) -> Map:
@@ -203,6 +211,8 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
     _check_connections(written, subject, look)
     if not 0.0 < written.options.time_factor < math.inf:
         raise ScenarioError(f"{source}: $.options.time_factor must be positive, but is {written.options.time_factor:g}")
+    if written.options.header is not None and written.options.header < 0:
+        raise ScenarioError(f"{source}: $.options.header must be a line, or 0, but is {written.options.header}")
     if not 1 <= written.options.substeps <= 1000:
         raise ScenarioError(f"{source}: $.options.substeps must be 1 to 1000, but is {written.options.substeps}")
     uncertain: list[ModelParameter] = []
@@ -227,6 +237,11 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
         written.cuts,
         tuple(u.name for u in uncertain if subject.model.variables[u.name].variability == "tunable"),
         tuple(u.name for u in uncertain if u.name in written.start),
+        units={
+            name: resolve(text, subject.model.units)
+            for name in (*written.inputs, *written.outputs)
+            if (text := subject.model.variables[name].unit)
+        },
     )
 
 

@@ -23,6 +23,7 @@ class Data:
         source: file name, for messages.
         signals: (n, signals), off their references.
         factor: rows of the file for one of these.
+        notes: what was detected and filled when the file was read.
         held: (n * factor, inputs) inputs in all rows of the file, where there are more; ``inputs`` are their means.
     """
 
@@ -33,6 +34,7 @@ class Data:
     signals: Array = field(default_factory=lambda: np.zeros((0, 0)))
     factor: int = 1
     held: Array | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def driven(self) -> Array:

@@ -91,8 +91,8 @@ def detect(text: str, path: Path, header: int | None = None) -> Dialect:
     found = [entry for s in SEPARATORS for d in (".", ",") if (entry := _block(lines, s, d)) is not None]
     if not found:
         raise _no_table(text, path)
-    # More cells tell the right separator; a decimal point is preferred where both fit.
-    width, _, first, separator, decimal = max(found, key=lambda e: (e[0] * e[1], e[0], e[4] == "."))
+    # More values tell the right separator; a decimal point is preferred where both fit.
+    _, width, first, separator, decimal = max(found, key=lambda e: (e[0], e[1], e[4] == "."))
     if decimal == "." and separator != "," and _only_commas(lines[first:], text, separator):
         decimal = ","
     if width > MAXIMUM_CHANNELS:
@@ -129,7 +129,7 @@ def _start_of(text: str, line: int, path: Path) -> int:
 
 
 def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int, str, str] | None:
-    """Return (width, rows, first line, separator, decimal) of the longest run of rows of numbers, or None."""
+    """Return (values, width, first line, separator, decimal) of the longest run of rows of numbers, or None."""
     best: tuple[int, int, int] | None = None
     width = start = count = 0
     for n, line in enumerate(lines):
@@ -140,9 +140,9 @@ def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, in
         now = len(cells) if good >= 2 and 2 * good >= sum(cell != "" for cell in cells) else 0
         if now != width:
             width, start, count = now, n, 0
-        count += 1
-        if width >= 2 and (best is None or count * width > best[0] * best[1]):
-            best = width, count, start
+        count += good
+        if width >= 2 and (best is None or count > best[0]):
+            best = count, width, start
     return None if best is None else (*best, separator, decimal)
 
 

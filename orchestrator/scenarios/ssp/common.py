@@ -1,7 +1,9 @@
 """Names and schemas that reading and writing share."""
 
+import os
 from functools import cache
 from pathlib import Path
+from urllib.parse import unquote
 
 from lxml import etree
 
@@ -158,4 +160,41 @@ def solver_tolerance(system: etree._Element) -> float | None:
                 continue
             if annotation.get("type") == OMS and 0.0 < value < 1.0 and value != OMS_TOLERANCE:
                 return value
+    return None
+
+
+def oms_step(system: etree._Element) -> float | None:
+    """Return the communication step that a system states where OMSimulator looks for it.
+
+    Args:
+        system: the outermost system.
+
+    Returns:
+        The step [s]; None where there is none.
+    """
+    for annotation in system.findall(f"{tag('ssd', 'Annotations')}/{tag('ssc', 'Annotation')}"):
+        for found in annotation.findall(f".//{tag('oms', 'SimulationInformation')}/{tag('oms', 'FixedStepMaster')}"):
+            try:
+                value = float(str(found.get("stepSize")))
+            except ValueError:
+                continue
+            if annotation.get("type") == OMS and 0.0 < value < float("inf"):
+                return value
+    return None
+
+
+def archived(folder: Path, source: str) -> Path | None:
+    """Return the file of an archive that a URI names, such as ``resources/My%20Part.fmu``.
+
+    Args:
+        folder: of the unpacked archive.
+        source: relative to it.
+
+    Returns:
+        The file; None where there is none, or it lies outside.
+    """
+    for text in (unquote(source), source):
+        file = (folder / text).resolve()
+        if "\0" not in text and file.is_relative_to(folder.resolve()) and os.path.isfile(file):
+            return file
     return None

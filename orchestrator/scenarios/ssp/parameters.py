@@ -1,7 +1,6 @@
 """Parameter bindings of SSP files: values, inline or in files, mapped or not, with units."""
 
 import math
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ from orchestrator.master import units
 from orchestrator.master.problems import Problem
 from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.master.values import nearest
-from orchestrator.scenarios.ssp.common import EXPONENTS, parse, tag
+from orchestrator.scenarios.ssp.common import EXPONENTS, archived, parse, tag
 
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 
@@ -104,8 +103,8 @@ def _content(
     source = element.get("source")
     if source is None:
         return element.find(tag(space, name))
-    file = (folder / source).resolve()
-    if not (file.is_relative_to(folder.resolve()) and os.path.isfile(file)):
+    file = archived(folder, source)
+    if file is None:
         problems.append(Problem(f"{path}.source", f"must be a file of the archive, but is {source!r}"))
         return None
     try:
@@ -181,7 +180,10 @@ def _typed(kind: str, given: Given) -> Value:
         return text in {"true", "1"}
     if kind == "Enumeration" and given.type == "Enumeration":
         return text
-    return int(_number(text))
+    value = _number(text)
+    if not value.is_integer():
+        raise ValueError("")
+    return int(value)
 
 
 def _number(text: str) -> float:

@@ -3,21 +3,22 @@
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from lxml import etree
 
 from orchestrator.errors import FmuError, ScenarioError
 from orchestrator.fmi.instances import FmuFactory
-from orchestrator.fmi.model_description import read_description
+from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.master.algorithms import GaussSeidel, Jacobi
 from orchestrator.master.problems import Problem, raise_problems
-from orchestrator.master.protocol import NUMERIC, Unit, Value
-from orchestrator.master.signals import Scaled, Signal
-from orchestrator.master.system import Connection, Instance, SignalSource, System
+from orchestrator.master.protocol import NUMERIC, Value
+from orchestrator.master.signals import Signal
+from orchestrator.master.system import Instance, System
+from orchestrator.master.units import resolve
 from orchestrator.scenarios.scenario import Scenario
-from orchestrator.scenarios.ssp.common import OSP, SPACES, STRUCTURE, parse, solver_tolerance, tag
+from orchestrator.scenarios.ssp.common import OSP, SPACES, STRUCTURE, archived, oms_step, parse, solver_tolerance, tag
+from orchestrator.scenarios.ssp.flow import Flow, Node, Structure, instance_names
 from orchestrator.scenarios.ssp.parameters import Given, bound_values, own_value, read_units
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.scratch import Scratch
@@ -25,20 +26,6 @@ from orchestrator.shared.isolation.scratch import Scratch
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 DEFAULT_STOP = 1.0
 DEFAULT_STEPS = 1000
-Node = tuple[str, str]
-
-
-@dataclass
-class _Structure:
-    """What is found while walking through nested systems. Elements are named by their path, joined by slashes."""
-
-    folder: Path
-    units: Mapping[str, Unit]
-    problems: list[Problem] = field(default_factory=list)
-    components: dict[str, Path] = field(default_factory=dict)
-    kinds: dict[Node, str] = field(default_factory=dict)
-    drivers: dict[Node, tuple[Node, float, float]] = field(default_factory=dict)
-    given: dict[Node, Given] = field(default_factory=dict)
 
 
 @contextmanager
@@ -80,36 +67,39 @@ def _scenario(
     if not file.is_file():
         raise ScenarioError(f"{path}: must hold {STRUCTURE}, but does not")
     root = parse(file.read_bytes(), "ssd", f"{path}: {STRUCTURE}")
-    structure = _Structure(folder, read_units(root, "ssd"))
+    structure = Structure(folder, read_units(root, "ssd"))
     system = root.find(tag("ssd", "System"))
     assert system is not None
     _walk(system, "", structure)
     raise_problems(structure.problems, f"{path}: {STRUCTURE}")
-    instances = _instances(structure, path, solver_tolerance(system))
-    connections, sources = _connections(structure, inputs)
+    descriptions = _descriptions(structure, path)
+    names = instance_names(structure.components)
+    flow = Flow(structure, {name: d.model for name, d in descriptions.items()}, names)
+    instances = _instances(structure, descriptions, names, flow.starts(inputs), solver_tolerance(system))
+    connections, sources = flow.connections(inputs)
     made = System(tuple(instances), tuple(connections), tuple(sources))
     raise_problems(structure.problems + made.problems(), f"{path}: {STRUCTURE}")
     start, stop, own_step = _experiment(root)
-    grid = step or own_step or (stop - start) / DEFAULT_STEPS
+    grid = step or own_step or oms_step(system) or (stop - start) / DEFAULT_STEPS
+    raw = {instance: name for name, instance in names.items()}
     record = tuple(
         f"{i.name}.{v.name}"
         for i in instances
         for v in i.model.variables.values()
-        if v.causality == "output" and v.type in NUMERIC and (i.name, v.name) in structure.kinds
+        if v.causality == "output" and v.type in NUMERIC and (raw[i.name], v.name) in structure.kinds
     )
     algorithm = Jacobi(grid) if simultaneous else GaussSeidel(grid)
-    return Scenario(made, record, algorithm, stop, start, root.get("name") or path.stem)
+    title = root.get("name") or path.stem
+    return Scenario(made, record, algorithm, stop, start, title, derived=tuple(flow.outputs(record)))
 
 
-def _walk(system: etree._Element, path: str, structure: _Structure) -> None:
+def _walk(system: etree._Element, path: str, structure: Structure) -> None:
     """Collect components, connectors, connections and parameter values of a system and the systems within it."""
     _connectors(system, path, structure)
     for element in system.findall(tag("ssd", "Elements") + "/*"):
         name = f"{path}/{element.get('name')}" if path else str(element.get("name"))
         place = f"$.{name}"
-        if "." in name:
-            structure.problems.append(Problem(place, f"must have a name without a dot, but is called {name!r}"))
-        elif element.tag == tag("ssd", "System"):
+        if element.tag == tag("ssd", "System"):
             _walk(element, name, structure)
         elif element.tag == tag("ssd", "Component"):
             _connectors(element, name, structure)
@@ -121,45 +111,51 @@ def _walk(system: etree._Element, path: str, structure: _Structure) -> None:
     _bind(system, path, structure)
 
 
-def _connectors(element: etree._Element, path: str, structure: _Structure) -> None:
+def _connectors(element: etree._Element, path: str, structure: Structure) -> None:
     for connector in element.findall(f"{tag('ssd', 'Connectors')}/{tag('ssd', 'Connector')}"):
-        structure.kinds[path, str(connector.get("name"))] = str(connector.get("kind"))
+        node = (path, str(connector.get("name")))
+        structure.kinds[node] = str(connector.get("kind"))
+        real = connector.find(tag("ssc", "Real"))
+        if real is not None and real.get("unit"):
+            structure.connector_units[node] = resolve(str(real.get("unit")), structure.units)
 
 
-def _component(element: etree._Element, name: str, structure: _Structure) -> None:
+def _component(element: etree._Element, name: str, structure: Structure) -> None:
     source, kind = str(element.get("source")), element.get("type", FMU_TYPE)
-    file = (structure.folder / source).resolve()
+    file = archived(structure.folder, source)
     if kind != FMU_TYPE:
         structure.problems.append(Problem(f"$.{name}.type", f"must be {FMU_TYPE}, but is {kind!r}"))
     elif element.get("implementation") == "ModelExchange":
         structure.problems.append(Problem(f"$.{name}.implementation", "must be CoSimulation, but is ModelExchange"))
-    elif not (file.is_relative_to(structure.folder.resolve()) and os.path.isfile(file)):
+    elif file is None:
         structure.problems.append(Problem(f"$.{name}.source", f"must be a file of the archive, but is {source!r}"))
     else:
         structure.components[name] = file
     _bind(element, name, structure)
 
 
-def _bind(element: etree._Element, path: str, structure: _Structure) -> None:
+def _bind(element: etree._Element, path: str, structure: Structure) -> None:
     for name, value in bound_values(element, f"$.{path or 'System'}", structure.folder, structure.problems):
         # The innermost binding is read first and the outer one wins, as the standard has it.
         owner, parameter = path, name
-        while (
-            (owner, parameter) not in structure.kinds and "." in parameter and _has_child(structure, owner, parameter)
-        ):
-            child, _, parameter = parameter.partition(".")
-            owner = f"{owner}/{child}" if owner else child
+        while (owner, parameter) not in structure.kinds:
+            child = _child(structure, owner, parameter)
+            if child is None:
+                break
+            owner, parameter = f"{owner}/{child}" if owner else child, parameter[len(child) + 1 :]
         structure.given[owner, parameter] = value
 
 
-def _has_child(structure: _Structure, owner: str, parameter: str) -> bool:
-    child = parameter.partition(".")[0]
-    full = f"{owner}/{child}" if owner else child
+def _child(structure: Structure, owner: str, parameter: str) -> str | None:
+    """Return the element of ``owner`` whose name, and a dot, a parameter begins with; of several the longest."""
+    begin = f"{owner}/" if owner else ""
     known = {*structure.components, *(path for path, _ in structure.kinds)}
-    return any(name == full or name.startswith(full + "/") for name in known)
+    children = {name[len(begin) :].partition("/")[0] for name in known if name.startswith(begin) and name != owner}
+    fitting = [child for child in children if child and parameter.startswith(f"{child}.")]
+    return max(fitting, key=len, default=None)
 
 
-def _connection(element: etree._Element, path: str, place: str, structure: _Structure) -> None:
+def _connection(element: etree._Element, path: str, place: str, structure: Structure) -> None:
     ends = []
     for side in ("start", "end"):
         child, connector = element.get(f"{side}Element"), str(element.get(f"{side}Connector"))
@@ -193,49 +189,43 @@ def _connection(element: etree._Element, path: str, place: str, structure: _Stru
     structure.drivers[target] = (source, factor, offset)
 
 
-def _instances(structure: _Structure, path: Path, tolerance: float | None) -> list[Instance]:
-    instances = []
+def _descriptions(structure: Structure, path: Path) -> dict[str, FmuDescription]:
+    found = {}
     for name, file in structure.components.items():
         try:
-            description = read_description(file)
+            found[name] = read_description(file)
         except FmuError as error:
             raise FmuError(f"{path}: {name}: {str(error).replace(str(file), file.name)}") from None
+    for owner, variable in structure.kinds:
+        if owner in found and variable not in found[owner].model.variables:
+            text = f"must be a variable of {found[owner].model.name}, but {variable!r} is none"
+            structure.problems.append(Problem(f"$.{owner}.Connectors", text, mismatch=True))
+    for owner, variable in structure.given:
+        if owner not in found and (owner, variable) not in structure.kinds:
+            text = f"must name a component's parameter or a system's connector, but {variable!r} of "
+            structure.problems.append(Problem("$.ParameterBindings", f"{text}{owner or 'the system'} is none"))
+    return found
+
+
+def _instances(
+    structure: Structure,
+    descriptions: Mapping[str, FmuDescription],
+    names: Mapping[str, str],
+    handed: Mapping[Node, Given],
+    tolerance: float | None,
+) -> list[Instance]:
+    """Return the components; what a system's connector hands to one stands over the component's own bindings."""
+    instances = []
+    for name, description in descriptions.items():
         start: dict[str, Value] = {}
-        for (owner, variable), given in structure.given.items():
+        for (owner, variable), given in {**structure.given, **handed}.items():
             if owner == name:
                 value = own_value(description.model, variable, given, structure.units, f"$.{name}", structure.problems)
                 if value is not None:
                     start[variable] = value
-        for node in structure.kinds:
-            if node[0] == name and node[1] not in description.model.variables:
-                text = f"must be a variable of {description.model.name}, but {node[1]!r} is none"
-                structure.problems.append(Problem(f"$.{name}.Connectors", text, mismatch=True))
-        instances.append(Instance(name, description.model, FmuFactory(file, description), start, tolerance))
-    for owner, variable in structure.given:
-        if owner not in structure.components:
-            text = f"must name a component's parameter, but {variable!r} of {owner or 'the system'} is none"
-            structure.problems.append(Problem("$.ParameterBindings", text))
+        factory = FmuFactory(structure.components[name], description)
+        instances.append(Instance(names[name], description.model, factory, start, tolerance))
     return instances
-
-
-def _connections(structure: _Structure, inputs: Mapping[str, Signal]) -> tuple[list[Connection], list[SignalSource]]:
-    """Follow each component's input back through the connectors of systems to the component that feeds it."""
-    connections, sources = [], []
-    for target in [node for node in structure.drivers if node[0] in structure.components]:
-        node, factor, offset = structure.drivers[target]
-        while node[0] not in structure.components and node in structure.drivers:
-            node, inner_factor, inner_offset = structure.drivers[node]
-            factor, offset = factor * inner_factor, factor * inner_offset + offset
-        name = ".".join(target)
-        if node[0] in structure.components:
-            connections.append(Connection(".".join(node), name, factor, offset))
-        elif node[0] == "" and node[1] in inputs:
-            # As other tools do: what is set at a communication point holds over the step from there.
-            sources.append(SignalSource(name, Scaled(inputs[node[1]], factor, offset), at="start"))
-    for name in inputs:
-        if structure.kinds.get(("", name)) != "input":
-            structure.problems.append(Problem("$.System.Connectors", f"must have an input {name!r}, but has none"))
-    return connections, sources
 
 
 def _experiment(root: etree._Element) -> tuple[float, float, float | None]:

@@ -1,0 +1,151 @@
+"""Records of the independent simulator with what is true of them: one task each, made in any process."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.judging import Truth
+from orchestrator.plants.bank import DRIVETRAIN_BANK
+from orchestrator.records.model_file import Model, default_model
+from tests.support.hidden_effects import (
+    MACHINES,
+    SINGLE,
+    UNKNOWN,
+    Case,
+    Ways,
+    double_case,
+    none_case,
+    one_encoder_case,
+    single_case,
+    unknown_case,
+)
+
+FAMILY = {effect.label: effect.family or effect.label for effect in DRIVETRAIN_BANK}
+# Truth of the simulator -> label without site, parameter, whether its unit carries a torque.
+RECOVERED = {
+    "alpha": ("backlash", "alpha", False), "Fc_m": ("coulomb_friction@motor", "torque", True),
+    "Fc_l": ("coulomb_friction@load", "torque", True), "delay": ("input_delay", "delay", False),
+    "sat": ("torque_saturation", "limit", False), "rip": ("torque_ripple", "amplitude", True),
+    "ecc": ("gear_eccentricity", "amplitude", False), "T0": ("load_torque", "torque", True),
+    "grav": ("gravity_load", "amplitude", True), "J3": ("extra_resonance", "inertia", True),
+    "qd": ("quadratic_drag", "coefficient", True),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SimulatedTask:
+    """One record of the independent simulator.
+
+    Attributes:
+        group: "none", "single", "double", "unknown" or "one_encoder".
+        kinds: what is hidden.
+        seed: of the record.
+        ways: machine and nuisances.
+    """
+
+    group: str
+    kinds: tuple[str, ...]
+    seed: int
+    ways: Ways
+
+    @property
+    def key(self) -> str:
+        """Return what tells it from every other record."""
+        nuisances = [name for name in ("torque_noise", "shifts", "gain") if getattr(self.ways, name)]
+        return ":".join((self.group, "+".join(self.kinds), str(self.seed), self.ways.machine, *nuisances))
+
+    def make(self) -> Case:
+        """Return the record with its truth."""
+        match self.group:
+            case "none":
+                return none_case(self.seed, ways=self.ways)
+            case "single":
+                return single_case(self.kinds[0], self.seed, ways=self.ways)
+            case "double":
+                return double_case((self.kinds[0], self.kinds[1]), self.seed, ways=self.ways)
+            case "unknown":
+                return unknown_case(self.kinds[0], self.seed, ways=self.ways)
+            case _:
+                return one_encoder_case(self.seed, torque_noise=self.ways.torque_noise)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Records of each group."""
+
+    none: int = 0
+    single: int = 0
+    double: int = 0
+    unknown: int = 0
+    one_encoder: int = 0
+
+
+def simulated_tasks(
+    counts: Counts, seed: int, ways: Ways, machines: Sequence[str] = tuple(MACHINES)
+) -> list[SimulatedTask]:
+    """Return records in a random order; kinds and machines take turns.
+
+    Args:
+        counts: of each group.
+        seed: first one.
+        ways: nuisances.
+        machines: names of ``MACHINES``.
+
+    Returns:
+        The tasks.
+    """
+    pairs: list[tuple[str, ...]] = [pair for pair in itertools.combinations(SINGLE, 2) if not _are_relatives(*pair)]
+    np.random.default_rng(seed).shuffle(pairs)
+    kinds: dict[str, list[tuple[str, ...]]] = {
+        "none": [()], "single": [(kind,) for kind in SINGLE], "double": list(pairs),
+        "unknown": [(kind,) for kind in UNKNOWN], "one_encoder": [("backlash",)],
+    }  # fmt: skip
+    tasks = []
+    for place, (group, hidden) in enumerate(kinds.items()):
+        for n in range(getattr(counts, group)):
+            machine = replace(ways, machine=machines[n % len(machines)])
+            tasks.append(SimulatedTask(group, hidden[n % len(hidden)], seed + 1000 * place + n, machine))
+    return [tasks[n] for n in np.random.default_rng(seed + 1).permutation(len(tasks))]
+
+
+def _are_relatives(a: str, b: str) -> bool:
+    return FAMILY[SINGLE[a][2][0]] == FAMILY[SINGLE[b][2][0]]
+
+
+def truth_of(case: Case) -> Truth:
+    """Return what is true of a record; a drive whose gain is off shows torques in units of its gain.
+
+    Args:
+        case: the record.
+
+    Returns:
+        The truth.
+    """
+    motor, load = case.truth["shifts"]
+    # Angles that are all late are a dead time to one record; the log's own lateness is named as a nuisance.
+    allowed: tuple[str, ...] = ("input_delay", "drive_filter", "early_torque") if motor else ()
+    allowed += ("late_load",) if load != motor else ()
+    sizes: dict[str, dict[str, tuple[float, float]]] = {}
+    for short, value in case.truth["effects"].items():
+        if short in RECOVERED:
+            label, parameter, carries = RECOVERED[short]
+            sizes.setdefault(label, {})[parameter] = (value / (case.truth["gain"] if carries else 1.0), 0.0)
+    return Truth(case.right, allowed, sizes)
+
+
+def model_of(case: Case) -> Model:
+    """Return the nominal model of a case's machine, each linear parameter known to 5 %.
+
+    Args:
+        case: the record.
+
+    Returns:
+        The model.
+    """
+    model = default_model()
+    known = dict(model.parameters)
+    for name, value in case.truth["nominal"].items():
+        known[name] = replace(known[name], value=value, uncertainty=0.05 * value)
+    return replace(model, parameters=known)

@@ -1,0 +1,130 @@
+"""What a diagnosis says of one record, in the few values that every benchmark needs.
+
+This is the only module of the benchmarks that knows the result of ``oc.diagnose``.
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import orchestrator as oc
+from orchestrator.errors import OrchestratorError
+from orchestrator.records.model_file import Model
+from orchestrator.records.record import Record
+
+GRADES = ("certain", "likely", "possible")
+NAMED = ("certain", "likely")  # grades that count as a name
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """A named effect: its grade, its values by short name, and the labels that the record does not tell from it."""
+
+    grade: str
+    values: dict[str, Estimate]
+    family: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a diagnosis says of one record.
+
+    Attributes:
+        names: label (``name@site``) -> effect.
+        parameters: re-fitted values of the model's own parameters, by name.
+        misfit: signal -> rms on the test part of re-fitted parameters, and with the names.
+        refused: why nothing is said; empty: something is.
+        seconds: processor time.
+    """
+
+    names: dict[str, NamedEffect] = field(default_factory=dict)
+    parameters: dict[str, Estimate] = field(default_factory=dict)
+    misfit: dict[str, tuple[float, float]] = field(default_factory=dict)
+    refused: str = ""
+    seconds: float = 0.0
+
+    def labels(self, grades: tuple[str, ...] = NAMED) -> list[str]:
+        """Return the labels of some grades.
+
+        Args:
+            grades: of the names.
+
+        Returns:
+            The labels.
+        """
+        return [label for label, effect in self.names.items() if effect.grade in grades]
+
+
+def diagnose_record(record: Record, model: Model, settings: Any = None, search: bool = True) -> Outcome:
+    """Return what a diagnosis says of a record; a refusal is an outcome.
+
+    Args:
+        record: the record.
+        model: what it is compared with.
+        settings: of the diagnosis; None: the default.
+        search: False: parameters are re-fitted, no effect is looked for.
+
+    Returns:
+        The outcome.
+    """
+    begun = time.process_time()
+    try:
+        outcome = outcome_of(oc.diagnose(record, model, settings=settings, search=search))
+    except OrchestratorError as error:
+        outcome = Outcome(refused=str(error))
+    return replace(outcome, seconds=time.process_time() - begun)
+
+
+def outcome_of(result: Any) -> Outcome:
+    """Return the outcome of one result of ``oc.diagnose``.
+
+    Args:
+        result: of a plant of ours.
+
+    Returns:
+        The outcome.
+    """
+    diagnosis = result.diagnosis
+    names = {}
+    for effect in (*diagnosis.effects, *diagnosis.nuisances):
+        if effect.name == "drive_gain":  # never more than a remark: values that carry a torque take its place
+            continue
+        site = getattr(effect, "site", "")
+        label = f"{effect.name}@{site}" if site else effect.name
+        names[label] = NamedEffect(_grade(effect, diagnosis), _values(effect.parameters), _family(effect))
+    parameters = _values({name: one for name, one in diagnosis.parameters.items() if one.value is not None})
+    return Outcome(names, parameters, _misfit(diagnosis))
+
+
+def _grade(effect: Any, diagnosis: Any) -> str:
+    if hasattr(effect, "grade"):
+        return str(effect.grade.word)
+    return {"green": "certain", "amber": "likely"}.get(diagnosis.trust.level.word, "possible")
+
+
+def _family(effect: Any) -> tuple[str, ...]:
+    return tuple(effect.evidence.family if hasattr(effect, "evidence") else getattr(effect, "family", ()))
+
+
+def _misfit(diagnosis: Any) -> dict[str, tuple[float, float]]:
+    if hasattr(diagnosis, "test"):
+        return {
+            f"{n}:{one.signal}": (one.parameters, one.final)
+            for n, part in enumerate(diagnosis.test)
+            for one in part.signals
+        }
+    return {one.signal: (one.best_before, one.after) for one in diagnosis.misfit}
+
+
+def _values(estimates: Mapping[str, Any]) -> dict[str, Estimate]:
+    return {name: Estimate(one.value, *one.interval) for name, one in estimates.items()}

@@ -1,0 +1,174 @@
+"""Named columns of any file: records of FMUs of others, and tables that a scenario feeds in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import RecordError
+from orchestrator.records.formats import open_source
+from orchestrator.records.formats.source import Head
+from orchestrator.records.names import find_named, listed, near, recognised_time
+from orchestrator.records.units import parse_unit
+from orchestrator.shared.units import KnownUnit
+from orchestrator.shared.units import parse_unit as parse_any_unit
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A column that is asked for.
+
+    Attributes:
+        column: its name in the file, or ``#3`` for the third; for the time, ``time`` is recognised by other names, too.
+        where: what asks for it, such as ``$.inputs.u.column``, for messages.
+        cure: what to do where its unit is not known, for messages.
+        unit: its unit, which goes before what the file states; empty: what the file states.
+    """
+
+    column: str
+    where: str
+    cure: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class NamedColumns:
+    """Columns of a file.
+
+    Attributes:
+        time: (n,) s; NaN where there is none.
+        values: an array (n,) for each column that was asked for, in the file's numbers; NaN: missing.
+        units: the unit of each, as it is stated; empty: it is not.
+        labels: what the file calls the time and each column.
+        notes: what was detected, a few words each.
+    """
+
+    time: Array
+    values: tuple[Array, ...]
+    units: tuple[str, ...]
+    labels: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def read_columns(
+    path: Path, time: Wanted, wanted: Sequence[Wanted], time_factor: float = 1.0, header: int | None = None
+) -> NamedColumns:
+    """Return the time and named columns of a file of any known format.
+
+    Args:
+        path: the file.
+        time: the column of the time.
+        wanted: the columns.
+        time_factor: seconds in the numbers of the time; 1.0: its unit says so.
+        header: line of the names in a text, from 1; 0: there are none; None: found.
+
+    Returns:
+        The columns, all of one length.
+
+    Raises:
+        RecordError: the file cannot be read, lacks a column, or a unit of the time is not known.
+    """
+    with open_source(path, header) as source:
+        places = [_place(source.heads, entry, path, time) for entry in (time, *wanted)]
+        distinct = sorted(set(places))
+        loaded = dict(zip(distinct, source.load(distinct), strict=True))
+        heads, dialect = [source.heads[place] for place in places], source.dialect
+    labels = tuple(head.full or head.name for head in heads)
+    arrays = [loaded[place] for place in places]
+    for values, label in zip(arrays, labels, strict=True):
+        if values.size != arrays[0].size:
+            raise RecordError(
+                f"{path}: column `{label}` must have as many rows as `{labels[0]}`, but has {values.size}, not "
+                f"{arrays[0].size}: name channels of one raster"
+            )
+    seconds, said = _seconds(arrays[0], heads[0], time, time_factor, path)
+    numbers = []
+    for values, label in zip(arrays[1:], labels[1:], strict=True):
+        if values.dtype.kind == "M":
+            raise RecordError(f"{path}: column `{label}` must hold numbers, but holds dates")
+        numbers.append(values.astype(float))
+    units = tuple(entry.unit or head.unit for entry, head in zip(wanted, heads[1:], strict=True))
+    return NamedColumns(seconds, tuple(numbers), units, labels, (dialect, f"{labels[0]} {said}"))
+
+
+def column_names(path: Path) -> list[str]:
+    """Return the names of the columns of a file.
+
+    Args:
+        path: the file.
+
+    Returns:
+        The names, in the order of the file.
+
+    Raises:
+        RecordError: it cannot be read.
+    """
+    with open_source(path) as source:
+        return [head.full or head.name for head in source.heads]
+
+
+def known_unit(text: str, wanted: Wanted, label: str, path: Path) -> KnownUnit:
+    """Return a stated unit.
+
+    Args:
+        text: as it is stated.
+        wanted: the column that is in it.
+        label: name of the column, for the message.
+        path: of the file, for the message.
+
+    Returns:
+        Dimension and conversion.
+
+    Raises:
+        RecordError: it is not known.
+    """
+    unit = parse_any_unit(text)
+    if unit is None:
+        raise RecordError(
+            f"{path}: column `{label}` must be in a unit that is known, but is in {text!r}: {wanted.cure}"
+        )
+    return unit
+
+
+def _place(heads: Sequence[Head], wanted: Wanted, path: Path, time: Wanted) -> int:
+    places = find_named(heads, wanted.column)
+    if len(places) == 1:
+        return places[0]
+    if not places and wanted is time and wanted.column == "time":
+        place = recognised_time(heads, str(path))
+        if place is not None:
+            return place
+    count = f"{len(places)} of them: name it by number, such as `#{places[0] + 1}`" if places else "no such column"
+    raise RecordError(
+        f"{path}: {wanted.where} must name a column, but there is {count}: {wanted.column!r} of "
+        f"{listed(heads)}{near(wanted.column, heads)}"
+    )
+
+
+def _seconds(raw: NDArray[Any], head: Head, wanted: Wanted, factor: float, path: Path) -> tuple[Array, str]:
+    """Return times in seconds, and in which form they were."""
+    label = head.full or head.name
+    if raw.dtype.kind == "M":
+        stamps = raw.astype("datetime64[ns]")
+        good = ~np.isnat(stamps)
+        if not good.any():
+            raise RecordError(f"{path}: column `{label}` must hold times, but is empty")
+        away = (stamps - stamps[good][0]).astype(np.int64).astype(float) * 1e-9
+        return np.where(good, away, np.nan), "as date and time"
+    numbers = raw.astype(float)
+    if factor != 1.0:
+        return factor * numbers, f"in {factor:g} s"
+    text = wanted.unit or head.unit
+    if not text:
+        return numbers, "in s"
+    unit = parse_unit(text, ("time",))
+    if unit is None or unit.kind != "time":
+        raise RecordError(
+            f"{path}: column `{label}` must be a time in s, ms, us, min or h, but is in {text!r}: {wanted.cure}"
+        )
+    return unit.factor * numbers, f"in {text}"

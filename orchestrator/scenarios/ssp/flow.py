@@ -1,0 +1,224 @@
+"""Where values go in a package: through the connectors of systems from component to component, units converted."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from orchestrator.master import units
+from orchestrator.master.problems import Problem
+from orchestrator.master.protocol import ModelInterface, Unit
+from orchestrator.master.signals import Scaled, Signal
+from orchestrator.master.system import Connection, SignalSource
+from orchestrator.scenarios.definition import Derived
+from orchestrator.scenarios.ssp.parameters import Given
+
+Node = tuple[str, str]
+"""A connector: path of its element (empty: the outermost system), name."""
+
+
+@dataclass
+class Structure:
+    """What is found while walking through nested systems. Elements are named by their path, joined by slashes.
+
+    Attributes:
+        folder: of the unpacked archive.
+        units: that the file declares.
+        problems: what is wrong.
+        components: file of each component.
+        kinds: kind of each connector.
+        connector_units: of those that state one.
+        drivers: for each connector that is fed: what feeds it, factor and offset.
+        given: values of parameter bindings.
+    """
+
+    folder: Path
+    units: Mapping[str, Unit]
+    problems: list[Problem] = field(default_factory=list)
+    components: dict[str, Path] = field(default_factory=dict)
+    kinds: dict[Node, str] = field(default_factory=dict)
+    connector_units: dict[Node, Unit] = field(default_factory=dict)
+    drivers: dict[Node, tuple[Node, float, float]] = field(default_factory=dict)
+    given: dict[Node, Given] = field(default_factory=dict)
+
+
+@dataclass
+class _Value:
+    """``factor * x + offset`` of what flows along connectors, in ``unit``; None: in whatever unit comes next."""
+
+    factor: float = 1.0
+    offset: float = 0.0
+    unit: Unit | None = None
+
+
+def instance_names(components: Mapping[str, Path]) -> dict[str, str]:
+    """Return what components are called in signals, where a dot ends the name of an instance.
+
+    Args:
+        components: by path.
+
+    Returns:
+        Names without dots, each once, by path.
+    """
+    found: dict[str, str] = {}
+    for path in sorted(components, key=lambda text: "." in text):
+        name = path.replace(".", "_")
+        while name in found.values():
+            name += "_"
+        found[path] = name
+    return {path: found[path] for path in components}
+
+
+class Flow:
+    """Follows values through a package.
+
+    Args:
+        structure: the package.
+        models: interface of each component.
+        names: of the instances that components become.
+    """
+
+    def __init__(self, structure: Structure, models: Mapping[str, ModelInterface], names: Mapping[str, str]) -> None:
+        self._structure, self._models, self._names = structure, models, names
+
+    def connections(self, inputs: Mapping[str, Signal]) -> tuple[list[Connection], list[SignalSource]]:
+        """Return what feeds the inputs of components.
+
+        Args:
+            inputs: signals for the input connectors of the outermost system.
+
+        Returns:
+            Connections between instances, and signals.
+        """
+        connections, sources = [], []
+        for target, root in self._ends():
+            name = self._address(target)
+            if root[0] in self._models:
+                value = self._carried(root, target, self._starting_at(root))
+                source, own = self._own_unit(root), self._own_unit(target)
+                ratio = units.conversion(source, own) or (1.0, 0.0)  # what the master converts by itself
+                factor = value.factor / ratio[0]
+                connections.append(Connection(self._address(root), name, factor, value.offset - factor * ratio[1]))
+            elif root[0] == "" and root[1] in inputs:
+                value = self._carried(root, target, self._starting_at(root))
+                # As other tools do: what is set at a communication point holds over the step from there.
+                sources.append(SignalSource(name, Scaled(inputs[root[1]], value.factor, value.offset), at="start"))
+        for name in inputs:
+            if self._structure.kinds.get(("", name)) != "input":
+                text = f"must have an input {name!r}, but has none"
+                self._structure.problems.append(Problem("$.System.Connectors", text))
+        return connections, sources
+
+    def starts(self, inputs: Mapping[str, Signal]) -> dict[Node, Given]:
+        """Return the values that bindings give to connectors of systems, where they reach components.
+
+        Args:
+            inputs: signals for the input connectors of the outermost system, which stand over bindings.
+
+        Returns:
+            Value by connector of a component, in its own unit.
+        """
+        found = {}
+        for target, root in self._ends():
+            given = self._structure.given.get(root)
+            if root[0] in self._models or given is None or (root[0] == "" and root[1] in inputs):
+                continue
+            if given.type not in ("Real", "Integer") or not _is_number(given.text):
+                found[target] = given
+                continue
+            unit = None if given.unit is None else units.resolve(given.unit, {**self._structure.units, **given.units})
+            number = given.factor * float(given.text) + given.offset
+            value = self._carried(root, target, self._step(_Value(1.0, 0.0, unit), self._connector_unit(root), root))
+            number = value.factor * number + value.offset
+            text = f"{number:.0f}" if number.is_integer() and abs(number) < 1e15 else repr(number)
+            found[target] = Given(given.type, text, None, {})
+        return found
+
+    def outputs(self, record: tuple[str, ...]) -> Iterator[Derived]:
+        """Yield the output connectors of the outermost system that show recorded signals.
+
+        Args:
+            record: names of the recorded signals.
+
+        Yields:
+            Each connector with its source and conversion.
+        """
+        for node, kind in self._structure.kinds.items():
+            if node[0] == "" and kind == "output" and node in self._structure.drivers:
+                root = self._root(node)
+                if root[0] in self._models and self._address(root) in record:
+                    value = self._carried(root, node, self._starting_at(root))
+                    unit = None if value.unit is None else value.unit.name
+                    yield Derived(node[1], self._address(root), value.factor, value.offset, unit)
+
+    def _ends(self) -> Iterator[tuple[Node, Node]]:
+        """Yield each fed connector of a component, and where what feeds it comes from."""
+        for target in self._structure.drivers:
+            if target[0] in self._models and target[1] in self._models[target[0]].variables:
+                yield target, self._root(target)
+
+    def _root(self, node: Node) -> Node:
+        seen = {node}
+        while node in self._structure.drivers:
+            node = self._structure.drivers[node][0]
+            if node[0] in self._models:
+                break
+            if node in seen:
+                problem = Problem(
+                    f"$.{'.'.join(filter(None, node))}", "must not be fed by itself, but is", mismatch=True
+                )
+                self._structure.problems += [] if problem in self._structure.problems else [problem]
+                break
+            seen.add(node)
+        return node
+
+    def _carried(self, root: Node, target: Node, value: _Value) -> _Value:
+        """Return a value that has gone from ``root`` to ``target``."""
+        path: list[Node] = []
+        node = target
+        while node != root:
+            path.append(node)
+            node = self._structure.drivers[node][0]
+        for node in reversed(path):
+            _, factor, offset = self._structure.drivers[node]
+            value = self._step(value, self._connector_unit(node), node)
+            if (factor, offset) != (1.0, 0.0):
+                unit = self._connector_unit(node)
+                value = _Value(factor * value.factor, factor * value.offset + offset, unit)
+        return self._step(value, self._own_unit(target), target)
+
+    def _starting_at(self, root: Node) -> _Value:
+        return self._step(_Value(1.0, 0.0, self._own_unit(root)), self._connector_unit(root), root)
+
+    def _step(self, value: _Value, unit: Unit | None, node: Node) -> _Value:
+        """Return a value in another unit; where that measures something else, it is a problem."""
+        if unit is None:
+            return value
+        ratio = units.conversion(value.unit, unit)
+        if ratio is None:
+            assert value.unit is not None
+            text = f"must have a unit that measures what {value.unit.name} does, but has {unit.name}"
+            problem = Problem(f"$.{'.'.join(filter(None, node))}", text, mismatch=True)
+            if problem not in self._structure.problems:
+                self._structure.problems.append(problem)
+            ratio = 1.0, 0.0
+        return _Value(ratio[0] * value.factor, ratio[0] * value.offset + ratio[1], unit)
+
+    def _connector_unit(self, node: Node) -> Unit | None:
+        return self._structure.connector_units.get(node)
+
+    def _own_unit(self, node: Node) -> Unit | None:
+        """The unit that the FMU states; of a system's connector, and where the FMU states none, the connector's own."""
+        model = self._models.get(node[0])
+        name = None if model is None or node[1] not in model.variables else model.variables[node[1]].unit
+        return self._connector_unit(node) if model is None or name is None else units.resolve(name, model.units)
+
+    def _address(self, node: Node) -> str:
+        return f"{self._names[node[0]]}.{node[1]}"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
