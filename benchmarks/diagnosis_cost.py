@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 
 from orchestrator.diagnosis.diagnose import diagnose
-from orchestrator.diagnosis.fit.record_likelihood import RecordLikelihood
 from orchestrator.plants.description import Plant
 from orchestrator.plants.predictor import _coarse_runner
 from orchestrator.records.model_file import read_model

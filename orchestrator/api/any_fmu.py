@@ -33,6 +33,7 @@ from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Trust
 
 Progress = Callable[[str], None]
+STAGES = ("nominal", "parameters", "final", "noise")
 SHOWN = 5  # effects of a step that the table shows
 
 
@@ -177,7 +178,7 @@ def _tables(found: FmuDiagnosisResult) -> Iterator[Block]:
         yield table("What was tried", ("on top of", "effect", "gain [%]", "over its error", ""), tried)
     for title, tests in (("Misfit on test data", found.test), ("Misfit on the other record", (found.validation,))):
         cells: list[tuple[str, ...]] = [
-            (test.source, one.signal, *(f"{v:.4g}" for v in (one.nominal, one.parameters, one.final, one.noise)), one.unit)
+            (test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit)
             for test in tests if test is not None for one in test.signals
         ]  # fmt: skip
         if cells:

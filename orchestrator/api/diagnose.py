@@ -142,7 +142,8 @@ def _of_an_fmu(
     """Return what records say of an FMU, its arguments checked."""
     if not isinstance(fmu, (Path, str)) or given is None:
         raise ScenarioError("`map` must come with the path of an FMU as `model`, and the path with a `map`", "map")
-    records = [record] if isinstance(record, (Path, str)) else list(record) if isinstance(record, Sequence) else [record]
+    several = isinstance(record, Sequence) and not isinstance(record, str)
+    records = list(record) if several else [record]
     others = [options[name] for name in ("validate", "test") if options[name] is not None]
     if not records or not all(isinstance(path, (Path, str)) for path in (*records, *others)):
         raise ScenarioError(

@@ -74,7 +74,8 @@ def test_any_tool_gets_the_misfit_that_is_stated(tmp_path):
         for run, end in zip(exported["runs"], ends, strict=True):
             rows = slice(run["row"], end)
             count = end - run["row"]
-            u = np.array(list(zip(step * np.arange(count), runs.u[rows], strict=True)), dtype=[("time", float), ("u", float)])
+            asked = list(zip(step * np.arange(count), runs.u[rows], strict=True))
+            u = np.array(asked, dtype=[("time", float), ("u", float)])
             result = fmpy.simulate_fmu(
                 str(tmp_path / "out" / found.fmu_name), stop_time=(count - 1) * step, step_size=step,
                 output_interval=step, input=u, output=encoders, fmi_type="CoSimulation",

@@ -1,4 +1,4 @@
-"""Torque balances: along the exact, event-located motion of a model with an effect nothing is missing, and without it much is."""
+"""Torque balances along the exact, event-located motion of a model: with its effect nothing is missing, without much."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,8 @@ EFFECTS = {
     "rate_limit@actuator": {"effects.rate_limit.rate": 120.0},
     "hardening_stiffness@shaft": {"effects.hardening_stiffness.cubic": 3e6},
     "torque_ripple@motor": {
-        "effects.torque_ripple.amplitude": 1.0, "effects.torque_ripple.cycles_per_rev": 6.0, "effects.torque_ripple.phase": 0.4,
+        "effects.torque_ripple.amplitude": 1.0, "effects.torque_ripple.cycles_per_rev": 6.0,
+        "effects.torque_ripple.phase": 0.4,
     },
     "load_torque@load": {"effects.load_torque.torque": 4.0},
     "gravity_load@load": {"effects.gravity_load.amplitude": 6.0, "effects.gravity_load.phase": 0.7},
@@ -49,7 +50,8 @@ EFFECTS = {
 def requests(size=2400, seed=5):
     rng = np.random.default_rng(seed)
     time = STEP * np.arange(size)
-    return sum(rng.uniform(8.0, 25.0) * np.sin(2 * np.pi * f * time + rng.uniform(0, 6.0)) for f in (0.3, 0.7, 1.3, 2.1))
+    lines = (0.3, 0.7, 1.3, 2.1)
+    return sum(rng.uniform(8.0, 25.0) * np.sin(2 * np.pi * f * time + rng.uniform(0, 6.0)) for f in lines)
 
 
 def exact_record(values):

@@ -59,8 +59,6 @@ def test_a_band_ends_where_the_motion_does(tmp_path):
     quiet = prepare_signals(axis_record(p, 1, "axis"), 1.0, SETTINGS.band)
     assert 1.0 < quiet.cutoffs[0] < 0.35 / quiet.step + 1e-9
     record = axis_record(p, 1, "axis")
-    noisy = record_from_columns(
-        {"time": record.time, "u": record.u, "theta_m": record.theta_m + 3e-3 * np.random.default_rng(0).normal(size=record.size)},
-        "noisy",
-    )
+    noise = 3e-3 * np.random.default_rng(0).normal(size=record.size)
+    noisy = record_from_columns({"time": record.time, "u": record.u, "theta_m": record.theta_m + noise}, "noisy")
     assert prepare_signals(noisy, 1.0, SETTINGS.band).cutoffs[0] < quiet.cutoffs[0]

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-
 from orchestrator.diagnosis.proof.simulation import Simulation
+from tests.support.short_records import AXIS, DRIVETRAIN, H, signals_from, torque
+
 from orchestrator.plants.learned import with_law
 from orchestrator.plants.linear_run import is_linear
-from tests.support.short_records import AXIS, DRIVETRAIN, H, signals_from, torque
 
 DELAY, LIMIT = "effects.input_delay.delay", "effects.torque_saturation.limit"
 START = np.array([0.4, 2.0, 0.1, 0.5, 3.0, 0.0, 0.0, 0.0])

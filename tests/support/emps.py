@@ -67,6 +67,7 @@ def open_loop(p: Array, which: str) -> float:
     """Return R2 of the free run over a whole record, driven by its force; the initial state lies closest to it."""
     from orchestrator.diagnosis.fit.signals import signals_of
     from orchestrator.diagnosis.proof.free_run import free_run
+
     from orchestrator.diagnosis.settings import DiagnosisSettings
     from orchestrator.plants.known.servo_axis import PLANT
     from orchestrator.records.record import record_from_columns

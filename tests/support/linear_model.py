@@ -1,4 +1,4 @@
-"""A residual model that is linear in everything, for tests of the engine: a slope, and effects that are known columns."""
+"""A residual model that is linear in everything, for tests of the engine: a slope and effects of known columns."""
 
 from collections.abc import Mapping, Sequence
 
@@ -27,7 +27,12 @@ class LinearModel:
     edges = 0.0
 
     def __init__(
-        self, data: Array, ramp: Array, columns: Mapping[str, Array], noise: float, kinds: Mapping[str, str] | None = None
+        self,
+        data: Array,
+        ramp: Array,
+        columns: Mapping[str, Array],
+        noise: float,
+        kinds: Mapping[str, str] | None = None,
     ) -> None:
         self.data, self.ramp, self.columns, self.noise = data, ramp, columns, noise
         self.step, self.size = 0.01, data.size

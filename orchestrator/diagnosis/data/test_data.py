@@ -46,9 +46,7 @@ class TestData(Generic[R]):
     _first_rows: tuple[int, ...]
 
 
-def split_records(
-    records: Sequence[R], share: float, other: R | None = None
-) -> tuple[tuple[R, ...], TestData[R]]:
+def split_records(records: Sequence[R], share: float, other: R | None = None) -> tuple[tuple[R, ...], TestData[R]]:
     """Return the parts of records that are fitted, and the test data.
 
     Args:

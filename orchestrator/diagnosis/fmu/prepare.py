@@ -52,7 +52,8 @@ def prepare_problems(
             y = problem.must_simulate(problem.nominal)
             noise, said = noise_of(given, data, [problem.data.outputs, problem.data.outputs - y], settings.probe)
             problem.noise = np.sqrt(noise**2 + probe.solver_error**2)
-            notes += (*data.notes[2:], *said, *begins_elsewhere(problem, y, settings.probe), *lone_rows(problem, y, settings.probe))
+            notes += (*data.notes[2:], *said, *begins_elsewhere(problem, y, settings.probe))
+            notes += lone_rows(problem, y, settings.probe)
             problems.append(problem)
     except BaseException:
         first.runner.close()

@@ -129,7 +129,10 @@ def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
     for n, cutoff in enumerate(model.cutoffs):
         weights[:, n, n] = frequencies < cutoff
     rows = kept_rows(model, settings)
-    return Whitening(weights, rows, _taper(model), model.active[:, rows], length)
+    apart = float(rows[1] - rows[0]) if rows.size > 1 else 1.0
+    # Of a band that ends below the highest one, neighbouring rows repeat each other: they count by what is independent.
+    independent = np.minimum(2.0 * np.array(model.cutoffs) * apart * model.step, 1.0)
+    return Whitening(weights, rows, _taper(model), model.active[:, rows] * np.sqrt(independent)[:, None], length)
 
 
 def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings) -> Whitening:

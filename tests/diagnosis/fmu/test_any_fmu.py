@@ -13,12 +13,12 @@ from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.cli import main
 from orchestrator.diagnosis.fmu.bank import PORT
-from orchestrator.diagnosis.fmu.prepare import prepare_problems
 from orchestrator.diagnosis.fmu.mapping import read_map
+from orchestrator.diagnosis.fmu.prepare import prepare_problems
 from orchestrator.diagnosis.fmu.reading import read_data
 from orchestrator.diagnosis.fmu.sites import effects_of
 from orchestrator.diagnosis.fmu.subject import subject_of
-from orchestrator.diagnosis.fmu_settings import FitterSettings, FmuSettings, ProcessSettings
+from orchestrator.diagnosis.fmu_settings import FmuSettings, ProcessSettings
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import InputError, OrchestratorError
 from orchestrator.scenarios.ssp.read import opened_ssp
