@@ -57,39 +57,16 @@ ROOMS = (
     Room("metric", ("orchestrator/paired/metric.py",), ("tests/paired/test_metric.py",)),
     Room(
         "search",
-        tuple(
-            f"orchestrator/diagnosis/search/{name}.py"
-            for name in ("candidate", "model_space", "search", "screening", "periodic")
-        ),
-        ("tests/diagnosis/test_search_units.py", "tests/diagnosis/test_search_screening.py"),
+        ("orchestrator/diagnosis/selection/search.py", "orchestrator/diagnosis/selection/screening.py"),
+        ("tests/diagnosis/test_search.py",),
     ),
+    Room("grades", ("orchestrator/diagnosis/selection/grading.py",), ("tests/diagnosis/test_grading.py",)),
     Room(
-        "verdict",
-        (
-            "orchestrator/diagnosis/judged.py",
-            "orchestrator/diagnosis/passes.py",
-            *(f"orchestrator/diagnosis/verdict/{n}.py" for n in ("admission", "remainder", "where", "naming", "words")),
-        ),
-        ("tests/diagnosis/test_verdict_units.py", "tests/diagnosis/test_verdict_places.py"),
+        "fits",
+        ("orchestrator/diagnosis/inference/fitting.py", "orchestrator/diagnosis/inference/problem.py"),
+        ("tests/diagnosis/test_fitting.py", "tests/diagnosis/test_search.py"),
     ),
-    Room(
-        "free run",
-        tuple(f"orchestrator/diagnosis/proof/{name}.py" for name in ("free_run", "misfit")),
-        ("tests/diagnosis/test_proof_units.py",),
-    ),
-    Room(
-        "likelihood",
-        (
-            "orchestrator/estimation/innovations.py",
-            "orchestrator/diagnosis/fit/record_likelihood.py",
-            "orchestrator/diagnosis/fit/fitting.py",
-        ),
-        (
-            "tests/estimation/test_innovations_units.py",
-            "tests/diagnosis/test_likelihood_units.py",
-            "tests/diagnosis/test_sizes_and_chance.py",
-        ),
-    ),
+    Room("likelihood", ("orchestrator/estimation/innovations.py",), ("tests/estimation/test_innovations_units.py",)),
     Room(
         "contact",
         ("pyfmu_sources/contact.py", "pyfmu_sources/equations.py"),

@@ -22,10 +22,24 @@ class ParameterTable(Protocol):
     """What an effect asks of the plant that it belongs to."""
 
     def index(self, name: str) -> int:
-        """Return the place of a parameter in the plant's tuple."""
+        """Return the place of a parameter in the plant's tuple.
+
+        Args:
+            name: in the plant's table.
+
+        Returns:
+            The place, from 0.
+        """
 
     def entry(self, place: int) -> Parameter:
-        """Return the table row of the parameter at a place."""
+        """Return the table row of a parameter.
+
+        Args:
+            place: in the plant's tuple.
+
+        Returns:
+            Name, default, bounds and unit.
+        """
 
 
 @dataclass(frozen=True, eq=False)

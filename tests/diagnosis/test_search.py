@@ -1,4 +1,4 @@
-"""The search on a model whose effects are known columns: what is there is found, and what does as well is its family."""
+"""The search on a model of known columns: effects that are there are found, and what does as well is their family."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Torque balances along the exact, event-located motion of a model: with its effect nothing is missing, without much."""
+"""Torque balances along the exact, event-located motion: nothing is missing with an effect, and much without it."""
 
 import numpy as np
 import pytest

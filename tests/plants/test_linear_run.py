@@ -2,14 +2,22 @@
 
 import numpy as np
 import pytest
-from orchestrator.diagnosis.proof.simulation import Simulation
-from tests.support.short_records import AXIS, DRIVETRAIN, H, signals_from, torque
 
+from orchestrator.diagnosis.report.run_signals import RunSignals
+from orchestrator.diagnosis.report.simulation import Simulation
+from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
+from orchestrator.plants.known.servo_axis import PLANT as AXIS
 from orchestrator.plants.learned import with_law
 from orchestrator.plants.linear_run import is_linear
 
+H = 0.005
 DELAY, LIMIT = "effects.input_delay.delay", "effects.torque_saturation.limit"
 START = np.array([0.4, 2.0, 0.1, 0.5, 3.0, 0.0, 0.0, 0.0])
+
+
+def torque(size):
+    """Steps of torque [N.m] of eight samples each."""
+    return np.repeat(np.random.default_rng(4).uniform(-12.0, 12.0, size // 8 + 1), 8)[:size]
 
 
 def model_of(plant, values):
@@ -31,7 +39,7 @@ def model_of(plant, values):
 )
 def test_it_is_the_exact_plant(plant, values):
     p, channels = model_of(plant, values), len(plant.bodies)
-    signals = signals_from(np.zeros((200, 2)), torque(200), channels)
+    signals = RunSignals(H, torque(200), np.zeros((200, channels)), np.ones(channels), 1.0, 10.0)
     start = np.where(np.isin(np.arange(8), plant.states), START, 0.0)
     quick, exact = Simulation(plant, p, signals), Simulation(plant, p, signals)
     exact.__dict__["_kernel"] = None

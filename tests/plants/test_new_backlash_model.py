@@ -15,7 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from orchestrator.paired.experiment import BACKLASH_MODELS, Experiment
 from orchestrator.records.model_file import default_model
-from orchestrator.diagnosis.verdict.admission import check_diagnosable
+from orchestrator.diagnosis.data.admission import check_model
 from pyfmu_sources import contact, drivetrain, drivetrain_parameters as dt
 from pyfmu_sources.model_xml import ENUMERATIONS
 
@@ -24,7 +24,7 @@ print(number, ENUMERATIONS["BacklashModel"][-1][0], BACKLASH_MODELS[-1])
 print(Experiment(backlash_model="soft_teeth").backlash_model)
 model = default_model()
 chosen = replace(model.parameters["backlash_model"], value=float(number))
-check_diagnosable(replace(model, parameters={**model.parameters, "backlash_model": chosen}))
+check_model(replace(model, parameters={**model.parameters, "backlash_model": chosen}))
 p = dt.parameters(backlash_model=float(number), alpha=0.01, contact_stiffness=800.0, contact_damping=2.0)
 x = contact.consistent_start((0.0,) * 8, p)
 mode, whole, h, I = drivetrain.initial_mode(x, p), drivetrain.prepare(p, 0.002), 0.002, 3.984

@@ -61,22 +61,3 @@ def force_error(p: Array, which: str) -> float:
 def r_squared(simulated: Array, measured: Array) -> float:
     """Return the coefficient of determination."""
     return 1.0 - float(np.sum((simulated - measured) ** 2) / np.sum((measured - measured.mean()) ** 2))
-
-
-def open_loop(p: Array, which: str) -> float:
-    """Return R2 of the free run over a whole record, driven by its force; the initial state lies closest to it."""
-    from orchestrator.diagnosis.fit.signals import signals_of
-    from orchestrator.diagnosis.proof.free_run import free_run
-
-    from orchestrator.diagnosis.settings import DiagnosisSettings
-    from orchestrator.plants.known.servo_axis import PLANT
-    from orchestrator.records.record import record_from_columns
-
-    settings = DiagnosisSettings()
-    data = read(which)
-    columns = {"time": data["time"], "u": data["force"], "theta_m": data["position"]}
-    signals = signals_of(record_from_columns(columns, which), 0.0, settings.likelihood)
-    first = np.zeros(8)
-    first[0] = data["position"][0]
-    run = free_run(PLANT, PLANT.extended(p.tolist()), first, signals, slice(0, signals.size), settings.proof.free_run)
-    return r_squared(run.outputs[:, 0], data["position"])

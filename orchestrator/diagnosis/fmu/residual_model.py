@@ -19,7 +19,14 @@ from orchestrator.diagnosis.fmu.passed import at_input, at_output
 from orchestrator.diagnosis.fmu.problem import BoxProblem
 from orchestrator.diagnosis.fmu.response import PulseResponses, measure_responses, start_responses
 from orchestrator.diagnosis.fmu.sites import effects_of
-from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, NoiseSources, UncertainParameter, Values
+from orchestrator.diagnosis.model.interface import (
+    CandidateEffect,
+    ModelPoint,
+    NoiseSources,
+    ResidualModel,
+    UncertainParameter,
+    Values,
+)
 from pyfmu_sources.port_laws import COMPLIANCE
 
 Array = NDArray[np.float64]
@@ -29,7 +36,7 @@ KEPT = 3_000_000  # rows of outputs of runs that are kept
 BAND = 0.45  # of the rate of samples: highest frequency of the analysis
 
 
-class FmuResiduals:
+class FmuResiduals(ResidualModel):
     """An FMU, or several, beside one record: a :class:`ResidualModel`.
 
     Args:

@@ -168,7 +168,7 @@ def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ScoreComparison:
     """How much better one model predicts blocks left out than another.
 
     Attributes:
@@ -181,7 +181,7 @@ class Comparison:
     t: float
 
 
-def compare(before: FittedModel, after: FittedModel) -> Comparison:
+def compare(before: FittedModel, after: FittedModel) -> ScoreComparison:
     """Compare two models of one problem, block by block.
 
     Args:
@@ -200,4 +200,4 @@ def compare(before: FittedModel, after: FittedModel) -> Comparison:
     chance = np.bincount(after.blocks, 2.0 * (before.held_out - after.held_out) * after.held_out, count)
     fixed = (a.sum() - b.sum()) / (np.sqrt(chance @ chance) + 1e-9 * b.sum())
     t = max(even, fixed) if ratio > 1.0 else min(even, fixed)
-    return Comparison(float(1.0 - b.sum() / a.sum()), float(t))
+    return ScoreComparison(float(1.0 - b.sum() / a.sum()), float(t))

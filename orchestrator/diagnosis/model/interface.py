@@ -270,7 +270,11 @@ class ResidualModel(Protocol):
         """
 
     def inertia_shares(self) -> Mapping[str, float]:
-        """Return name of each inertia -> its share of the whole; empty: the model has none that a record must show."""
+        """Return the inertias that a record must show.
+
+        Returns:
+            Name of each -> its share of the whole; empty: there are none.
+        """
 
     def without_priors(self, spread: float) -> "ResidualModel":
         """Return the model as a plain regression of torque on motion, each parameter unknown within a factor.

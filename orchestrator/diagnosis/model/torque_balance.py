@@ -34,7 +34,14 @@ from orchestrator.diagnosis.data.signals import (
 )
 from orchestrator.diagnosis.model.balance_kernel import acceleration_kernel, hidden_load_kernel, slide_bristle
 from orchestrator.diagnosis.model.drive import delivered_torque, shifted
-from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint, NoiseSources, UncertainParameter, Values
+from orchestrator.diagnosis.model.interface import (
+    CandidateEffect,
+    ModelPoint,
+    NoiseSources,
+    ResidualModel,
+    UncertainParameter,
+    Values,
+)
 from orchestrator.diagnosis.model.plant_effects import candidate_effects, effect_parameters
 from orchestrator.diagnosis.model.units import in_metres
 from orchestrator.diagnosis.settings import BalanceSettings, DiagnosisSettings
@@ -48,7 +55,7 @@ INITIAL_TORQUE = "initial torque"
 _POOL = ThreadPoolExecutor(2)
 
 
-class TorqueBalance:
+class TorqueBalance(ResidualModel):
     """A plant of ours beside one record: a :class:`ResidualModel`.
 
     Args:

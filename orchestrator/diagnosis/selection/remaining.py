@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.diagnosis.inference.fitting import Comparison
+from orchestrator.diagnosis.inference.fitting import ScoreComparison
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import LawArgument
 from orchestrator.diagnosis.selection.search import SearchResult
@@ -47,7 +47,7 @@ class Dependence:
     knots: tuple[float, ...]
     values: tuple[float, ...]
     errors: tuple[float, ...]
-    comparison: Comparison
+    comparison: ScoreComparison
     share: float
     formula: str = ""
     changes: Mapping[str, float] = field(default_factory=dict)
@@ -169,10 +169,10 @@ def _block_errors(
     return np.maximum(errors, 1e-300), np.array(shifts)
 
 
-def _compared(before: Array, after: Array) -> Comparison:
+def _compared(before: Array, after: Array) -> ScoreComparison:
     logs = np.log(before / after)
     t = float(logs.mean() / (logs.std(ddof=1) / np.sqrt(len(logs)) + 1e-9))
-    return Comparison(float(1.0 - after.sum() / before.sum()), t)
+    return ScoreComparison(float(1.0 - after.sum() / before.sum()), t)
 
 
 def simple_terms(s: Array) -> dict[str, Array]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from orchestrator.diagnosis.inference.fitting import Comparison, FittedModel, compare, fit_model, weigh_prior
+from orchestrator.diagnosis.inference.fitting import ScoreComparison, FittedModel, compare, fit_model, weigh_prior
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint
 from orchestrator.diagnosis.selection.screening import Screening, screened_point
@@ -26,7 +26,7 @@ class TriedEffect:
     """An effect that was fitted on top of a model."""
 
     label: str
-    comparison: Comparison
+    comparison: ScoreComparison
     fitted: FittedModel
 
 
@@ -278,7 +278,7 @@ class _Search:
         before, after = farthest_parameter(problem, model), farthest_parameter(problem, tried.fitted)
         return after < max(self.settings.prior_deviations, before + 1.0)
 
-    def _gains(self, comparison: Comparison) -> bool:
+    def _gains(self, comparison: ScoreComparison) -> bool:
         return comparison.t >= self.settings.least_t and comparison.gain >= self.settings.least_gain
 
     def _best_with_second(
