@@ -17,7 +17,7 @@ from typing import Any
 
 from benchmarks.judging import Row, grade_table, judge, seconds_line, size_line
 from benchmarks.rows import run_tasks
-from benchmarks.simulated import FAMILY, Counts, SimulatedTask, model_of, simulated_tasks, truth_of
+from benchmarks.simulated import RELATIVES, Counts, SimulatedTask, model_of, simulated_tasks, truth_of
 from benchmarks.verdicts import GRADES, NAMED, diagnose_record
 from tests.support.hidden_effects import MACHINES, Ways
 
@@ -67,8 +67,8 @@ def print_figures(rows: Sequence[Row]) -> dict[str, Any]:
     Returns:
         Group -> counts.
     """
-    print("\nhidden -> named (families)")
-    matrix = Counter((row.kind, _families(row)) for row in rows if row.group != "double")
+    print("\nhidden -> named (relatives together)")
+    matrix = Counter((row.kind, _relatives(row)) for row in rows if row.group != "double")
     for kind in dict.fromkeys(kind for kind, _ in matrix):
         said = ", ".join(f"{count} {names}" for (hidden, names), count in sorted(matrix.items()) if hidden == kind)
         print(f"{kind:>22}: {said}")
@@ -80,8 +80,8 @@ def print_figures(rows: Sequence[Row]) -> dict[str, Any]:
     return figures
 
 
-def _families(row: Row) -> str:
-    return " + ".join(sorted({FAMILY.get(label, label) for label in row.outcome.labels()})) or "no name"
+def _relatives(row: Row) -> str:
+    return " + ".join(sorted({RELATIVES.get(label, label) for label in row.outcome.labels()})) or "no name"
 
 
 def add_ways(parser: argparse.ArgumentParser) -> None:

@@ -44,6 +44,12 @@ class Part:
 def build_effect_fmu(folder: Path) -> Path:
     """Return the effect FMU, built in ``folder`` from the laws' own source, its modules named by their content.
 
+    Args:
+        folder: that exists.
+
+    Returns:
+        The path of the FMU.
+
     Raises:
         FmuError: the build fails.
     """
