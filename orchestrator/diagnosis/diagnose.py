@@ -26,7 +26,7 @@ from orchestrator.diagnosis.report.estimates import (
 )
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.test_report import misfit_on_test_data, motion_shares
-from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, Workings
+from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
 from orchestrator.diagnosis.selection.grading import (
     Grade,
     RecordEvidence,
@@ -112,7 +112,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
         verdict=verdict, effects=effects, nuisances=_nuisances(found, graded, parameters, model, settings),
         parameters=parameters, left=dict(zip(workings.balances[0].channels, map(float, left), strict=True)),
         remaining=remaining, law=_law(verdict, remaining, settings), test=test, record=record, trust=trust,
-        notes=_notes(found, record), settings=settings, model=model, workings=workings,
+        notes=_notes(found, record, test), settings=settings, model=model, workings=workings,
     )  # fmt: skip
 
 
@@ -158,8 +158,12 @@ def _law(verdict: str, remaining: Sequence[Dependence], settings: DiagnosisSetti
     return best if strong and best.code else None
 
 
-def _notes(found: SearchResult, record: RecordEvidence) -> tuple[str, ...]:
-    notes = []
+def _notes(found: SearchResult, record: RecordEvidence, test: Sequence[TestMisfit]) -> tuple[str, ...]:
+    notes = [
+        f"nothing moves in the last {one.rows} rows of {one.source}, which are its test part: they test nothing"
+        for one in test
+        if one.still
+    ]
     if not found.complete:
         notes.append("the time limit ended the search: effects that were not tried may be missing")
     if record.inertia_error > record.inertia:

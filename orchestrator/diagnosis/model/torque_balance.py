@@ -51,6 +51,7 @@ from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
 Array = NDArray[np.float64]
+SHORTEST = 1e-9  # rad: distance over which friction of a body that does not move builds up
 INITIAL_TORQUE = "initial torque"
 _POOL = ThreadPoolExecutor(2)
 
@@ -116,7 +117,7 @@ class TorqueBalance(ResidualModel):
         ratio = plant.ratio(self.nominal)
         angles, speeds, accelerations = list(self._angles), list(self._speeds), list(self._accelerations)
         resolutions = [
-            max(6.0 * noise, 2e-5 * float(np.ptp(angle))) for noise, angle in zip(signals.noise, angles, strict=True)
+            max(6.0 * noise, 2e-5 * float(np.ptp(angle)), SHORTEST) for noise, angle in zip(signals.noise, angles, strict=True)
         ]
         if self.hides_load:
             angles.append(self._hidden[:, 0])

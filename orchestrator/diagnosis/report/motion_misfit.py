@@ -13,6 +13,7 @@ from orchestrator.plants.description import Plant
 from orchestrator.shared.cores import spread
 
 Array = NDArray[np.float64]
+LEAST_TRAVEL = 20.0  # in deviations of the noise, from which a test part moves
 
 
 def run_parts(first: int, size: int, settings: ReportSettings) -> list[slice]:
@@ -107,4 +108,5 @@ def motion_misfit(
         )
         for n, name in enumerate(plant.encoders[: signals.channels])
     )
-    return TestMisfit(source, signals.size - first, rows)
+    travel = np.ptp(signals.angles[first:], axis=0)
+    return TestMisfit(source, signals.size - first, rows, still=bool(np.all(travel < LEAST_TRAVEL * signals.noise)))

@@ -51,9 +51,10 @@ def torque_left(part: Record, workings: Workings, model: Model, settings: Diagno
         settings: of the band.
 
     Returns:
-        (nominal, parameters, final); empty where the part is too short for the band.
+        (nominal, parameters, final); empty of two bodies, where the noise of encoders
+        is most of it, and where the part is too short.
     """
-    if part.size < LEAST_TORQUE_ROWS:
+    if part.size < LEAST_TORQUE_ROWS or len(model.plant.bodies) > 1:
         return ()
     balance = balance_of(part, model, settings)
     inner = slice(balance.size // 20, -(balance.size // 20))
