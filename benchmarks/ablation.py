@@ -15,13 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from orchestrator.diagnosis.selection.grading import GRADE_RULES, GradeRule
-
 from benchmarks import diagnosis, measured, outside_class
 from benchmarks.diagnosis import add_ways, ways_of
 from benchmarks.judging import Row
 from benchmarks.rows import Task, run_tasks
 from benchmarks.simulated import Counts, simulated_tasks
+from orchestrator.diagnosis.selection.grading import GRADE_RULES, GradeRule
 from orchestrator.diagnosis.settings import DiagnosisSettings
 
 # What a name counts: a right one of more the surer it is, a wrong one against the diagnosis.

@@ -5,6 +5,7 @@ python -m tools.settings_page
 
 from pathlib import Path
 
+from orchestrator.diagnosis.selection.grading import GRADE_RULES
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.paired.settings import MapSettings
@@ -22,11 +23,11 @@ Every threshold of a workflow is a setting. A TOML file changes those that it na
 default (those of a calibration have no groups):
 
 ```toml
-[search]
-penalty = 6.0
+[selection]
+least_t = 3.0
 
-[proof.free_run]
-iterations = 20
+[grades]
+likely_share = 0.05
 ```
 
     python -m orchestrator diagnose DATA.csv --settings FILE.toml
@@ -46,7 +47,19 @@ def page() -> str:
         parts.append(
             "\n".join([f"\n## {title} (`{command}`)\n", "| setting | default | meaning |", "|---|---|---|", *rows, ""])
         )
-    return "".join(parts)
+    return "".join([*parts, _rules()])
+
+
+def _rules() -> str:
+    """Return the table of the rules that lower a grade."""
+    cells = [
+        (rule.name, rule.highest.word, rule.statistic, f"`{rule.setting}`" if rule.setting else "", rule.reason)
+        for rule in GRADE_RULES
+    ]
+    rows = [f"| {' | '.join(row)} |" for row in cells]
+    head = "| rule | grade where it does not hold | statistic | threshold | reason |\n|---|---|---|---|---|\n"
+    text = "An effect is certain unless a rule lowers it. `disabled` names rules that are off."
+    return "\n## Rules\n\n" + text + "\n\n" + head + "\n".join(rows) + "\n"
 
 
 def _shown(default: object) -> str:

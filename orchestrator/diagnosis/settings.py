@@ -92,8 +92,10 @@ class GradeSettings(Settings, frozen=True):
     likely_size_t: Annotated[float, setting("sizes over their errors of a likely one")] = 3.0
     certain_gain: Annotated[float, share("of what is left without it that a certain effect takes")] = 0.2
     wave_share: Annotated[float, share("likely_share of waves, whose scanned cycles follow anything")] = 0.08
-    limit_share: Annotated[float, share("likely_share of limits, which cut off any misfit of large torques")] = 0.2
-    shape_gain: Annotated[float, share("likely_gain of waves and limits")] = 0.5
+    drive_share: Annotated[
+        float, share("likely_share of limits and of what is late: a little less or later torque follows any misfit")
+    ] = 0.2
+    shape_gain: Annotated[float, share("likely_gain of waves, of limits and of what is late")] = 0.5
     sure_size_t: Annotated[float, setting("sizes over their errors that count as much as likely_t")] = 6.0
     most_left: Annotated[float, share("of the torque that may be left beside a certain name")] = 0.5
     timing_left: Annotated[float, share("of the torque that may be left beside the name of a delay")] = 0.2

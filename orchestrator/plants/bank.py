@@ -1,7 +1,7 @@
 """The effects that the drivetrain may lack, one row each.
 
 An effect is added in three places: its law in :mod:`pyfmu_sources.effects` (and where the equations call it), its
-parameters in the plant's table, and one row here; ``docs/diagnosis.md`` walks through an example.
+parameters in the plant's table, and one row here; ``docs/extending.md`` walks through an example.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""The worked example of docs/diagnosis.md, carried out on a copy of the sources."""
+"""The worked example of docs/extending.md, carried out on a copy of the sources."""
 
 import re
 from pathlib import Path
@@ -11,6 +11,7 @@ from tests.support.copies import ROOT, copy_project, run_in_copy
 PROGRAM = """
 from pathlib import Path
 from orchestrator.diagnosis.diagnose import diagnose
+from orchestrator.diagnosis.selection.grading import Grade
 from orchestrator.records.model_file import read_model
 from pyfmu_sources import servo_axis_parameters as axis
 from tests.support.axis_record import axis_record
@@ -19,7 +20,7 @@ p = list(axis.DEFAULTS)
 p[axis.P_J], p[axis.P_B], p[axis.P_FAN] = 1.04, 1.95, 0.2
 found = diagnose(axis_record(p, 3, "fan"), read_model(Path("model.toml")))
 effect = found.effects[0]
-print(found.verdict, effect.name, abs(effect.parameters["coefficient"].value - 0.2) < 0.005, len(found.effects))
+print(found.verdict, effect.name, abs(effect.parameters["coefficient"].value - 0.2) < 0.005, len(found.graded(Grade.LIKELY)))
 """
 
 
@@ -38,7 +39,7 @@ def apply(edit: str, root: Path) -> None:
 @pytest.mark.slow
 def test_worked_example_adds_an_effect(tmp_path: Path) -> None:
     copy_project(tmp_path)
-    page = (ROOT / "docs" / "diagnosis.md").read_text()
+    page = (ROOT / "docs" / "extending.md").read_text()
     start, stop = page.index("## Adding an effect"), page.index("## Adding a plant")
     edits = re.findall(r"```python\n(.*?)```", page[start:stop], re.DOTALL)
     assert len(edits) == 7

@@ -1,4 +1,4 @@
-"""The plant of docs/diagnosis.md, added to a copy of the sources as one module."""
+"""The plant of docs/extending.md, added to a copy of the sources as one module."""
 
 import re
 from pathlib import Path
@@ -38,14 +38,15 @@ for drag in (0.0, 0.03):
     found = diagnose(record, read_model(Path("model.toml")))
     sizes = [effect.parameters["coefficient"].value for effect in found.effects]
     print(found.verdict, *(effect.name for effect in found.effects), *sizes)
-    print(found.misfit[0].after / found.misfit[0].noise)
+    signal = found.test[0].signals[0]
+    print(signal.final / signal.noise)
 """
 
 
 @pytest.mark.slow
 def test_a_plant_is_one_module(tmp_path: Path) -> None:
     copy_project(tmp_path)
-    page = (ROOT / "docs" / "diagnosis.md").read_text()
+    page = (ROOT / "docs" / "extending.md").read_text()
     (module,) = re.findall(r"```python\n(.*?)```", page[page.index("## Adding a plant") :], re.DOTALL)
     path, _, text = module.removeprefix("# ").partition("\n")
     assert not (tmp_path / path).exists()
@@ -55,5 +56,5 @@ def test_a_plant_is_one_module(tmp_path: Path) -> None:
     assert plain == "parameters"
     assert dragged.split()[:2] == ["effects", "quadratic_drag"]
     assert [float(value) for value in dragged.split()[2:]] == [pytest.approx(0.03, rel=0.01)]
-    assert float(plain_misfit) < 1.2
-    assert float(dragged_misfit) < 1.2
+    assert float(plain_misfit) < 1.5
+    assert float(dragged_misfit) < 1.5

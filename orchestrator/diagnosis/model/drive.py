@@ -41,7 +41,8 @@ def delivered_torque(plant: Plant, p: Array, requests: Array, step: float, held:
         torque = held_average(requests) if held else triangle_average(requests)
     if drive.second_lag and (second := plant.value(p, drive.second_lag)) > 0.0:
         torque = lagged(torque, second, step)
-    late = plant.value(p, drive.delay) - plant.value(p, LEAD.name) + (lag if lag <= SHORT_LAG * step else 0.0)
+    lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
+    late = plant.value(p, drive.delay) - lead + (lag if lag <= SHORT_LAG * step else 0.0)
     return shifted(torque, late / step)
 
 

@@ -85,7 +85,7 @@ class TorqueBalance(ResidualModel):
         self._drive = tuple(
             plant.index(name)
             for name in (*vars(plant.drive).values(), "measurement.lead")
-            if isinstance(name, str) and name
+            if isinstance(name, str) and name in plant.names
         )
         self.parameters = self._uncertain(model)
         self._places = [plant.index(entry.name) for entry in self.parameters if not entry.local]
@@ -117,7 +117,8 @@ class TorqueBalance(ResidualModel):
         ratio = plant.ratio(self.nominal)
         angles, speeds, accelerations = list(self._angles), list(self._speeds), list(self._accelerations)
         resolutions = [
-            max(6.0 * noise, 2e-5 * float(np.ptp(angle)), SHORTEST) for noise, angle in zip(signals.noise, angles, strict=True)
+            max(6.0 * noise, 2e-5 * float(np.ptp(angle)), SHORTEST)
+            for noise, angle in zip(signals.noise, angles, strict=True)
         ]
         if self.hides_load:
             angles.append(self._hidden[:, 0])

@@ -85,8 +85,9 @@ def _misfit(workings: Workings, model: Model, record: Record, first: int, settin
     models = (workings.nominal, workings.base, workings.final)
     unit, signals = "m" if in_metres(model) else "rad", _signals_of(workings, record)
     found = motion_misfit(model.plant, models, signals, first, record.source, unit, settings.report)
-    part = record.part(first, record.size)
-    return replace(found, torque=torque_left(part, workings, model, settings))
+    if found.still:
+        return found
+    return replace(found, torque=torque_left(record.part(first, record.size), workings, model, settings))
 
 
 def misfit_on_record(diagnosis: Diagnosis, record: Record) -> TestMisfit:

@@ -113,8 +113,9 @@ class GradeRule:
 
 
 def _explains_enough(effect: EffectEvidence, s: GradeSettings) -> bool:
-    share = {"wave": s.wave_share, "limit": s.limit_share}.get(effect.kind, s.likely_share)
-    gain = s.shape_gain if effect.kind in ("wave", "limit") else s.likely_gain
+    shares = {"wave": s.wave_share, "limit": s.drive_share, "timing": s.drive_share}
+    share = shares.get(effect.kind, s.likely_share)
+    gain = s.shape_gain if effect.kind in shares else s.likely_gain
     return effect.share >= share or (effect.share > 0.0 and effect.gain > gain)
 
 
@@ -134,7 +135,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     GradeRule(
         "enough share", Grade.POSSIBLE, lambda e, r, s: _explains_enough(e, s.grades),
         "share of the missing torque, or of what is left without it", "grades.likely_share",
-        "the same; waves and limits have a scanned shape that follows anything",
+        "the same; waves, limits and what is late follow whatever another law leaves",
     ),
     GradeRule(
         "large gain", Grade.LIKELY, lambda e, r, s: e.gain >= s.grades.certain_gain,

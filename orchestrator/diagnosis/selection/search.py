@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from orchestrator.diagnosis.inference.fitting import ScoreComparison, FittedModel, compare, fit_model, weigh_prior
+from orchestrator.diagnosis.inference.fitting import FittedModel, ScoreComparison, compare, fit_model, weigh_prior
 from orchestrator.diagnosis.inference.problem import FitProblem, prior_of
 from orchestrator.diagnosis.model.interface import CandidateEffect, ModelPoint
 from orchestrator.diagnosis.selection.screening import Screening, screened_point
