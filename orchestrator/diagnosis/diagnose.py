@@ -12,6 +12,7 @@ import numpy as np
 from orchestrator.diagnosis.data.admission import check_model, check_record, check_resolved
 from orchestrator.diagnosis.data.test_data import split_records
 from orchestrator.diagnosis.inference.problem import fit_problem
+from orchestrator.diagnosis.model.hidden_gap import find_hidden_gap
 from orchestrator.diagnosis.model.interface import Values
 from orchestrator.diagnosis.model.law_arguments import law_arguments
 from orchestrator.diagnosis.model.plant_effects import effect_parameters
@@ -24,6 +25,7 @@ from orchestrator.diagnosis.report.estimates import (
     interval_width,
     parameter_estimates,
 )
+from orchestrator.diagnosis.report.hidden_gap import report_hidden_gap
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.test_report import misfit_on_test_data, motion_shares
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
@@ -81,12 +83,18 @@ def diagnose(
     fitted, test_data = split_records(whole, settings.test_share, test)
     models = [balance_of(record, model, settings) for record in fitted]
     until = np.inf if time_limit is None else time.monotonic() + time_limit
-    chosen = settings.selection if search else msgspec.structs.replace(settings.selection, most_effects=0)
+    hidden = search and len(fitted) == 1 and models[0].hides_load
+    gap = find_hidden_gap(fitted[0], model) if hidden else None
+    chosen = (
+        settings.selection if search and gap is None else msgspec.structs.replace(settings.selection, most_effects=0)
+    )
     problem = fit_problem(models, settings.fit)
     found = search_effects(problem, chosen, progress, lambda: bool(time.monotonic() > until))
     points = (found.problem.start, found.base.point, found.final.point)
     nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
     workings = Workings(fitted, test_data, found, tuple(models), nominal, base, final)
+    if gap is not None:
+        return report_hidden_gap(replace(workings, final=model.plant.extended(gap.values)), gap, model, settings)
     return _report(workings, model, settings)
 
 

@@ -20,7 +20,8 @@ p = list(axis.DEFAULTS)
 p[axis.P_J], p[axis.P_B], p[axis.P_FAN] = 1.04, 1.95, 0.2
 found = diagnose(axis_record(p, 3, "fan"), read_model(Path("model.toml")))
 effect = found.effects[0]
-print(found.verdict, effect.name, abs(effect.parameters["coefficient"].value - 0.2) < 0.005, len(found.graded(Grade.LIKELY)))
+off = abs(effect.parameters["coefficient"].value - 0.2)
+print(found.verdict, effect.name, off < 0.005, len(found.graded(Grade.LIKELY)))
 """
 
 

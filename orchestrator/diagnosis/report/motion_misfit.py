@@ -51,10 +51,35 @@ def free_runs(
     """
 
     def run(part: slice) -> FreeRun:
-        guess = signals.guess_state(plant, p, part.start)
-        return free_run(plant, p, guess, signals, part, settings, history)
+        guesses = start_guesses(plant, p, signals, part.start)
+        runs = [free_run(plant, p, guess, signals, part, settings, history) for guess in guesses]
+        return min(runs, key=lambda one: float(np.sum((one.rms / signals.noise) ** 2)))
 
     return spread(run, list(parts))
+
+
+def start_guesses(plant: Plant, p: Array, signals: RunSignals, row: int) -> list[Array]:
+    """Return first guesses of the state at a row: one, or three where a load that is not measured lies in a gap.
+
+    Args:
+        plant: the plant.
+        p: its parameters.
+        signals: of the record.
+        row: of it.
+
+    Returns:
+        States (8,): in mid-gap, and at either flank.
+    """
+    guess = signals.guess_state(plant, p, row)
+    gap = plant.value(p, plant.shaft.gap) if plant.shaft and plant.shaft.gap else 0.0
+    if gap <= 0.0 or signals.channels == len(plant.bodies):
+        return [guess]
+    found = [guess]
+    for side in (-1.0, 1.0):
+        moved = guess.copy()
+        moved[plant.bodies[1].angle] += side * gap
+        found.append(moved)
+    return found
 
 
 def run_misfit(plant: Plant, p: Array, signals: RunSignals, first: int, settings: ReportSettings) -> Array:

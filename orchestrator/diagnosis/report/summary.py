@@ -2,6 +2,7 @@
 next.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance
@@ -155,12 +156,29 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
     if effect.name == "backlash" and play is not None:
         yield f"    {play}"
     yield f"    How sure: {CERTAINTY[effect.grade]}; {grade_reasons(effect)}"
-    shares = [f"{100.0 * max(effect.evidence.share, 0.0):.0f} % of the missing torque"]
-    if effect.motion_share == effect.motion_share:
-        shares.append(f"{100.0 * max(effect.motion_share, 0.0):.0f} % of the motion's misfit on test data")
-    yield f"    It explains {' and '.join(shares)}."
+    shares = []
+    if math.isfinite(effect.evidence.share):
+        shares.append(f"{percent(effect.evidence.share)} of the missing torque")
+    if math.isfinite(effect.motion_share):
+        shares.append(f"{percent(effect.motion_share)} of the motion's misfit on test data")
+    if shares:
+        yield f"    It explains {' and '.join(shares)}."
     if effect.name in MOTION:
         yield f"    In the motion: {MOTION[effect.name]}"
+
+
+def percent(share: float) -> str:
+    """Return a share in words.
+
+    Args:
+        share: of one.
+
+    Returns:
+        Whole per cent; what is less, or none at all, as such.
+    """
+    if share <= 0.0:
+        return "none"
+    return "under 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
 
 
 def grade_reasons(effect: GradedEffect) -> str:
@@ -173,8 +191,10 @@ def grade_reasons(effect: GradedEffect) -> str:
         The words.
     """
     evidence = effect.evidence
-    text = f"on data left out it takes {100.0 * evidence.gain:.0f} % of the error, "
-    text += f"{evidence.t:.1f} times its uncertainty"
+    text = f"its size is {evidence.size_t:.1f} times its error"
+    if math.isfinite(evidence.gain):
+        text = f"on data left out it takes {percent(evidence.gain)} of the error, "
+        text += f"{evidence.t:.1f} times its uncertainty"
     rules = {rule.name: rule.reason for rule in GRADE_RULES}
     lowered = [rules[name] for name in effect.lowered_by if rules[name] != "the same"]
     if evidence.family:
@@ -205,6 +225,8 @@ def nuisance_words(nuisance: Nuisance) -> str:
 
 
 def _left(found: Diagnosis) -> str:
+    if not found.left:
+        return "What is left is noise."
     parts = [
         f"{100.0 * share:.2g} % of the torque's power at {BODIES.get(name, name)}" for name, share in found.left.items()
     ]
