@@ -64,8 +64,8 @@ def test_the_diagnosis_finds_what_the_readme_says(tmp_path, fmus):
         f"{size['value']:.{n}f} +- {size['standard_error']:.{n}f} {size['unit']} | {truth:g} {size['unit']} |"
         for size, n, truth in sizes
     ]
-    misfit = found["misfit"]["theta_m"]
-    rows += [f"{misfit['before']:.3g} rad -> {misfit['after']:.2g} rad | {misfit['noise']:.2g} rad of encoder noise |"]
+    misfit = found["test"][0]["misfit"]["theta_m"]
+    rows += [f"{misfit['nominal']:.3g} rad -> {misfit['final']:.2g} rad | {misfit['noise']:.2g} rad of encoder noise |"]
     said = (ROOT / "README.md").read_text(encoding="utf-8")
     assert [row for row in rows if row not in said] == []
 

@@ -95,7 +95,10 @@ class GradeSettings(Settings, frozen=True):
     drive_share: Annotated[
         float, share("likely_share of limits and of what is late: a little less or later torque follows any misfit")
     ] = 0.2
-    shape_gain: Annotated[float, share("likely_gain of waves, of limits and of what is late")] = 0.5
+    most_gain: Annotated[
+        float,
+        share("of what is left without it: likely_gain of waves, limits and what is late, and enough for certainty"),
+    ] = 0.5
     sure_size_t: Annotated[float, setting("sizes over their errors that count as much as likely_t")] = 6.0
     most_left: Annotated[float, share("of the torque that may be left beside a certain name")] = 0.5
     timing_left: Annotated[float, share("of the torque that may be left beside the name of a delay")] = 0.2

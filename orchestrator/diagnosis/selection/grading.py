@@ -17,6 +17,7 @@ from orchestrator.diagnosis.selection.search import SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings, GradeSettings
 
 Array = NDArray[np.float64]
+FOLLOWING = ("wave", "limit", "timing")  # kinds that follow whatever another law leaves
 FREE_SPREAD = 30.0  # of a parameter whose prior is off
 
 
@@ -115,8 +116,13 @@ class GradeRule:
 def _explains_enough(effect: EffectEvidence, s: GradeSettings) -> bool:
     shares = {"wave": s.wave_share, "limit": s.drive_share, "timing": s.drive_share}
     share = shares.get(effect.kind, s.likely_share)
-    gain = s.shape_gain if effect.kind in shares else s.likely_gain
+    gain = s.most_gain if effect.kind in FOLLOWING else s.likely_gain
     return effect.share >= share or (effect.share > 0.0 and effect.gain > gain)
+
+
+def _explains_much(effect: EffectEvidence, s: GradeSettings) -> bool:
+    alone = effect.kind not in FOLLOWING and effect.share > 0.0 and effect.gain > s.most_gain
+    return effect.share >= s.certain_share or alone
 
 
 GRADE_RULES: tuple[GradeRule, ...] = (
@@ -129,8 +135,8 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "paired gain over its error, or size over its error", "grades.likely_t", "a gain of few blocks may be chance",
     ),
     GradeRule(
-        "large share", Grade.LIKELY, lambda e, r, s: e.share >= s.grades.certain_share, "share of the missing torque",
-        "grades.certain_share", "laws are idealisations: what explains little may stand for what another leaves",
+        "large share", Grade.LIKELY, lambda e, r, s: _explains_much(e, s.grades),
+        "share of the missing torque, or of what is left without it", "grades.certain_share", "laws are idealisations: what explains little may stand for what another leaves",
     ),
     GradeRule(
         "enough share", Grade.POSSIBLE, lambda e, r, s: _explains_enough(e, s.grades),
