@@ -47,7 +47,7 @@ def find_hidden_gap(record: Record, model: Model) -> HiddenGap | None:
         model: without a gap of its own.
 
     Returns:
-        The gap, or that there is none; None where the estimator's model does not explain the record, or cannot be asked.
+        The gap, or that there is none; None where the estimator does not explain the record, or cannot be asked.
     """
     alpha = model.parameters.get("alpha")
     if model.plant is not PLANT or alpha is None or alpha.value > 0.0 or record.missing:

@@ -136,7 +136,8 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "large share", Grade.LIKELY, lambda e, r, s: _explains_much(e, s.grades),
-        "share of the missing torque, or of what is left without it", "grades.certain_share", "laws are idealisations: what explains little may stand for what another leaves",
+        "share of the missing torque, or of what is left without it",
+        "grades.certain_share", "laws are idealisations: what explains little may stand for what another leaves",
     ),
     GradeRule(
         "enough share", Grade.POSSIBLE, lambda e, r, s: _explains_enough(e, s.grades),
