@@ -139,18 +139,19 @@ class FitProblem:
                     found[n][rows] = whitening.apply(change)
         return found
 
-    def reweighted(self, point: ModelPoint) -> "FitProblem":
+    def reweighted(self, point: ModelPoint, quiet: bool = False) -> "FitProblem":
         """Return the problem with the whitening that the residuals at a point ask for.
 
         Args:
             point: values of the model.
+            quiet: the weights take for granted only the flat noise and hardly any of the unknown torques.
 
         Returns:
             A copy.
         """
         seen = self.record_points(point)
         found = tuple(
-            estimate_whitening(model, model.residuals([one])[0], self.settings)
+            estimate_whitening(model, model.residuals([one])[0], self.settings, quiet)
             for model, one in zip(self.models, seen, strict=True)
         )
         return replace(self, whitenings=found)

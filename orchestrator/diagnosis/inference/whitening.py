@@ -23,6 +23,7 @@ from orchestrator.diagnosis.settings import FitSettings
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+QUIET = 1e-4  # of the unknown torques that residuals show, where weights take hardly any for granted
 RIDGE = 1e-12  # of the diagonal of a spectral matrix: encoders that move as one leave it singular
 
 
@@ -135,13 +136,14 @@ def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
     return Whitening(weights, rows, _taper(model), model.active[:, rows] * np.sqrt(independent)[:, None], length)
 
 
-def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings) -> Whitening:
+def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSettings, quiet: bool = False) -> Whitening:
     """Return the weights that residuals of a model ask for.
 
     Args:
         model: beside the record.
         residuals: (channels, n) of the model.
         settings: of fits.
+        quiet: the weights take only the flat noise for granted and hardly any of the unknown torques.
 
     Returns:
         The weights.
@@ -154,9 +156,11 @@ def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSett
         for column, right in enumerate(residuals):  # scipy's cross-spectrum conjugates its first signal
             measured[:, row, column] = csd(right, left, 1.0 / model.step, nperseg=segment, detrend=False)[1]
     inside = np.array([(frequencies > 0) & (frequencies < max(c, 3 * frequencies[1])) for c in model.cutoffs])
-    levels = _most_likely_levels(model, frequencies, measured, inside, settings)
+    measurement, process = _most_likely_levels(model, frequencies, measured, inside, settings)
+    if quiet:
+        measurement, process = model.noise_sources(frequencies).levels, QUIET * process
     fine = rfftfreq(plain.length, model.step)
-    matrix = spectral_matrix(model, fine, *levels)
+    matrix = spectral_matrix(model, fine, measurement, process)
     within = np.array([fine < cutoff for cutoff in model.cutoffs])
     both = within[:, None, :] & within[None, :, :] | np.eye(len(within), dtype=bool)[:, :, None]
     factor = np.linalg.inv(np.linalg.cholesky(matrix * both.transpose(2, 0, 1)))

@@ -17,6 +17,7 @@ from orchestrator.diagnosis.selection.screening import Screening, screened_point
 from orchestrator.diagnosis.settings import SelectionSettings
 
 Progress = Callable[[str], None]
+LOUDER = 2.0  # times that weights must rise by it: else the model leaves hardly any
 SETTLINGS = 5  # of fit and whitening at most
 SETTLED = 0.02  # share of the score by which one changes it that is the last
 
@@ -194,11 +195,34 @@ class _Search:
         problem, model = found.problem, found.final
         tried = self._tried(problem, model, found.refused, self.settings.refined)
         step = self._chosen(problem, model, tried, found.refused, first)
-        quieter = None if step.taken else self._quieter_problem(problem, model, tried)
-        if quieter is None:
+        if step.taken:
             return problem, step
-        model, again = self._compared(quieter, model, tried)
-        return quieter, self._chosen(quieter, model, again, found.refused, first=False)
+        second = self._under_own_noise(problem, model, tried, found.refused)
+        if second is None:
+            second = self._under_own_noise(
+                problem, model, self._tried_quietly(problem, model, found.refused), found.refused
+            )
+        return second or (problem, step)
+
+    def _under_own_noise(
+        self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect], refused: frozenset[str]
+    ) -> tuple[FitProblem, SearchStep] | None:
+        """Return the step that an effect makes under the noise that it leaves itself; None: none pays."""
+        quieter = self._quieter_problem(problem, model, tried)
+        if quieter is None:
+            return None
+        before, again = self._compared(quieter, model, tried)
+        step = self._chosen(quieter, before, again, refused, first=False)
+        return (quieter, step) if step.taken else None
+
+    def _tried_quietly(self, problem: FitProblem, model: FittedModel, refused: frozenset[str]) -> list[TriedEffect]:
+        """Return effects that were fitted where little of what is left counts as unknown torques or inputs."""
+        quiet = problem.reweighted(model.point, quiet=True)
+        pairs = zip(quiet.whitenings, problem.whitenings, strict=True)
+        louder = max(float(np.max(np.abs(a.weights) / np.maximum(np.abs(b.weights), 1e-300))) for a, b in pairs)
+        if louder < LOUDER:
+            return []
+        return self._tried(quiet, fit_model(quiet, model.point), refused, self.settings.refined)
 
     def _compared(
         self, problem: FitProblem, model: FittedModel, tried: Sequence[TriedEffect]
