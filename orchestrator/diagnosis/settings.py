@@ -92,12 +92,14 @@ class GradeSettings(Settings, frozen=True):
     likely_size_t: Annotated[float, setting("sizes over their errors of a likely one")] = 3.0
     certain_gain: Annotated[float, share("of what is left without it that a certain effect takes")] = 0.2
     wave_share: Annotated[float, share("likely_share of waves, whose scanned cycles follow anything")] = 0.08
-    drive_share: Annotated[
-        float, share("likely_share of limits and of what is late: a little less or later torque follows any misfit")
+    follower_share: Annotated[
+        float, share("likely_share of limits, of constants and of what is late: each follows what another law leaves")
     ] = 0.2
     most_gain: Annotated[
         float,
-        share("of what is left without it: likely_gain of waves, limits and what is late, and enough for certainty"),
+        share(
+            "of what is left without it: likely_gain of what follows others, and enough for certainty of what does not"
+        ),
     ] = 0.5
     sure_size_t: Annotated[float, setting("sizes over their errors that count as much as likely_t")] = 6.0
     most_left: Annotated[float, share("of the torque that may be left beside a certain name")] = 0.5

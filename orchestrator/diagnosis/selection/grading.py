@@ -17,7 +17,7 @@ from orchestrator.diagnosis.selection.search import SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings, GradeSettings
 
 Array = NDArray[np.float64]
-FOLLOWING = ("wave", "limit", "timing")  # kinds that follow whatever another law leaves
+FOLLOWING = ("wave", "limit", "timing", "constant")  # kinds that follow whatever another law leaves
 FREE_SPREAD = 30.0  # of a parameter whose prior is off
 
 
@@ -114,8 +114,9 @@ class GradeRule:
 
 
 def _explains_enough(effect: EffectEvidence, s: GradeSettings) -> bool:
-    shares = {"wave": s.wave_share, "limit": s.drive_share, "timing": s.drive_share}
-    share = shares.get(effect.kind, s.likely_share)
+    share = s.likely_share
+    if effect.kind in FOLLOWING:
+        share = s.wave_share if effect.kind == "wave" else s.follower_share
     gain = s.most_gain if effect.kind in FOLLOWING else s.likely_gain
     return effect.share >= share or (effect.share > 0.0 and effect.gain > gain)
 
@@ -142,7 +143,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     GradeRule(
         "enough share", Grade.POSSIBLE, lambda e, r, s: _explains_enough(e, s.grades),
         "share of the missing torque, or of what is left without it", "grades.likely_share",
-        "the same; waves, limits and what is late follow whatever another law leaves",
+        "the same; waves, limits, constants and what is late follow whatever another law leaves",
     ),
     GradeRule(
         "large gain", Grade.LIKELY, lambda e, r, s: e.gain >= s.grades.certain_gain,
