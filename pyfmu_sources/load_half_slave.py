@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from . import load_half
 from .event_numbers import NO_EVENT
-from .fmu_variables import LARGEST, FmuVariable
+from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .load_half import Motion, Outputs, Parameters, State, cubic_motion, held_motion, rates_and_outputs
 from .slave_base import SlaveBase, StepRefusedError
 
@@ -53,6 +53,10 @@ class LoadHalf(SlaveBase):
         FmuVariable("theta_l_start", "parameter", "rad", 0.0, "Initial load angle", -1e12, 1e12),
         FmuVariable("omega_l_start", "parameter", "rad/s", 0.0, "Initial load speed", -1e12, 1e12),
     )  # fmt: skip
+    terminals: ClassVar[Terminals] = {
+        "shaft": {"angle": "theta_m", "speed": "omega_m", "torque": "T_shaft"},
+        "encoder": {"angle": "theta_l"},
+    }
 
     _x: State
     _contact: int

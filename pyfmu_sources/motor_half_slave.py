@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from . import motor_half
 from .event_numbers import NO_EVENT
-from .fmu_variables import LARGEST, FmuVariable
+from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .motor_half import Outputs, Parameters, State, rates_and_outputs
 from .slave_base import SlaveBase, StepRefusedError
 
@@ -34,6 +34,10 @@ class MotorHalf(SlaveBase):
         FmuVariable("omega_m_start", "parameter", "rad/s", 0.0, "Initial motor speed", -1e12, 1e12),
         FmuVariable("T_m_start", "parameter", "N.m", 0.0, "Initial motor torque", -1e12, 1e12),
     )
+    terminals: ClassVar[Terminals] = {
+        "shaft": {"angle": "theta_m", "speed": "omega_m", "torque": "T_shaft"},
+        "encoder": {"angle": "theta_m"},
+    }
 
     _x: State
     _p: Parameters

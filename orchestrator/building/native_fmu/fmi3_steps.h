@@ -70,7 +70,9 @@ EXPORT Status FMI(fmi3EnterContinuousTimeMode)(Component c)
 
 /* --- Steps ------------------------------------------------------------------------------------------------------------- */
 
+#ifdef CONTINUOUS_STATES
 static bool takes_events(const Instance *s) { return s->host.events && s->host.early_return; }
+#endif
 
 /* Advance over a piece of a step, or to the first event in it where the host takes events; return how far. */
 static double advance_piece(Instance *s, double time, double step, Fault *fault)
