@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from . import backlash_estimator as source
 from .backlash_estimator import Filters, Model, SettingValues
-from .fmu_variables import FmuVariable
+from .fmu_variables import FmuVariable, Terminals
 from .sampled_slave import SampledSlave
 
 U, THETA_M, THETA_L, ALPHA_HAT, ALPHA_DEVIATION, CONTACT_HAT, FIRST_ESTIMATE = range(7)
@@ -76,6 +76,7 @@ class BacklashEstimator(SampledSlave):
         ),
         FmuVariable("sample_time", "parameter", "s", 1e-3, "Sample time", 1e-9, 1.0),
     )
+    terminals: ClassVar[Terminals] = {"encoder": {"motor": "theta_m", "load": "theta_l"}}
 
     _model: Model
     _settings: SettingValues

@@ -33,7 +33,7 @@ from .drivetrain_parameters import (
     Parameter,
 )
 from .event_numbers import NO_EVENT
-from .fmu_variables import LARGEST, FmuVariable
+from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .plant_slave import PlantSlave
 from .slave_base import TOO_STIFF, StepRefusedError
 
@@ -126,6 +126,10 @@ class Drivetrain(PlantSlave):
         *(_variable(parameter) for parameter in PARAMETERS),
         *(FmuVariable(name, "parameter", unit, 0.0, text, -1e12, 1e12) for name, unit, text in _STARTS),
     )
+    terminals: ClassVar[Terminals] = {
+        "shaft": {"angle": "theta_l", "speed": "omega_l", "torque": "T_l"},
+        "encoder": {"motor": "theta_m", "load": "theta_l"},
+    }
 
     _x: State
     _mode: Mode

@@ -9,6 +9,8 @@ LARGEST = 1.7976931348623157e308
 LARGEST_INTEGER = 2147483647
 
 Exponents = dict[str, int]
+# Variables by their names in a terminal, by terminal: what belongs to one connection.
+Terminals = dict[str, dict[str, str]]
 SYMBOLS: dict[str, Exponents] = {
     "1": {},
     "kg": {"kg": 1},

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from . import kalman
-from .fmu_variables import FmuVariable
+from .fmu_variables import FmuVariable, Terminals
 from .kalman import Gain, Matrix6, Vector6, Weight
 from .sampled_slave import SampledSlave
 
@@ -89,6 +89,7 @@ class KalmanEstimator(SampledSlave):
         ),
         *_matrices(),
     )
+    terminals: ClassVar[Terminals] = {"encoder": {"motor": "theta_m", "load": "theta_l"}}
 
     _A: Matrix6
     _B: Vector6

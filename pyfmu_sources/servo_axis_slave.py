@@ -9,7 +9,7 @@ from . import servo_axis
 from .drive_request import saturated
 from .drivetrain_parameters import BIG
 from .event_numbers import NO_EVENT
-from .fmu_variables import LARGEST, FmuVariable
+from .fmu_variables import LARGEST, FmuVariable, Terminals
 from .plant_slave import PlantSlave
 from .servo_axis import State
 from .servo_axis_modes import UNDECIDED, Indicators, Outputs, after_events, decided, indicators, rates_and_outputs
@@ -40,6 +40,10 @@ class ServoAxis(PlantSlave):
         FmuVariable("omega_m_start", "parameter", "rad/s", 0.0, "Initial speed", -1e12, 1e12),
         FmuVariable("T_m_start", "parameter", "N.m", 0.0, "Initial torque of the drive", -1e12, 1e12),
     )
+    terminals: ClassVar[Terminals] = {
+        "shaft": {"angle": "theta_m", "speed": "omega_m", "torque": "T_l"},
+        "encoder": {"angle": "theta_m"},
+    }
 
     _x: State
     _mode: int

@@ -26,7 +26,7 @@ except ImportError:
     from pythonfmu.fmi2slave import Fmi2Slave
     from pythonfmu.logmsg import LogMsg
 
-from .fmu_variables import LARGEST, FmuVariable, with_starts
+from .fmu_variables import LARGEST, FmuVariable, Terminals, with_starts
 from .hidden_state import copied, hidden_names, hidden_type, shaped
 
 INSTANTIATED, INITIALIZING, STEPPING, TERMINATED = range(4)
@@ -47,6 +47,7 @@ class SlaveBase(Fmi2Slave):
 
     table: ClassVar[tuple[FmuVariable, ...]] = ()
     title: ClassVar[str] = ""
+    terminals: ClassVar[Terminals] = {}
     step_size: ClassVar[float] = 1e-3
     variable_step: ClassVar[bool] = True
     stop_time: ClassVar[float] = 2.0

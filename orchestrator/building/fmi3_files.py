@@ -1,5 +1,6 @@
-"""Files that an FMU of FMI 3.0 has beside its model description: how its sources are compiled."""
+"""Files that an FMU of FMI 3.0 has beside its model description: how its sources are compiled, its terminals."""
 
+from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -18,6 +19,33 @@ def build_description(name: str) -> bytes:
     files = SubElement(build, "SourceFileSet", {"language": "C99"})
     SubElement(files, "SourceFile", {"name": f"{name}.c"})
     SubElement(build, "Library", {"name": "m", "external": "true", "description": "Mathematics of the C library"})
+    return _xml(root)
+
+
+def terminals_and_icons(cls: Any) -> bytes:
+    """Return ``terminalsAndIcons/terminalsAndIcons.xml``: the icon's place, and the terminals of a slave.
+
+    Torques flow; angles and speeds are signals. Terminals connect what has the same name in both.
+
+    Args:
+        cls: the adapter.
+
+    Returns:
+        The file's content.
+    """
+    root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
+    picture = SubElement(root, "GraphicalRepresentation")
+    corners = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+    SubElement(picture, "CoordinateSystem", corners | {"suggestedScalingFactorTo_mm": "0.1"})
+    SubElement(picture, "Icon", corners)
+    if cls.terminals:
+        terminals = SubElement(root, "Terminals")
+        for name, members in cls.terminals.items():
+            terminal = SubElement(terminals, "Terminal", {"name": name, "matchingRule": "plug"})
+            for member, variable in members.items():
+                kind = "inflow" if member == "torque" else "signal"
+                names = {"variableName": variable, "memberName": member, "variableKind": kind}
+                SubElement(terminal, "TerminalMemberVariable", names)
     return _xml(root)
 
 

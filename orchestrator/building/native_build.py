@@ -14,7 +14,7 @@ from orchestrator.building.build import default_directory, stamp_of, trusted
 from orchestrator.building.compilers import FLAGS, TARGETS, Compiler, compile_library, find_compiler
 from orchestrator.building.documentation import documentation
 from orchestrator.building.fmi3_description import fmi3_description
-from orchestrator.building.fmi3_files import build_description
+from orchestrator.building.fmi3_files import build_description, terminals_and_icons
 from orchestrator.building.native_description import native_description
 from orchestrator.building.native_sources import RUNTIME, c_sources, indicator_count, slave_class
 from orchestrator.building.reference_files import reference_files
@@ -171,6 +171,7 @@ def _native_members(recipe: Recipe, compiler: Compiler, fingerprint: str, fmi: i
     if fmi == 3:
         description = fmi3_description(cls, recipe.name, native=True)
         sources["buildDescription.xml"] = build_description(recipe.name)
+        members["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(cls)
     stamp(description, fingerprint)
     guid = content_guid(description, members | {f"sources/{name}": data for name, data in sources.items()})
     sources = {name: data.replace(PLACEHOLDER.encode(), guid.encode()) for name, data in sources.items()}

@@ -89,7 +89,7 @@ def _state_variables(cls: Any) -> Iterator[FmuVariable]:
 
 def _indicators(cls: Any) -> Iterator[FmuVariable]:
     """Yield the event indicators as variables."""
-    if not has_states(cls):
+    if not hasattr(cls, "indicators"):
         return
     count = len(get_type_hints(cls.indicators)["return"].__args__)
     for n in range(1, count + 1):

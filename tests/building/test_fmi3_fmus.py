@@ -14,7 +14,8 @@ from orchestrator.building.archive import read_archive
 from orchestrator.building.arrays import arrays
 from orchestrator.building.compilers import find_compiler
 from orchestrator.building.native_build import ensure_native
-from orchestrator.building.sources import catalogue
+from orchestrator.building.native_sources import slave_class
+from orchestrator.building.sources import catalogue, recipe_of
 from orchestrator.checking.binaries import inspect
 from pyfmu_sources.fmu_variables import FmuVariable
 from tests.support.fmi3_calls import Slave3
@@ -93,6 +94,40 @@ def test_sources_say_how_they_are_compiled(native3: dict[str, Path], name: str) 
     root = etree.fromstring(members["sources/buildDescription.xml"])
     assert schema.validate(root), schema.error_log
     assert {f"sources/{file.get('name')}" for file in root.iter("SourceFile")} <= set(members)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_terminals_are_of_variables(native3: dict[str, Path], name: str) -> None:
+    schema = etree.XMLSchema(etree.parse(str(SCHEMAS / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd")))
+    root = etree.fromstring(read_archive(native3[name])["terminalsAndIcons/terminalsAndIcons.xml"])
+    assert schema.validate(root), schema.error_log
+    variables = {variable.name for variable in fmpy.read_model_description(native3[name]).modelVariables}
+    members = [member.get("variableName") for member in root.iter("TerminalMemberVariable")]
+    assert set(members) <= variables
+    assert len(members) >= 2 or name == "LqrController"
+
+
+def test_both_halves_have_one_shaft() -> None:
+    shafts = [slave_class(recipe_of(name)).terminals["shaft"] for name in ("MotorHalf", "LoadHalf")]
+    assert shafts[0] == shafts[1] == {"angle": "theta_m", "speed": "omega_m", "torque": "T_shaft"}
+
+
+@pytest.mark.parametrize(("name", "friction"), [("Drivetrain", 0.0), ("Drivetrain", 1.0), ("ServoAxis", 1.0)])
+def test_model_exchange_is_that_of_fmi_2(
+    native: dict[str, Path], native3: dict[str, Path], name: str, friction: float
+) -> None:
+    signals = np.array([(0.0, 20.0), (0.25, 20.0), (0.25, -20.0), (0.5, -20.0)], dtype=[("time", float), ("u", float)])
+    starts = {"effects.coulomb_friction.motor.torque": friction} | ({"alpha": 0.01} if name == "Drivetrain" else {})
+    found = [
+        fmpy.simulate_fmu(
+            str(path), fmi_type="ModelExchange", stop_time=STOP, output_interval=5e-3, relative_tolerance=1e-10,
+            input=signals, start_values=starts, output=["theta_m", "omega_m"], record_events=False,
+        )
+        for path in (native[name], native3[name])
+    ]  # fmt: skip
+    for column in ("theta_m", "omega_m"):
+        np.testing.assert_allclose(found[0][column], found[1][column], rtol=0.0, atol=1e-7)
+    assert np.ptp(found[1]["omega_m"]) > 0.1
 
 
 def test_gains_are_arrays(native3: dict[str, Path]) -> None:

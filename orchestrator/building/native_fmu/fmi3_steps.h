@@ -70,11 +70,15 @@ EXPORT Status FMI(fmi3EnterContinuousTimeMode)(Component c)
 
 /* --- Steps ------------------------------------------------------------------------------------------------------------- */
 
+#ifdef CONTINUOUS_STATES
+static bool takes_events(const Instance *s) { return s->host.events && s->host.early_return; }
+#endif
+
 /* Advance over a piece of a step, or to the first event in it where the host takes events; return how far. */
 static double advance_piece(Instance *s, double time, double step, Fault *fault)
 {
 #ifdef CONTINUOUS_STATES
-    if (s->host.events && s->host.early_return) {
+    if (takes_events(s)) {
         const double taken = slave_advance_to_event(&s->slave, time, step, fault);
         s->course.event_due = !fault->kind && HAS_EVENT(&s->slave);
         return taken;

@@ -2,14 +2,8 @@
  *
  * The slave holds its inputs over a step. The host is asked for them at the middle and at the end of a step, and each half
  * of it is taken with constants that have the mean and the first moment of the parabola through the three values: that
- * is of order four in the step. At the end of each half the host may read, and ask to return. */
-
-static void read_inputs(const Instance *s, double u[])
-{
-    for (Reference r = 0; r < VARIABLES; r++)
-        if (variables[r].causality == INPUT)
-            u[r] = s->slave.real[r];
-}
+ * is of order four in the step. At the end of each half the host may read, and ask to return. A slave that follows its
+ * inputs (FOLLOWS_INPUTS: slave_take_node, slave_advance_along) is given the three values instead. */
 
 /* Ask the host for inputs at a time, or let it read; return whether it wants to return there. */
 static bool call_host(Instance *s, double time, bool set)
@@ -22,6 +16,36 @@ static bool call_host(Instance *s, double time, bool set)
     s->function = function;
     s->worst = s->worst > worst ? s->worst : worst; /* what the host's calls inside have said */
     return !set && s->host.early_return && wanted && until <= time;
+}
+
+#ifdef FOLLOWS_INPUTS
+static double advance_with_updates(Instance *s, double time, double step, Fault *fault)
+{
+    void *before = NULL;
+    if (save_state(s, &before) > WARNING)
+        return 0.0;
+    for (int node = 0; node < 3 && !fault->kind; node++) {
+        if (node)
+            call_host(s, time + 0.5 * node * step, true);
+        slave_take_node(&s->slave, node, fault);
+    }
+    const double taken = fault->kind ? 0.0 : slave_advance_along(&s->slave, time, step, takes_events(s), fault);
+    if (fault->kind) {
+        restore_state(s, before);
+    } else {
+        s->course.event_due = HAS_EVENT(&s->slave);
+        s->course.time = taken == step ? time + step : time + taken;
+        call_host(s, s->course.time, false);
+    }
+    free_state(&before);
+    return taken;
+}
+#else
+static void read_inputs(const Instance *s, double u[])
+{
+    for (Reference r = 0; r < VARIABLES; r++)
+        if (variables[r].causality == INPUT)
+            u[r] = s->slave.real[r];
 }
 
 /* Set the inputs as they are at a share of the step: on the parabola through begin, middle and end. */
@@ -74,3 +98,4 @@ static double advance_with_updates(Instance *s, double time, double step, Fault 
     free_state(&before);
     return taken;
 }
+#endif

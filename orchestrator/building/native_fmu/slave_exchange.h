@@ -40,11 +40,13 @@ static Status indicators_of(Instance *s, double values[])
 
 static Status completed_step(Instance *s, bool *event)
 {
+    *event = false;
+#if INDICATORS > 0
     double values[INDICATORS];
     indicators_of(s, values);
-    *event = false;
     for (size_t n = 0; n < INDICATORS; n++)
         *event = *event || values[n] <= 0.0;
+#endif
     return s->worst;
 }
 

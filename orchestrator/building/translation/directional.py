@@ -47,7 +47,8 @@ def directional(plain: Program, owner: Owner) -> Directional:
     lines = [line for part in given for line in part]
     lines += [] if function.faults else ["(void)fault;"]
     lines.append(f"const {program.names.c(function.returns)} found = {function.c}({', '.join(arguments)});")
-    for field, start, count in (("first", 0, states), ("second", states, len(outputs))):
+    fields = ("v[0]", "v[1]") if function.returns.uniform else ("first", "second")
+    for field, start, count in zip(fields, (0, states), (states, len(outputs)), strict=True):
         place = f"directional_unknowns[{start} + n]" if start else "directional_unknowns[n]"
         lines += [f"for (int n = 0; n < {count}; n++)", f"    sensitivities[{place}] = found.{field}.v[n].d;"]
     body = "\n".join(f"    {line}" for line in lines)

@@ -22,10 +22,18 @@ _SAMPLED = {
     "predict": ("", False),
     "correct": ("", True),
 }
-# Hooks of a slave with continuous states, and those that FMI 3.0 wants besides.
+# Hooks of a slave with continuous states (it may lack indicators and `begin_exchange`), those that FMI 3.0 wants
+# besides, and those of one that follows its inputs.
 _CONTINUOUS = {"derivatives": "", "indicators": "", "update": ", double time", "observe": "", "begin_exchange": ""}
 _EVENTS = {"advance_to_event": ", double time, double step", "output_rates": ""}
-_ARGUMENTS = {"advance": "time, step", "advance_to_event": "time, step", "update": "time"}
+_FOLLOWING = {"take_node": ", int64_t node", "advance_along": ", double time, double step, bool to_event"}
+_ARGUMENTS = {
+    "advance": "time, step",
+    "advance_to_event": "time, step",
+    "update": "time",
+    "take_node": "node",
+    "advance_along": "time, step, to_event",
+}
 _TYPES = {"Real": "REAL_VALUE", "Integer": "WHOLE_VALUE", "Enumeration": "CHOICE_VALUE"}
 _CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER", "local": "LOCAL"}
 
@@ -60,7 +68,8 @@ def translate_slave(cls: Any, taken: frozenset[str] = frozenset(), fmi: int = 2)
     sampled = any(base.__name__ == "SampledSlave" for base in cls.__mro__)
     hooks = [_hook(program, name, *hook) for name, hook in (_SAMPLED if sampled else _PLAIN).items()]
     if has_states(cls):
-        hooks.append(_continuous(program, cls, _CONTINUOUS | (_EVENTS if fmi == 3 else {})))
+        further = _EVENTS | (_FOLLOWING if getattr(cls, "follows_inputs", False) else {})
+        hooks.append(_continuous(program, cls, _CONTINUOUS | (further if fmi == 3 else {})))
     program.check_lengths()
     pairs = directional(program, owner) if hasattr(cls, "response") else None
     struct = _struct(program, owner)
@@ -119,8 +128,8 @@ def _continuous(program: Program, cls: Any, hooks: dict[str, str]) -> str:
     assert owner is not None
     if owner.attributes.get(cls.state_attribute) != Tuple((REAL,) * count):
         raise FmuError(f"`{program.owner_name}.{cls.state_attribute}` must be a tuple of {count} floats")
-    made = {name: program.method(None, None, name) for name in hooks}
-    returned = made["indicators"].returns
+    made = {name: program.method(None, None, name) for name in hooks if hasattr(cls, name)}
+    returned = made["indicators"].returns if "indicators" in made else Tuple(())
     if made["derivatives"].returns != Tuple((REAL,) * count) or not isinstance(returned, Tuple):
         raise FmuError(f"`{program.owner_name}` must return {count} derivatives, and indicators as a tuple of floats")
     nominals = ", ".join(repr(float(nominal)) for _, _, nominal, _ in cls.continuous_states)
@@ -132,6 +141,12 @@ def _continuous(program: Program, cls: Any, hooks: dict[str, str]) -> str:
         f"#define STATES(slave) ((slave)->{program.attribute_name(cls.state_attribute)}.v)",
         f"static const double nominals[] = {{{nominals}}};",
     ]
+    if "indicators" not in made:
+        lines.append("#define slave_indicators(slave, values, fault) ((void)(slave), (void)(values), (void)(fault))")
+    if "begin_exchange" not in made:
+        lines.append("#define slave_begin_exchange(slave, fault) ((void)(slave), (void)(fault))")
+    if "advance_along" in hooks:
+        lines.append("#define FOLLOWS_INPUTS")
     if "output_rates" in hooks:
         lines += _output_rates(program, cls, made["output_rates"])
     functions = (_state_hook(program, name, hooks[name], function) for name, function in made.items())

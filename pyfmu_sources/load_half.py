@@ -1,0 +1,355 @@
+"""The load's half of a drivetrain that is cut at its gear: gap, elastic shaft and load, driven by the motor's motion.
+
+    J_l theta_l'' + b_l theta_l' = T_shaft - T_l,    d = theta_m / i - theta_l
+    T_shaft = k (d -+ alpha) + c d'  beyond the gap,  0 within
+
+The motor's motion over a step is a polynomial, so that the solution within one contact is a power series, and the next
+contact event a root of a power series, found as in :mod:`linear_mode`.
+"""
+
+from math import sqrt
+
+from .event_numbers import NO_EVENT
+from .linear_mode import EPSILON, GUARD_ROUNDINGS, TERMS, Series, first_root
+
+Parameters = tuple[float, float, float, float, float, float]
+State = tuple[float, float]
+Outputs = tuple[float, float, float]
+# Coefficients by powers of time: angle (four) and speed (three) of the motor.
+Motion = tuple[float, float, float, float, float, float, float]
+
+P_J, P_K, P_C, P_B, P_I, P_ALPHA = range(6)
+MOST_EVENTS = 5000
+LOOSE = 1e-9  # of the half-gap and 1 rad
+
+
+def held_motion(theta_m: float, omega_m: float) -> Motion:
+    """Return the motion of held inputs: a constant angle [rad], and a constant speed [rad/s] for the damping alone.
+
+    Args:
+        theta_m: [rad].
+        omega_m: [rad/s].
+
+    Returns:
+        The coefficients.
+    """
+    return (theta_m, 0.0, 0.0, 0.0, omega_m, 0.0, 0.0)
+
+
+def cubic_motion(theta: float, omega: float, theta_end: float, omega_end: float, h: float) -> Motion:
+    """Return the motion that has these angles [rad] and speeds [rad/s] at both ends of ``h`` [s] (Hermite's cubic).
+
+    Args:
+        theta: at the beginning.
+        omega: at the beginning.
+        theta_end: at the end.
+        omega_end: at the end.
+        h: [s].
+
+    Returns:
+        The coefficients.
+    """
+    mean = (theta_end - theta) / h
+    second = (3.0 * mean - 2.0 * omega - omega_end) / h
+    third = (omega + omega_end - 2.0 * mean) / (h * h)
+    return (theta, omega, second, third, omega, 2.0 * second, 3.0 * third)
+
+
+def moved(motion: Motion, t: float) -> Motion:
+    """Return a motion with its time counted from ``t`` [s].
+
+    Args:
+        motion: coefficients.
+        t: [s].
+
+    Returns:
+        The coefficients; the first and the fifth are angle and speed at ``t``.
+    """
+    a, b, c, d, e, f, g = motion
+    return (
+        a + t * (b + t * (c + t * d)),
+        b + t * (2.0 * c + 3.0 * t * d),
+        c + 3.0 * t * d,
+        d,
+        e + t * (f + t * g),
+        f + 2.0 * t * g,
+        g,
+    )
+
+
+def settled(x: State, contact: int, p: Parameters, theta_m: float, speed: float) -> int:
+    """Return the flank that touches once the gap allows it; 1 without a gap.
+
+    A motor's angle from elsewhere is never exact: within ``LOOSE`` a contact ends only when the teeth move on that way.
+
+    Args:
+        x: load angle and load speed.
+        contact: flank that touched: -1, 0 or 1.
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+        theta_m: motor angle [rad].
+        speed: derivative of the twist [rad/s].
+
+    Returns:
+        -1, 0 or 1.
+    """
+    if p[P_ALPHA] == 0.0:
+        return 1
+    d = theta_m / p[P_I] - x[0]
+    side = contact if contact != 0 else 1 if d > 0.0 else -1
+    beyond = side * d - p[P_ALPHA]
+    inwards = side * speed
+    if contact != 0:
+        beyond = -beyond
+        inwards = -inwards
+    room = rounding(x, p, theta_m)
+    if beyond <= room or (beyond <= LOOSE * (1.0 + p[P_ALPHA]) and inwards <= 0.0):
+        return contact
+    if contact == 0:
+        return side
+    return -contact if -contact * d > p[P_ALPHA] else 0
+
+
+def change(contact: int, follows: int) -> int:
+    """Return the guard that leads from one contact to another, or ``NO_EVENT``.
+
+    Args:
+        contact: -1, 0 or 1.
+        follows: -1, 0 or 1.
+
+    Returns:
+        0, 1 or ``NO_EVENT``.
+    """
+    if contact == follows:
+        return NO_EVENT
+    return 1 if contact == 0 and follows == -1 else 0
+
+
+def rounding(x: State, p: Parameters, theta_m: float) -> float:
+    """Return how far off a twist may be by rounding [rad].
+
+    Args:
+        x: load angle and load speed.
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+        theta_m: motor angle [rad].
+
+    Returns:
+        The distance.
+    """
+    return GUARD_ROUNDINGS * EPSILON * (1.0 + abs(theta_m / p[P_I]) + abs(x[0]) + p[P_ALPHA])
+
+
+def shaft_torque(x: State, contact: int, p: Parameters, theta_m: float, omega_m: float) -> float:
+    """Return the torque of the shaft on the load [N.m].
+
+    Args:
+        x: load angle and load speed.
+        contact: flank that touches: -1, 0 or 1.
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+        theta_m: motor angle [rad].
+        omega_m: motor speed [rad/s].
+
+    Returns:
+        The torque.
+    """
+    if contact == 0:
+        return 0.0
+    wound = theta_m / p[P_I] - x[0] - contact * p[P_ALPHA]
+    return p[P_K] * wound + p[P_C] * (omega_m / p[P_I] - x[1])
+
+
+def rates_and_outputs(
+    x: State, contact: int, p: Parameters, theta_m: float, omega_m: float, T_l: float
+) -> tuple[State, Outputs]:
+    """Return the derivatives, and the outputs theta_l, omega_l and T_shaft.
+
+    Args:
+        x: load angle and load speed.
+        contact: flank that touches: -1, 0 or 1.
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+        theta_m: motor angle [rad].
+        omega_m: motor speed [rad/s].
+        T_l: load torque [N.m].
+
+    Returns:
+        Both, SI units.
+    """
+    torque = shaft_torque(x, contact, p, theta_m, omega_m)
+    return ((x[1], (torque - T_l - p[P_B] * x[1]) / p[P_J]), (x[0], x[1], torque))
+
+
+def guards(x: State, contact: int, p: Parameters, theta_m: float) -> tuple[float, float]:
+    """Return how far the contact is from its end at either flank [rad]; 1 for a guard that is not in use.
+
+    Args:
+        x: load angle and load speed.
+        contact: flank that touches: -1, 0 or 1.
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+        theta_m: motor angle [rad].
+
+    Returns:
+        Both; negative ends the contact.
+    """
+    if p[P_ALPHA] == 0.0:
+        return (1.0, 1.0)
+    d = theta_m / p[P_I] - x[0]
+    if contact == 0:
+        return (p[P_ALPHA] - d, p[P_ALPHA] + d)
+    return (contact * d - p[P_ALPHA], 1.0)
+
+
+def after(contact: int, which: int) -> int:
+    """Return the contact that follows when the guard ``which`` ends one.
+
+    Args:
+        contact: -1, 0 or 1.
+        which: 0 or 1.
+
+    Returns:
+        -1, 0 or 1.
+    """
+    if contact != 0:
+        return 0
+    return 1 if which == 0 else -1
+
+
+def solution(
+    x: State, contact: int, p: Parameters, motion: Motion, T_l: float, step: float
+) -> tuple[State, float, int]:
+    """Return the state at the first event within ``step`` [s], at what share of it, and the guard.
+
+    Args:
+        x: load angle and load speed.
+        contact: flank that touches: -1, 0 or 1.
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+        motion: of the motor, its time counted from ``x``.
+        T_l: load torque [N.m].
+        step: short enough for the series [s].
+
+    Returns:
+        The three; 1 and ``NO_EVENT`` without an event.
+    """
+    touches = 1.0 if contact != 0 else 0.0
+    k, c, i = touches * p[P_K], touches * p[P_C], p[P_I]
+    theta: Series = [x[0]]
+    omega: Series = [x[1]]
+    driver: Series = [motion[0] / i]
+    scale = 1.0
+    for n in range(TERMS):
+        angle = motion[n] if n < 4 else 0.0
+        speed = motion[4 + n] if n < 3 else 0.0
+        push = scale * (k * angle + c * speed) / i
+        if n == 0:
+            push -= T_l + k * contact * p[P_ALPHA]
+        f = step / (n + 1)
+        a, b = theta[n], omega[n]
+        theta.append(f * b)
+        omega.append(f * (push - k * a - (c + p[P_B]) * b) / p[P_J])
+        scale *= step
+        driver.append(scale * motion[n + 1] / i if n < 3 else 0.0)
+    share = 1.0
+    which = NO_EVENT
+    if p[P_ALPHA] > 0.0:
+        tolerance = rounding(x, p, motion[0])
+        for candidate in range(1 if contact != 0 else 2):
+            side = 1.0 if contact > 0 or (contact == 0 and candidate == 1) else -1.0
+            offset = -p[P_ALPHA] if contact != 0 else p[P_ALPHA]
+            room: Series = [offset + tolerance + side * (driver[0] - theta[0])]
+            for n in range(1, TERMS + 1):
+                room.append(side * (driver[n] - theta[n]))
+            time = first_root(room, share, tolerance)
+            if time < share:
+                share = time
+                which = candidate
+    return ((value(theta, share), value(omega, share)), share, which)
+
+
+def value(series: Series, time: float) -> float:
+    """Return a power series at ``time``.
+
+    Args:
+        series: coefficients.
+        time: 0 to 1.
+
+    Returns:
+        Its value.
+    """
+    total = series[TERMS]
+    for n in range(TERMS - 1, -1, -1):
+        total = series[n] + time * total
+    return total
+
+
+def fastest(p: Parameters) -> float:
+    """Return a rate [1/s] that none of the motion exceeds.
+
+    Args:
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+
+    Returns:
+        The rate.
+    """
+    return sqrt(p[P_K] / p[P_J]) + (p[P_C] + p[P_B]) / p[P_J]
+
+
+def advance_to_event(
+    x: State, contact: int, p: Parameters, motion: Motion, T_l: float, begin: float, end: float
+) -> tuple[State, float, int]:
+    """Return the state at the first event of a motion between two times, the time, and the guard.
+
+    Args:
+        x: load angle and load speed at ``begin``.
+        contact: flank that touches: -1, 0 or 1.
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+        motion: of the motor.
+        T_l: load torque [N.m].
+        begin: in the motion's time [s].
+        end: in the motion's time [s].
+
+    Returns:
+        The three; ``end`` and ``NO_EVENT`` without an event.
+    """
+    longest = 1.0 / fastest(p)
+    time = begin
+    there = moved(motion, begin)
+    which = change(contact, settled(x, contact, p, there[0], there[1] / p[P_I] - x[1]))
+    if which != NO_EVENT:
+        return (x, begin, which)
+    while time < end:
+        step = end - time
+        last = step <= longest
+        if not last:
+            step = longest
+        x, share, which = solution(x, contact, p, moved(motion, time), T_l, step)
+        if which != NO_EVENT:
+            return (x, time + share * step, which)
+        if last:
+            break
+        time += step
+    return (x, end, NO_EVENT)
+
+
+def advance(
+    x: State, contact: int, p: Parameters, motion: Motion, T_l: float, begin: float, end: float
+) -> tuple[State, int]:
+    """Return state and contact at the end of a motion, all events inside; NaN where there are far too many.
+
+    Args:
+        x: load angle and load speed at ``begin``.
+        contact: flank that touches: -1, 0 or 1.
+        p: inertia, stiffness, damping, friction, gear ratio and half-gap.
+        motion: of the motor.
+        T_l: load torque [N.m].
+        begin: in the motion's time [s].
+        end: in the motion's time [s].
+
+    Returns:
+        Both.
+    """
+    time = begin
+    for _ in range(MOST_EVENTS):
+        x, time, which = advance_to_event(x, contact, p, motion, T_l, time, end)
+        if which == NO_EVENT:
+            return (x, contact)
+        contact = after(contact, which)
+    nan = float("nan")
+    return ((nan, nan), contact)

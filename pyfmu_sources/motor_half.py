@@ -1,0 +1,54 @@
+"""The motor's half of a drivetrain that is cut at its gear: a lag and an inertia.
+
+    J_m theta_m'' + b_m theta_m' = T_m - T_shaft / i,    tau T_m' + T_m = u
+
+With the inputs held the solution is a power series; a step is cut so that the series reaches the last bit.
+"""
+
+Parameters = tuple[float, float, float, float]
+State = tuple[float, float, float]
+Outputs = tuple[float, float, float]
+
+P_J, P_B, P_I, P_TAU = range(4)
+TERMS = 20
+
+
+def rates_and_outputs(x: State, p: Parameters, u: float, T_shaft: float) -> tuple[State, Outputs]:
+    """Return the derivatives, and the outputs theta_m, omega_m and T_m.
+
+    Args:
+        x: motor angle, motor speed and motor torque.
+        p: inertia, friction, gear ratio and time constant.
+        u: requested torque [N.m].
+        T_shaft: torque of the shaft on the load [N.m].
+
+    Returns:
+        Both, SI units.
+    """
+    acceleration = (x[2] - T_shaft / p[P_I] - p[P_B] * x[1]) / p[P_J]
+    return ((x[1], acceleration, (u - x[2]) / p[P_TAU]), (x[0], x[1], x[2]))
+
+
+def advance(x: State, p: Parameters, u: float, T_shaft: float, h: float) -> State:
+    """Return the state after ``h`` [s] with the inputs held.
+
+    Args:
+        x: motor angle, motor speed and motor torque.
+        p: inertia, friction, gear ratio and time constant.
+        u: requested torque [N.m].
+        T_shaft: torque of the shaft on the load [N.m].
+        h: length of the step [s].
+
+    Returns:
+        The state.
+    """
+    count = 1 + int(h * (p[P_B] / p[P_J] + 1.0 / p[P_TAU]))
+    step = h / count
+    for _ in range(count):
+        r, _outputs = rates_and_outputs(x, p, u, T_shaft)
+        for n in range(1, TERMS):
+            f = step / n
+            a, b, c = f * r[0], f * r[1], f * r[2]
+            x = (x[0] + a, x[1] + b, x[2] + c)
+            r = (b, (c - p[P_B] * b) / p[P_J], -c / p[P_TAU])
+    return x
