@@ -145,11 +145,10 @@ def main() -> None:
         records += [(task, "measured") for task in measured.measured_tasks(args.measured)]
     chosen = args.rules or [rule.name for rule in GRADE_RULES]
     lines = args.out / f"rows-{args.seed}.jsonl"
-    rows = {
-        rule: run_tasks([AblatedTask(*record, rule) for record in records], diagnose_task, lines, args.processes)
-        for rule in ("", *chosen)
-    }
-    found = [count_rule(rule, rows[""], rows[rule]) for rule in chosen]
+    tasks = [AblatedTask(*record, rule) for rule in ("", *chosen) for record in records]
+    rows = run_tasks(tasks, diagnose_task, lines, args.processes)
+    whole, size = rows[: len(records)], len(records)
+    found = [count_rule(rule, whole, rows[n * size : (n + 1) * size]) for n, rule in enumerate(chosen, 1)]
     table = ablation_table(found, GRADE_RULES, len(records))
     print(table)
     idle = [count.name for count in found if count.changed * RECORDS < LEAST * len(records)]

@@ -5,6 +5,7 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.ablation import RuleCount, count_rule
 from benchmarks.harm import SEEN, falsify, harmed, missed, seen_part, simulated_effects
 from benchmarks.judging import Row, Truth, grade_table, judge, size_line
 from benchmarks.measured import truth_of
@@ -117,3 +118,11 @@ def test_the_diagnosis_gets_the_first_part_alone() -> None:
     part = seen_part(case)
     assert part.size == round(SEEN * case.record.size)
     assert (part.theta_m == case.record.theta_m[: part.size]).all()
+
+
+def test_without_a_rule_outcomes_are_compared_in_pairs() -> None:
+    truth = Truth((("gravity_load",),))
+    right, wrong = named(gravity_load__load="certain"), named(backlash__shaft="likely")
+    whole = [row_of(one, truth) for one in (right, right, wrong, Outcome())]
+    without = [row_of(one, truth) for one in (right, named(gravity_load__load="possible"), Outcome(), wrong)]
+    assert count_rule("rule", whole, without) == RuleCount("rule", changed=3, better=2, worse=1)
