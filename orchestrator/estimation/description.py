@@ -58,8 +58,9 @@ def describe(fit: GapFit) -> Estimate:
     }
     visible, message = _verdict(alpha, low, high, traversals)
     still = _standing_still(problem.outputs, likelihood.noise(fit.point.theta).measured, settings)
-    if still:
-        visible, message, error, low, high = False, still, math.inf, 0.0, math.inf
+    message = still or message
+    if "cannot be seen" in message:  # then no number is an answer
+        visible, alpha, error, low, high = False, math.nan, math.inf, 0.0, math.inf
     drive = float(np.sqrt(np.mean(kept.states[:, 4] ** 2)))
     lacking = _lacking(diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I], problem.record.size, settings)
     diagnostics["lacking"] = lacking
