@@ -36,7 +36,7 @@ def trust_of_estimates(
         if estimate.method == FITTED and own is not None:
             found[estimate.method] = own
         elif estimate.method == "two_encoders" and own is None:
-            found[estimate.method] = trust_of([Reason(Level.AMBER, estimate.message)])
+            found[estimate.method] = trust_of([Reason(Level.AMBER, estimate.message)])  # what it cannot see, it says
         else:
             found[estimate.method] = trust_of(_beside(estimate, fit, own))
     return found

@@ -1,6 +1,6 @@
 """The half-gap, the channels' lateness, the ratio and the offset that explain two angles best.
 
-The load's angle at moment t is ``ratio theta_m(t - late) + offset - s alpha + eccentricity``, where the flank s is +1 or
+The load's angle at moment t is ``ratio theta_m(t - late) + offset - s alpha + eccentricity``, where the flank s is 1 or
 -1 while teeth touch and anything between while they do not. The flank is a hidden Markov chain of three states; the
 likelihood is maximised by expectation and maximisation (Baum, Petrie, Soules and Weiss 1970), in which all else is
 linear least squares, the lateness by Gauss and Newton.
@@ -104,7 +104,7 @@ class FlankProblem:
         return fit
 
     def _table(self, base: float) -> Array:
-        """Return the regression (n, k) with the motor's angle at ``base`` [s] before each point, flanks left at zero."""
+        """Return the regression (n, k), the motor's angle ``base`` [s] before each point, with flanks of zero."""
         if base != self._base:
             at, w, motor = self.points.time - base, self.width, self.points.motor
             angle = motor.at(at) - self._centre

@@ -1,8 +1,8 @@
 """The gap from the angles of motor and load alone, without a torque or a plant.
 
 While teeth touch, the load's angle follows the motor's over the gear ratio, half a gap behind or ahead; see
-``orchestrator.estimation.flanks`` and ``docs/estimation.md``. The interval is a jackknife over blocks of the record, and
-allows for the shape of the noise, which is not normal.
+``orchestrator.estimation.flanks`` and ``docs/estimation.md``. The interval is a jackknife over blocks of the record,
+and allows for the shape of the noise, which is not normal.
 """
 
 import math
@@ -72,8 +72,13 @@ def estimate(record: Record, model: Model, settings: FlankSettings = DEFAULT_SET
             "i": {"value": fit.ratio, "standard_error": deviations.ratio, "nominal": model.parameters["i"].value}
         },
     }
+    message = (
+        f"the load's channel is {1e3 * abs(fit.late):.3g} ms {'late' if fit.late >= 0.0 else 'early'} (standard error "
+        f"{1e3 * deviations.late:.2g} ms), "
+        f"the gear ratio {fit.ratio:.6g}; {WOUND_UP}"
+    )
     return Estimate(
-        "two_encoders", fit.alpha, error, (max(fit.alpha - reach, 0.0), fit.alpha + reach), fit.alpha > reach, WOUND_UP,
+        "two_encoders", fit.alpha, error, (max(fit.alpha - reach, 0.0), fit.alpha + reach), fit.alpha > reach, message,
         diagnostics, curves,
     )  # fmt: skip
 
