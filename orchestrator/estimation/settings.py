@@ -55,6 +55,12 @@ class GapVerdictSettings(Settings, frozen=True):
     misfit_widening: Annotated[
         float, setting("factor on the interval where the model is not exact: what it lacks is not white", ge=1)
     ] = 1.3
+    blocks: Annotated[
+        int,
+        setting(
+            "blocks of the record whose scatter the interval allows for, where it is more than that of noise", ge=5
+        ),
+    ] = 20
 
 
 class FlankSettings(Settings, frozen=True):
@@ -71,6 +77,9 @@ class FlankSettings(Settings, frozen=True):
     separate: Annotated[
         float, setting("half-gap in standard deviations of the noise from which on two flanks are told apart")
     ] = 2.5
+    least_touching: Annotated[
+        float, share("points at which teeth touch; with fewer, the flanks are the rims of a single cloud")
+    ] = 0.3
     shape: Annotated[
         float, share("of the noise, by which bounces and rounding shift the middle of a flank: standard deviation")
     ] = 0.065

@@ -50,18 +50,21 @@ def estimate(record: Record, model: Model, settings: FlankSettings = DEFAULT_SET
     touched = flanks[flanks != 0]
     traversals = int(np.count_nonzero(np.diff(touched)))
     separate = fit.alpha / noise
+    touching = float(1.0 - fit.share[:, 1].mean())
+    two = separate >= settings.separate and touching >= settings.least_touching
     diagnostics: dict[str, Any] = {
         "traversals": traversals,
         "level": LEVEL,
         "noise": noise,
         "half_gap_in_noise": separate,
+        "touching": touching,
         "count": points.count,
         "points": int(points.time.size),
         "converged": fit.converged,
     }
     curves = {"time": points.time, "twist": problem.twist(fit), "flank": flanks}
-    if separate < settings.separate or traversals < RETURNED:
-        return _unseen(diagnostics, curves, traversals if separate >= settings.separate else 0)
+    if not two or traversals < RETURNED:
+        return _unseen(diagnostics, curves, traversals if two else 0)
     deviations, quantile = jackknife(problem, fit)
     shape = settings.shape * noise
     error = math.hypot(max(deviations.alpha, math.sqrt(fit.covariance[ALPHA, ALPHA])), shape)
