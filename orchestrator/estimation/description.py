@@ -76,9 +76,9 @@ def describe(fit: GapFit) -> Estimate:
 def _block_variance(fit: GapFit, column: int, blocks: int) -> float:
     """Return the variance of an unknown that blocks of the record show, over that of white one-step errors.
 
-    It is one where it is no more than chance makes it. Godambe's information from blocks (White 1982; Kuensch 1989): rounding, errors of the model and of the log's times
-    make errors that hang together within a block, which the Fisher information does not know. Student's distribution
-    makes up for the number of blocks.
+    It is one where it is no more than chance makes it. Godambe's information from blocks (White 1982; Kuensch 1989):
+    rounding, errors of the model and of the log's times make errors that hang together within a block, which the
+    Fisher information does not know. Student's distribution makes up for the number of blocks.
     """
     from scipy.stats import chi2, t
 

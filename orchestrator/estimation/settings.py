@@ -77,6 +77,9 @@ class FlankSettings(Settings, frozen=True):
     separate: Annotated[
         float, setting("half-gap in standard deviations of the noise from which on two flanks are told apart")
     ] = 2.5
+    least_counts: Annotated[
+        float, setting("half-gap in counts of the coarser encoder from which on it is not rounding to two values", ge=0)
+    ] = 0.5
     least_touching: Annotated[
         float, share("points at which teeth touch; with fewer, the flanks are the rims of a single cloud")
     ] = 0.3

@@ -51,14 +51,16 @@ def estimate(record: Record, model: Model, settings: FlankSettings = DEFAULT_SET
     traversals = int(np.count_nonzero(np.diff(touched)))
     separate = fit.alpha / noise
     touching = float(1.0 - fit.share[:, 1].mean())
-    two = separate >= settings.separate and touching >= settings.least_touching
+    count = max(points.count, points.motor.count / abs(fit.ratio))
+    apart = separate >= settings.separate and fit.alpha >= settings.least_counts * count
+    two = apart and touching >= settings.least_touching
     diagnostics: dict[str, Any] = {
         "traversals": traversals,
         "level": LEVEL,
         "noise": noise,
         "half_gap_in_noise": separate,
         "touching": touching,
-        "count": points.count,
+        "count": count,
         "points": int(points.time.size),
         "converged": fit.converged,
     }

@@ -149,7 +149,8 @@ def test_the_sentence_says_what_the_table_says(columns) -> None:
         assert ("and larger" in seen.verdict()[0]) == bool(sizes and list(sizes.values())[-1])
 
 
-def test_a_lost_sign_of_the_torque_gets_a_hint(columns) -> None:
+def test_a_lost_sign_of_the_torque_gets_a_hint() -> None:
+    columns = make_record({"alpha": 0.01}, 4, u=60.0 * np.sin(6.0 * 0.005 * np.arange(1200)))[0]
     lost = record_from_columns(dict(columns) | {"u": np.abs(columns["u"])}, "magnitude")
     assert any("the log has lost the sign" in text for text in oc.inspect(lost).verdict())
     assert not any("lost the sign" in text for text in oc.inspect(record_from_columns(columns, "whole")).verdict())
