@@ -6,8 +6,8 @@
     python -m benchmarks.two_encoders 20 --kind held # one flank loaded throughout: no gap may be seen
 
 The simulator shares no code with the estimator: a motor follows given moves and pushes a load through play. The load
-has inertia, Coulomb and viscous friction, a torque from outside that may change, and stiff, lossy teeth, so that it wanders
-between the flanks after each impact. Both encoders are noisy and rounded; the load's channel is late.
+has inertia, Coulomb and viscous friction, a torque from outside that may change, and stiff, lossy teeth, so that it
+wanders between the flanks after each impact. Both encoders are noisy and rounded; the load's channel is late.
 Seeds from 0 on were looked at while the method was made; ``--first 100000`` starts at seeds that were not.
 """
 

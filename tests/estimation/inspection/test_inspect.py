@@ -9,7 +9,9 @@ import pytest
 
 import orchestrator as oc
 from orchestrator.cli import main
-from orchestrator.estimation.inspection.channels import channels_of, delay_between
+from orchestrator.estimation.inspection.channels import channels_of, delay_between, reversals_of
+from orchestrator.estimation.inspection.sufficiency import Sufficiency
+from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.records.model_file import read_model
 from orchestrator.records.record import record_from_columns
 from pyfmu_sources.servo_axis_parameters import DEFAULTS
@@ -150,10 +152,14 @@ def test_the_sentence_says_what_the_table_says(columns) -> None:
 
 
 def test_a_lost_sign_of_the_torque_gets_a_hint() -> None:
-    columns = make_record({"alpha": 0.01}, 4, u=60.0 * np.sin(6.0 * 0.005 * np.arange(1200)))[0]
-    lost = record_from_columns(dict(columns) | {"u": np.abs(columns["u"])}, "magnitude")
-    assert any("the log has lost the sign" in text for text in oc.inspect(lost).verdict())
-    assert not any("lost the sign" in text for text in oc.inspect(record_from_columns(columns, "whole")).verdict())
+    """A machine that swings at 1 Hz under a torque of which the log has the magnitude."""
+    time = 0.005 * np.arange(1200)
+    swung = {"time": time, "u": np.abs(np.sin(6.3 * time)), "theta_m": np.sin(6.3 * time)}
+    whole, lost = (record_from_columns(swung | {"u": u}, "swing") for u in (np.sin(6.3 * time), swung["u"]))
+    nothing = Sufficiency((), np.inf, time.size, (), np.inf, np.nan, "of this test")
+    hints = [verdict_of(one, nothing, reversals_of(one), None)[1:] for one in (whole, lost)]
+    assert hints[0] == []
+    assert "the log has lost the sign" in hints[1][0]
 
 
 def test_a_model_that_cannot_be_the_machine_gets_no_table(columns) -> None:
