@@ -108,7 +108,7 @@ def calibrate(
         for j in range(i)
         if abs(correlation[i, j]) > settings.calibration.confounded
     )
-    warnings = [*probe.notes]
+    warnings = [*probe.notes, *problem.runner.remarks]
     warnings += [
         f"`{n}` is hardly determined: excite what it acts on"
         for n, share in learned.items()

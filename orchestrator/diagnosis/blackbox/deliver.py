@@ -4,6 +4,7 @@ import hashlib
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from orchestrator.diagnosis.blackbox.binding import owned
 from orchestrator.diagnosis.blackbox.judged import BoxOutcome
 from orchestrator.diagnosis.blackbox.problem import series_of
 from orchestrator.errors import FmuError, OrchestratorError
+from orchestrator.master.protocol import Value
 from orchestrator.master.signals import Samples
 from orchestrator.scenarios.isolated import Safety
 from orchestrator.scenarios.scenario import simulate
@@ -31,6 +33,9 @@ BUILD = (
     "import sys; from pythonfmu import FmuBuilder; "
     "FmuBuilder.build_FMU(sys.argv[1], dest=sys.argv[2], project_files=sys.argv[3:])"
 )
+
+
+_KINDS = {"Boolean": bool, "Integer": int, "Real": float, "String": str}
 
 
 @dataclass(frozen=True)
@@ -138,7 +143,7 @@ def parts_of(outcome: BoxOutcome) -> tuple[Part, ...]:
             given |= {"series": -1, "law": effect.kind.law, "sign": problem.sign.get(effect.place, 1.0), "lead": 0.5}
         elif effect.kind.where == PARAMETER:
             given |= {"series": SERIES.index(effect.kind.name.partition("_")[2])}
-            given |= {"q1": problem.starts(outcome.model)[effect.place], "q2": float(problem.data.time[0])}
+            given |= {"q1": float(problem.starts(outcome.model)[effect.place]), "q2": float(problem.data.time[0])}
             if effect.signal:
                 given["q2"] = problem.map.signals[effect.signal].reference
         else:
@@ -220,7 +225,7 @@ def difference(path: Path, outcome: BoxOutcome, jacobi: bool = False) -> float:
     return worst
 
 
-def _given_to(member: str, outcome: BoxOutcome) -> dict[str, float | int | bool]:
+def _given_to(member: str, outcome: BoxOutcome) -> dict[str, Value]:
     """Return start values of one of the FMUs, by its own names."""
     problem = outcome.problem
     placed = {owned(n, problem.runner.subject.members): v for n, v in problem.starts(outcome.model).items()}
@@ -233,7 +238,7 @@ def _at(outcome: BoxOutcome, variable: str) -> tuple[str, str]:
     return member or PLANT, name
 
 
-def _values(values: dict[str, float | int | bool]) -> bytes:
+def _values(values: Mapping[str, Value]) -> bytes:
     spaces = {key: SPACES[key] for key in ("ssv", "ssc")}
     root = etree.Element(tag("ssv", "ParameterSet"), nsmap=spaces, version="1.0", name="initialValues")
     root.set("generationTool", "backlash-cosim")
@@ -241,10 +246,9 @@ def _values(values: dict[str, float | int | bool]) -> bytes:
     parameters = etree.SubElement(root, tag("ssv", "Parameters"))
     for name, value in values.items():
         parameter = etree.SubElement(parameters, tag("ssv", "Parameter"), name=name)
-        kind = "Boolean" if isinstance(value, bool) else "Integer" if isinstance(value, int) else "Real"
-        etree.SubElement(
-            parameter, tag("ssv", kind), value=str(value).lower() if isinstance(value, bool) else repr(value)
-        )
+        kind = next(name for name, of in _KINDS.items() if isinstance(value, of))
+        text = str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else repr(value)
+        etree.SubElement(parameter, tag("ssv", kind), value=text)
     require_valid(root, "ssv", "values")
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
 

@@ -216,7 +216,8 @@ def _units_at(problem: BoxProblem, effect: BoxEffect) -> tuple[str, ...]:
     """Return the units of an effect's values, at the place where it acts."""
     if effect.kind.where == PORT:
         port = problem.map.ports[effect.place]
-        names = {"effort": problem.units.get(port.input, ""), "flow": problem.units.get(port.position, "")}
+        flow = problem.units.get(port.position, "")
+        names = {"effort": problem.units.get(port.input, ""), "flow": f"({flow or '1'}.s)" if port.flow_only else flow}
     elif effect.kind.where == CUT:
         cut = problem.map.cuts[effect.place]
         names = {"effort": problem.units.get(cut.effort or "", ""), "flow": problem.units.get(cut.input, "")}

@@ -49,7 +49,9 @@ def measured_motions(problem: BoxProblem) -> dict[str, Motion]:
     for name, port in problem.map.ports.items():
         if port.position in problem.outputs and problem.n >= window:
             y = problem.data.outputs[:, problem.outputs.index(port.position)]
-            found[name] = Motion(*(savgol_filter(y, window, 3, deriv=order, delta=problem.h) for order in range(3)))
+            smooth = [savgol_filter(y, window, 3, deriv=order, delta=problem.h) for order in range(3)]
+            # Of a flow, what has passed stands for the position.
+            found[name] = Motion(problem.h * np.cumsum(smooth[0]), *smooth[:2]) if port.flow_only else Motion(*smooth)
     return found
 
 

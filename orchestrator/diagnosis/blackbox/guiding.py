@@ -18,6 +18,7 @@ from orchestrator.diagnosis.blackbox.runner import Plan
 from orchestrator.diagnosis.blackbox.whitening import Surrogate
 from orchestrator.diagnosis.blackbox.wire import Guide
 from orchestrator.errors import SlaveError
+from orchestrator.master.protocol import Value
 from pyfmu_sources.port_laws import INERTIA
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ class GuidedProblem(BoxProblem):
 
     pulls: tuple[Pull, ...] = ()
     speed: float = 0.0
-    _answers: dict[tuple[float, ...], Array] = field(init=False, default_factory=dict, repr=False)
+    _answers: dict[tuple[Value, ...], Array] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def caught(self) -> int:

@@ -231,7 +231,7 @@ def _of_no_size(
 def _warned(probe: Probe, search: BoxSearch, verdict: str, best: BoxFit, share: float) -> tuple[str, ...]:
     """Return sentences for the user; ``share``: of what is missing, how much the effects explain."""
     problem = search.fitter.problem
-    warnings = list(probe.notes)
+    warnings = [*probe.notes, *problem.runner.remarks]
     data = problem.data
     if data.factor > 1:
         rate = f"{1.0 / data.step:.4g} Hz"

@@ -113,6 +113,9 @@ def laws_of_motion(problem: BoxProblem, read: Array, settings: RestSettings = DE
     count = settings.stretches
     found = []
     for name, (place, x, v) in _ports(problem, read).items():
+        if problem.map.ports[name].flow_only:
+            found.append((1.0, f"the flow at `{name}`", place, _cells(x, count)))
+            continue
         for kind, size in (("", np.ones(len(x))), (" and the speed", v), (" and the direction", np.tanh(10.0 * v))):
             here = f"the position{kind} at `{name}`"
             found += [(1.0, here, place, _cells(x, k) * size[:, None]) for k in (count, 4 * count)]
@@ -162,7 +165,7 @@ def _ports(problem: BoxProblem, read: Array) -> dict[str, tuple[int, Array, Arra
     found = {}
     for name, port in problem.map.ports.items():
         x = read[:, problem.runner.reads.index(port.position)]
-        v = np.gradient(x)
+        v = x if port.flow_only else np.gradient(x)
         place = problem.noise_places.index(problem.runner.inputs.index(port.input))
         found[name] = (place, x, v / max(float(v.std()), 1e-300))
     return found

@@ -16,6 +16,7 @@ from orchestrator.diagnosis.blackbox.settings import DEFAULT, BoxSettings
 from orchestrator.diagnosis.blackbox.whitening import Surrogate, realised
 from orchestrator.diagnosis.blackbox.wire import Feedback, Guide
 from orchestrator.errors import SlaveError
+from orchestrator.master.protocol import Value
 from pyfmu_sources.port_laws import COMPLIANCE
 
 Array = NDArray[np.float64]
@@ -200,7 +201,7 @@ class BoxProblem:
         """
         return np.asarray((self.data.outputs[: len(y)] - y) / self.noise)
 
-    def starts(self, model: BoxModel) -> dict[str, float]:
+    def starts(self, model: BoxModel) -> dict[str, Value]:
         """Return what is set before a run, by name.
 
         Args:
@@ -209,7 +210,7 @@ class BoxProblem:
         Returns:
             Value by name.
         """
-        values = dict(self.map.fixed)
+        values: dict[str, Value] = dict(self.map.fixed)
         values |= {u.name: float(v) for u, v in zip(self.map.uncertain, model.p, strict=True)}
         return values
 

@@ -29,6 +29,9 @@ OF_MOTION = (
 )  # fmt: skip
 """Laws that mean something only against a motion, or a current."""
 
+OF_POSITION = ("spring", "hardening_spring", "gravity", "ripple", "hysteresis")
+"""Laws that depend on where a motion has got to: not offered where only a flow is known."""
+
 Array = NDArray[np.float64]
 
 ANGLES = ("rad", "deg", "")
@@ -64,10 +67,11 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
         if motion is None:
             x = nominal[:, runner.reads.index(port.position)]
             v = np.gradient(x, h) if port.velocity is None else nominal[:, runner.reads.index(port.velocity)]
+            x = h * np.cumsum(v) if port.flow_only else x
             motion = Motion(x, v, np.gradient(v, h))
         x, v = motion.x, motion.v
         effort = float(problem.drive([runner.inputs.index(port.input)])[0])
-        angular = problem.units.get(port.position, "") in ANGLES
+        angular = problem.units.get(port.position, "") in ANGLES and not port.flow_only
         a = _rms(motion.a)
         span = float(np.ptp(x)) or 1.0
         # From two thirds of a cycle within the span to what the samples still follow, half a radian of it apart.
@@ -89,7 +93,8 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
             once=own.once,
             long=own.long,
         )
-        left_out = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
+        left_out: tuple[str, ...] = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
+        left_out += OF_POSITION if port.flow_only else ()
         kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
         kinds = [k for k in kinds if k.name not in left_out]
         found += [BoxEffect(kind, name, scene) for kind in kinds]
@@ -114,7 +119,7 @@ def alike_one_way(problem: BoxProblem) -> dict[str, tuple[str, ...]]:
     found = {}
     for name, port in problem.map.ports.items():
         unit = problem.units.get(port.input)
-        if unit not in EFFORTS or port.position not in problem.outputs:
+        if unit not in EFFORTS or port.position not in problem.outputs or port.flow_only:
             continue
         x = problem.data.outputs[:, problem.outputs.index(port.position)]
         back = min(float(np.max(np.maximum.accumulate(s * x) - s * x)) for s in (1.0, -1.0))
