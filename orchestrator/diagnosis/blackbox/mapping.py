@@ -206,14 +206,7 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
         look.factor(f"$.outputs.{name}.factor", measured.factor)
         if measured.noise is not None and not 0.0 < measured.noise < math.inf:
             raise ScenarioError(f"{source}: $.outputs.{name}.noise must be positive, but is {measured.noise!r}")
-    for name, port in written.ports.items():
-        look.up(f"$.ports.{name}.input", port.input, ("input",))
-        if not port.position and port.velocity is None:
-            raise ScenarioError(f"{source}: $.ports.{name} must have `position`, `velocity` or both, but has neither")
-        if port.position:
-            look.up(f"$.ports.{name}.position", port.position, ("output", "local"))
-        if port.velocity is not None:
-            look.up(f"$.ports.{name}.velocity", port.velocity, ("output", "local"))
+    _check_ports(written, look)
     for name, signal in written.signals.items():
         look.factor(f"$.signals.{name}.factor", signal.factor)
         if not math.isfinite(signal.reference):
@@ -255,6 +248,24 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
             if (text := subject.model.variables[name].unit)
         },
     )
+
+
+def _check_ports(written: MapFile, look: "_Look") -> None:
+    """Refuse ports without a motion or flow, or of what is no input or output.
+
+    Raises:
+        ScenarioError: see ``read_map``.
+    """
+    for name, port in written.ports.items():
+        look.up(f"$.ports.{name}.input", port.input, ("input",))
+        if not port.position and port.velocity is None:
+            raise ScenarioError(
+                f"{look.source}: $.ports.{name} must have `position`, `velocity` or both, but has neither"
+            )
+        if port.position:
+            look.up(f"$.ports.{name}.position", port.position, ("output", "local"))
+        if port.velocity is not None:
+            look.up(f"$.ports.{name}.velocity", port.velocity, ("output", "local"))
 
 
 def _check_connections(written: MapFile, subject: Subject, look: "_Look") -> None:
