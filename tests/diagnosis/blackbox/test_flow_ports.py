@@ -10,7 +10,7 @@ from orchestrator.api.calibrate import calibrate
 from orchestrator.api.diagnose import diagnose
 from orchestrator.diagnosis.blackbox.draft import drafted
 from orchestrator.diagnosis.blackbox.mapping import Map, read_map
-from orchestrator.diagnosis.blackbox.sites import OF_POSITION
+from orchestrator.diagnosis.blackbox.sites import OF_POSITION, effects_of
 from orchestrator.diagnosis.blackbox.subject import Subject, subject_of
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import ModelInterface, Variable
@@ -51,9 +51,10 @@ def test_a_resistance_that_grows_with_the_current_is_named_by_its_flow_alone(tmp
         value = found.effects[0].estimates[0]
         assert (value.value, value.unit) == (pytest.approx(size, rel=0.05), "V.s2/(A.s)2")
         assert max(m.corrected for m in found.outcome.misfit) < 1.3
-        tried = {t.effect.partition("@")[0] for step in found.results(tmp_path).candidates for t in step.tried}
-        assert "viscous_drag" in tried
-        assert not tried & set(OF_POSITION)
+        problem = found.outcome.problem
+        offered = {e.kind.name for e in effects_of(problem, problem.must_read(problem.nominal)) if e.place == "coil"}
+        assert {"viscous_drag", "quadratic_drag", "load"} <= offered
+        assert not offered & set(OF_POSITION)
     finally:
         found.close()
 
