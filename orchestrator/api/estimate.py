@@ -22,7 +22,7 @@ from orchestrator.diagnosis.report.summary import play_of
 from orchestrator.diagnosis.selection.grading import Grade
 from orchestrator.errors import ConvergenceError, InputError, ScenarioError
 from orchestrator.estimation import cramer_rao
-from orchestrator.estimation.methods import maximum_likelihood
+from orchestrator.estimation.methods import maximum_likelihood, two_encoders
 from orchestrator.estimation.protocol import METHODS, Estimate, NotApplicableError, estimator
 from orchestrator.estimation.repeats import in_words, repeats_of
 from orchestrator.estimation.settings import DEFAULT_SETTINGS, EstimationSettings
@@ -37,8 +37,9 @@ from orchestrator.shared.settings import as_tables
 from orchestrator.shared.trust import Level, Trust
 
 DEFAULT_METHOD = FITTED
+WITHOUT_TORQUE = "two_encoders"  # the method of records that have none
 DIAGNOSIS = "diagnosis"  # the row of a corrected model's half-gap, and the folder of its diagnosis
-SKIPS_MISSING = ("maximum_likelihood", "ekf")
+SKIPS_MISSING = ("maximum_likelihood", "ekf", WITHOUT_TORQUE)
 UNSEEN = 1.0  # rad, bound from which on a record says nothing
 
 
@@ -87,7 +88,7 @@ class EstimateResult(Result):
 
     @property
     def alpha(self) -> float:
-        """Half-gap [rad] at the load."""
+        """Half-gap [rad] at the load; NaN where the gap cannot be seen."""
         return self.best.alpha
 
     @property
@@ -182,8 +183,8 @@ class EstimateResult(Result):
             more_records=tuple(described(other) for other in self.more) or None,
             repeats=None if repeats is None else RepeatsFound(repeats.sources, repeats.floor),
             method=self.best.method if self.estimates else None,
-            play=self._play().found() if self.estimates else None,
-            live=None if fit is None or r.missing else fitted_live(r, fit),
+            play=self._play().found() if self.estimates and math.isfinite(self.alpha) else None,
+            live=None if fit is None or r.missing or not math.isfinite(fit.alpha) else fitted_live(r, fit),
             diagnosis=None if self.diagnosis is None else self.diagnosis.results((place or Path()) / DIAGNOSIS),
             undiagnosed=self.undiagnosed or None,
             settings=as_tables(self.settings),
@@ -213,24 +214,28 @@ class EstimateResult(Result):
 
     def write_files(self, folder: Path) -> None:
         """Write the fitted signals as CSV, and the figures."""
-        from orchestrator.estimation.figures import draw_online, draw_profile
+        from orchestrator.estimation.figures import draw_flanks, draw_online, draw_profile
 
         for estimate in self.estimates:
             if estimate.method == "maximum_likelihood":
                 self.plot(folder / "estimate_fit.png")
                 write_tables(folder, self.record, [estimate], self._ratio(estimate))
                 limit = estimate.diagnostics["profile_limit"]
-                draw_profile(folder / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
+                if math.isfinite(estimate.alpha):
+                    draw_profile(folder / "estimate_profile.png", estimate.curves["profile"], estimate, limit)
             elif estimate.method == "ekf":
                 draw_online(folder / "estimate_online.png", self.record, estimate)
                 write_tables(folder, self.record, [estimate], self.model.parameters["i"].value)
+            elif estimate.method == WITHOUT_TORQUE:
+                draw_flanks(folder / "estimate_flanks.png", estimate)
+                write_tables(folder, self.record, [estimate], self._ratio(estimate))
 
 
 def estimate(
     record: Record | Path | str | Sequence[Record | Path | str],
     model: Model | None = None,
     *,
-    method: str = DEFAULT_METHOD,
+    method: str | None = None,
     motor_only: bool = False,
     time_limit: float = math.inf,
     diagnose: bool = True,
@@ -242,7 +247,8 @@ def estimate(
     Args:
         record: a measured record, or its path; several of one machine are fitted together.
         model: what it is compared with (default: ``read_model()``).
-        method: a key of ``METHODS``, such as "maximum_likelihood" or "ekf", or "all".
+        method: a key of ``METHODS``, such as "maximum_likelihood" or "ekf", or "all" (default: "maximum_likelihood",
+            or "two_encoders" where a record has no torque).
         motor_only: leave the load encoder out.
         time_limit: [s], after which ``maximum_likelihood`` gives up (default: never).
         diagnose: where ``maximum_likelihood`` shows that the model does not explain the records, find what it misses
@@ -265,7 +271,7 @@ def estimate(
     """
     model = read_model(None) if model is None else model
     chosen = chosen_settings(settings, EstimationSettings)
-    if method != "all" and method not in METHODS:
+    if method is not None and method != "all" and method not in METHODS:
         raise ScenarioError(f"`method` must be one of {', '.join(METHODS)}, all, but is {method!r}", "method")
     require_linear(model)
     given_records = [record] if isinstance(record, (Record, Path, str)) else list(record)
@@ -274,6 +280,7 @@ def estimate(
     measured, *more = (plausible_record(one, model, motor_only) for one in given_records)
     if any((other.theta_l is None) != (measured.theta_l is None) for other in more):
         raise ScenarioError("`record` must be records with the same encoders, or `motor_only`", "record", "motor_only")
+    method = method or default_method([measured, *more])
     found: list[MethodResult] = []
     for name in METHODS if method == "all" else (method,):
         begun = time.perf_counter()
@@ -296,6 +303,18 @@ def estimate(
     first = () if missing is None else _of_diagnosis(missing)
     repeats = repeats_of([measured, *more])
     return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen, why)
+
+
+def default_method(records: Sequence[Record]) -> str:
+    """Return the method for records when none is asked for.
+
+    Args:
+        records: of one machine.
+
+    Returns:
+        A key of ``METHODS``.
+    """
+    return DEFAULT_METHOD if all(record.has_torque for record in records) else WITHOUT_TORQUE
 
 
 def _beside(estimates: Sequence[Estimate]) -> str:
@@ -349,6 +368,8 @@ def _fitted(
     Raises:
         NotApplicableError: there are several records, or samples are missing.
     """
+    if name != WITHOUT_TORQUE and not all(one.has_torque for one in (record, *more)):
+        raise NotApplicableError("needs the torque `u`, which the record does not have")
     if name == DEFAULT_METHOD:
         return maximum_likelihood.estimate(
             record, model, more=more, time_limit=time_limit, report=report, settings=settings
@@ -357,6 +378,8 @@ def _fitted(
         raise NotApplicableError("takes one record; several are fitted together by maximum_likelihood")
     if record.missing and name not in SKIPS_MISSING:
         raise NotApplicableError(f"takes records without missing samples, but {record.missing} rows have some")
+    if name == WITHOUT_TORQUE:
+        return two_encoders.estimate(record, model, settings.flanks)
     return estimator(name)(record, model)
 
 
@@ -365,5 +388,7 @@ def _bound(record: Record, model: Model, estimates: Sequence[Estimate]) -> float
     for estimate in estimates:
         if "cramer_rao" in estimate.diagnostics:
             return float(estimate.diagnostics["cramer_rao"])
+    if not (record.has_torque and estimates[-1].visible):
+        return math.inf
     bound = cramer_rao.bound_at(record, model, estimates[-1].alpha)
     return bound if bound < UNSEEN else math.inf

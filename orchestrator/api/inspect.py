@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from orchestrator.api.methods import MethodResult, method_entry
 from orchestrator.api.records import as_record
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.estimation.inspection.channels import (
@@ -18,9 +19,12 @@ from orchestrator.estimation.inspection.channels import (
     excitation_of,
     reversals_of,
 )
-from orchestrator.estimation.inspection.machine import as_model, fits, rough_machine, visible_effects
-from orchestrator.estimation.inspection.starter import assumed_columns, starter
-from orchestrator.estimation.inspection.sufficiency import SEEN, SIZES, Sufficiency, sufficiency
+from orchestrator.estimation.inspection.machine import as_model, is_of, rough_machine, visible_effects
+from orchestrator.estimation.inspection.starter import OF_DEFAULT, assumed_columns, starter
+from orchestrator.estimation.inspection.sufficiency import SEEN, Sufficiency, sufficiency
+from orchestrator.estimation.inspection.verdict import verdict_of
+from orchestrator.estimation.methods import two_encoders
+from orchestrator.estimation.protocol import Estimate, NotApplicableError
 from orchestrator.records.model_file import Model, read_model
 from orchestrator.records.record import Record
 from orchestrator.shared.results.estimate import ExcitationFound, RecordFound
@@ -48,11 +52,12 @@ class InspectResult(Result):
         channels: facts of each column.
         excitation: the torque's power by frequency.
         delay: lag of the load's angle behind the motor's and its standard error [s], or None.
-        reversals: sign changes of torque and of motor speed.
+        reversals: sign changes of torque, None without one, and of motor speed.
         sufficiency: which gaps would be seen, and which experiment would do better.
         effects: the smallest size of each effect that would show, with its unit.
         assumed: what was assumed, a sentence each.
         starter: text of a model file to start from.
+        two_angles: the half-gap from the two angles alone, where the log has no torque.
         arguments: what was asked for.
     """
 
@@ -62,11 +67,12 @@ class InspectResult(Result):
     channels: tuple[Channel, ...]
     excitation: tuple[Band, ...]
     delay: tuple[float, float] | None
-    reversals: tuple[int, int]
+    reversals: tuple[int | None, int]
     sufficiency: Sufficiency
     effects: tuple[tuple[str, float, str], ...]
     assumed: tuple[str, ...]
     starter: str
+    two_angles: Estimate | None = None
     arguments: Mapping[str, Any] = field(default_factory=dict)
 
     @property
@@ -85,32 +91,12 @@ class InspectResult(Result):
         draw_record(Path(path), self.record, list(self.excitation))
 
     def verdict(self) -> list[str]:
-        """Say whether the record suffices, and what would do better.
+        """Say whether the record suffices, what it lacks, and what would do better.
 
         Returns:
             A sentence each.
         """
-        found = self.sufficiency
-        if found.smallest <= SIZES[0]:
-            said = [f"The record shows half-gaps of {SIZES[0]:g} rad and larger, and perhaps smaller ones."]
-        elif math.isfinite(found.smallest):
-            said = [
-                f"The record shows half-gaps from about {found.smallest:.2g} rad on (bound below {SEEN:g} of the size)."
-            ]
-        else:
-            said = [
-                "The record shows no gap of any size that was tried: its torque does not move the teeth through one."
-            ]
-        best = found.better[0] if found.better else None
-        if best is not None and best.bound < 0.9 * found.own:
-            said.append(
-                f"Better, of the same length and within the same torque and speed: {best.name}, bound {best.bound:.2g} "
-                f"instead of {found.own:.2g} rad for a half-gap of {found.design_size:g} rad; `estimate` with `design` "
-                "searches further."
-            )
-        else:
-            said.append("No simple excitation of the same length, torque and speed would show the gap clearly better.")
-        return said
+        return verdict_of(self.record, self.sufficiency, self.reversals, self.two_angles)
 
     def blocks(self) -> Sequence[Block]:
         """Return what was read, the tables and the verdict."""
@@ -146,11 +132,13 @@ class InspectResult(Result):
             [(name, f"{size:.2g} {unit}") for name, size, unit in self.effects],
         )
         assumed = [f"Assumed: {'; '.join(self.assumed)}."] if self.assumed else []
-        return [*read, channels, *self._between(), bands, gaps, effects, *assumed, *self.verdict()]
+        shown = [t for t in (bands, gaps, effects) if t.rows]
+        return [*read, channels, *self._between(), *shown, *assumed, *self.verdict()]
 
     def _between(self) -> list[str]:
         torque, speed = self.reversals
-        said = [f"The torque changes sign {torque} times, the motor's speed {speed} times."]
+        driven = "" if torque is None else f"the torque changes sign {torque} times, "
+        said = [f"{driven}the motor's speed changes sign {speed} times.".capitalize()]
         if self.delay is not None:
             lag, error = self.delay
             said.append(
@@ -161,7 +149,7 @@ class InspectResult(Result):
 
     def results(self, place: Path | None = None) -> InspectFound:
         """Return what ``inspect.json`` says."""
-        r, found = self.record, self.sufficiency
+        r, found, angles = self.record, self.sufficiency, self.two_angles
         return InspectFound(
             record=RecordFound(r.size, r.step, r.source, r.missing, tuple(r.notes)),
             channels=tuple(ChannelFound(**vars(c)) for c in self.channels),
@@ -179,6 +167,7 @@ class InspectResult(Result):
             ),
             assumed=tuple(self.assumed),
             verdict=tuple(self.verdict()),
+            two_angles=None if angles is None else method_entry(MethodResult(angles.method, angles, math.inf, 0.0)),
         )
 
     def write_files(self, folder: Path) -> None:
@@ -225,26 +214,48 @@ def inspect(
     if not isinstance(record, Record):
         columns, assumed = assumed_columns(Path(record), columns, base.header)
         base = replace(base, columns=columns)
-    measured = as_record(record, base, part=part, resample=resample, rate=rate)
-    origin: Mapping[str, str] = {}
-    machine = base
-    if model is None:
-        why = fits(measured, base)
-        if why or assumed:
-            rough = rough_machine(measured)
-            machine, origin = as_model(rough, base), rough.origin
-            assumed = (*assumed, "inertias, stiffness, friction and lag roughly, from the record; see the model file")
-        else:
-            assumed = (*assumed, "the default model's values, each known to 5 %")
+    measured = as_record(record, base, torque_needed=False, part=part, resample=resample, rate=rate)
+    machine, origin, more = _machine(measured, base, given=model is not None, sure=not assumed)
+    assumed = (*assumed, *more)
     with np.errstate(all="ignore"):
         enough = sufficiency(measured, machine)
         effects = visible_effects(measured, machine)
     text = starter(machine, columns, origin, assumed, measured.source)
     return InspectResult(
         measured, machine, tuple(channels_of(measured)), tuple(excitation_of(measured)), delay_between(measured),
-        reversals_of(measured), enough, tuple(effects), assumed, text,
+        reversals_of(measured), enough, tuple(effects), assumed, text, _of_two_angles(measured, machine),
         {
             "record": measured.source, "model": base.source, "part": part, "resample": resample, "rate": rate,
             "header": header,
         },
     )  # fmt: skip
+
+
+def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Model, Mapping[str, str], tuple[str, ...]]:
+    """Return the machine that the judgement is for, where each of its values is from, and what was assumed.
+
+    Args:
+        record: the record.
+        base: the model that was given, or the default one.
+        given: whether one was given.
+        sure: whether nothing was assumed of the columns.
+    """
+    if given:
+        return base, dict.fromkeys(base.plant.linear, "of the model that was given"), ()
+    rough = rough_machine(record)
+    if not record.has_torque:
+        return as_model(rough, base), rough.origin, ()
+    if sure and is_of(record, base):
+        return base, dict.fromkeys(base.plant.linear, OF_DEFAULT), ("the default model's values, each known to 5 %",)
+    said = "inertias, stiffness, friction and lag roughly, from the record; see the model file"
+    return as_model(rough, base), rough.origin, (said,)
+
+
+def _of_two_angles(record: Record, model: Model) -> Estimate | None:
+    """Return the half-gap from the two angles of a log without a torque."""
+    if record.has_torque:
+        return None
+    try:
+        return two_encoders.estimate(record, model)
+    except NotApplicableError:
+        return None

@@ -56,13 +56,19 @@ def method_row(result: MethodResult) -> list[str]:
     estimate = result.estimate
     assert estimate is not None
     low, high = estimate.interval
-    errors = [f"{estimate.standard_error:.2g}", f"{result.bound:.2g}" if math.isfinite(result.bound) else ""]
     name = estimate.method.replace("_", " ")
+    if not estimate.visible:
+        return [name, "not seen", _word(result), f"below {high:.6g}" if math.isfinite(high) else "", "", ""]
+    errors = [f"{estimate.standard_error:.2g}", f"{result.bound:.2g}" if math.isfinite(result.bound) else ""]
     return [name, f"{estimate.alpha:.6g}", _word(result), f"{low:.6g} to {high:.6g}", *errors]
 
 
 def _word(result: MethodResult) -> str:
     return "" if result.trust is None else result.trust.level.word
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def method_entry(result: MethodResult) -> MethodFound:
@@ -78,9 +84,9 @@ def method_entry(result: MethodResult) -> MethodFound:
     if estimate is None:
         return MethodFound(not_applicable=result.reason)
     return MethodFound(
-        alpha=estimate.alpha,
-        standard_error=estimate.standard_error,
-        cramer_rao=result.bound,
+        alpha=_number(estimate.alpha),
+        standard_error=_number(estimate.standard_error),
+        cramer_rao=_number(result.bound),
         interval=estimate.interval,
         level=LEVEL,
         unit="rad",

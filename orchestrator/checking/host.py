@@ -14,6 +14,7 @@ from orchestrator.checking.probing.varargs import LOGGER, fill_in
 
 _TYPES: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
 _MESSAGES = 4
+_ERRORS = (3, 4)  # fmi2Error and fmi2Fatal
 _LONGEST_TEXT = 1 << 20
 
 
@@ -49,9 +50,11 @@ class Host:
         self._states: dict[int, c_void_p] = {}
         self._number = 0
         self._messages: list[str] = []
+        self._errors = 0
         self._logger = LOGGER(self._log)
 
-    def _log(self, _environment: int, _name: bytes, _status: int, _category: bytes, message: int, *rest: Any) -> None:
+    def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, message: int, *rest: Any) -> None:
+        self._errors += status in _ERRORS
         self._take(fill_in(message, rest))
 
     def _take(self, text: str) -> None:
@@ -131,13 +134,13 @@ class Host:
             arguments: numbers by kind, see ``_argument``.
 
         Returns:
-            Status, what the output arguments hold, and what was logged.
+            Status, what the output arguments hold, what was logged, and how many of that as errors.
         """
-        self._messages = []
+        self._messages, self._errors = [], 0
         made = [self._argument(*a) for a in arguments]
         values = [value for value, _ in made]
         status = getattr(self._handle, function)(self._instances[instance][0], *values)
-        return [int(status), [read() for _, read in made if read is not None], self._messages]
+        return [int(status), [read() for _, read in made if read is not None], self._messages, self._errors]
 
     def _argument(self, kind: str, value: Any = None) -> tuple[Any, Callable[[], Any] | None]:
         """Return an argument, and how to read it afterwards when it is an output."""

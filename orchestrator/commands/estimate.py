@@ -16,7 +16,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from orchestrator.api.arguments import chosen_settings
 from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
 from orchestrator.api.estimable import plausible_record, require_linear
-from orchestrator.api.estimate import DEFAULT_METHOD, DIAGNOSIS, EstimateResult, estimate
+from orchestrator.api.estimate import (
+    DEFAULT_METHOD,
+    DIAGNOSIS,
+    WITHOUT_TORQUE,
+    EstimateResult,
+    default_method,
+    estimate,
+)
 from orchestrator.api.records import read_model
 from orchestrator.api.shown import Block
 from orchestrator.commands._console import print_blocks
@@ -81,7 +88,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="the model it is compared with (default: the thesis's values, 5 %% each)",
     )
     listed = "; ".join(f"{name}: {text}" for name, text in METHODS.items())
-    parser.add_argument("--method", choices=[*METHODS, "all"], help=f"{listed} (default: {DEFAULT_METHOD})")
+    parser.add_argument(
+        "--method",
+        choices=[*METHODS, "all"],
+        help=f"{listed} (default: {DEFAULT_METHOD}; {WITHOUT_TORQUE} without a torque)",
+    )
     parser.add_argument("--motor-only", action="store_true", help="leave the load encoder out")
     parser.add_argument("--time-limit", type=float, metavar="S", help="give up after this time (default: never)")
     parser.add_argument("--settings", type=Path, metavar="FILE.toml", help="thresholds, in the groups of the result")
@@ -123,12 +134,11 @@ def run(args: argparse.Namespace) -> int:
         if records:
             _announce(records, model, args)
             blocks += what_was_read(records)
-            method = args.method or DEFAULT_METHOD
             with _shown(records, model) as progress:
                 found = estimate(
                     records,
                     model,
-                    method=method,
+                    method=args.method,
                     motor_only=args.motor_only,
                     time_limit=math.inf if args.time_limit is None else args.time_limit,
                     diagnose=not args.no_diagnose,
@@ -163,7 +173,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _announce(records: list[Record], model: Model, args: argparse.Namespace) -> None:
     """Say what a long fit will cost before it starts."""
-    if (args.method or DEFAULT_METHOD) not in (DEFAULT_METHOD, "all"):
+    if (args.method or default_method(records)) not in (DEFAULT_METHOD, "all") or not records[0].has_torque:
         return
     rows = sum(record.size for record in records)
     seconds = expected_seconds(records, model)
@@ -215,7 +225,8 @@ def _shown(records: list[Record], model: Model) -> Iterator[Callable[[str, str, 
     """Show stages with the time left on a terminal; yield what is to be called at each."""
     rows = sum(record.size for record in records)
     with Stages() as stages:
-        stages.begin("preparing", expected_seconds(records, model) if sys.stderr.isatty() else 0.0)
+        fitted = sys.stderr.isatty() and records[0].has_torque
+        stages.begin("preparing", expected_seconds(records, model) if fitted else 0.0)
         known = [DEFAULT_METHOD]
 
         def show(work: str, stage: str, share: float) -> None:

@@ -35,10 +35,12 @@ def describe(fit: GapFit) -> Estimate:
     # Torque noise above the least means that the model is not exact; what it lacks is not white, as the likelihood
     # takes it to be, so the interval is widened.
     inexact = max(likelihood.noise(fit.point.theta).torque) > 10.0 * LEAST_TORQUE_NOISE
-    limit = NORMAL_95**2 * (settings.misfit_widening**2 if inexact else 1.0)
+    wider = max(settings.misfit_widening**2 if inexact else 1.0, _block_variance(fit, column, settings.blocks))
+    limit = NORMAL_95**2 * wider
     low, high = curve.interval(alpha, limit)
     # A profile point that is not quite the maximum makes the interval too short, never too long.
     half = math.sqrt(limit) * error
+    error *= math.sqrt(wider)
     low, high = min(low, max(alpha - half, 0.0)), max(high, alpha + half)
     kept = likelihood.run(fit.point.theta, keep=True)
     flanks = kept.contacts[kept.contacts != 0]
@@ -58,8 +60,9 @@ def describe(fit: GapFit) -> Estimate:
     }
     visible, message = _verdict(alpha, low, high, traversals)
     still = _standing_still(problem.outputs, likelihood.noise(fit.point.theta).measured, settings)
-    if still:
-        visible, message, error, low, high = False, still, math.inf, 0.0, math.inf
+    message = still or message
+    if "cannot be seen" in message:  # then no number is an answer
+        visible, alpha, error, low, high = False, math.nan, math.inf, 0.0, math.inf
     drive = float(np.sqrt(np.mean(kept.states[:, 4] ** 2)))
     lacking = _lacking(diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I], problem.record.size, settings)
     diagnostics["lacking"] = lacking
@@ -68,6 +71,26 @@ def describe(fit: GapFit) -> Estimate:
     curves["offset"] = _value(likelihood, fit, "effects.sensor_offset.load.offset")
     curves["model"] = likelihood.parameters(fit.point.theta)
     return Estimate("maximum_likelihood", alpha, error, (low, high), visible, message, diagnostics, curves)
+
+
+def _block_variance(fit: GapFit, column: int, blocks: int) -> float:
+    """Return the variance of an unknown that blocks of the record show, over that of white one-step errors.
+
+    It is one where it is no more than chance makes it. Godambe's information from blocks (White 1982; Kuensch 1989):
+    rounding, errors of the model and of the log's times make errors that hang together within a block, which the
+    Fisher information does not know. Student's distribution makes up for the number of blocks.
+    """
+    from scipy.stats import chi2, t
+
+    scores = fit.likelihood.scores(fit.point, fit.free)
+    sums = np.array([block.sum(axis=0) for block in np.array_split(scores, blocks)])
+    sums -= sums.mean(axis=0)
+    weights = fit.covariance[:, column]
+    variance = float(np.sum((sums @ weights) ** 2)) * blocks / (blocks - 1.0)
+    ratio = variance / max(float(fit.covariance[column, column]), 1e-300)
+    if not ratio > float(chi2.ppf(0.975, blocks - 1)) / (blocks - 1.0):
+        return 1.0
+    return ratio * (float(t.ppf(0.975, blocks - 1)) / NORMAL_95) ** 2
 
 
 def _value(likelihood: Likelihood, fit: GapFit, name: str) -> float:

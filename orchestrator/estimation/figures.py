@@ -46,7 +46,8 @@ def draw_fit(path: Path, record: Record, estimate: Estimate, ratio: float) -> No
     for sign in (-1.0, 1.0):
         axes[0].axhline(sign * 1e3 * estimate.alpha, color=ORANGE, linewidth=0.8, linestyle="--")
     axes[0].set_ylabel("twist [mrad]")
-    axes[0].set_title(f"half-gap {estimate.alpha:.5g} rad; dashed: its flanks")
+    seen = math.isfinite(estimate.alpha)
+    axes[0].set_title(f"half-gap {estimate.alpha:.5g} rad; dashed: its flanks" if seen else "the gap cannot be seen")
     axes[1].plot(t, record.theta_m[span], ".", markersize=2.5, color=GREY, label="motor, record")
     axes[1].plot(t, states[span, 0], color=BLUE, linewidth=1.0, label="motor, fitted")
     axes[1].set_ylabel("motor angle [rad]")
@@ -124,6 +125,28 @@ def draw_online(path: Path, record: Record, estimate: Estimate) -> None:
     axis.set_ylabel("half-gap [rad]")
     axis.set_ylim(0.0, max(2.5 * float(alpha[-1]), 1e-4))
     axis.margins(x=0.0)
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.25)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+
+
+def draw_flanks(path: Path, estimate: Estimate) -> None:
+    """Draw the load's distance from mid-gap over the points of an estimate from two encoders, coloured by flank.
+
+    Args:
+        path: the picture.
+        estimate: by ``two_encoders``.
+    """
+    figure, (axis,) = _figure(1, (8.0, 4.2))
+    time, twist, flank = (estimate.curves[name] for name in ("time", "twist", "flank"))
+    for side, colour, label in ((-1, BLUE, "lower flank"), (0, GREY, "between"), (1, ORANGE, "upper flank")):
+        rows = flank == side
+        axis.plot(time[rows], 1e3 * twist[rows], ".", markersize=2.5, color=colour, label=label)
+    if estimate.visible:
+        for sign in (-1.0, 1.0):
+            axis.axhline(sign * 1e3 * estimate.alpha, color="black", linewidth=0.8, linestyle="--")
+    axis.set_xlabel("time [s]")
+    axis.set_ylabel("load from mid-gap [mrad]")
     axis.legend(fontsize=8)
     axis.grid(alpha=0.25)
     figure.savefig(path, dpi=DPI, metadata={"Software": None})

@@ -361,6 +361,12 @@ def run_filter(  # type: ignore[no-untyped-def]
                 errors[k, o] = x[row] - x[row]
                 variances[k, o] = 1.0
                 continue
+            if not s > 0.0:  # rounding has used the covariance up: the filter has diverged
+                errors[k:, :] = math.nan
+                variances[k:, :] = math.nan
+                states[k:, :] = math.nan
+                contacts[k:] = 0
+                return
             errors[k, o] = e
             variances[k, o] = s
             _update(x, cov, row, e, s, gain, work)

@@ -26,7 +26,7 @@ from pyfmu_sources.drivetrain_parameters import NAMES
 JUMP = 100.0
 START_DAMPING = 1e-6
 DIFFERENCE = 0.01  # step of a difference quotient, in standard deviations
-LARGEST_LOG_NOISE = 20.0  # beyond the bounds of any unknown, where a difference quotient may look
+LEAST_LOG_NOISE, LARGEST_LOG_NOISE = -40.0, 20.0  # beyond all bounds, where a difference quotient may look
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class Likelihood:
         Returns:
             The levels.
         """
-        measured = [math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._noise]
+        measured = [math.exp(min(max(theta[n], LEAST_LOG_NOISE), LARGEST_LOG_NOISE)) for n in self._noise]
         motor, load = (math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._torque)
         return NoiseLevels((measured[0], measured[-1]), (motor, load))
 
@@ -213,6 +213,39 @@ class Likelihood:
             Both, and the likelihood that knows this information.
         """
         base = point.result
+        error, spread, back = self._differences(point, free)
+        white = (base.errors / np.sqrt(base.variances)).ravel()
+        gradient = back.T @ (error @ white + 0.5 * spread @ (1.0 - white**2))
+        information = back.T @ (error @ error.T + 0.5 * spread @ spread.T) @ back
+        weight = self._weight[free]
+        gradient += weight * (point.theta - self._mean)[free]
+        information = 0.5 * (information + information.T) + np.diag(weight)
+        known = self.information.copy()
+        known[np.ix_(free, free)] = information
+        return gradient, information, self.changed(information=known)
+
+    def scores(self, point: Point, free: NDArray[np.int64]) -> Array:
+        """Return what each row adds to the gradient (k,) of half the objective, without the prior.
+
+        Args:
+            point: where they are taken.
+            free: (k,) indices of the free unknowns.
+
+        Returns:
+            Shape (n, k).
+        """
+        base = point.result
+        error, spread, back = self._differences(point, free)
+        white = (base.errors / np.sqrt(base.variances)).ravel()
+        each = error * white + 0.5 * spread * (1.0 - white**2)
+        return np.asarray(each.reshape(free.size, *base.errors.shape).sum(axis=2).T @ back)
+
+    def _differences(self, point: Point, free: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+        """Return derivatives of the whitened errors and of the log variances along directions, and the way back.
+
+        The first two are (k, n outputs), the matrix (k, k) takes a vector of unknowns to the directions.
+        """
+        base = point.result
         basis = self._basis(free)
 
         def look(n: int, step: float) -> tuple[Array, Array]:
@@ -235,16 +268,7 @@ class Likelihood:
         columns = list(self._pool.map(run, range(free.size)) if self._pool else map(run, range(free.size)))
         error = np.array([column[0] for column in columns])
         spread = np.array([column[1] for column in columns])
-        white = (base.errors / np.sqrt(base.variances)).ravel()
-        back = np.linalg.inv(basis)
-        gradient = back.T @ (error @ white + 0.5 * spread @ (1.0 - white**2))
-        information = back.T @ (error @ error.T + 0.5 * spread @ spread.T) @ back
-        weight = self._weight[free]
-        gradient += weight * (point.theta - self._mean)[free]
-        information = 0.5 * (information + information.T) + np.diag(weight)
-        known = self.information.copy()
-        known[np.ix_(free, free)] = information
-        return gradient, information, self.changed(information=known)
+        return error, spread, np.asarray(np.linalg.inv(basis))
 
     def _basis(self, free: NDArray[np.int64]) -> Array:
         """Return a factor (k, k) of the covariance of the free unknowns; alpha never moves down along a column."""

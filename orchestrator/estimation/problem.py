@@ -118,12 +118,13 @@ def make_problem(record: Record, model: Model) -> GapProblem:
         encoder = model.encoder(column)
         known = encoder.noise is not None and encoder.resolution is not None and record.averaged == 1
         spread = 0.02 if known else NOISE_SPREAD
-        noises.append(
-            Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, math.log(level) - 6.0, math.log(level) + 6.0)
-        )
+        least = max(math.log(level) - 6.0, math.log(max(rounding_noise(record, model, column), 1e-12)))
+        noises.append(Unknown(f"log_noise_{column}", math.log(level), spread, 0.1, least, math.log(level) + 6.0))
     unit = _torque_unit(record, model.parameters["tau"].value)
-    least = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE) if both else tuple(unit * level for level in LEAST_WHERE_INEXACT)
-    for side, low in zip(("motor", "load"), least, strict=True):
+    exact = (LEAST_TORQUE_NOISE, LEAST_TORQUE_NOISE)
+    for side, low in zip(
+        ("motor", "load"), exact if both else tuple(unit * w for w in LEAST_WHERE_INEXACT), strict=True
+    ):
         noises.append(Unknown(f"log_torque_{side}", -7.0, math.inf, 0.5, math.log(low), math.log(LARGEST_TORQUE_NOISE)))
     if not both:
         levels.append(levels[0])
@@ -177,12 +178,29 @@ def measurement_noise(record: Record, model: Model, column: str) -> float:
     values = record.theta_m if column == "theta_m" else record.theta_l
     assert values is not None
     encoder = model.encoder(column) if record.averaged == 1 else Encoder()
-    count = quantisation_step(values[np.isfinite(values)]) if encoder.resolution is None else encoder.resolution
-    if encoder.noise is not None:
-        level = math.sqrt(encoder.noise**2 + count**2 / 12.0)
-    else:
-        level = max(robust_noise(values), count / math.sqrt(12.0))
+    rounding = rounding_noise(record, model, column)
+    level = max(robust_noise(values), rounding) if encoder.noise is None else math.hypot(encoder.noise, rounding)
     return max(level, 1e-9)
+
+
+def rounding_noise(record: Record, model: Model, column: str) -> float:
+    """Return the standard deviation that rounding to counts gives an encoder's angle [rad].
+
+    No fitted noise is smaller: while a machine rests, its rounding errors are all the same, but they do not go away.
+
+    Args:
+        record: the record.
+        model: of the machine.
+        column: "theta_m" or "theta_l".
+
+    Returns:
+        A count over the square root of twelve; 0.0: the column is not rounded.
+    """
+    values = record.theta_m if column == "theta_m" else record.theta_l
+    assert values is not None
+    encoder = model.encoder(column) if record.averaged == 1 else Encoder()
+    count = quantisation_step(values[np.isfinite(values)]) if encoder.resolution is None else encoder.resolution
+    return count / math.sqrt(12.0)
 
 
 def with_least_torque_noise(problem: GapProblem, least: tuple[float, float]) -> GapProblem:

@@ -21,6 +21,7 @@ METHODS = {
     "speed_difference": "integral of the speed difference over a traversal of the gap",
     "torque_pulse": "torque pulses, or the quasi-stationary twist against torque",
     "operating_data": "width of the twist's hysteresis in normal closed-loop data",
+    "two_encoders": "two flanks in the load's angle against the motor's; needs no torque",
 }
 LEVEL = 0.95
 
@@ -39,7 +40,7 @@ class Estimate:
 
     Attributes:
         method: key of ``METHODS``.
-        alpha: half gap, load side [rad].
+        alpha: half gap, load side [rad]; NaN where the gap cannot be seen.
         standard_error: [rad]; infinite when the record says nothing about the gap.
         interval: 95 % interval [rad]; its lower end is 0.0 when no gap is compatible with the record.
         visible: whether the record shows a gap at all.

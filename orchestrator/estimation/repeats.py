@@ -38,6 +38,8 @@ def repeats_of(records: Sequence[Record]) -> Repeats | None:
     Returns:
         The floor; None: no two have the same torque and sample time.
     """
+    if not all(record.has_torque for record in records):
+        return None
     names = ("theta_m",) if records[0].theta_l is None else ("theta_m", "theta_l")
     variances, sources = [], dict[str, None]()
     for one, other in itertools.combinations((record.filled() for record in records), 2):

@@ -55,6 +55,48 @@ class GapVerdictSettings(Settings, frozen=True):
     misfit_widening: Annotated[
         float, setting("factor on the interval where the model is not exact: what it lacks is not white", ge=1)
     ] = 1.3
+    blocks: Annotated[
+        int,
+        setting(
+            "blocks of the record whose scatter the interval allows for, where it is more than that of noise", ge=5
+        ),
+    ] = 20
+
+
+class FlankSettings(Settings, frozen=True):
+    """The gap from two angles alone: a hidden state for the flank."""
+
+    late_deviation: Annotated[
+        float, setting("standard deviation of the lateness of one channel before anything is known [s]", gt=0)
+    ] = 0.02
+    latest: Annotated[float, setting("lateness that is looked for at most [s]", gt=0)] = 0.1
+    late_step: Annotated[
+        float, setting("change of the lateness from which the motor's angle is taken anew [s]", gt=0)
+    ] = 2e-5
+    most_points: Annotated[int, setting("points that are used; of more, evenly so many", ge=200)] = 10000
+    separate: Annotated[
+        float, setting("half-gap in standard deviations of the noise from which on two flanks are told apart")
+    ] = 2.5
+    least_counts: Annotated[
+        float, setting("half-gap in counts of the coarser encoder from which on it is not rounding to two values", ge=0)
+    ] = 0.5
+    least_touching: Annotated[
+        float, share("points at which teeth touch; with fewer, the flanks are the rims of a single cloud")
+    ] = 0.3
+    shape: Annotated[
+        float, share("of the noise, by which bounces and rounding shift the middle of a flank: standard deviation")
+    ] = 0.065
+    speed_window: Annotated[float, setting("half of the time over which the motor's speed is taken [s]", gt=0)] = 2e-3
+    turns_for_eccentricity: Annotated[float, setting("turns of a shaft from which its eccentricity is fitted")] = 1.0
+    least_noise: Annotated[float, share("noise of an edge between counts, in counts, below which none is fitted")] = (
+        0.05
+    )
+    prior_steps: Annotated[float, setting("steps between states that each has beforehand", gt=0)] = 1.0
+    rounds: Annotated[int, setting("rounds of expectation and maximisation at most", ge=1)] = 60
+    first_rounds: Annotated[int, setting("rounds that each start has", ge=1)] = 10
+    tolerance: Annotated[float, setting("change of the log likelihood at which it rests", gt=0)] = 1e-3
+    blocks: Annotated[int, setting("blocks of the record, each left out once for the standard error", ge=5)] = 20
+    block_rounds: Annotated[int, setting("rounds that a record without a block has", ge=1)] = 8
 
 
 class TrustSettings(Settings, frozen=True):
@@ -71,6 +113,7 @@ class EstimationSettings(Settings, frozen=True):
 
     fit: MaximisationSettings = MaximisationSettings()
     verdict: GapVerdictSettings = GapVerdictSettings()
+    flanks: FlankSettings = FlankSettings()
     trust: TrustSettings = TrustSettings()
 
 

@@ -14,23 +14,26 @@ from orchestrator.shared.inference.normal import NORMAL_95
 
 
 def write_tables(directory: Path, record: Record, estimates: Iterable[Estimate], ratio: float) -> None:
-    """Write ``estimate.csv`` (record and fitted model), ``profile.csv`` and ``online.csv``, as far as there is data.
+    """Write ``estimate.csv``, ``profile.csv``, ``online.csv`` and ``flanks.csv``, as far as there is data.
 
     Args:
         directory: where to.
         record: the measured record.
-        estimates: of which those by ``maximum_likelihood`` and ``ekf`` have curves.
+        estimates: of which those by ``maximum_likelihood``, ``ekf`` and ``two_encoders`` have curves.
         ratio: fitted gear ratio.
     """
     for estimate in estimates:
         if estimate.method == "maximum_likelihood":
             _write(directory / "estimate.csv", _fit_columns(record, estimate, ratio))
-            profile = estimate.curves["profile"]
-            _write(directory / "profile.csv", {"alpha": profile.alpha, "drop": profile.drop})
+            if math.isfinite(estimate.alpha):
+                profile = estimate.curves["profile"]
+                _write(directory / "profile.csv", {"alpha": profile.alpha, "drop": profile.drop})
         elif estimate.method == "ekf":
             alpha, deviation = estimate.curves["alpha"], estimate.curves["deviation"]
             low, high = np.maximum(alpha - NORMAL_95 * deviation, 0.0), alpha + NORMAL_95 * deviation
             _write(directory / "online.csv", {"time": record.time, "alpha": alpha, "low": low, "high": high})
+        elif estimate.method == "two_encoders":
+            _write(directory / "flanks.csv", {name: estimate.curves[name] for name in ("time", "twist", "flank")})
 
 
 def _fit_columns(record: Record, estimate: Estimate, ratio: float) -> dict[str, Array]:

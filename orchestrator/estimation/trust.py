@@ -35,6 +35,8 @@ def trust_of_estimates(
     for estimate in estimates:
         if estimate.method == FITTED and own is not None:
             found[estimate.method] = own
+        elif estimate.method == "two_encoders" and own is None:
+            found[estimate.method] = trust_of([Reason(Level.AMBER, estimate.message)])  # what it cannot see, it says
         else:
             found[estimate.method] = trust_of(_beside(estimate, fit, own))
     return found

@@ -90,7 +90,8 @@ class FmuSlave(Slave):
         if self._description.once:
             digest = str(self.path) if self.path.is_dir() else content_hash(self.path)
             if digest in _only_ones:
-                raise FmuError(f"{self.name}: {self.path} may be instantiated only once per process, but is twice")
+                text = f"{self.path} may be instantiated only once per process, but is twice"
+                raise FmuError(f"{self.name}: {text}: `simulate` and `ssp run` give each instance a process")
             _only_ones.add(digest)
             self._once = digest
 

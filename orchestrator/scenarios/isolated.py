@@ -16,6 +16,7 @@ from orchestrator.errors import ChildError, FmuError, OrchestratorError, Simulat
 from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.ours import is_ours
+from orchestrator.fmi.remote import RemoteFactory
 from orchestrator.master.algorithms import step_count
 from orchestrator.master.compiled import prepare
 from orchestrator.master.result import LOOPS, Recording, Statistics, claimed_remarks
@@ -103,7 +104,9 @@ def run_safely(scenario: Scenario, safety: Safety) -> Recording:
     """
     foreign = [] if safety.trust else foreign_fmus(scenario.system)
     movable = all(isinstance(i.create, FmuFactory) for i in scenario.system.instances)
-    if movable and (foreign or safety.time is not None):
+    if movable and _one_a_process(scenario.system):
+        result = _in_processes(scenario, safety, foreign)
+    elif movable and (foreign or safety.time is not None):
         result = _in_child(scenario, safety, foreign)
     else:
         with scenario.session() as session:
@@ -157,6 +160,35 @@ def unpacked(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]
                 origins[str(folder)] = str(factory.path)
             instances.append(replace(instance, create=replace(factory, path=folder)))
         yield replace(system, instances=tuple(instances)), scratch, origins
+
+
+def _one_a_process(system: System) -> bool:
+    """Whether an FMU that may be instantiated once per process has several instances."""
+    once = [f.path for f in (i.create for i in system.instances) if isinstance(f, FmuFactory) and f.description.once]
+    contents = [content_hash(path) for path in once]
+    return len(set(contents)) < len(contents)
+
+
+def _in_processes(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Recording:
+    """Run a scenario with a process for each of its instances."""
+    time = DEFAULT_TIME_LIMIT if safety.time is None else safety.time
+    limits = Limits(time, safety.memory, _LARGEST_FILE, time, _MOST_FILES)
+    with unpacked(scenario.system) as (system, _, origins):
+        instances = []
+        for instance in system.instances:
+            factory = instance.create
+            assert isinstance(factory, FmuFactory)
+            walls = Path(origins[str(factory.path)]) in foreign
+            made = RemoteFactory(factory.path, factory.description, limits, walls)
+            instances.append(replace(instance, create=made))
+        try:
+            with replace(scenario, system=replace(system, instances=tuple(instances))).session() as session:
+                return session.run()
+        except OrchestratorError as error:
+            text = str(error)
+            for folder, origin in origins.items():
+                text = text.replace(folder, origin)
+            raise type(error)(text, *error.arguments) from None
 
 
 def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Recording:

@@ -47,7 +47,7 @@ class Play:
         return "; ".join(parts)
 
     def _sides(self, load: float) -> dict[str, float]:
-        return {"load": load, "motor": load * self.ratio}
+        return {"load": load, "motor": load * abs(self.ratio)}
 
 
 def _degrees(angle: float) -> str:

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from orchestrator.diagnosis.blackbox.mapping import InputEntry, Options, OutputEntry
-from orchestrator.diagnosis.blackbox.reading import columns_of, read_data
 
+from orchestrator.diagnosis.fmu.mapping import InputEntry, Options, OutputEntry
+from orchestrator.diagnosis.fmu.reading import columns_of, read_data
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.master.protocol import Unit
 from orchestrator.master.units import resolve

@@ -69,6 +69,8 @@ BEHAVIOURS = {
     "unknown_reference": "misuse.value-reference",
     "variable_refused": "steps.variable",
     "version": "load.version",
+    "warns": "run.warning",
+    "logs_errors": "run.logged-error",
     "write_file": "files.written",
     "write_resources": "files.changed",
 }

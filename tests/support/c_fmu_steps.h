@@ -57,6 +57,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 #ifdef FAULT_fatal_step
     if (self->s.steps == 5) return fmi2Fatal;
 #endif
+#ifdef FAULT_logs_errors
+    if (self->s.steps == 3) refuse(self, "no licence: demo mode");
+#endif
 #ifdef FAULT_pending_step
     return fmi2Pending;
 #endif
@@ -138,6 +141,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 #endif
 #ifdef FAULT_ends_early
     if (self->s.steps > 50) return fmi2Discard;
+#endif
+#ifdef FAULT_warns
+    return fmi2Warning;
 #endif
     return fmi2OK;
 }

@@ -69,6 +69,7 @@ class Library:
         ended: whether the child process is gone.
         asynchronous: whether fmi2DoStep may return fmi2Pending.
         messages: the last few that an instance logged during the present call.
+        errors: how many it logged as errors during the present call.
     """
 
     def __init__(self, host: FmiProcess, asynchronous: bool = False) -> None:
@@ -77,6 +78,7 @@ class Library:
         self.current = ""
         self.ended = False
         self.messages: list[str] = []
+        self.errors = 0
 
     def load(self, path: str) -> str:
         """Load the library at ``path``; return why that fails, or nothing.
@@ -157,8 +159,8 @@ class Library:
             ChildError: the answer of the child is none that the function can have.
         """
         match self._ask(function, "call", number, function, [list(a) for a in arguments]):
-            case [int() as status, list() as values, messages]:
-                self.messages = _texts(messages)
+            case [int() as status, list() as values, messages, int() as errors]:
+                self.messages, self.errors = _texts(messages), errors
                 if len(values) == sum(a[0].startswith(("out", "new", "free")) for a in arguments):
                     return status, values
         raise _odd(function)
@@ -187,6 +189,7 @@ class ProbedSlave:
         self.library = library
         self._number = number
         self.dead = False
+        self.remarks: dict[str, tuple[int, str]] = {}
 
     def raw(self, function: str, *arguments: Sequence[Any]) -> int:
         """Call a function and return its status.
@@ -204,6 +207,11 @@ class ProbedSlave:
             raise StatusError(function, FATAL, f"{function} was not called, because a call before returned fmi2Fatal")
         status, values = self.library.raw(self._number, function, arguments)
         self.dead = status == FATAL
+        said = f"{function} ({'; '.join(self.library.messages)})" if self.library.messages else function
+        rule = "run.warning" if status == WARNING else "run.logged-error"
+        if status == WARNING or (status == OK and self.library.errors):
+            count, first = self.remarks.get(rule, (0, said))
+            self.remarks[rule] = (count + 1, first)
         return status, values
 
     def call(self, function: str, *arguments: Sequence[Any], when: str = "") -> list[Any]:

@@ -4,7 +4,7 @@ A probe that cannot be carried out on an FMU raises ``SkippedError`` with the re
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library, ProbedSlave, StatusError, TerminatedError, finite
@@ -27,12 +27,14 @@ class Context:
         trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
             cannot be repeated, so that nothing can be compared with it.
         single: whether a second instance is known not to work.
+        remarked: rules of warnings that have been reported.
     """
 
     bench: Bench
     report: Callable[..., None]
     trace: list[list[Any]] | None = None
     single: bool = False
+    remarked: set[str] = field(default_factory=set)
 
     @property
     def names(self) -> list[str]:
@@ -119,6 +121,17 @@ def life_cycle(context: Context) -> None:
                 bench.job = replace(job, steps=n + 1)
                 break
         slave.call("fmi2Terminate")
+        _remarks(context, slave)
+
+
+def _remarks(context: Context, slave: ProbedSlave) -> None:
+    """Report warnings, and errors that were logged while calls went well, each kind once."""
+    wanted = {"run.warning": "return fmi2OK", "run.logged-error": "log errors only when they fail"}
+    found = {"run.warning": "returned fmi2Warning", "run.logged-error": "logged an error and returned fmi2OK"}
+    for rule, (count, first) in slave.remarks.items():
+        if rule not in context.remarked:
+            context.remarked.add(rule)
+            context.report(rule, f"calls must {wanted[rule]}, but {count} {found[rule]}, {first} first")
 
 
 def _start_values(context: Context, slave: ProbedSlave) -> None:
@@ -184,6 +197,7 @@ def inputs(context: Context) -> None:
         bench.excited = False
     with bench.instance() as slave:
         context.trace = bench.run(slave)
+        _remarks(context, slave)
 
 
 def setting(context: Context) -> None:

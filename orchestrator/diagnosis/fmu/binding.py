@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from orchestrator.diagnosis.fmu.wire import Array, Batch, Guide, Job, Load
 from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 from orchestrator.fmi.model_description import read_description
 from orchestrator.fmi.slave import FmuSlave
+from orchestrator.master.protocol import Value
+from orchestrator.master.result import RunRemark
 from orchestrator.master.system import split
 
 CALLS = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
@@ -60,6 +63,7 @@ class Member:
                 raise FmuError(f"{path}: `{name}` must be a variable of type Real, but is not")
         self.inputs, self.tunables, self.reads = list(inputs), list(tunables), list(reads)
         self._slave: FmuSlave | None = None
+        self._said: list[RunRemark] = []  # of instances that are gone
         self._used = self._broken = self._refused = False  # the last: it refuses a reset
         self._prepare(False)
 
@@ -68,6 +72,15 @@ class Member:
         """Return the instance."""
         assert self._slave is not None
         return self._slave
+
+    def take_remarks(self) -> list[RunRemark]:
+        """Return what the FMU had to say of runs that went on, and forget it.
+
+        Returns:
+            The remarks.
+        """
+        said, self._said = self._said, []
+        return [*said, *(self._slave.take_remarks() if self._slave else ())]
 
     def done(self) -> None:
         """Note that the run went well: the instance may be reset."""
@@ -80,6 +93,7 @@ class Member:
                 self._used = False
                 return self._slave
             slave, self._slave = self._slave, None
+            self._said += slave.take_remarks()
             if not self._broken:
                 with contextlib.suppress(OrchestratorError):
                     slave.terminate()
@@ -101,7 +115,7 @@ class Member:
             self._refused = self._broken = True
         return not self._refused
 
-    def begun(self, starts: Mapping[str, float], start: float, stop: float, fresh: bool) -> FmuSlave:
+    def begun(self, starts: Mapping[str, Value], start: float, stop: float, fresh: bool) -> FmuSlave:
         """Return an instance in initialisation mode, its start values set.
 
         Args:
@@ -185,11 +199,16 @@ class Box:
         passing = np.array([[t.wire, t.by] for t in batch.through], dtype=np.int64).reshape(-1, 2)
         passed = np.array([t.gain for t in batch.through], dtype=float)
         into = self._into[: values.shape[1]]
+        warned = np.zeros((len(self._members), 3), dtype=np.int64)
         status, call, k, n = run_loop(
             calls, counts, where, self._sent, self._read, into, self._outof, values, grid, self._wires, self._gains,
-            passing, passed, ports, sign, q, most, batch.lead, *_led(batch.guide, job.pulls), out,
+            passing, passed, ports, sign, q, most, batch.lead, *_led(batch.guide, job.pulls), warned,
+            out,
         )  # fmt: skip
         members = list(self._members.values())
+        for member, (count, first, at) in zip(members, warned.tolist(), strict=True):
+            if count:
+                member.slave.warned(count, CALLS[first], start + at * step)
         if call == AWAY:
             for member in members:
                 member.done()
@@ -201,6 +220,14 @@ class Box:
         for member in members:
             member.done()
         return out
+
+    def take_remarks(self) -> list[RunRemark]:
+        """Return what the FMUs had to say of runs that went on, and forget it.
+
+        Returns:
+            The remarks; a lone FMU has no name.
+        """
+        return [replace(r, instance=name) for name, member in self._members.items() for r in member.take_remarks()]
 
     def _begin(self, job: Job, values: Array, batch: Batch) -> None:
         """Bring all members to where the first step begins."""
@@ -215,7 +242,7 @@ class Box:
         for slave in begun.values():
             slave.start()
 
-    def _of(self, member: str, values: Mapping[str, float]) -> dict[str, float]:
+    def _of(self, member: str, values: Mapping[str, Value]) -> dict[str, Value]:
         """Return the values of one member, by its own names."""
         placed = [(owned(name, self._members), value) for name, value in values.items()]
         return {variable: value for (owner, variable), value in placed if owner == member}

@@ -4,14 +4,16 @@ from collections.abc import Mapping, Sequence
 
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.master.protocol import Unit, Variable
+from orchestrator.master.units import resolve
 
-CONJUGATE = (
-    ((1, 2, -2), (0, 0, 0), "rad"),
-    ((1, 1, -2), (0, 1, 0), "m"),
-)
-"""Exponents (kg, m, s) of effort and position of mechanical ports: torque and angle, force and length."""
+POWER, ENERGY = (1, 2, -3, 0, 0, 0, 0), (1, 2, -2, 0, 0, 0, 0)
+"""Exponents (kg, m, s, A, K, mol, cd) of an effort times a flow, and of an effort times a position."""
 SPREAD = "5 %"
 MOST_PARAMETERS = 12
+NO_PORT = (
+    "# By its units no input is an effort whose product with an output is a power or an energy: no port is drafted.",
+    "# Where one is, add [ports.NAME] with input = ..., and position = ..., velocity = ... or both.",
+)
 
 
 def drafted(subject: Subject, columns: Sequence[str], time: str = "time") -> str:
@@ -41,8 +43,11 @@ def drafted(subject: Subject, columns: Sequence[str], time: str = "time") -> str
         comment = "" if k < MOST_PARAMETERS else "# "
         lines.append(f'{comment}{_key(v.name)} = {{ uncertainty = "{SPREAD}" }}  # {v.start:g} {v.unit or ""}'.rstrip())
     for name, effort, position, velocity in _ports(inputs, outputs, model.units, found):
-        lines += ["", f"[ports.{name}]", f'input = "{effort}"', f'position = "{position}"']
+        lines += ["", f"[ports.{name}]", f'input = "{effort}"']
+        lines += [f'position = "{position}"'] if position else []
         lines += [f'velocity = "{velocity}"'] if velocity else []
+    if "[ports.port_1]" not in lines:
+        lines += ["", *NO_PORT]
     return "\n".join(lines) + "\n"
 
 
@@ -63,27 +68,30 @@ def _column(variable: Variable, columns: Sequence[str], time: str) -> str | None
 
 
 def _ports(
-    inputs: Sequence[Variable], outputs: Sequence[Variable], units: Mapping[str, Unit], found: dict[str, str | None]
+    inputs: Sequence[Variable], outputs: Sequence[Variable], units: Mapping[str, Unit], measured: dict[str, str | None]
 ) -> list[tuple[str, str, str, str]]:
-    """Return name, input, position and velocity of every conjugate pair that units or order suggest."""
+    """Return name, input, position and velocity of the pairs of input and outputs that are conjugate by their units."""
 
     def exponents(v: Variable) -> tuple[int, ...] | None:
-        unit = units.get(v.unit or "")
-        return None if unit is None or unit.exponents is None else tuple(unit.exponents[:3])
+        unit = None if v.unit is None else resolve(v.unit, units)
+        return None if unit is None or unit.exponents is None else tuple(unit.exponents[:7])
+
+    def partner(effort: Variable, product: tuple[int, ...], near: str) -> Variable | None:
+        """The output whose product with an input is ``product``; of several one that is measured, or called alike."""
+        own = exponents(effort)
+        found = [v for v in outputs if own and (e := exponents(v)) and all(map(_adds_up, own, e, product))]
+        ranked = sorted(found, key=lambda v: (v.name[-1:] != near, not measured[v.name]))
+        return ranked[0] if ranked else None
 
     ports: list[tuple[str, str, str, str]] = []
     for effort in inputs:
-        for force, place, symbol in CONJUGATE:
-            if exponents(effort) != force:
-                continue
-            positions = [v for v in outputs if v.unit == symbol or (exponents(v) == place and symbol == "m")]
-            same = [v for v in positions if v.name[-1:] == effort.name[-1:]] or positions
-            if not same:
-                continue
-            rates = [v for v in outputs if v.unit == f"{symbol}/s" and v.name[-1:] == same[0].name[-1:]]
-            ports.append((f"port_{len(ports) + 1}", effort.name, same[0].name, rates[0].name if rates else ""))
-    if not ports and inputs and outputs:  # no units: the first of each, to be looked over
-        driven = [v for v in inputs if found[v.name]] or list(inputs)
-        seen = [v for v in outputs if found[v.name]] or list(outputs)
-        ports.append(("port_1", driven[0].name, seen[0].name, ""))
+        position = partner(effort, ENERGY, effort.name[-1:])
+        velocity = partner(effort, POWER, (position or effort).name[-1:])
+        if position or velocity:
+            pair = position.name if position else "", velocity.name if velocity else ""
+            ports.append((f"port_{len(ports) + 1}", effort.name, *pair))
     return ports
+
+
+def _adds_up(one: int, other: int, both: int) -> bool:
+    return one + other == both

@@ -13,7 +13,7 @@ from orchestrator.errors import OrchestratorError
 
 Array = NDArray[np.float64]
 Answer = list[Any]
-"""Results (an array, or None), reasons and seconds."""
+"""Results (an array, or None), reasons, seconds, and remarks: instance, text and count."""
 
 
 def opened(request: Load) -> Callable[[Batch], Answer]:
@@ -45,7 +45,8 @@ def opened(request: Load) -> Callable[[Batch], Answer]:
                 reason = " ".join(str(error).split())
             results.append(rows)
             reasons.append(reason)
-        return [results, reasons, time.monotonic() - begun]
+        remarks = [[r.instance, r.text, r.count] for r in box.take_remarks()]
+        return [results, reasons, time.monotonic() - begun, remarks]
 
     return run
 

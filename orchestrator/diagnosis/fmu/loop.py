@@ -87,21 +87,31 @@ def _guide(j, read, outof, guides, pulls, led, off, pull):  # type: ignore[no-un
 
 
 @kept()
-def _step(calls, counts, where, time, step):  # type: ignore[no-untyped-def]
+def _note(status, warned, n, call, k):  # type: ignore[no-untyped-def]
+    """Count a warning of a member, and remember the first; return the status."""
+    if status == 1:
+        if warned[n, 0] == 0:
+            warned[n, 1], warned[n, 2] = call, k
+        warned[n, 0] += 1
+    return status
+
+
+@kept()
+def _step(calls, counts, where, time, step, k, warned):  # type: ignore[no-untyped-def]
     """Set, step and read all FMUs; return ``(status, call, member)``."""
     for n in range(len(calls)):
         if counts[n, 0] > 0:
             status = call_transfer(calls[n, 1], calls[n, 0], where[n, 0], counts[n, 0], where[n, 1])
-            if status > 1:
+            if _note(status, warned, n, SET, k) > 1:
                 return status, SET, n
     for n in range(len(calls)):
         status = call_step(calls[n, 2], calls[n, 0], time, step)
-        if status > 1:
+        if _note(status, warned, n, STEP, k) > 1:
             return status, STEP, n
     for n in range(len(calls)):
         if counts[n, 1] > 0:
             status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
-            if status > 1:
+            if _note(status, warned, n, GET, k) > 1:
                 return status, GET, n
     return np.int32(0), GET, 0
 
@@ -109,7 +119,7 @@ def _step(calls, counts, where, time, step):  # type: ignore[no-untyped-def]
 @kept()
 def run_loop(  # type: ignore[no-untyped-def]
     calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, sign, q, most,
-    lead, guides, pulls, led, every, out,
+    lead, guides, pulls, led, every, warned, out,
 ):  # fmt: skip
     """Run one record; return ``(status, call, step, member)``, status at most 1 when all went well.
 
@@ -135,6 +145,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         pulls: (guides, 2) effort for being off, and for a change of that since the sample before.
         led: (samples, guides) the record.
         every: steps in a sample.
+        warned: (members, 3) zeros: number of calls that returned a warning, call and step of the first.
         out: (rows, variables read), row 0 the initial values.
     """
     start, step, per_row = grid[0], grid[1], int(grid[2])
@@ -160,7 +171,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         for w in range(len(wires)):
             fed[w, 1] = fed[w, 0]
             fed[w, 0] = sent[into[wires[w, 0]]]
-        status, call, n = _step(calls, counts, where, start + k * step, step)
+        status, call, n = _step(calls, counts, where, start + k * step, step, k, warned)
         if status > 1:
             return status, call, k, n
         if (k + 1) % per_row == 0:

@@ -13,7 +13,7 @@ A map is TOML::
     [ports.shaft]
     input = "M_B"                             # what effects at the port add to
     position = "phiA"                         # any readable variable
-    velocity = "wA"                           # absent: differentiated
+    velocity = "wA"                           # absent: differentiated; alone: a flow, such as a current
     [signals]
     warmth = { column = "T", reference = 20 }  # what parameters may depend on
     [cuts.coupling]                           # with a scenario of several FMUs
@@ -32,8 +32,9 @@ import msgspec
 
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.errors import ScenarioError
-from orchestrator.master.protocol import Unit, Variable
+from orchestrator.master.protocol import Unit, Value, Variable
 from orchestrator.master.units import resolve
+from orchestrator.master.values import typed_value
 from orchestrator.records.model_file import ModelParameter
 
 MAXIMUM_BYTES = 1 << 24
@@ -60,16 +61,24 @@ class OutputEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class ParameterEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A parameter, or a start value: where the record's own value differs, and how far it may be off."""
 
-    value: float | None = None
+    value: float | bool | str | None = None
     uncertainty: str | float = 0.0
 
 
 class PortEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A conjugate pair: an effort that is added to an input, and the motion that it acts on."""
+    """A conjugate pair: an effort that is added to an input, and the motion or flow that it acts on.
+
+    Where only a flow is known, such as a current, ``position`` of a checked map names it as well.
+    """
 
     input: str
-    position: str
+    position: str = ""
     velocity: str | None = None
+
+    @property
+    def flow_only(self) -> bool:
+        """Whether the flow is all that is known: nothing can depend on a position."""
+        return self.position == self.velocity
 
 
 class SignalEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -134,7 +143,7 @@ class Map(msgspec.Struct, frozen=True):
     outputs: dict[str, OutputEntry]
     ports: dict[str, PortEntry]
     uncertain: tuple[ModelParameter, ...]
-    fixed: dict[str, float]
+    fixed: dict[str, Value]
     options: Options
     source: str
     signals: dict[str, SignalEntry] = {}
@@ -199,11 +208,7 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
         look.factor(f"$.outputs.{name}.factor", measured.factor)
         if measured.noise is not None and not 0.0 < measured.noise < math.inf:
             raise ScenarioError(f"{source}: $.outputs.{name}.noise must be positive, but is {measured.noise!r}")
-    for name, port in written.ports.items():
-        look.up(f"$.ports.{name}.input", port.input, ("input",))
-        look.up(f"$.ports.{name}.position", port.position, ("output", "local"))
-        if port.velocity is not None:
-            look.up(f"$.ports.{name}.velocity", port.velocity, ("output", "local"))
+    _check_ports(written, look)
     for name, signal in written.signals.items():
         look.factor(f"$.signals.{name}.factor", signal.factor)
         if not math.isfinite(signal.reference):
@@ -216,9 +221,12 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
     if not 1 <= written.options.substeps <= 1000:
         raise ScenarioError(f"{source}: $.options.substeps must be 1 to 1000, but is {written.options.substeps}")
     uncertain: list[ModelParameter] = []
-    fixed = dict(subject.given)
+    fixed: dict[str, Value] = dict(subject.given)
     for table, entries in (("parameters", written.parameters), ("start", written.start)):
         for name, entry in entries.items():
+            if look.is_set(f"$.{table}.{name}", name, entry):
+                fixed[name] = look.fixed(f"$.{table}.{name}", name, entry, subject.given.get(name))
+                continue
             found = look.uncertain(f"$.{table}.{name}", name, entry, subject.given.get(name))
             if found.uncertainty > 0.0:
                 uncertain.append(found)
@@ -228,7 +236,7 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
     return Map(
         {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.inputs.items()},
         {n: msgspec.structs.replace(e, column=e.column or n) for n, e in written.outputs.items()},
-        written.ports,
+        {n: msgspec.structs.replace(e, position=e.position or e.velocity or "") for n, e in written.ports.items()},
         tuple(uncertain),
         fixed,
         written.options,
@@ -243,6 +251,24 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
             if (text := subject.model.variables[name].unit)
         },
     )
+
+
+def _check_ports(written: MapFile, look: "_Look") -> None:
+    """Refuse ports without a motion or flow, or of what is no input or output.
+
+    Raises:
+        ScenarioError: see ``read_map``.
+    """
+    for name, port in written.ports.items():
+        look.up(f"$.ports.{name}.input", port.input, ("input",))
+        if not port.position and port.velocity is None:
+            raise ScenarioError(
+                f"{look.source}: $.ports.{name} must have `position`, `velocity` or both, but has neither"
+            )
+        if port.position:
+            look.up(f"$.ports.{name}.position", port.position, ("output", "local"))
+        if port.velocity is not None:
+            look.up(f"$.ports.{name}.velocity", port.velocity, ("output", "local"))
 
 
 def _check_connections(written: MapFile, subject: Subject, look: "_Look") -> None:
@@ -296,10 +322,35 @@ class _Look:
         if not (math.isfinite(factor) and factor != 0.0):
             raise ScenarioError(f"{self.source}: {where} must be finite and not 0, but is {factor!r}")
 
-    def uncertain(self, where: str, name: str, entry: ParameterEntry, given: float | None) -> ModelParameter:
+    def is_set(self, where: str, name: str, entry: ParameterEntry) -> bool:
+        """Whether a parameter is of a type that can be set, but not fitted."""
+        variable = self._variables.get(name)
+        if variable is None or variable.type == "Real":
+            return False
+        if entry.uncertainty not in (0.0, ""):
+            raise ScenarioError(
+                f"{self.source}: {where} must be of type Real to be fitted, but is {variable.type}: it can be set, "
+                "with `value` and without `uncertainty`"
+            )
+        return True
+
+    def fixed(self, where: str, name: str, entry: ParameterEntry, given: Value | None) -> Value:
+        """Return the value of a parameter that is no Real."""
+        variable: Variable = self._variables[name]
+        value = next((v for v in (entry.value, given, variable.start) if v is not None), None)
+        if value is None:
+            raise ScenarioError(f"{self.source}: {where}.value must be given: the FMU states no start value")
+        typed, text = typed_value(variable, value)
+        if typed is None:
+            raise ScenarioError(f"{self.source}: {where}.value {text}")
+        return typed
+
+    def uncertain(self, where: str, name: str, entry: ParameterEntry, given: Value | None) -> ModelParameter:
         """Return a parameter with its uncertainty as a number."""
         variable = self.up(where, name, ("parameter", "local", "output", "input"))
         value = next((v for v in (entry.value, given) if v is not None), variable.start)
+        if isinstance(value, (bool, str)):
+            raise ScenarioError(f"{self.source}: {where}.value must be a number, but is {value!r}")
         if not isinstance(value, int | float) or not math.isfinite(value):
             raise ScenarioError(f"{self.source}: {where}.value must be given: the FMU states no start value")
         spread = _spread(f"{self.source}: {where}.uncertainty", entry.uncertainty, float(value))

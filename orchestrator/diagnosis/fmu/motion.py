@@ -44,12 +44,18 @@ def port_motions(problem: BoxProblem, reads: Array) -> dict[str, Motion]:
 
     window, step, found = problem.settings.response.window, problem.h, {}
     for name, port in problem.map.ports.items():
+        if port.flow_only and port.velocity in problem.outputs:
+            y = problem.data.outputs[:, problem.outputs.index(port.velocity)]
+            flow, slope = (savgol_filter(y, window, 3, deriv=order, delta=step) for order in range(2))
+            found[name] = Motion(step * np.cumsum(flow), flow, slope)
+            continue
         if port.position in problem.outputs:
             y = problem.data.outputs[:, problem.outputs.index(port.position)]
             found[name] = Motion(*(savgol_filter(y, window, 3, deriv=order, delta=step) for order in range(3)))
             continue
         x = reads[:, problem.runner.reads.index(port.position)]
         v = np.gradient(x, step) if port.velocity is None else reads[:, problem.runner.reads.index(port.velocity)]
+        x = step * np.cumsum(v) if port.flow_only else x
         found[name] = Motion(x, v, np.gradient(v, step))
     return found
 

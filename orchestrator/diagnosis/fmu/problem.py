@@ -15,6 +15,7 @@ from orchestrator.diagnosis.fmu.runner import Plan, Runner
 from orchestrator.diagnosis.fmu.wire import Feedback, Guide
 from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings
 from orchestrator.errors import SlaveError
+from orchestrator.master.protocol import Value
 from pyfmu_sources.port_laws import COMPLIANCE
 
 Array = NDArray[np.float64]
@@ -203,7 +204,7 @@ class BoxProblem:
         """
         return np.asarray((self.data.outputs[: len(y)] - y) / self.noise)
 
-    def starts(self, model: BoxModel) -> dict[str, float]:
+    def starts(self, model: BoxModel) -> dict[str, Value]:
         """Return what is set before a run, by name.
 
         Args:
@@ -212,7 +213,7 @@ class BoxProblem:
         Returns:
             Value by name.
         """
-        values = dict(self.map.fixed)
+        values: dict[str, Value] = dict(self.map.fixed)
         values |= {u.name: float(v) for u, v in zip(self.map.uncertain, model.p, strict=True)}
         return values
 

@@ -1,11 +1,12 @@
 """Runs of a foreign FMU in jails: batches, deadlines, and a new jail where one was lost."""
 
+import re
 import threading
 import time
 from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.diagnosis.fmu.wire import Batch, Feedback, Guide, Job, Load, Through, Wire
 from orchestrator.diagnosis.fmu_settings import DEFAULT, ProcessSettings
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
+from orchestrator.master.protocol import Value
+from orchestrator.master.result import MOST_REMARKS, RunRemark, claimed_remarks
 from orchestrator.shared.cores import usable_cores
 from orchestrator.shared.isolation.archives import unpack
 from orchestrator.shared.isolation.jail import Jail
@@ -38,7 +41,7 @@ class Plan:
         pulls: efforts that lead it along a record, for being off and for a change of that; empty: it runs freely.
     """
 
-    starts: dict[str, float]
+    starts: dict[str, Value]
     table: Array
     effects: tuple[Feedback, ...] = ()
     pulls: tuple[tuple[float, float], ...] = ()
@@ -83,6 +86,7 @@ class Runner:
         self.lost = 0
         self.through: list[Through] = []  # measured
         self.reason = ""  # why the last run that failed did
+        self._remarks: dict[str, RunRemark] = {}  # of all runs, the first of each kind
         self._jails: dict[int, Jail] = {}
         self._warm: set[int] = set()
         self._lock = threading.Lock()
@@ -254,8 +258,10 @@ class Runner:
     ) -> None:
         """Look at what the child claims, and keep it."""
         match answer:
-            case [list() as found, list() as reasons, float() as seconds] if len(found) == len(reasons) == len(chunk):
-                pass
+            case [list() as found, list() as reasons, float() as seconds, remarks] if (
+                len(found) == len(reasons) == len(chunk)
+            ):
+                self._remember(claimed_remarks(remarks))
             case _:
                 raise SlaveError(f"{self.path}: its process must return {len(chunk)} runs, but does not")
         for k, rows, reason in zip(chunk, found, reasons, strict=True):
@@ -269,6 +275,26 @@ class Runner:
         if mine in self._warm:  # the first answer of a child includes what it loads
             self.step_cost = max(0.5 * self.step_cost, seconds / max(steps, 1))
         self._warm.add(mine)
+
+    def _remember(self, remarks: Sequence[RunRemark]) -> None:
+        """Keep what was said of runs that went on: the first of each kind, and how many there were."""
+        with self._lock:
+            for remark in remarks:
+                kind = re.sub(r"[-+.\d]+", "#", f"{remark.instance} {remark.text}")
+                known = self._remarks.get(kind)
+                if known is not None:
+                    self._remarks[kind] = replace(known, count=known.count + remark.count)
+                elif len(self._remarks) < MOST_REMARKS:
+                    self._remarks[kind] = remark
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the FMU had to say while its runs went on, in sentences."""
+        names = {"": self.path.name}
+        return tuple(
+            f"{names.get(r.instance, r.instance)}: {r.text} ({r.count} times in {self.runs} runs)"
+            for r in self._remarks.values()
+        )
 
     def _named(self, error: object) -> str:
         """Return a message with FMUs in place of the folders that they lie in here."""
@@ -307,7 +333,7 @@ def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid, through: list[Th
         if id(plan.table) not in places:
             places[id(plan.table)] = len(tables)
             tables.append(np.ascontiguousarray(plan.table))
-        starts = {name: float(value) for name, value in plan.starts.items()}
+        starts = dict(plan.starts)
         jobs.append(Job(starts, places[id(plan.table)], list(plan.effects), [list(p) for p in plan.pulls]))
     start, step, per_row, lead, fresh, guide = grid
     return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through, fresh, guide)
@@ -336,6 +362,6 @@ def _compile_loop() -> None:
     run_loop.compile(
         (whole[:, ::1], whole[:, ::1], whole[:, ::1], real[::1], real[::1], whole[::1], whole[::1], real[:, ::1],
          real[::1], whole[:, ::1], real[:, ::1], whole[:, ::1], real[::1], whole[:, ::1], real[::1], real[:, ::1],
-         real[::1], real, whole[:, ::1], real[:, ::1], real[:, ::1], whole, real[:, ::1])
+         real[::1], real, whole[:, ::1], real[:, ::1], real[:, ::1], whole, whole[:, ::1], real[:, ::1])
     )  # fmt: skip
     _compiled.append(True)

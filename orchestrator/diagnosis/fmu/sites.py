@@ -22,6 +22,9 @@ OF_MOTION = (
 )  # fmt: skip
 """Laws that mean something only against a motion, or a current."""
 
+OF_POSITION = ("spring", "hardening_spring", "gravity", "ripple", "hysteresis")
+"""Laws that depend on where a motion has got to: not offered where only a flow is known."""
+
 Array = NDArray[np.float64]
 
 ANGLES = ("rad", "deg", "")
@@ -54,7 +57,7 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
         motion = motions[name]
         x, v = motion.x, motion.v
         effort = float(problem.drive([runner.inputs.index(port.input)])[0])
-        angular = problem.units.get(port.position, "") in ANGLES
+        angular = problem.units.get(port.position, "") in ANGLES and not port.flow_only
         a = _rms(motion.a)
         span = float(np.ptp(x)) or 1.0
         # From two thirds of a cycle within the span to what the samples still follow, half a radian of it apart.
@@ -76,7 +79,8 @@ def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
             once=own.once,
             long=own.long,
         )
-        left_out = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
+        left_out: tuple[str, ...] = OF_MOTION if problem.units.get(port.input) in FLOWS else ()
+        left_out += OF_POSITION if port.flow_only else ()
         kinds = [k for k in BANK.values() if k.where == PORT and (angular or not k.angular)]
         kinds = [k for k in kinds if k.name not in left_out]
         found += [BoxEffect(kind, name, scene) for kind in kinds]

@@ -8,7 +8,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.model_description import read_description
 from orchestrator.master import units
-from orchestrator.master.protocol import ModelInterface, Unit, Variable
+from orchestrator.master.protocol import ModelInterface, Unit, Value, Variable
 from orchestrator.master.system import System
 from orchestrator.scenarios.scenario import load_scenario
 
@@ -40,7 +40,7 @@ class Subject:
     members: Mapping[str, Path]
     model: ModelInterface
     connections: tuple[Connected, ...] = ()
-    given: Mapping[str, float] = field(default_factory=dict)
+    given: Mapping[str, Value] = field(default_factory=dict)
     fed: tuple[str, ...] = ()
 
     @property
@@ -77,7 +77,7 @@ def subject_of(path: Path) -> Subject:
         variables.update({v.name: v for v in named})
     model = ModelInterface(scenario.name, variables, declared)
     fed = tuple(source.target for source in system.sources)
-    return Subject(path, members, model, _connections(system, path), _given(system, variables, path), fed)
+    return Subject(path, members, model, _connections(system, path), _given(system), fed)
 
 
 def _connections(system: System, path: Path) -> tuple[Connected, ...]:
@@ -96,16 +96,12 @@ def _connections(system: System, path: Path) -> tuple[Connected, ...]:
     return tuple(found)
 
 
-def _given(system: System, variables: Mapping[str, Variable], path: Path) -> dict[str, float]:
-    found = {}
+def _given(system: System) -> dict[str, Value]:
+    found: dict[str, Value] = {}
     for instance in system.instances:
         for variable, given in instance.start.items():
             name = f"{instance.name}.{variable}"
             value = system.start_value(name, given)[0]
-            if variables[name].type != "Real" or not isinstance(value, int | float):
-                raise ScenarioError(
-                    f"{path}: $.instances.{instance.name}.parameters.{variable} must be Real to be fitted, but is "
-                    f"{variables[name].type}"
-                )
-            found[name] = float(value)
+            assert value is not None  # the scenario has been checked
+            found[name] = value
     return found

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.master.protocol import Value
+
 Array = NDArray[np.float64]
 
 
@@ -67,7 +69,7 @@ class Job:
     ``pulls``: (guides, 2) efforts for being off the record, and for a change of that in a sample; empty: it is free.
     """
 
-    starts: dict[str, float]
+    starts: dict[str, Value]
     table: int
     effects: list[Feedback]
     pulls: list[list[float]] = field(default_factory=list)

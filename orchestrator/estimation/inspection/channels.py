@@ -62,7 +62,7 @@ def channels_of(record: Record) -> list[Channel]:
         A channel per column.
     """
     missing_u = 0 if record.u_deviation is None else int(np.count_nonzero(record.u_deviation))
-    found = [_channel("u", "N.m", record.u, missing_u)]
+    found = [_channel("u", "N.m", record.u, missing_u)] if record.has_torque else []
     for name in ("theta_m", "theta_l"):
         values = getattr(record, name)
         if values is not None:
@@ -105,10 +105,12 @@ def excitation_of(record: Record) -> list[Band]:
         record: the record.
 
     Returns:
-        The bands, rising.
+        The bands, rising; none without a torque.
     """
     from scipy.signal import coherence, welch
 
+    if not record.has_torque:
+        return []
     filled = record.filled()
     length = min(filled.size // 4, max(64, round(8.0 / filled.step)))
     rate = 1.0 / filled.step
@@ -129,7 +131,7 @@ def delay_between(record: Record) -> tuple[float, float] | None:
 
     The lag at which a straight line explains one angle by the other best, between samples by a parabola, on four parts
     of the record, whose spread gives the standard error. The shaft's own compliance is part of the lag. None where
-    there is one encoder.
+    there is one encoder, or no torque: `two_encoders` then tells the lag from the gap.
 
     Args:
         record: the record.
@@ -137,7 +139,7 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     Returns:
         The lag and its standard error.
     """
-    if record.theta_l is None:
+    if record.theta_l is None or not record.has_torque:
         return None
     filled = record.filled()
     assert filled.theta_l is not None
@@ -161,19 +163,19 @@ def _unexplained(motor: Array, load: Array) -> float:
     return float(b @ b - (a @ b) ** 2 / max(float(a @ a), 1e-300))
 
 
-def reversals_of(record: Record) -> tuple[int, int]:
+def reversals_of(record: Record) -> tuple[int | None, int]:
     """Return how often the torque and the motor's speed change sign, small wiggles apart.
 
     Args:
         record: the record.
 
     Returns:
-        Both numbers.
+        Both numbers; None for a torque that there is not.
     """
     filled = record.filled()
     width = max(1, round(0.02 / record.step))
     speed = np.convolve(np.gradient(filled.theta_m, filled.step), np.ones(width) / width, "same")
-    return _sign_changes(filled.u), _sign_changes(speed)
+    return _sign_changes(filled.u) if record.has_torque else None, _sign_changes(speed)
 
 
 def _sign_changes(values: Array) -> int:

@@ -20,7 +20,8 @@ def draw_record(path: Path, record: Record, bands: list[Band]) -> None:
         record: the record.
         bands: of its excitation.
     """
-    signals = [("u", "torque [N.m]", record.u), ("theta_m", "motor [rad]", record.theta_m)]
+    signals = [("u", "torque [N.m]", record.u)] if record.has_torque else []
+    signals.append(("theta_m", "motor [rad]", record.theta_m))
     if record.theta_l is not None:
         signals.append(("theta_l", "load [rad]", record.theta_l))
     figure = Figure(figsize=(9.0, 2.0 * (len(signals) + 1)), layout="constrained")

@@ -16,7 +16,10 @@ from orchestrator.shared.inference.inverse import pseudo_inverse
 Array = NDArray[np.float64]
 
 LAGS = (1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)  # s, tried for the drive
+LEAST_LAG = 1e-9  # s, of a drive that has none
 LEAST_FREQUENCY = 5.0  # Hz, of a shaft
+SAME_RATIO = 0.1  # of two gear ratios, as a share
+SAME_INERTIA = 2.0  # factor between two inertias, of which one is from a record
 # How far the rough values may be off, as a share.
 ROUGH = {"J_m": 0.5, "J_l": 0.5, "k": 0.6, "c": 0.9, "b_m": 0.9, "b_l": 0.9, "tau": 0.5, "i": 0.0}
 EFFECTS = ("friction at the motor", "quadratic drag", "gravity or imbalance of the load", "torque ripple (6 a turn)")
@@ -30,21 +33,26 @@ class RoughMachine:
     origin: Mapping[str, str]
 
 
-def fits(record: Record, model: Model) -> str:
-    """Return why the record cannot be of this machine, or nothing.
+def is_of(record: Record, model: Model) -> bool:
+    """Return whether a record looks like one of this machine: gear ratio and inertia are the model's.
 
     Args:
         record: the record.
         model: of the machine.
 
     Returns:
-        The reason.
+        Whether it does.
     """
     try:
         check_plausible(record, model)
-    except RecordError as error:
-        return str(error)
-    return ""
+    except RecordError:
+        return False
+    p = {name: entry.value for name, entry in model.parameters.items()}
+    record = record.filled()
+    same = record.theta_l is None or abs(_ratio(record)[0] / p["i"] - 1.0) < SAME_RATIO
+    _, inertia, _, _ = _balance_at(record, p["tau"])
+    relative = inertia / (p["J_m"] + p["J_l"] / p["i"] ** 2)
+    return same and 1.0 / SAME_INERTIA < relative < SAME_INERTIA
 
 
 def rough_machine(record: Record) -> RoughMachine:
@@ -54,18 +62,13 @@ def rough_machine(record: Record) -> RoughMachine:
         record: the record.
 
     Returns:
-        Values by parameter, and where each is from.
+        Values by parameter, and where each is from; without a torque the gear ratio alone.
     """
-    values: dict[str, float] = {}
-    origin: dict[str, str] = {}
     record = record.filled()
-    if record.theta_l is None:
-        values["i"], origin["i"] = 1.0, "ASSUMED: one encoder does not show it"
-    else:
-        motor, load = record.theta_m - record.theta_m.mean(), record.theta_l - record.theta_l.mean()
-        ratio = float(motor @ load) / max(float(load @ load), 1e-300)
-        near = round(ratio) if abs(ratio - round(ratio)) < 0.005 * abs(ratio) else ratio
-        values["i"], origin["i"] = float(near) or 1.0, f"from the record: slope of motor over load angle {ratio:.6g}"
+    ratio, said = _ratio(record)
+    values, origin = {"i": ratio}, {"i": said}
+    if not record.has_torque:
+        return RoughMachine(values, origin)
     tau, inertia, friction, share = _balance(record)
     values["tau"], origin["tau"] = tau, f"ROUGH, from the record: momentum balance, explains {100.0 * share:.1f} %"
     ratio = abs(values["i"])
@@ -89,6 +92,16 @@ def rough_machine(record: Record) -> RoughMachine:
     return RoughMachine(values, origin)
 
 
+def _ratio(record: Record) -> tuple[float, str]:
+    """Return the gear ratio, and where it is from."""
+    if record.theta_l is None:
+        return 1.0, "ASSUMED: one encoder does not show it"
+    motor, load = record.theta_m - record.theta_m.mean(), record.theta_l - record.theta_l.mean()
+    ratio = float(motor @ load) / max(float(load @ load), 1e-300)
+    near = round(ratio) if abs(ratio - round(ratio)) < 0.005 * abs(ratio) else ratio
+    return float(near) or 1.0, f"from the record: slope of motor over load angle {ratio:.6g}"
+
+
 def as_model(rough: RoughMachine, base: Model) -> Model:
     """Return ``base`` with the rough values and wide uncertainties.
 
@@ -107,8 +120,16 @@ def as_model(rough: RoughMachine, base: Model) -> Model:
     return replace(base, parameters=parameters, source="rough machine")
 
 
-def _smoothed(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
-    """Return impulse [N.m.s], speed and angle of the motor, smoothed over a short time, and the width of that."""
+def smoothed(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
+    """Return impulse, speed and angle of the motor, smoothed over a short time.
+
+    Args:
+        record: without missing samples.
+        tau: lag of the drive [s].
+
+    Returns:
+        Impulse of the torque [N.m.s], speed [rad/s] and angle [rad], and how many rows each is a mean of.
+    """
     width = max(5, round(SMOOTHING_TIME / record.step))
     kernel = np.ones(width) / width
     impulse = np.cumsum(lagged(record.u, tau, record.step)) * record.step
@@ -119,19 +140,20 @@ def _smoothed(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
 
 def _balance(record: Record) -> tuple[float, float, float, float]:
     """Return lag [s], inertia [kg.m2] and viscous friction at the motor, and the share of the impulse they explain."""
-    best = (1e-3, 1.0, 0.0, -math.inf)
-    for tau in LAGS:
-        impulse, speed, angle, _ = _smoothed(record, tau)
-        time = np.linspace(-1.0, 1.0, speed.size)
-        trend = np.column_stack([np.ones_like(time), time])
-        table = np.column_stack([speed, angle, trend])
-        solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
-        plain, *_ = np.linalg.lstsq(trend, impulse, rcond=None)
-        share = 1.0 - float(np.var(impulse - table @ solution)) / max(float(np.var(impulse - trend @ plain)), 1e-300)
-        if share > best[3]:
-            best = (tau, float(solution[0]), float(solution[1]), share)
-    tau, inertia, friction, share = best
+    tau, inertia, friction, share = max((_balance_at(record, tau) for tau in LAGS), key=lambda found: found[3])
     return tau, abs(inertia) or 1.0, abs(friction), share
+
+
+def _balance_at(record: Record, tau: float) -> tuple[float, float, float, float]:
+    """Return the lag [s] that is given, and what goes with it, as ``_balance`` does."""
+    impulse, speed, angle, _ = smoothed(record, tau)
+    time = np.linspace(-1.0, 1.0, speed.size)
+    trend = np.column_stack([np.ones_like(time), time])
+    table = np.column_stack([speed, angle, trend])
+    solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
+    plain, *_ = np.linalg.lstsq(trend, impulse, rcond=None)
+    share = 1.0 - float(np.var(impulse - table @ solution)) / max(float(np.var(impulse - trend @ plain)), 1e-300)
+    return tau, float(solution[0]), float(solution[1]), share
 
 
 def _shaft_frequency(record: Record, ratio: float) -> float:
@@ -164,10 +186,12 @@ def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]
         Name, size and unit of each.
     """
     record = record.filled()
+    if not record.has_torque:
+        return []
     p = {name: entry.value for name, entry in model.parameters.items()}
-    impulse, speed, angle, width = _smoothed(record, p["tau"])
+    impulse, speed, angle, width = smoothed(record, max(p["tau"], LEAST_LAG))
     h = record.step
-    load = angle / p["i"]
+    load = angle / p.get("i", 1.0)
     shapes = {
         EFFECTS[0]: (np.sign(speed), "N.m"),
         EFFECTS[1]: (speed * np.abs(speed), "N.m.s2/rad2"),

@@ -17,6 +17,7 @@ MACHINE_KEYS = (
     "counts_per_rev", "rated_value", "resistance", "torque_constant", "back_emf_constant", "inductance", "modulo",
     "rate",
 )  # fmt: skip
+OF_DEFAULT = "of the thesis's drivetrain, whose gear ratio and inertia the record shows"
 MEANING = {
     "J_m": "inertia of the motor",
     "J_l": "inertia of the load",
@@ -46,7 +47,7 @@ def assumed_columns(
         RecordError: the file cannot be read, or a column is missing or ambiguous.
     """
     with open_source(path, header) as source:
-        chosen = chosen_channels(source, columns, str(path))
+        chosen = chosen_channels(source, columns, str(path), torque_needed=False)
     filled, said = dict(columns), []
     for name, choice in chosen.items():
         column = filled.get(name, Column())
@@ -89,7 +90,7 @@ def starter(
     Args:
         model: values and uncertainties.
         columns: where each column comes from.
-        origin: a sentence on where each value is from; those without one are of the model itself.
+        origin: of each parameter that is written, a sentence on where its value is from.
         assumed: what was assumed of the columns' units.
         record: the file's name.
 
@@ -108,13 +109,13 @@ def starter(
         if name in columns:
             lines += [f"# [encoders.{name}]", "# counts_per_rev = ...   # absent: found from the record"]
             lines += ["# noise = ...            # rad, before rounding; absent: estimated", ""]
-    for name, meaning in MEANING.items():
+    for name, said in origin.items():
         entry = model.parameters[name]
         share = entry.uncertainty / abs(entry.value) if entry.value else 0.0
-        said = origin.get(name, "of the model that was given")
+        meaning = MEANING.get(name) or model.plant.table[list(model.parameters).index(name)].description
         lines += [f"[parameters.{name}]", f"value = {entry.value:.6g}   # {entry.unit or '1'}: {meaning}; {said}"]
         lines += [f"relative_uncertainty = {share:.3g}   # off by at most this share; the fit finds the value", ""]
-    lines += _further(model)
+    lines += _further(model, origin)
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -135,11 +136,11 @@ def _column_lines(column: Column, assumed: Sequence[str], name: str) -> list[str
     return lines
 
 
-def _further(model: Model) -> list[str]:
-    """Return the parameters beyond the linear ones as comments: what the FMU has when nothing is said."""
+def _further(model: Model, written: Mapping[str, str]) -> list[str]:
+    """Return the parameters that are not ``written`` as comments: what the FMU has when nothing is said."""
     lines = ["# What the machine may have besides, as it stands in the model; `diagnose` finds which of them it has."]
     for name, entry in model.parameters.items():
-        if name not in MEANING:
+        if name not in written:
             lines.append(f'# [parameters."{name}"]   value = {entry.value:g}   # {entry.unit or "1"}')
     return lines
 

@@ -6,15 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from orchestrator.errors import RecordError
 from orchestrator.estimation.design import Excitation, MachineLimits, bound_of_excitation, simple_candidates
+from orchestrator.estimation.innovations import affine_model, simulate
+from orchestrator.estimation.inspection.machine import smoothed
 from orchestrator.estimation.problem import measurement_noise
+from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.records.model_file import Model
+from orchestrator.records.plausibility import check_plausible
 from orchestrator.records.record import Record
+from pyfmu_sources.drivetrain_parameters import P_ALPHA, P_I
 
 SIZES = (5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05)  # rad, half-gaps that are tried
 MOST_ROWS = 3000  # for one bound
 SEEN = 0.25  # a size is seen where the bound is below this share of it
 LONGEST_DESIGN = 10.0  # s
+HELD = 0.01  # share of the time in which the shaft's torque may have the other sign, if one flank is loaded throughout
 
 
 @dataclass(frozen=True)
@@ -22,12 +29,14 @@ class Sufficiency:
     """What a record shows of gaps.
 
     Attributes:
-        bounds: for each of ``SIZES`` that was tried, the bound on the standard error [rad].
+        bounds: for each of ``SIZES`` that was tried, the bound on the standard error [rad]; infinite where the record
+            would not traverse the gap often enough. Empty where no size can be seen.
         smallest: smallest half-gap that is seen [rad], or infinity.
         rows: how many rows of the record the bounds are of.
         better: excitations of the same length and limits, the best first; with their bounds for ``design_size``.
         own: the bound of the record itself for ``design_size`` [rad].
         design_size: half-gap [rad].
+        why: why no size can be seen, whatever the bounds; empty where one may be.
     """
 
     bounds: Sequence[tuple[float, float]]
@@ -36,6 +45,24 @@ class Sufficiency:
     better: Sequence[Excitation]
     own: float
     design_size: float
+    why: str = ""
+
+    def ranges(self) -> list[tuple[float, float]]:
+        """Return the smallest and the largest size of each run of sizes that are seen [rad].
+
+        Returns:
+            The runs, rising; the first begins where the bound meets its share, between two sizes.
+        """
+        runs: list[list[float]] = []
+        seen = False
+        for size, bound in self.bounds:
+            if bound < SEEN * size:
+                if seen:
+                    runs[-1][1] = size
+                else:
+                    runs.append([self.smallest if not runs else size, size])
+            seen = bound < SEEN * size
+        return [(low, high) for low, high in runs]
 
 
 def sufficiency(record: Record, model: Model) -> Sufficiency:
@@ -48,6 +75,9 @@ def sufficiency(record: Record, model: Model) -> Sufficiency:
     Returns:
         Bounds by size, the smallest size that is seen [rad], and the torque that would do better.
     """
+    why = _why_none(record, model)
+    if why:
+        return Sufficiency((), math.inf, record.size, (), math.inf, math.nan, why)
     rows = min(record.size, MOST_ROWS)
     part = record.part(0, rows).filled()
     both = part.theta_l is not None
@@ -59,7 +89,8 @@ def sufficiency(record: Record, model: Model) -> Sufficiency:
     longer = math.sqrt(rows / record.size)
     bounds = []
     for size in SIZES:
-        bound = bound_of_excitation(model, part.time, part.u, size, noise, not both)
+        traversed = _traversals(model, part, size) / longer**2 >= DEFAULT_SETTINGS.trust.least_traversals
+        bound = bound_of_excitation(model, part.time, part.u, size, noise, not both) if traversed else math.inf
         bounds.append((size, longer * bound))
     seen = [size for size, bound in bounds if bound < SEEN * size]
     smallest = _between(bounds) if seen else math.inf
@@ -73,6 +104,55 @@ def sufficiency(record: Record, model: Model) -> Sufficiency:
         if math.isfinite(c.bound)
     ]
     return Sufficiency(bounds, smallest, rows, scaled, dict(bounds)[size], size)
+
+
+def _why_none(record: Record, model: Model) -> str:
+    """Return why no gap of any size can be seen, or nothing."""
+    if model.fmu != "Drivetrain":
+        return f"the model is {model.fmu}, an axis without teeth, which has no gap"
+    if not record.has_torque:
+        return "without a torque nothing tells what it would show; `estimate` looks for one in the two angles"
+    try:
+        check_plausible(record, model)
+    except RecordError as error:
+        return f"it cannot be of this machine, and `estimate` refuses it: {error}"
+    share = _other_sign(record, model)
+    if share < HELD:
+        return (
+            "one flank is loaded throughout, by gravity or another torque that is larger than what drives and brakes "
+            "the load; let the shaft's torque change its sign"
+        )
+    return ""
+
+
+def _other_sign(record: Record, model: Model) -> float:
+    """Return the share of the time in which the shaft's torque has its rarer sign, by the motor's balance.
+
+    Within three standard deviations of the balance's own scatter a torque has no sign.
+    """
+    record = record.filled()
+    p = {name: entry.value for name, entry in model.parameters.items()}
+    impulse, speed, angle, width = smoothed(record, p["tau"])
+    rows = np.arange(0, speed.size, width)
+    if rows.size < 8:
+        return 1.0
+    span = np.diff(rows) * record.step
+    torque = (np.diff(impulse[rows]) - p["J_m"] * np.diff(speed[rows]) - p["b_m"] * np.diff(angle[rows])) / span
+    # A mean speed is the difference of two readings, and the torque that of two such speeds.
+    noise = math.sqrt(6.0) * measurement_noise(record, model, "theta_m") / (width * record.step)
+    scatter = 3.0 * p["J_m"] * noise / (width * record.step)
+    up, down = int(np.count_nonzero(torque > scatter)), int(np.count_nonzero(torque < -scatter))
+    return float(min(up, down)) / max(up + down, 1)
+
+
+def _traversals(model: Model, record: Record, size: float) -> int:
+    """Return how often the model's plant, driven by the record's torque from rest, goes through a half-gap [rad]."""
+    values = list(model.values)
+    values[P_ALPHA] = size
+    states = simulate(affine_model(tuple(values)), record.u, record.step, np.zeros(5))
+    twist = states[:, 0] / values[P_I] - states[:, 2]
+    flanks = np.where(twist > size, 1, np.where(twist < -size, -1, 0))
+    return int(np.count_nonzero(np.diff(flanks[flanks != 0])))
 
 
 def _between(bounds: Sequence[tuple[float, float]]) -> float:

@@ -28,6 +28,7 @@ from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound,
 Json = Mapping[str, Any]
 Methods = Mapping[str, MethodFound]
 CURVE_POINTS = 121
+FLANK_POINTS = 2000
 CHI_SQUARE_95 = 3.841458820694124  # of one degree of freedom
 OFFERED = ("effects.coulomb_friction.motor.torque", "effects.coulomb_friction.load.torque")  # live, beside the gap
 UNEXPLAINED = "The model does not explain what was measured"
@@ -44,13 +45,19 @@ def build(source: ResultDocument) -> Report:
         The report.
     """
     results = read(source.results, EstimateFound)
-    found = {name: e for name, e in results.estimates.items() if e.alpha is not None}
+    found = {name: e for name, e in results.estimates.items() if e.not_applicable is None}
     sections: list[Section] = trust_section(results.trust)
     sections += [*_missing(results), *_repeats(results)]
     if results.estimates:
         sections += [_methods(found), *_remarks(results.estimates), *_comparison(found)]
     limit = (results.diagnostics or {}).get("profile_limit") or CHI_SQUARE_95
-    sections += [*_profile(source, limit), *_online(source), *record_plots(source, "estimate.csv"), *_errors(source)]
+    sections += [
+        *_flanks(source),
+        *_profile(source, limit),
+        *_online(source),
+        *record_plots(source, "estimate.csv"),
+        *_errors(source),
+    ]
     sections += plant_section(source, "estimate.csv", results.live, OFFERED)
     parameters = (results.diagnostics or {}).get("parameters")
     if parameters:
@@ -92,7 +99,7 @@ def _repeats(results: EstimateFound) -> list[Section]:
 
 
 def _answer(results: EstimateFound) -> tuple[tuple[Badge, str] | None, str]:
-    if results.alpha is None:
+    if results.method is None:
         if results.estimates:
             return ("bad", "no estimate"), "No method can be applied to this record."
         return None, "An excitation that shows the gap."
@@ -103,7 +110,7 @@ def _answer(results: EstimateFound) -> tuple[tuple[Badge, str] | None, str]:
     message = results.message or ""
     if not results.visible:
         said = f"{message[:1].upper()}{message[1:]}"
-        if "confidence" not in message:
+        if "confidence" not in message and results.alpha is not None:
             said = f"No gap is seen: it is {interval}. {said}".strip()
         return trust_badge(results.trust, "no gap is seen"), f"{said}{source}."
     summary = f"The half-gap is {results.alpha:.6g} rad, {interval}{source}."
@@ -127,7 +134,9 @@ def _methods(found: Methods) -> ReportTable:
     rows = []
     for name, e in found.items():
         level = None if e.trust is None else e.trust.level
-        rows.append((words(name), e.alpha, level, *(e.interval or (None, None)), e.standard_error, e.cramer_rao))
+        low, high = e.interval or (None, None)
+        sizes = (e.alpha, level, low, high) if e.visible else (None, level, None, high)
+        rows.append((words(name), *sizes, e.standard_error, e.cramer_rao))
     note = "Lower and upper: ends of the 95 % interval. Cramér-Rao: the least standard error that the record allows."
     return ReportTable("Estimates", columns, tuple(rows), note)
 
@@ -136,7 +145,7 @@ def _remarks(estimates: Methods) -> list[Section]:
     """Return what is to be said of single methods: messages, what keeps them from green, why they do not apply."""
     said = []
     for name, e in estimates.items():
-        if e.alpha is None:
+        if e.not_applicable is not None:
             said.append(f"{words(name)} does not apply: {e.not_applicable}.")
             continue
         message = e.message or ""
@@ -148,6 +157,7 @@ def _remarks(estimates: Methods) -> list[Section]:
 
 
 def _comparison(found: Methods) -> list[Section]:
+    found = {name: e for name, e in found.items() if e.visible}
     if len(found) < 2:
         return []
     alpha = [e.alpha or 0.0 for e in found.values()]
@@ -187,6 +197,25 @@ def _online(source: ResultDocument) -> list[Section]:
     names = {"alpha": "estimate", "low": "lower end (95 %)", "high": "upper end (95 %)"}
     curves = tuple(Series(label, time, numbers(table[name])) for name, label in names.items())
     return [Plot("Online estimate", "time [s]", "half-gap [rad]", curves, log_y=True)]
+
+
+def _flanks(source: ResultDocument) -> list[Section]:
+    """Return the load's distance from mid-gap, as two encoders without a torque show it."""
+    table = source.columns("flanks.csv")
+    if not {"time", "twist", "flank"} <= set(table):
+        return []
+    rows = list(zip(*(numbers(table[name]) for name in ("time", "twist", "flank")), strict=True))
+    rows = rows[:: max(1, len(rows) // FLANK_POINTS)]
+    sides = ((-1.0, "lower flank"), (0.0, "between"), (1.0, "upper flank"))
+    series = tuple(
+        Series(label, [r[0] for r in rows if r[2] == side], [r[1] for r in rows if r[2] == side], "points")
+        for side, label in sides
+        if any(r[2] == side for r in rows)
+    )
+    note = (
+        "The motor's angle over the ratio, less the load's, at the same moment: plus or minus the half-gap at a flank."
+    )
+    return [Plot("Which flank the teeth touch", "time [s]", "load from mid-gap [rad]", series, note=note)]
 
 
 def _errors(source: ResultDocument) -> list[Section]:

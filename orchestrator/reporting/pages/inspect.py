@@ -26,20 +26,24 @@ def build(source: ResultDocument) -> Report:
     sections.append(Text("How the file was read", results.record.notes))
     if (source.directory / PICTURE).is_file():
         sections.append(Picture("The record", source.directory / PICTURE))
-    sections += [_facts(results), _channels(results), _excitation(results), _gaps(results), _effects(results)]
+    tables = (_excitation(results), _gaps(results), _effects(results))
+    sections += [_facts(results), _channels(results), *(t for t in tables if t.rows)]
     sections += _better(results)
     return Report(
         "Inspection of a record",
         results.verdict[0],
         tuple(sections),
-        _badge(results.smallest_gap, bool(results.assumed)),
+        _badge(results),
         source.origin(),
         source.downloads(),
     )
 
 
-def _badge(smallest: float | None, assumed: bool) -> tuple[Badge, str]:
+def _badge(results: InspectFound) -> tuple[Badge, str]:
     """Return the badge: what was assumed may be wrong, so it is green only where nothing was."""
+    smallest, assumed, angles = results.smallest_gap, bool(results.assumed), results.two_angles
+    if angles is not None and angles.visible:
+        return "warn", "the two angles show a gap"
     if smallest is None:
         return "bad", "shows no gap"
     if assumed:

@@ -3,7 +3,7 @@
 import msgspec
 
 from orchestrator.shared.results import Found
-from orchestrator.shared.results.estimate import ExcitationFound, RecordFound
+from orchestrator.shared.results.estimate import ExcitationFound, MethodFound, RecordFound
 
 
 class ChannelFound(msgspec.Struct, frozen=True):
@@ -29,9 +29,9 @@ class BandFound(msgspec.Struct, frozen=True):
 
 
 class ReversalsFound(msgspec.Struct, frozen=True):
-    """Sign changes."""
+    """Sign changes; None for a torque that the log does not have."""
 
-    torque: int
+    torque: int | None
     motor_speed: int
 
 
@@ -73,3 +73,4 @@ class InspectFound(Found, frozen=True, kw_only=True):
     better_experiments: tuple[ExcitationFound, ...]
     assumed: tuple[str, ...]
     verdict: tuple[str, ...]
+    two_angles: MethodFound | None = None

@@ -9,9 +9,13 @@ import pytest
 
 import orchestrator as oc
 from orchestrator.cli import main
-from orchestrator.estimation.inspection.channels import channels_of, delay_between
+from orchestrator.estimation.inspection.channels import channels_of, delay_between, reversals_of
+from orchestrator.estimation.inspection.sufficiency import Sufficiency
+from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.records.model_file import read_model
 from orchestrator.records.record import record_from_columns
+from pyfmu_sources.servo_axis_parameters import DEFAULTS
+from tests.support.axis_record import MODEL, axis_record
 from tests.support.drive_record import COUNTS, HALF_GAP, RATED, write_log
 from tests.support.independent_plant import make_record, write_csv
 
@@ -97,3 +101,95 @@ def test_the_page_and_the_picture_are_written(columns, tmp_path: Path, capsys: p
     assert seen["smallest_gap"] <= 0.001
     starter = read_model(out / "model.toml")
     assert starter.parameters["J_l"].value == pytest.approx(5.6)
+
+
+HELD_TORQUE = 160.0  # N.m, on the load from outside
+MOTOR_SHARE = HELD_TORQUE / 3.984
+
+
+def _held_record(seed: int, swing: float, alpha: float = 0.01):  # type: ignore[no-untyped-def]
+    """Return 6 s in which the motor carries a torque on the load and swings it to and fro."""
+    time = 0.005 * np.arange(1200)
+    u = MOTOR_SHARE + swing * np.sin(7.0 * time) + 0.3 * swing * np.sin(17.0 * time)
+    start = {"theta_m": (alpha + HELD_TORQUE / 3300.0) * 3.984, "T_m": MOTOR_SHARE}
+    columns, _ = make_record({"alpha": alpha, "T0": HELD_TORQUE}, seed, u=u, x0=start)
+    return record_from_columns(columns, "held")
+
+
+@pytest.mark.parametrize("seed", [41, 42])
+def test_inspect_and_estimate_agree_where_one_flank_is_loaded_throughout(seed: int) -> None:
+    record = _held_record(seed, 8.0)
+    seen = oc.inspect(record, oc.read_model())
+    assert seen.smallest_gap == np.inf
+    assert not seen.sufficiency.bounds
+    assert "one flank is loaded throughout" in seen.verdict()[0]
+    assert not re.search(r"[\d.]+ rad", seen.verdict()[0])
+    found = oc.estimate(record, oc.read_model(), diagnose=False)
+    assert not found.visible
+    assert np.isnan(found.alpha)
+    shown = "".join(str(block) for block in found.blocks())
+    assert "not seen" in shown
+    assert found.results().alpha is None
+    assert found.results().play is None
+
+
+def test_the_advice_of_a_held_record_shows_the_gap(columns) -> None:
+    """Its words: let the shaft's torque change its sign."""
+    assert "let the shaft's torque change its sign" in oc.inspect(_held_record(43, 8.0), oc.read_model()).verdict()[0]
+    assert oc.inspect(record_from_columns(columns, "reversing"), oc.read_model()).smallest_gap <= 0.001
+
+
+def test_the_sentence_says_what_the_table_says(columns) -> None:
+    """A weak torque moves the teeth through small gaps only: a size that is not seen is in no range of the sentence."""
+    for scale in (1.0, 0.05, 0.01):
+        weak = dict(columns) | {"u": scale * columns["u"]}
+        seen = oc.inspect(record_from_columns(weak, "weak"), oc.read_model())
+        sizes = {size: bound < 0.25 * size for size, bound in seen.sufficiency.bounds}
+        ranges = seen.sufficiency.ranges()
+        for size, visible in sizes.items():
+            assert visible == any(low <= size <= high for low, high in ranges)
+        assert ("and larger" in seen.verdict()[0]) == bool(sizes and list(sizes.values())[-1])
+
+
+def test_a_lost_sign_of_the_torque_gets_a_hint() -> None:
+    """A machine that swings at 1 Hz under a torque of which the log has the magnitude."""
+    time = 0.005 * np.arange(1200)
+    swung = {"time": time, "u": np.abs(np.sin(6.3 * time)), "theta_m": np.sin(6.3 * time)}
+    whole, lost = (record_from_columns(swung | {"u": u}, "swing") for u in (np.sin(6.3 * time), swung["u"]))
+    nothing = Sufficiency((), np.inf, time.size, (), np.inf, np.nan, "of this test")
+    hints = [verdict_of(one, nothing, reversals_of(one), None)[1:] for one in (whole, lost)]
+    assert hints[0] == []
+    assert "the log has lost the sign" in hints[1][0]
+
+
+def test_a_model_that_cannot_be_the_machine_gets_no_table(columns) -> None:
+    slow = dict(columns) | {"time": 20.0 * columns["time"]}
+    record = record_from_columns(slow, "slow")
+    seen = oc.inspect(record, oc.read_model())
+    assert not seen.sufficiency.bounds
+    assert "`estimate` refuses it" in seen.verdict()[0]
+    with pytest.raises(oc.RecordError, match="log faster"):
+        oc.estimate(record)
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.02])
+def test_an_axis_without_teeth_is_inspected(lag: float, tmp_path: Path) -> None:
+    model = tmp_path / "axis.toml"
+    model.write_text(f"{MODEL}\n[parameters.tau]\nvalue = {lag}\n")
+    seen = oc.inspect(axis_record(DEFAULTS, 5, "axis"), oc.read_model(model))
+    assert "an axis without teeth" in seen.verdict()[0]
+    assert [name for name, _, _ in seen.effects]
+    starter = tmp_path / "starter.toml"
+    starter.write_text(seen.starter)
+    again = read_model(starter)
+    assert again.fmu == "ServoAxis"
+    assert again.parameters["J"].value == 1.0
+
+
+def test_a_small_joint_is_no_thesis_drivetrain() -> None:
+    """A joint of a hundredth of the inertia: its starter says that values are rough, not the given model's."""
+    joint = {"J_m": 0.004, "J_l": 0.05, "k": 40.0, "c": 0.02, "b_m": 0.01, "b_l": 0.02, "i": 3.984, "tau": 0.02}
+    columns = make_record({"alpha": 0.01}, 8, 6.0, torque=0.005, nominal=joint)[0]
+    text = oc.inspect(record_from_columns(columns, "joint")).starter
+    assert "ROUGH" in text
+    assert "the thesis's" not in text

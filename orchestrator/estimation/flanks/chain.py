@@ -1,0 +1,92 @@
+"""A chain of three hidden states: the teeth touch at the lower flank, nowhere, or at the upper one."""
+
+import math
+
+import numpy as np
+
+from orchestrator.shared.numba_cache import kept
+
+STATES = 3
+OUTLIER = 1e-6  # share of points that may be anything, so that one bad row cannot rule
+ROOT_HALF = math.sqrt(0.5)
+
+
+@kept(nogil=True, error_model="numpy")
+def densities(left, variance, alpha, mask, out):  # type: ignore[no-untyped-def]
+    """Fill ``out`` (n, 3) with the density of each point's twist in each state.
+
+    Args:
+        left: (n,) twist about mid-gap [rad].
+        variance: (n,) of its noise [rad^2].
+        alpha: half-gap [rad].
+        mask: (n,) whether a point counts.
+        out: filled; ones where a point does not count.
+    """
+    for k in range(left.size):
+        if not mask[k]:
+            out[k, :] = 1.0
+            continue
+        sigma = math.sqrt(variance[k])
+        r = left[k]
+        low, high = (r + alpha) / sigma, (r - alpha) / sigma
+        bell = 0.3989422804014327 / sigma
+        floor = OUTLIER * bell
+        out[k, 0] = bell * math.exp(-0.5 * low * low) + floor
+        out[k, 2] = bell * math.exp(-0.5 * high * high) + floor
+        inside = 0.5 * (math.erfc(-low * ROOT_HALF) - math.erfc(-high * ROOT_HALF))
+        out[k, 1] = inside / (2.0 * alpha) + floor
+
+
+@kept(nogil=True, error_model="numpy")
+def smooth(density, change, share, steps):  # type: ignore[no-untyped-def]
+    """Return the log likelihood; fill each state's share at each point and the expected steps between states.
+
+    Args:
+        density: (n, 3) of each point in each state.
+        change: (3, 3) probabilities of the next state.
+        share: (n, 3) filled: probability of each state, given all points.
+        steps: (3, 3) filled: expected number of steps from state to state.
+
+    Returns:
+        The log likelihood.
+    """
+    n = density.shape[0]
+    scale = np.empty(n)
+    ahead = np.empty((n, 3))
+    total = 0.0
+    for k in range(n):
+        norm = 0.0
+        for s in range(3):
+            if k == 0:
+                value = 1.0 / 3.0
+            else:
+                value = 0.0
+                for r in range(3):
+                    value += ahead[k - 1, r] * change[r, s]
+            ahead[k, s] = value * density[k, s]
+            norm += ahead[k, s]
+        scale[k] = norm
+        total += math.log(norm)
+        for s in range(3):
+            ahead[k, s] /= norm
+    back = np.ones(3)
+    before = np.empty(3)
+    steps[:, :] = 0.0
+    for s in range(3):
+        share[n - 1, s] = ahead[n - 1, s]
+    for k in range(n - 2, -1, -1):
+        for r in range(3):
+            value = 0.0
+            for s in range(3):
+                flow = change[r, s] * density[k + 1, s] * back[s] / scale[k + 1]
+                steps[r, s] += ahead[k, r] * flow
+                value += flow
+            before[r] = value
+        norm = 0.0
+        for r in range(3):
+            back[r] = before[r]
+            share[k, r] = ahead[k, r] * back[r]
+            norm += share[k, r]
+        for r in range(3):
+            share[k, r] /= norm
+    return total

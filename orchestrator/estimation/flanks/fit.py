@@ -1,0 +1,256 @@
+"""The half-gap, the channels' lateness, the ratio and the offset that explain two angles best.
+
+The load's angle at moment t is ``ratio theta_m(t - late) + offset - s alpha + eccentricity``, where the flank s is 1 or
+-1 while teeth touch and anything between while they do not. The flank is a hidden Markov chain of three states; the
+likelihood is maximised by expectation and maximisation (Baum, Petrie, Soules and Weiss 1970), in which all else is
+linear least squares, the lateness by Gauss and Newton.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.estimation.flanks.chain import STATES, densities, smooth
+from orchestrator.estimation.flanks.points import Points
+from orchestrator.estimation.innovations import Array
+from orchestrator.estimation.settings import FlankSettings
+
+TURN = 2.0 * math.pi
+OFFSET, RATIO, LATE, ALPHA = range(4)  # places of the columns of the regression
+STARTS = (0.3, 0.6, 1.0, 1.5)  # half-gaps tried, in standard deviations of the twist
+
+
+@dataclass(frozen=True)
+class FlankFit:
+    """A maximum of the likelihood.
+
+    Attributes:
+        values: (k,) offset [rad], slope of the load's angle over the motor's, slope times lateness beyond ``base`` [s],
+            half-gap [rad], then amplitudes of the eccentricities [rad].
+        variance: of the points' noise [rad^2].
+        change: (3, 3) probabilities of the next state.
+        share: (n, 3) probability of each state at each point.
+        loglik: log likelihood.
+        base: lateness at which the motor's angle is taken [s].
+        covariance: (k, k) of ``values`` if the points' noise were white, the prior of the lateness included.
+        converged: whether the likelihood had come to rest.
+    """
+
+    values: Array
+    variance: float
+    change: Array
+    share: Array
+    loglik: float
+    base: float
+    covariance: Array
+    converged: bool
+
+    @property
+    def alpha(self) -> float:
+        """Return the half-gap [rad]."""
+        return abs(float(self.values[ALPHA]))
+
+    @property
+    def late(self) -> float:
+        """Return how late the load's channel is [s]."""
+        return self.base + float(self.values[LATE] / self.values[RATIO])
+
+    @property
+    def ratio(self) -> float:
+        """Return the gear ratio."""
+        return 1.0 / float(self.values[RATIO])
+
+
+class FlankProblem:
+    """The points of a record and the regression behind them."""
+
+    def __init__(self, points: Points, settings: FlankSettings) -> None:
+        self.points = points
+        self.settings = settings
+        angle = points.motor.at(points.time)
+        self._centre = float(angle.mean())
+        slope = float(np.polyfit(angle - self._centre, points.load, 1)[0]) if np.ptp(angle) > 0.0 else 1.0
+        self._slope = slope if slope != 0.0 else 1.0
+        self._turns = self._shafts(float(np.ptp(angle)))
+        motor = abs(self._slope) * points.motor.count
+        self.floor = (settings.least_noise * math.hypot(points.count, motor)) ** 2 + 1e-24
+        self._base, self._rows = math.nan, np.empty((0, 0))
+        self.width = max(2.0 * points.step, settings.speed_window)
+
+    def _shafts(self, travel: float) -> list[float]:
+        """Return the turns per motor turn of the shafts whose eccentricity shows: those that turn right round."""
+        both = [abs(self._slope), 1.0]
+        if abs(both[0] - both[1]) < 1e-3:
+            both = both[1:]
+        return [turns for turns in both if travel * turns > self.settings.turns_for_eccentricity * TURN]
+
+    def start(self) -> FlankFit:
+        """Return the fit to start from: the flank goes with the direction of the motor.
+
+        Returns:
+            The fit.
+        """
+        n = self.points.time.size
+        values = np.zeros(4 + 2 * len(self._turns))
+        values[RATIO] = self._slope
+        change = np.full((STATES, STATES), 0.02) + 0.94 * np.eye(STATES)
+        share = np.full((n, STATES), 1.0 / STATES)
+        fit = FlankFit(values, 1.0, change, share, -math.inf, 0.0, np.eye(values.size), False)
+        for _ in range(5):
+            direction = np.sign(self._table(fit.base)[:, LATE]) * -np.sign(self._slope)
+            fit = self._moved(self._regressed(fit, direction, np.ones(n)))
+        return fit
+
+    def _table(self, base: float) -> Array:
+        """Return the regression (n, k), the motor's angle ``base`` [s] before each point, with flanks of zero."""
+        if base != self._base:
+            at, w, motor = self.points.time - base, self.width, self.points.motor
+            angle = motor.at(at) - self._centre
+            speed = (motor.at(at + w) - motor.at(at - w)) / (2.0 * w)
+            columns = [np.ones(angle.size), angle, -speed, np.zeros(angle.size)]
+            for turns in self._turns:
+                columns += [np.sin(turns * angle), np.cos(turns * angle)]
+            self._base, self._rows = base, np.column_stack(columns)
+        return self._rows
+
+    def _moved(self, fit: FlankFit) -> FlankFit:
+        """Return the fit with the motor's angle taken at the lateness that was found, where that is another."""
+        late = float(np.clip(fit.late, -self.settings.latest, self.settings.latest))
+        if abs(late - fit.base) < self.settings.late_step:
+            return fit
+        values = fit.values.copy()
+        values[LATE] = 0.0
+        return replace(fit, values=values, base=late)
+
+    def _regressed(self, fit: FlankFit, flank: Array, weight: Array) -> FlankFit:
+        """Return the fit after weighted least squares with the flanks held.
+
+        Args:
+            fit: to start from.
+            flank: (n,) expected flank.
+            weight: (n,) of each point, over its variance in units of that of an edge.
+        """
+        table = self._table(fit.base).copy()
+        table[:, ALPHA] = -flank
+        normal = table.T @ (weight[:, None] * table)
+        normal[ALPHA, ALPHA] = float(weight.sum())  # a flank is -1 or 1: its square is known where it is not
+        right = table.T @ (weight * self.points.load)
+        # The lateness has a prior, so that a record of one speed, which cannot tell it from a gap, has an interval.
+        slope = self._slope
+        prior = max(fit.variance, self.floor) / (slope * self.settings.late_deviation) ** 2
+        normal[LATE, LATE] += prior
+        right[LATE] -= prior * slope * fit.base
+        scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        inverse = np.linalg.pinv(normal / np.outer(scale, scale), rcond=1e-12, hermitian=True) / np.outer(scale, scale)
+        values = inverse @ right
+        left = self.points.load - table @ values
+        spread = left**2 + values[ALPHA] ** 2 * (1.0 - flank**2)
+        variance = max(float(weight @ spread) / max(float(weight.sum()), 1e-300), self.floor)
+        return replace(fit, values=values, variance=variance, covariance=variance * inverse)
+
+    def refined(self, fit: FlankFit, mask: NDArray[np.bool_] | None = None, rounds: int | None = None) -> FlankFit:
+        """Return the maximum of the likelihood that expectation and maximisation reach from a fit.
+
+        Args:
+            fit: to start from; its half-gap must be positive.
+            mask: (n,) which points count (default: all).
+            rounds: at most (default: as the settings have it).
+
+        Returns:
+            The maximum.
+        """
+        n = self.points.time.size
+        mask = np.ones(n, dtype=np.bool_) if mask is None else mask
+        density, share, steps = np.empty((n, STATES)), np.empty((n, STATES)), np.empty((STATES, STATES))
+        before = -math.inf
+        for _ in range(self.settings.rounds if rounds is None else rounds):
+            values = fit.values.copy()
+            if values[ALPHA] < 0.0:
+                values[ALPHA] = -values[ALPHA]
+            least = 0.1 * math.sqrt(fit.variance)
+            values[ALPHA] = max(values[ALPHA], least)
+            twist = self._table(fit.base) @ values - self.points.load
+            variance = fit.variance + self.points.variance
+            densities(twist, variance, float(values[ALPHA]), mask, density)
+            loglik = float(smooth(density, fit.change, share, steps))
+            touching = share[:, 0] + share[:, 2]
+            flank = np.divide(share[:, 2] - share[:, 0], touching, out=np.zeros(n), where=touching > 1e-12)
+            weight = touching * mask * fit.variance / variance
+            fit = self._moved(self._regressed(fit, flank, weight))
+            counts = steps + self.settings.prior_steps * (0.9 * np.eye(STATES) + 0.1 / STATES)
+            fit = replace(
+                fit, change=counts / counts.sum(axis=1, keepdims=True), share=share.copy(), loglik=loglik,
+                converged=abs(loglik - before) < self.settings.tolerance,
+            )  # fmt: skip
+            if fit.converged:
+                break
+            before = loglik
+        return fit
+
+    def twist(self, fit: FlankFit) -> Array:
+        """Return the load's distance from mid-gap at each point [rad]; at a flank it is plus or minus the half-gap.
+
+        Args:
+            fit: which gives ratio, lateness, offset and eccentricities.
+
+        Returns:
+            Shape (n,).
+        """
+        return np.asarray(self._table(fit.base) @ fit.values - self.points.load)
+
+
+def best_fit(problem: FlankProblem) -> FlankFit:
+    """Return the best maximum that several starts reach: by the motor's direction, and by sizes of the gap.
+
+    Args:
+        problem: of a record.
+
+    Returns:
+        The maximum.
+    """
+    first = problem.start()
+    spread = math.hypot(math.sqrt(first.variance), first.alpha)
+    starts = [first]
+    for share in STARTS:
+        values = first.values.copy()
+        values[ALPHA] = share * spread
+        starts.append(replace(first, values=values, variance=max((share * spread / 3.0) ** 2, problem.floor)))
+    fits = [problem.refined(start, rounds=problem.settings.first_rounds) for start in starts]
+    return problem.refined(max(fits, key=lambda fit: fit.loglik))
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Standard errors of half-gap [rad], lateness [s] and gear ratio."""
+
+    alpha: float
+    late: float
+    ratio: float
+
+
+def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Deviations, float]:
+    """Return standard errors from fits that leave out one block of the record each, and their 95 % quantile.
+
+    Errors within a block may be correlated as they like (Quenouille 1956; Kuensch 1989).
+
+    Args:
+        problem: of a record.
+        fit: its maximum.
+
+    Returns:
+        The errors, and the quantile of Student's distribution that goes with their number.
+    """
+    from scipy.stats import t
+
+    n, blocks = problem.points.time.size, problem.settings.blocks
+    found = []
+    for rows in np.array_split(np.arange(n), blocks):
+        mask = np.ones(n, dtype=np.bool_)
+        mask[rows] = False
+        without = problem.refined(fit, mask, problem.settings.block_rounds)
+        found.append((abs(without.alpha), without.late, without.ratio))
+    values = np.array(found)
+    errors = np.sqrt((blocks - 1.0) / blocks * np.sum((values - values.mean(axis=0)) ** 2, axis=0))
+    return Deviations(*(float(error) for error in errors)), float(t.ppf(0.975, blocks - 1))

@@ -1,0 +1,132 @@
+"""Where rounded angles are known well: at the edges between two counts, and where a machine rests."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.estimation.innovations import Array
+from orchestrator.records.record import Record, quantisation_step
+
+REST_ROWS = 5  # in which neither encoder moves by more than a count: the machine rests
+
+
+@dataclass(frozen=True)
+class Angle:
+    """An encoder's angle as a line through the edges between its counts.
+
+    A rounded angle is known to half a count; at the moment at which the count changes it is known much better. An
+    encoder that is not rounded changes in every row, and the line then goes through the middle of each two rows.
+
+    Attributes:
+        time: (n,) moments of the edges [s].
+        angle: (n,) there [rad].
+        count: step that the values are rounded to [rad]; 0.0: none.
+    """
+
+    time: Array
+    angle: Array
+    count: float
+
+    def at(self, time: Array) -> Array:
+        """Return the angle [rad] at some moments, by a local cubic between the edges.
+
+        Args:
+            time: (m,) [s].
+
+        Returns:
+            Shape (m,).
+        """
+        return np.asarray(self._curve(np.clip(time, self.time[0], self.time[-1])))
+
+    @cached_property
+    def _curve(self) -> Callable[[Array], Array]:
+        from scipy.interpolate import PchipInterpolator
+
+        return PchipInterpolator(self.time, self.angle)  # a cubic that does not overshoot rests
+
+
+@dataclass(frozen=True)
+class Points:
+    """Moments at which the load's angle is known, and the motor's angle as a function of time.
+
+    Attributes:
+        time: (n,) [s], rising.
+        load: (n,) the load's angle [rad].
+        variance: (n,) of it beyond what all points have, from rounding at rest [rad^2].
+        motor: the motor's angle.
+        count: of the load's encoder [rad]; 0.0: it is not rounded.
+        step: sample time [s].
+    """
+
+    time: Array
+    load: Array
+    variance: Array
+    motor: Angle
+    count: float
+    step: float
+
+
+def points_of(record: Record, latest: float, most: int) -> Points:
+    """Return the points of a record with two encoders.
+
+    Args:
+        record: with ``theta_l``.
+        latest: how late one channel may be [s]: so far from its ends the motor's angle must be known.
+        most: points that are returned at most.
+
+    Returns:
+        The edges between counts of the load's encoder, and its rests.
+    """
+    assert record.theta_l is not None
+    motor, load = _edges(record.time, record.theta_m), _edges(record.time, record.theta_l)
+    rest_time, rest_angle = _rests(record, motor.count, load.count)
+    time = np.concatenate([load.time, rest_time])
+    order = np.argsort(time, kind="stable")
+    if motor.time.size:
+        inside = (time[order] > motor.time[0] + latest) & (time[order] < motor.time[-1] - latest)
+        order = order[inside]
+    order = order[:: max(1, math.ceil(order.size / most))]
+    rounding = np.full(rest_time.size, load.count**2 / 12.0)
+    return Points(
+        time[order],
+        np.concatenate([load.angle, rest_angle])[order],
+        np.concatenate([np.zeros(load.time.size), rounding])[order],
+        motor,
+        load.count,
+        record.step,
+    )
+
+
+def _edges(time: Array, values: Array) -> Angle:
+    good = np.isfinite(values)
+    time, values = time[good], values[good]
+    changed = np.flatnonzero(np.diff(values) != 0.0)
+    # The cubic through four rows, in the middle: the mean of two where the count changes once, and right where the
+    # machine accelerates through many counts a row.
+    wide = np.concatenate([values[:1], values, values[-1:]])
+    middle = (9.0 * (wide[1:-2] + wide[2:-1]) - wide[:-3] - wide[3:]) / 16.0
+    return Angle(0.5 * (time[changed] + time[changed + 1]), middle[changed], quantisation_step(values))
+
+
+def _rests(record: Record, motor_count: float, load_count: float) -> tuple[Array, Array]:
+    """Return the middle of each rest [s] and the load's angle there; none where the load's encoder is not rounded."""
+    assert record.theta_l is not None
+    if load_count <= 0.0:
+        return np.empty(0), np.empty(0)
+    still = (np.diff(record.theta_l) == 0.0) & (np.abs(np.diff(record.theta_m)) <= 1.5 * motor_count)
+    starts, stops = _runs(still)
+    long = stops - starts >= REST_ROWS
+    middle = (starts[long] + stops[long]) // 2
+    within = np.abs(record.theta_m[stops[long]] - record.theta_m[starts[long]]) <= 1.5 * motor_count
+    middle = middle[within]
+    return record.time[middle], record.theta_l[middle]
+
+
+def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return first and last row of each run in which ``flags`` hold from row to row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return edges[::2], edges[1::2]

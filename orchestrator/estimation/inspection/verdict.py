@@ -1,0 +1,74 @@
+"""What an inspection says of gaps, in sentences that its table bears out."""
+
+import math
+
+from orchestrator.estimation.inspection.sufficiency import SEEN, SIZES, Sufficiency
+from orchestrator.estimation.protocol import Estimate
+from orchestrator.records.record import Record
+
+MANY_REVERSALS = 4  # of the speed, in which a torque that drives them changes its sign too
+MUCH_BETTER = 0.9  # share of the record's bound below which another experiment is worth a word
+
+
+def verdict_of(
+    record: Record, found: Sufficiency, reversals: tuple[int | None, int], two_angles: Estimate | None
+) -> list[str]:
+    """Return whether a record suffices to see a gap, what it lacks, and what would do better.
+
+    Args:
+        record: the record.
+        found: what it shows of gaps.
+        reversals: sign changes of torque, None without one, and of motor speed.
+        two_angles: the half-gap from the two angles alone, where that was looked for.
+
+    Returns:
+        A sentence each.
+    """
+    said = [_of_angles(two_angles)] if two_angles is not None else [_of_sizes(found)]
+    torque, speed = reversals
+    if torque == 0 and speed >= MANY_REVERSALS:
+        said.append(
+            f"The torque never changes its sign, though the motor's speed does {speed} times: either something else "
+            "drives the machine, or the log has lost the sign (a magnitude, or a sign in a bit of its own)."
+        )
+    if not found.why:
+        said.append(_of_experiments(found))
+    return said
+
+
+def _of_angles(estimate: Estimate) -> str:
+    low, high = estimate.interval
+    if not estimate.visible:
+        return f"From the two angles alone, {estimate.message}."
+    return (
+        f"The two angles alone show a half-gap of {estimate.alpha:.4g} rad (95 %: {low:.4g} to {high:.4g}); "
+        f"{estimate.message}."
+    )
+
+
+def _of_sizes(found: Sufficiency) -> str:
+    if found.why:
+        return f"The record shows no gap of any size: {found.why}."
+    runs = found.ranges()
+    if not runs:
+        return "The record shows no gap of any size that was tried: its torque does not move the teeth through one."
+    words = []
+    for low, high in runs:
+        about = "about " if low not in SIZES else ""
+        if high == SIZES[-1]:
+            words.append(f"{about}{low:.2g} rad and larger")
+        else:
+            words.append(f"{about}{low:.2g} to {high:.2g} rad" if high > low else f"{low:.2g} rad")
+    smaller = ", and perhaps smaller ones" if runs[0][0] <= SIZES[0] else ""
+    return f"The record shows half-gaps of {', and of '.join(words)}{smaller} (bound below {SEEN:g} of the size)."
+
+
+def _of_experiments(found: Sufficiency) -> str:
+    best = found.better[0] if found.better else None
+    if best is None or not best.bound < MUCH_BETTER * found.own:
+        return "No simple excitation of the same length, torque and speed would show the gap clearly better."
+    own = f"instead of {found.own:.2g} " if math.isfinite(found.own) else ""
+    return (
+        f"Better, of the same length and within the same torque and speed: {best.name}, bound {best.bound:.2g} {own}"
+        f"rad for a half-gap of {found.design_size:g} rad; `estimate` with `design` searches further."
+    )
