@@ -130,7 +130,7 @@ def difference(path: Path, problem: BoxProblem, model: BoxModel, jacobi: bool = 
     return worst
 
 
-def _given_to(member: str, problem: BoxProblem, model: BoxModel) -> dict[str, float | int | bool]:
+def _given_to(member: str, problem: BoxProblem, model: BoxModel) -> dict[str, float | int | bool | str]:
     """Return start values of one of the FMUs, by its own names."""
     placed = {owned(n, problem.runner.subject.members): v for n, v in problem.starts(model).items()}
     return {variable: value for (name, variable), value in placed.items() if name == member}

@@ -54,6 +54,7 @@ def report_hidden_gap(workings: Workings, gap: HiddenGap, model: Model, settings
 def _gap_effect(gap: HiddenGap, final: float, before: float, settings: DiagnosisSettings) -> GradedEffect:
     size = gap.alpha / gap.standard_error
     grades = settings.grades
+    lowered: tuple[str, ...]
     if size >= grades.certain_size_t:
         grade, lowered = Grade.CERTAIN, ()
     elif size >= grades.likely_size_t:
