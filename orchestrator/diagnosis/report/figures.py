@@ -76,7 +76,7 @@ def _draw_candidates(path: Path, diagnosis: Diagnosis) -> None:
     if not steps:
         return
     heights = [min(len(step.tried), SHOWN) for step in steps]
-    figure = Figure(figsize=(8.0, 0.8 * len(steps) + 0.32 * sum(heights)), layout="constrained")
+    figure = Figure(figsize=(8.0, 0.8 * len(steps) + 0.34 * sum(heights)), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(steps), 1, squeeze=False, height_ratios=heights)[:, 0]
     for axis, step in zip(axes, steps, strict=True):
@@ -89,7 +89,7 @@ def _draw_candidates(path: Path, diagnosis: Diagnosis) -> None:
         axis.set_xlim(min(-5.0, *(max(gain, -20.0) for gain in gains)), 105.0)
         axis.axvline(0.0, color="black", linewidth=0.8)
         before = ", ".join(effect_words(label) for label in step.before.labels) or "re-fitted parameters"
-        axis.set_title(f"Error of blocks left out that an effect takes [%], on top of: {before}", fontsize=9)
+        axis.set_title(f"Error of blocks left out that an effect takes [%], on top of\n{before}", fontsize=9)
         axis.grid(alpha=0.25, axis="x")
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
@@ -111,6 +111,7 @@ def _draw_blocks(path: Path, diagnosis: Diagnosis) -> None:
         axis.set_ylabel(f"{name} [{estimate.unit}]".replace("_", " "))
         axis.set_title(f"{effect_words(effect.label)}: {effect.grade.word}", fontsize=9)
     axes[-1].set_xlabel("block of the record")
+    axes[-1].xaxis.get_major_locator().set_params(integer=True)
     _finish(list(axes))
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
