@@ -94,7 +94,8 @@ def diagnose(
     nominal, base, final = (models[0].physical_values(problem.record_points(point)[0]) for point in points)
     workings = Workings(fitted, test_data, found, tuple(models), nominal, base, final)
     if gap is not None:
-        return report_hidden_gap(replace(workings, final=model.plant.extended(gap.values.tolist())), gap, model, settings)
+        values = model.plant.extended(gap.values.tolist())
+        return report_hidden_gap(replace(workings, final=values), gap, model, settings)
     return _report(workings, model, settings)
 
 
