@@ -11,106 +11,89 @@ def estimate(value):
     return {"value": value, "standard_error": 0.01 * value, "unit": "N.m"}
 
 
-def test_predictions_restarts_and_what_the_log_adds_have_their_places_on_the_page_of_a_diagnosis(tmp_path):
-    delay = {"name": "load_stamp", "site": "log", "parameters": {"delay": estimate(0.005) | {"unit": "s"}}}
-    errors = [{"model": "parameters", "theta_m": 0.01}, {"model": "final", "theta_m": 0.001}]
+MISFIT = {"nominal": 0.1, "parameters": 0.05, "final": 0.001, "noise": 0.0009, "unit": "rad"}
+
+
+def test_restarts_and_what_the_log_adds_have_their_places_on_the_page_of_a_diagnosis(tmp_path):
+    late = {"name": "late_load", "grade": "certain", "parameters": {"shift": estimate(0.005) | {"unit": "s"}}}
     results = {
         "verdict": "parameters",
-        "misfit": {"theta_m": {"before": 0.1, "after": 0.001, "noise": 0.0009, "unit": "rad"}},
-        "nuisances": [delay],
-        "horizons": [{"horizon": "2 s", "errors": errors}],
-        "analysis": {"rate": 200.0, "rows": 400, "rows_of_the_file": 5, "notes": []},
+        "test": [{"source": "a.csv", "rows": 60, "misfit": {"theta_m": MISFIT}, "worse": False}],
+        "nuisances": [late],
+        "analysis": [{"source": "a.csv", "rate": 200.0, "rows": 400, "rows_of_the_file": 5, "band": {"motor": 12.0}}],
         "live": {"fmu": "Drivetrain", "step": 0.5, "values": {}, "rows": [0, 1], "starts": [{}, {}]},
-        "settings": {"fit": {"fitted": 0.5}},
+        "settings": {"fit": {"blocks": 20}},
     }
     write_result(tmp_path, "diagnose", {}, None, results)
     (tmp_path / "diagnose.csv").write_text("time,theta_m,theta_m_after\n0,0,0\n0.5,1,1\n1,2,2\n")
     report = report_from_directory(tmp_path)
     tables = {table.title: table.rows for table in sections(report, ReportTable)}
-    assert tables["Predictions"] == (("2 s", "re-fitted", 0.01), ("2 s", "corrected", 0.001))
-    assert tables["What the log has, and the machine has not"][0][1] == "delay"
+    assert tables["What the log has, and the machine has not"][0][:3] == ("late load", "certain", "shift")
+    assert tables["What was analysed"] == (("a.csv", 200.0, 400, 5, "motor 12"),)
     difference, angle = sections(report, Plot)
     assert [(span.start, span.end) for span in difference.spans] == [(0.0, 0.0), (0.5, 0.5)]
     assert angle.spans == difference.spans
-    (analysed,) = (facts for facts in sections(report, Facts) if facts.title == "What was analysed")
-    assert dict(analysed.items)["rows of the file for each"] == 5
     assert "Fit" not in [section.title for section in report.sections]
 
 
-def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
+def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path):
     effect = {
         "name": "coulomb_friction",
         "site": "motor",
+        "grade": "likely",
         "parameters": {"torque": estimate(1.5) | {"interval": [1.4, 1.6]}},
-        "score": 120.0,
-        "runner_up": "stribeck_friction (motor)",
-        "margin": 15.0,
-        "family": ["coulomb_friction", "stribeck_friction"],
+        "explains": {"torque": 0.7, "motion": 0.9},
+        "gain": 0.8,
+        "t": 12.0,
+        "family": ["stribeck_friction@motor"],
+        "lowered_by": ["explained"],
     }
-    stages = [{"model": "nominal", "rms": 0.1}, {"model": "+ coulomb_friction@motor", "rms": 0.001}]
+    hint = effect | {"name": "load_torque", "site": "load", "grade": "possible", "family": [], "lowered_by": ["size"]}
+    test = {
+        "source": "record.csv", "rows": 300, "misfit": {"theta_m": MISFIT}, "worse": True, "r_squared": {"theta_m": 0.99},
+        "torque_left": {"nominal": 0.2, "parameters": 0.1, "final": 0.04},
+    }  # fmt: skip
     results = {
         "verdict": "effects",
-        "effects": [effect],
-        "suspects": [],
+        "effects": [effect, hint],
         "parameters": {"J_m": {"nominal": 0.4, "value": 0.42, "standard_error": 0.001, "unit": "kg.m2"}},
-        "where": [
-            {"signal": "theta_m", "regime": "speed", "interval": [-0.1, 0.1], "unit": "rad/s", "share_of_misfit": 0.8}
-        ],
-        "misfit": {"theta_m": {"before": 0.1, "after": 0.001, "noise": 0.0009, "unit": "rad", "stages": stages}},
+        "test": [test],
+        "validation": test | {"source": "other.csv", "worse": False},
         "model": "Corrected.fmu",
-        "warnings": ["the record is short"],
-        "validation": {
-            "theta_m": {
-                "before": 0.1,
-                "after": 0.01,
-                "noise": 0.0009,
-                "unit": "rad",
-                "r_squared": {"before": 0.5, "parameters": 0.6, "after": 0.99},
-            }
-        },
-        "torque_error": {"record": {"before": 0.2, "parameters": 0.1, "after": 0.04}},
-        "also_seen": [
-            {"name": "ripple", "period": 0.65, "period_unit": "rad", "size": 0.007, "unit": "N.m"}
-            | {"gain": 2.5, "level": 1.0, "sure": False},
-            {"name": "trend", "period": None, "period_unit": None, "size": 0.1, "unit": "N.m"}
-            | {"gain": 1.0, "level": 1.0, "sure": True},
-        ],
-        "remainder": {
-            "explained": 0.95,
-            "predictable": [{"site": "shaft", "kind": "speed", "gain": 12.0, "share": 0.02}],
+        "notes": ["the record is short"],
+        "remaining": {
+            "torque": {"motor": 0.029},
+            "follows": [{"site": "motor", "argument": "position", "share": 0.33, "gain": 0.3, "t": 4.0, "formula": ""}],
         },
         "candidates": [
-            {"on_top_of": [], "accepted": True, "tried": [{"effect": "delay", "gain": -1.0, "decided": 0.0}]}
+            {"on_top_of": [], "taken": "", "tried": [{"effect": "input_delay@actuator", "gain": 0.0, "t": 0.1}]}
         ],
     }
     write_result(tmp_path, "diagnose", {"data": "record.csv"}, None, results)
     (tmp_path / "diagnose_missing_torque.png").write_bytes(b"png")
     (tmp_path / "diagnose.csv").write_text("time,theta_m,theta_m_before,theta_m_after\n0,0,0,0\n1,1,1.1,1.001\n")
     report = report_from_directory(tmp_path)
-    assert "The model lacks Coulomb friction at the motor." in report.summary
-    assert "of the motor angle falls from 0.1 to 0.001 rad (noise: 0.0009)" in report.summary
-    (left,) = sections(report, Facts)
-    assert left.items[0][1] == "95 %"
+    assert "The model lacks Coulomb friction at the motor (likely)." in report.summary
+    assert "load torque" not in report.summary
+    assert "of the motor angle goes from 0.1 to 0.001 rad (noise: 0.0009)" in report.summary
     tables = {t.title: t for t in sections(report, ReportTable)}
     lacking = tables["What the model lacks"].rows
-    assert lacking == (("Coulomb friction at the motor", "torque", "1.5 N.m (95 %: 1.4 to 1.6)"),)
-    assert tables["Why these effects"].rows[0][-1] == "stribeck friction"
-    assert tables["Misfit on the other record"].rows[0][-1] == pytest.approx(10.0)
-    assert tables["What the rest follows"].rows == (("shaft", "speed", 12.0, 2.0),)
+    assert lacking[0] == ("Coulomb friction at the motor", "likely", "torque", "1.5 N.m (95 %: 1.4 to 1.6)")
+    assert lacking[1][1] == "possible"
+    why = tables["How sure"].rows[0]
+    assert why[2:6] == (pytest.approx(80.0), 12.0, pytest.approx(70.0), pytest.approx(90.0))
+    assert why[6:] == ("Stribeck friction at the motor", "explained")
+    assert "does worse" in tables["Misfit on test data of record.csv"].note
+    assert "does worse" not in tables["Misfit on the other record, other.csv"].note
+    assert tables["Misfit on test data of record.csv"].rows[0][-1] == 0.99
+    assert tables["Torque that is left"].rows[0] == ("record.csv", 20.0, 10.0, 4.0)
+    assert tables["What the rest follows"].rows[0][:3] == ("motor", "position", pytest.approx(33.0))
     assert tables["Parameters"].rows[0][6] == pytest.approx(5.0)
-    assert tables["R² of one free run over all of the other record"].rows == (("motor angle", 0.5, 0.6, 0.99),)
-    assert tables["Relative torque error of the inverse model"].rows == (("record", 20.0, 10.0, 4.0),)
-    assert tables["What else follows position or direction"].rows == (
-        ("ripple", "0.65 rad", "0.007 N.m", 2.5, 1.0, False),
-        ("trend", None, "0.1 N.m", 1.0, 1.0, True),
-    )
+    assert tables["What was tried"].rows[0][2] == "input delay in the actuator"
     plots = {p.title: p for p in sections(report, Plot)}
     (bars,) = sections(report, Bars)
-    assert [(b.name, b.length) for b in bars.items] == [
-        ("model as given", 1.0),
-        ("and Coulomb friction at the motor", pytest.approx(0.01)),
-    ]
-    assert bars.items[1].text == "1.11 times noise"
+    assert [b.length for b in bars.items] == [1.0, 0.5, pytest.approx(0.01)]
+    assert bars.items[2].text == "1.11 times noise"
     assert [p.path.name for p in sections(report, Picture)] == ["diagnose_missing_torque.png"]
     assert "data:image/png;base64,cG5n" in write_report(tmp_path).read_text()
     assert [s.name for s in plots["Motor angle"].series] == ["measured", "before", "after"]
@@ -122,7 +105,7 @@ def test_the_page_of_a_diagnosis_names_effects_places_and_the_gap(tmp_path):
 
 @pytest.mark.parametrize("verdict", ["none", "parameters", "unknown"])
 def test_a_diagnosis_without_effects_is_a_page_too(tmp_path, verdict):
-    results = {"verdict": verdict, "effects": [], "parameters": {}, "where": [], "misfit": {}, "model": None}
+    results = {"verdict": verdict, "effects": [], "parameters": {}, "test": [], "model": None}
     write_result(tmp_path, "diagnose", {}, None, results)
     assert report_from_directory(tmp_path).summary
 

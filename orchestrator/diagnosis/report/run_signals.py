@@ -84,6 +84,8 @@ class RunSignals:
     def guess_state(self, plant: Plant, p: Array, row: int) -> Array:
         """Return a first guess (8,) of the state at a row: smoothed angles, their derivatives, the drive's torque.
 
+        The drive is at rest before the record.
+
         Args:
             plant: the plant.
             p: its parameters.
@@ -105,7 +107,7 @@ class RunSignals:
         lag = plant.value(p, plant.drive.lag)
         limit = plant.value(p, plant.drive.limit)
         torque = np.clip(self.requests[: row + 1], -limit, limit)
-        state[plant.drive.torque] = lagged(torque, lag, self.step)[-1] if lag > 0.0 else torque[-1]
+        state[plant.drive.torque] = lagged(np.append(0.0, torque), lag, self.step)[-1] if lag > 0.0 else torque[-1]
         for place, followed in plant.followers:
             state[place] = state[followed]
         return state
@@ -114,7 +116,9 @@ class RunSignals:
         key = (channel, float(angles[-1, channel]))
         if key not in self._motions:
             smoothed = smooth(angles[:, channel], self.step, self.cutoff)
-            self._motions[key] = smoothed, first_derivative(smoothed, self.step)
+            speed = first_derivative(smoothed, self.step)
+            speed[:2], speed[-2:] = speed[2], speed[-3]
+            self._motions[key] = smoothed, speed
         return self._motions[key]
 
     @cached_property
