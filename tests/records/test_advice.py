@@ -326,6 +326,34 @@ ADVICE: dict[str, tuple[Input, str, Input]] = {
         Input(_mat(lambda t: t | {"u": t["u"][:700], "trq": t["u"]})), "name channels of one raster",
         Input(_mat(lambda t: t | {"u": t["u"][:700], "trq": t["u"]}), {"u": Column("trq")}),
     ),
+    "many missing, by another name": (
+        Input(_csv(None, lambda t: t | {"q": t["theta_m"], "theta_m": np.where(t["time"] < 2, t["theta_m"], np.nan)})),
+        "or name another column",
+        Input(
+            _csv(None, lambda t: t | {"q": t["theta_m"], "theta_m": np.where(t["time"] < 2.0, t["theta_m"], np.nan)}),
+            {"theta_m": Column("q")},
+        ),
+    ),
+    "rows that are not sorted": (
+        Input(_edited(lambda ls: [*ls[:101], *ls[201:301], *ls[101:201], *ls[301:]])), "sort the rows by time",
+        Input(PLAIN),
+    ),
+    "rows without a time": (
+        Input(_csv(None, _with("time", lambda t: np.where(t["time"] < 2.0, t["time"], np.nan)))),
+        "or say `[columns.time] rate = ...`",
+        Input(
+            _csv(None, _with("time", lambda t: np.where(t["time"] < 2.0, t["time"], np.nan))),
+            {"time": Column(rate=200.0)}, model={},
+        ),
+    ),
+    "a load that does not follow": (
+        Input(_csv(None, lambda t: t | {"q": t["theta_l"], "theta_l": np.cos(9.0 * t["time"])}), model={}),
+        "name the right column by `[columns.theta_l] name",
+        Input(
+            _csv(None, lambda t: t | {"q": t["theta_l"], "theta_l": np.cos(9.0 * t["time"])}), {"theta_l": Column("q")},
+            model={},
+        ),
+    ),
     "a short record": (Input(_edited(lambda ls: ls[:150])), "log a longer run", Input(PLAIN)),
     "a binary file": (Input(lambda path, t: path.write_bytes(bytes(range(256)) * 4)), "export it as CSV", Input(PLAIN)),
 }  # fmt: skip
