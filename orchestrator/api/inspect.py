@@ -40,6 +40,7 @@ from orchestrator.shared.results.inspect import (
 )
 
 STARTER = "model.toml"
+OF_GIVEN = "of the model that was given"
 SHOWN_EXPERIMENTS = 3
 
 
@@ -244,7 +245,8 @@ def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Mode
         sure: whether nothing was assumed of the columns.
     """
     if given:
-        return base, dict.fromkeys(base.plant.linear, "of the model that was given"), ()
+        said_of = {name: OF_GIVEN if name in base.stated else OF_DEFAULT for name in base.plant.linear}
+        return base, said_of, ()
     rough = rough_machine(record)
     if not record.has_torque:
         return as_model(rough, base), rough.origin, ()
