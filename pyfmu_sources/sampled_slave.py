@@ -12,7 +12,7 @@ Both see the same values: an output read after inputs have been set at a sample 
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 from .slave_base import Fmi2Status, SlaveBase, StepRefusedError
 
@@ -24,7 +24,7 @@ class SampledSlave(SlaveBase):
     """A slave with a sample clock; subclasses implement ``begin``, ``predict`` and ``correct``."""
 
     feedthrough = True
-    sample_time_reference: ClassVar[int] = 0
+    sample_time_reference = 0
     _warned = False
 
     def begin(self) -> None:

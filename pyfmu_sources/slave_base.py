@@ -48,6 +48,7 @@ class SlaveBase(Fmi2Slave):
     table: ClassVar[tuple[FmuVariable, ...]] = ()
     title: ClassVar[str] = ""
     terminals: ClassVar[Terminals] = {}
+    sample_time_reference: ClassVar[int | None] = None
     step_size: ClassVar[float] = 1e-3
     variable_step: ClassVar[bool] = True
     stop_time: ClassVar[float] = 2.0

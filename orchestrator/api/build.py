@@ -9,6 +9,7 @@ from orchestrator.api.shown import Block, Result
 from orchestrator.building.build import ROOT, default_directory, ensure_built
 from orchestrator.building.launcher import find_toolchain
 from orchestrator.building.native_build import ensure_native, native_directory, native_remark
+from orchestrator.building.python_fmi3 import ensure_python_fmi3
 from orchestrator.building.sources import catalogue
 from orchestrator.errors import FmuError, OutputError
 from orchestrator.shared.results import BuildFound
@@ -78,7 +79,7 @@ def build(
         force: build also what is up to date.
         native: translate the sources to C and compile them, so that the FMUs need no Python at run time.
         platforms: of native FMUs: "all" that the compiler can make, or this one alone ("here"), which is quicker.
-        fmi: version of FMI: 2, or 3 of native FMUs.
+        fmi: version of FMI, 2 or 3.
 
     Returns:
         The path of each FMU, by name.
@@ -91,8 +92,8 @@ def build(
         >>> oc.build(["Drivetrain"])["Drivetrain"].name
         'Drivetrain.fmu'
     """
-    if fmi not in VERSIONS or (fmi == 3 and not native):
-        raise FmuError(f"`fmi` must be 2, or 3 of native FMUs, but is {fmi!r}", "fmi")
+    if fmi not in VERSIONS:
+        raise FmuError(f"`fmi` must be one of {', '.join(map(str, VERSIONS))}, but is {fmi!r}", "fmi")
     usual = native_directory(fmi) if native else default_directory(fmi)
     folder = usual if directory is None else Path(directory)
     if folder.exists() and not folder.is_dir():
@@ -104,8 +105,9 @@ def build(
         raise FmuError(f"`platforms` must be one of {', '.join(PLATFORMS)}, but is {platforms!r}", "platforms")
     if native:
         return _native(list(names) if names else None, folder, force, platforms, fmi)
-    paths = ensure_built(list(names) if names else None, folder, force=force)
-    given = {"names": list(paths), "directory": str(folder), "force": force}
+    ensure = ensure_built if fmi == 2 else ensure_python_fmi3
+    paths = ensure(list(names) if names else None, folder, force=force)
+    given = {"names": list(paths), "directory": str(folder), "force": force} | ({"fmi": fmi} if fmi != 2 else {})
     return BuildResult(paths, find_toolchain().remark, given)
 
 

@@ -17,6 +17,7 @@ from orchestrator.estimation.inspection.channels import (
     channels_of,
     delay_between,
     excitation_of,
+    hints_of,
     reversals_of,
 )
 from orchestrator.estimation.inspection.machine import as_model, is_of, rough_machine, visible_effects
@@ -39,6 +40,7 @@ from orchestrator.shared.results.inspect import (
 )
 
 STARTER = "model.toml"
+OF_GIVEN = "of the model that was given"
 SHOWN_EXPERIMENTS = 3
 
 
@@ -96,7 +98,8 @@ class InspectResult(Result):
         Returns:
             A sentence each.
         """
-        return verdict_of(self.record, self.sufficiency, self.reversals, self.two_angles)
+        said = verdict_of(self.record, self.sufficiency, self.reversals, self.two_angles)
+        return [*said, *hints_of(self.record)]
 
     def blocks(self) -> Sequence[Block]:
         """Return what was read, the tables and the verdict."""
@@ -189,7 +192,8 @@ def inspect(
 
     Args:
         record: a measured record, or its path; with a path, missing factors of units are assumed and said.
-        model: the machine (default: the thesis's where the record fits it, else a rough one from the record).
+        model: the machine (default, and where it states no parameter: the thesis's where the record shows its
+            inertia, else a rough one from the record).
         part: first and last time to keep [s] (default: all).
         resample: as ``read_record`` has it.
         rate: as ``read_record`` has it [Hz].
@@ -241,7 +245,8 @@ def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Mode
         sure: whether nothing was assumed of the columns.
     """
     if given:
-        return base, dict.fromkeys(base.plant.linear, "of the model that was given"), ()
+        said_of = {name: OF_GIVEN if name in base.stated else OF_DEFAULT for name in base.plant.linear}
+        return base, said_of, ()
     rough = rough_machine(record)
     if not record.has_torque:
         return as_model(rough, base), rough.origin, ()

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -76,17 +77,37 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
     Raises:
         FmuError: the compiler fails.
     """
+    return compile_host(toolchain, SOURCE, {}, f'-DWRAPPER="{wrapper}"')
+
+
+def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], *options: str) -> bytes:
+    """Return a shared library that finds a Python, the same bytes wherever it is compiled.
+
+    Args:
+        toolchain: what to compile with.
+        source: file name of the source.
+        files: content by file name of what is not in ``native/``.
+        options: of the compiler.
+
+    Returns:
+        The library.
+
+    Raises:
+        FmuError: the compiler fails.
+    """
     assert toolchain.compiler is not None
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(NATIVE, folder, dirs_exist_ok=True)
+        for name, content in files.items():
+            (Path(folder) / name).write_bytes(content)
         library = str(toolchain.libpython) if toolchain.libpython else ""
         command = [
             toolchain.compiler,
             *("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden", "-Wl,--build-id=none"),
-            f'-DWRAPPER="{wrapper}"',
+            *options,
             f"-DPYTHON_LIBRARY={_quoted(library)}",
             f"-DPYTHON_PROGRAM=L{_quoted(toolchain.program if library else '')}",
-            *("-o", "launcher.so", SOURCE, "-ldl", "-lpthread"),
+            *("-o", "launcher.so", source, "-ldl", "-lpthread", "-lm"),
         ]
         try:
             run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
@@ -94,7 +115,7 @@ def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
             raise FmuError(f"the C compiler {toolchain.compiler} cannot be run: {error.strerror}") from None
         if run.returncode != 0:
             reason = next((line for line in run.stderr.splitlines() if "error" in line), "no message")
-            raise FmuError(f"the C compiler {toolchain.compiler} failed on {SOURCE}: {reason}")
+            raise FmuError(f"the C compiler {toolchain.compiler} failed on {source}: {reason}")
         return (Path(folder) / "launcher.so").read_bytes()
 
 

@@ -19,11 +19,12 @@ from orchestrator.errors import FmuError
 from pyfmu_sources.fmu_variables import FmuVariable
 
 RUNTIME = Path(__file__).parent / "native_fmu"
-_HEADERS = ("translated.h", "pairs.h", "slave_types.h", "slave_core.h", "slave_states.h", "slave_exchange.h")
+HEADERS = ("translated.h", "pairs.h", "slave_types.h", "slave_core.h", "slave_states.h", "slave_exchange.h")
 _OF_VERSION = {
     2: ("fmi2_types.h", "fmi2_slave.h", "fmi2_model_exchange.h"),
     3: ("fmi3_types.h", "fmi3_slave.h", "fmi3_steps.h", "fmi3_updates.h", "fmi3_absent.h"),
 }
+OF_FMI3 = (*HEADERS, *_OF_VERSION[3])
 _FILE = """/* {name}: {title}
  *
  * Made by backlash-cosim from {files}:
@@ -87,12 +88,21 @@ def _state_variables(cls: Any) -> Iterator[FmuVariable]:
         yield FmuVariable(f"der({name})", "local", rate, None, f"Rate of: {text}", derivative_of=name)
 
 
+def indicator_total(cls: Any) -> int:
+    """Return how many event indicators a slave has.
+
+    Args:
+        cls: the adapter.
+
+    Returns:
+        The number.
+    """
+    return len(get_type_hints(cls.indicators)["return"].__args__) if hasattr(cls, "indicators") else 0
+
+
 def _indicators(cls: Any) -> Iterator[FmuVariable]:
     """Yield the event indicators as variables."""
-    if not hasattr(cls, "indicators"):
-        return
-    count = len(get_type_hints(cls.indicators)["return"].__args__)
-    for n in range(1, count + 1):
+    for n in range(1, indicator_total(cls) + 1):
         yield FmuVariable(f"{INDICATOR}[{n}]", "local", description="Positive until an event ends the mode")
 
 
@@ -124,9 +134,9 @@ def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, by
         constants=translated.constants,
         prototypes=translated.prototypes,
         definitions=translated.definitions,
-        tables=translated.tables + (f"\n\n{_counts(cls)}" if fmi == 3 else ""),
+        tables=translated.tables + (f"\n\n{count_table(cls)}" if fmi == 3 else ""),
     )
-    needed = [name for name in (*_HEADERS, *_OF_VERSION[fmi]) if _is_needed(name, cls, translated.types)]
+    needed = [name for name in (*HEADERS, *_OF_VERSION[fmi]) if _is_needed(name, cls, translated.types)]
     headers = {name: (RUNTIME / name).read_bytes() for name in needed}
     return {f"{recipe.name}.c": text.encode("utf-8"), **headers}
 
@@ -137,8 +147,15 @@ def _is_needed(header: str, cls: Any, types: str) -> bool:
     return header != "pairs.h" or '"pairs.h"' in types
 
 
-def _counts(cls: Any) -> str:
-    """Return the C table of how many values there are at each value reference, and where event indicators stand."""
+def count_table(cls: Any) -> str:
+    """Return the C table of how many values there are at each value reference, and where event indicators stand.
+
+    Args:
+        cls: from :func:`slave_class`.
+
+    Returns:
+        The definition.
+    """
     counts = [0] * len(cls.table)
     indicators = ""
     for array in arrays(cls.table):
@@ -169,7 +186,7 @@ _PYTHON_ONLY = ("slave_base", "sampled_slave", "fmu_variables", "hidden_state", 
 def _runtime_names() -> frozenset[str]:
     """Return every identifier in the runtime's code, so that translated names keep clear of them."""
     names: set[str] = set()
-    for file in (*_HEADERS, *_OF_VERSION[2], *_OF_VERSION[3]):
+    for file in (*HEADERS, *_OF_VERSION[2], *_OF_VERSION[3]):
         text = re.sub(r"/\*.*?\*/|\"[^\"\n]*\"", " ", (RUNTIME / file).read_text(encoding="utf-8"), flags=re.DOTALL)
         names |= set(re.findall(r"[A-Za-z_]\w*", text))
     return frozenset(names)

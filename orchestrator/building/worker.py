@@ -50,7 +50,7 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
         fingerprint: by which a stale FMU is recognised.
     """
     starts = default_starts(recipe.plain) | dict(recipe.starts)
-    runtime = _runtime()
+    runtime = runtime_files()
     sources = {path.name: path.read_bytes() for path in closure(recipe.module)}
     content = [part for name in sorted(sources) for part in (name.encode(), sources[name])]
     options = json.dumps([recipe.name, sorted(starts.items()), recipe.law]).encode()
@@ -68,8 +68,8 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
     write_archive(target, _completed(members, package, runtime, fingerprint, recipe))
 
 
-def _runtime() -> dict[str, bytes]:
-    """Return the files of PythonFMU that a slave needs when it runs."""
+def runtime_files() -> dict[str, bytes]:
+    """Return the files of PythonFMU that a slave needs when it runs, by name."""
     import pythonfmu
 
     folder = Path(pythonfmu.__file__).parent
@@ -108,7 +108,7 @@ def _completed(
     description = ElementTree.fromstring(kept.pop("modelDescription.xml"))
     kept |= documentation(recipe, description)
     kept |= reference_files(recipe, description)
-    kept["documentation/licenses/PythonFMU.txt"] = _pythonfmu_license()
+    kept["documentation/licenses/PythonFMU.txt"] = pythonfmu_license()
     stamp(description, fingerprint)
     guid = content_guid(description, kept)
     return kept | {
@@ -117,7 +117,8 @@ def _completed(
     }
 
 
-def _pythonfmu_license() -> bytes:
+def pythonfmu_license() -> bytes:
+    """Return PythonFMU's licence."""
     files = distribution("pythonfmu").files or []
     path = next((file for file in files if file.name.upper().startswith("LICENSE")), None)
     return path.read_binary() if path is not None else b"PythonFMU is distributed under the MIT license.\n"

@@ -33,9 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="all",
         help="of native FMUs: all that the compiler can make (default), or this one alone, which is quicker",
     )
-    parser.add_argument(
-        "--fmi", type=int, choices=VERSIONS, default=2, help="version of FMI (default: 2); 3 of native FMUs"
-    )
+    parser.add_argument("--fmi", type=int, choices=VERSIONS, default=2, help="version of FMI (default: 2)")
     parser.add_argument("--force", action="store_true", help="build even what is up to date")
 
 

@@ -1,5 +1,6 @@
 """What the columns of a record must be: finite, in range, moving; and what an encoder's count is."""
 
+import itertools
 import math
 from collections.abc import Mapping
 
@@ -14,6 +15,9 @@ LARGEST_VALUE = 1e12  # of any number in a record
 LARGEST_ANGLE = 1e7  # rad
 LEAVING = 0.4  # of the rms speed: a machine that is slower was coming to rest
 LARGEST_GAP = 0.3  # rad, load side: motion beyond it that one encoder misses is no gap
+BLOCKS = 50  # of a record, in each of which the motor moves or stands still
+STILL = 0.005  # of the whole travel, within a block
+LEAST_MOVING = 0.6  # of a record: with less, its later parts show nothing
 LARGEST_SHARE_MISSING = 0.2  # of the rows of one column
 
 
@@ -82,6 +86,24 @@ def check_driven(u: Array, label: str, source: str) -> None:
             f"{source}: column `{label}` must drive the machine, but is 0 in all {u.size} rows: name the right one by "
             '`[columns.u] name = "..."`, or log a run with torque'
         )
+
+
+def moving_span(theta: Array, time: Array) -> tuple[float, float] | None:
+    """Return from when to when [s after the first row] the motor moves, where that is a short part of the record.
+
+    Args:
+        theta: (n,) angle of the motor [rad], without missing samples.
+        time: (n,) [s].
+
+    Returns:
+        Start and end; None where the motor moves in most of the record, or never.
+    """
+    edges = np.linspace(0, theta.size, BLOCKS + 1).astype(int)
+    travels = np.array([np.ptp(theta[a:b]) for a, b in itertools.pairwise(edges)])
+    moving = np.flatnonzero(travels > max(STILL * float(np.ptp(theta)), 3.0 * quantisation_step(theta)))
+    if not moving.size or moving[-1] + 1 - moving[0] > LEAST_MOVING * BLOCKS:
+        return None
+    return float(time[edges[moving[0]]] - time[0]), float(time[edges[moving[-1] + 1] - 1] - time[0])
 
 
 def check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str) -> None:

@@ -14,6 +14,8 @@ __all__ = ["COLUMNS", "KINDS", "SI", "Array", "Column"]
 Array = NDArray[np.float64]
 COLUMNS = ("time", "u", "theta_m", "theta_l")
 OPTIONAL = ("theta_l",)
+# Ranges of counters of time, in the numbers of a file.
+COUNTERS = (60.0, 3600.0, 86400.0, *(10.0**n for n in range(2, 10)), *(2.0**n for n in range(8, 33)))
 MEANINGS = {
     "time": "the time",
     "u": "the torque that the drive was asked for",
@@ -199,6 +201,43 @@ def check_wraps(values: Array, name: str, label: str, source: str) -> None:
             f"row {int(np.flatnonzero(np.abs(np.diff(values)) > 0.8 * span)[0]) + 2}: say `[columns.{name}] modulo = "
             f"{guess:g}` in the model file (`model`)"
         )
+
+
+def unwrapped_time(values: Array, column: Column, label: str, source: str) -> Array:
+    """Return times that go on where a counter overflows, after ``column.modulo``; refuse those that seem to.
+
+    Args:
+        values: (n,), in the numbers of the file.
+        column: what the model file says.
+        label: name in the file, for messages.
+        source: file name, for messages.
+
+    Returns:
+        Shape (n,).
+
+    Raises:
+        RecordError: the time falls from the end of a counter's range to its start, and no ``modulo`` is given.
+    """
+    rows = np.flatnonzero(np.isfinite(values))
+    good = values[rows]
+    steps = np.diff(good)
+    if column.modulo is not None:
+        out = values.copy()
+        out[rows[1:]] = good[0] + np.cumsum(np.mod(steps, column.modulo))
+        return out
+    fallen = np.flatnonzero(steps < 0.0)
+    if not fallen.size or fallen.size > 0.1 * steps.size:
+        return values
+    usual = float(np.median(steps[steps > 0.0], axis=0)) if np.any(steps > 0.0) else 0.0
+    high, low = float(good.max()), float(good.min())
+    for size in COUNTERS:
+        if abs(high + usual - size) <= 1.5 * usual and low < 2.0 * usual and np.all(good[fallen] > high - 2.0 * usual):
+            raise RecordError(
+                f"{source}: row {int(rows[fallen[0] + 1]) + 1}, column `{label}` must increase, but begins again at "
+                f"{good[fallen[0] + 1]:g} after {good[fallen[0]]:g}: where a counter overflows, say `[columns.time] "
+                f"modulo = {size:g}` in the model file (`model`); of two runs keep one by `part` START:END"
+            )
+    return values
 
 
 def _round_turn(span: float) -> float:

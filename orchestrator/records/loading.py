@@ -20,6 +20,7 @@ from orchestrator.records.columns import (
     scale_of,
     unit_of,
     unwrapped,
+    unwrapped_time,
 )
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
@@ -77,11 +78,11 @@ def load(
     chosen = chosen_channels(source, columns, str(path), reading.torque_needed)
     extra = {name: n for n, head in enumerate(source.heads) for name in further if name in (head.name, head.full)}
     places = sorted({choice.place for choice in chosen.values()} | set(extra.values()))
-    values = dict(zip(places, source.load(places), strict=True))
     labels = {name: source.heads[c.place].full or source.heads[c.place].name for name, c in chosen.items()}
     labels.setdefault("time", "time")
-    main = values[chosen["theta_m"].place].size
-    time, spoken = _time(source, chosen, values, columns.get("time", Column()), labels["time"], path, main)
+    values, time, spoken = _in_part(
+        source, places, chosen, columns.get("time", Column()), labels["time"], path, reading
+    )
     table: dict[str, Array] = {"time": time}
     notes = [source.dialect, *(choice.assumed for choice in chosen.values() if choice.assumed)]
     units = [spoken]
@@ -103,10 +104,33 @@ def load(
         notes.append("torque from the voltage, the winding's resistance and the motor's speed")
     if "u" not in chosen:
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
-    if reading.part is not None:
-        table = _part(table, reading.part, path)
     table, more = _resampled(table, reading)
     return Loaded(table, labels, (*notes, *more))
+
+
+def _in_part(
+    source: RecordSource,
+    places: Sequence[int],
+    chosen: Mapping[str, Choice],
+    column: Column,
+    label: str,
+    path: Path,
+    reading: Reading,
+) -> tuple[dict[int, NDArray[Any]], Array, str]:
+    """Return the channels, the time [s] and the words for it; of a part nothing outside is looked at but the time."""
+    raster = source.heads[chosen["theta_m"].place].raster
+    if reading.part is not None and "time" in chosen:
+        place = chosen["time"].place
+        time, spoken = _time(source, chosen, {place: source.times(place)}, column, label, path, 0, False)
+        rows = _rows_of(time, reading.part, path)
+        return dict(zip(places, source.within(rows, raster).load(places), strict=True)), time[rows], spoken
+    values = dict(zip(places, source.load(places), strict=True))
+    time, spoken = _time(source, chosen, values, column, label, path, values[chosen["theta_m"].place].size)
+    if reading.part is not None:
+        rows = _rows_of(time, reading.part, path)
+        time = time[rows]
+        values = {n: v[rows] if source.heads[n].raster == raster else v for n, v in values.items()}
+    return values, time, spoken
 
 
 def chosen_channels(
@@ -152,14 +176,17 @@ def _time(
     label: str,
     path: Path,
     rows: int,
+    whole: bool = True,
 ) -> tuple[Array, str]:
-    """Return the time [s] and the words that say what it was."""
+    """Return the time [s] and the words that say what it was; ``whole``: nothing of it will be left out."""
     rate = column.rate if column.rate is not None else source.rate
     if "time" not in chosen:
         assert rate is not None
         return np.arange(rows) / rate, f"time from the row and {rate:g} Hz"
     choice = chosen["time"]
     raw = values[choice.place]
+    if column.rate is not None and not _are_sample_numbers(raw):
+        return np.arange(raw.size) / column.rate, f"time from the row and {column.rate:g} Hz, `{label}` not used"
     if raw.dtype.kind == "M":
         stamps = raw.astype("datetime64[ns]")
         good = ~np.isnat(stamps)
@@ -167,7 +194,10 @@ def _time(
             raise RecordError(f"{path}: column `{label}` must hold times, but is empty")
         away = (stamps - stamps[good][0]).astype(np.int64).astype(float) * 1e-9
         return np.where(good, away, np.nan), f"{label} as date and time"
-    numbers = raw.astype(float) * column.factor + column.offset
+    numbers = raw.astype(float)
+    if whole or column.modulo is not None:
+        numbers = unwrapped_time(numbers, column, label, str(path))
+    numbers = numbers * column.factor + column.offset
     written = source.heads[choice.place].unit
     if choice.numbered or column.rate is not None:
         if rate is None:
@@ -181,6 +211,14 @@ def _time(
     first = float(numbers[np.isfinite(numbers)][0]) if np.isfinite(numbers).any() else 0.0
     start = first if abs(first * factor) > 1e6 else 0.0
     return (numbers - start) * factor, f"{label} in {spoken or 's'}"
+
+
+def _are_sample_numbers(raw: NDArray[Any]) -> bool:
+    """Return whether a column counts samples: whole numbers that rise; stamps that repeat do not."""
+    if raw.dtype.kind == "M":
+        return False
+    good = raw[np.isfinite(raw)]
+    return bool(np.all(good == np.rint(good)) and np.all(np.diff(good) > 0.0))
 
 
 def _epoch(numbers: Array) -> tuple[float, str]:
@@ -213,7 +251,7 @@ def _converted(
         )
         return summed, f"{spoken}, summed to an angle"
     if name != "u":
-        if column.modulo is None:
+        if column.modulo is None and np.all(np.diff(time[np.isfinite(time)]) > 0.0):  # else the time is what is wrong
             check_wraps(values, name, label, where)
         values = unwrapped(values, column)
     return values * scale, spoken
@@ -260,14 +298,21 @@ def _same_rows(
     return table, notes
 
 
-def _part(table: dict[str, Array], part: tuple[float, float], path: Path) -> dict[str, Array]:
-    time = table["time"] - table["time"][np.flatnonzero(np.isfinite(table["time"]))[0]]
-    keep = (time >= part[0]) & (time <= part[1])
-    if not keep.any():
+def _rows_of(time: Array, part: tuple[float, float], path: Path) -> slice:
+    """Return the rows from the first that lies in a part on, as far as they do, and as time does not begin again."""
+    good = np.flatnonzero(np.isfinite(time))
+    away = time[good] - time[good[0]] if good.size else np.zeros(0)
+    inside = (away >= part[0]) & (away <= part[1])
+    if not inside.any():
         raise RecordError(
-            f"{path}: `part` must lie within the record's 0 to {np.nanmax(time):g} s, but is {part[0]:g} to {part[1]:g}"
+            f"{path}: `part` must lie within the record's 0 to {away.max(initial=0.0):g} s, but is {part[0]:g} to "
+            f"{part[1]:g}"
         )
-    return {name: values[keep] for name, values in table.items()}
+    first = int(np.argmax(inside))
+    fallen = np.diff(away[first:]) < -0.5 * (away[first:-1] - away[first]) - 1e-9  # another run
+    ends = np.flatnonzero(~inside[first + 1 :] | fallen)
+    last = int(ends[0]) if ends.size else good.size - 1 - first
+    return slice(int(good[first]), int(good[first + last]) + 1)
 
 
 def _resampled(table: dict[str, Array], reading: Reading) -> tuple[dict[str, Array], list[str]]:
@@ -289,5 +334,9 @@ def _resampled(table: dict[str, Array], reading: Reading) -> tuple[dict[str, Arr
     }
     out = {name: interpolated(grid, time, values, reading.resample) for name, values in table.items() if name != "time"}
     spoken = ", ".join(f"{name} {error:.2g} {'N.m' if name == 'u' else 'rad'}" for name, error in cost.items())
-    text = f"resampled ({reading.resample}) to {1.0 / step:.6g} Hz; error of that about (rms): {spoken}"
+    low, high = np.quantile(1e3 * np.diff(time), (0.05, 0.95))
+    text = (
+        f"resampled ({reading.resample}) to {1.0 / step:.6g} Hz, the mean rate of steps of {low:.3g} to {high:.3g} ms; "
+        f"error of that about (rms): {spoken}"
+    )
     return {"time": grid, **out}, [text] if all(map(math.isfinite, cost.values())) else []

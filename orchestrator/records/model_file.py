@@ -81,6 +81,7 @@ class Model:
         columns: name and unit of each column in the record's file, where they differ from the default.
         source: file name, for messages.
         header: line of the record that holds the names, from 1; 0: there are none; None: found.
+        stated: parameters that the file names; the others are the thesis's.
     """
 
     fmu: str
@@ -89,6 +90,7 @@ class Model:
     columns: Mapping[str, Column] = field(default_factory=dict)
     source: str = "default model"
     header: int | None = None
+    stated: tuple[str, ...] = ()
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -122,7 +124,7 @@ COLUMN_NUMBERS = {
     "factor": COLUMNS,
     "offset": COLUMNS,
     "counts_per_rev": ("theta_m", "theta_l"),
-    "modulo": ("theta_m", "theta_l"),
+    "modulo": ("time", "theta_m", "theta_l"),
     "rated_value": ("u",),
     "torque_constant": ("u",),
     "resistance": ("u",),
@@ -195,6 +197,7 @@ def read_model(path: Path | None) -> Model:
         {name: _column(name, entry, content) for name, entry in columns.items()},
         path.name,
         content.header,
+        tuple(parameters),
     )
 
 

@@ -6,6 +6,7 @@ inertia that the torque seems to move, and their signs.
 """
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ LARGE_TRAVEL = 0.5  # rad of the load, beyond which twist no longer disturbs the
 LONGEST_STEP = 1.5  # rad of the shaft's oscillation
 SMOOTHING_TIME = 0.05  # s
 NEEDED_FIT = 0.8
+NEAR_DEGREES = 0.3  # of a logarithm: an inertia this near to 1/57 of the model's may be an angle in degrees
 
 
 def check_plausible(record: Record, model: Model) -> None:
@@ -108,45 +110,67 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> 
         )
 
 
-def _check_inertia(record: Record, p: dict[str, float]) -> None:
-    """Compare the inertia that the torque moves with the model's.
+def moved_inertia(record: Record, p: Mapping[str, float]) -> float | None:
+    """Return the inertia at the motor [kg.m2] that the torque seems to move, or None where the record does not tell.
 
     The momentum balance ``integral of T = J omega + b theta + constant + slope t`` is fitted to smoothed data.
+
+    Args:
+        record: of the machine, without missing samples.
+        p: parameters of the model by name, of which ``tau`` counts.
+
+    Returns:
+        The inertia; negative where the motion goes against the torque.
     """
     width = max(5, round(SMOOTHING_TIME / record.step))
     if record.size < 20 * width:
-        return
+        return None
     kernel = np.ones(width) / width
     torque = lagged(record.u, p["tau"], record.step)
     impulse = np.cumsum(torque) * record.step
     speed = np.gradient(record.theta_m, record.step)
     speed, angle, impulse = (np.convolve(v, kernel, "valid") for v in (speed, record.theta_m, impulse))
     if np.ptp(angle) < 0.2:
-        return
+        return None
     time = np.linspace(-1.0, 1.0, speed.size)
     table = np.column_stack([speed, angle, np.ones_like(time), time])
     solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
     left = impulse - table @ solution
     trend, *_ = np.linalg.lstsq(table[:, 2:], impulse, rcond=None)
     explained = 1.0 - float(np.var(left)) / max(float(np.var(impulse - table[:, 2:] @ trend)), 1e-300)
-    if explained < NEEDED_FIT:
+    return float(solution[0]) if explained >= NEEDED_FIT else None
+
+
+def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
+    """Compare the inertia that the torque moves with the model's; both may be what is wrong."""
+    moved = moved_inertia(record, p)
+    if moved is None:
         return
-    relative = float(solution[0]) / (p["J_m"] + p["J_l"] / p["i"] ** 2)
+    own = p["J_m"] + p["J_l"] / p["i"] ** 2
+    relative = moved / own
+    machine = "the machine's `[parameters.J_m] value` and `[parameters.J_l] value` (`model`)"
     if relative < -0.2:
         raise RecordError(
             f"{record.source}: column `u` must be positive where it drives `theta_m` forward, but the motion goes "
             "against it: the sign of `u` or of the angles is wrong; say `[columns.u] factor = -1` (`model`)"
         )
     if abs(relative) < 3.0 / DEGREES:
+        shown = f"(the torque would move {abs(moved):.2g} of the model's {own:.2g} kg.m2)"
+        if abs(math.log(max(abs(relative), 1e-12) * DEGREES)) < NEAR_DEGREES:
+            raise RecordError(
+                f"{record.source}: column `theta_m` must be in radians, but seems to be in degrees {shown}: say "
+                f'`[columns.theta_m] unit = "deg"`, or where it is in radians {machine}'
+            )
         raise RecordError(
-            f"{record.source}: column `theta_m` must be in radians, but seems to be in degrees (the torque would move "
-            f'only {relative:.2g} of the model\'s inertia): say `[columns.theta_m] unit = "deg"` (`model`)'
+            f"{record.source}: the model's inertia must be the machine's, but is {1.0 / max(abs(relative), 1e-12):.3g} "
+            f"times as large as what the torque moves {shown}: say {machine}, or the right `unit` in `[columns.u]` and "
+            "`[columns.theta_m]`"
         )
     if relative > DEGREES / 3.0:
         raise RecordError(
             f"{record.source}: column `u` must be in N.m and `theta_m` in radians, but the torque would move "
             f"{relative:.3g} times the model's inertia: say `[columns.u] unit` and `[columns.theta_m] unit`, or the "
-            "machine's `[parameters.J_m] value` and `[parameters.J_l] value` (`model`)"
+            f"{machine.removeprefix('the ')}"
         )
 
 

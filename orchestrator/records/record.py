@@ -13,7 +13,14 @@ import numpy as np
 
 from orchestrator.errors import RecordError
 from orchestrator.records.arrays import MINIMUM_ROWS, Record, lined
-from orchestrator.records.checks import check_driven, check_finite, check_moving, check_range, quantisation_step
+from orchestrator.records.checks import (
+    check_driven,
+    check_finite,
+    check_moving,
+    check_range,
+    moving_span,
+    quantisation_step,
+)
 from orchestrator.records.columns import COLUMNS, Array, Column
 from orchestrator.records.filters import decimated
 from orchestrator.records.formats import open_source
@@ -49,6 +56,15 @@ def read_record(
     if "u" in loaded.table:
         check_driven(loaded.table["u"], loaded.labels["u"], path.name)
     record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
+    span = moving_span(lined(record.theta_m), record.time)
+    if span is not None:
+        start, end = span
+        note = (
+            f"the motor moves from {start:.3g} to {end:.3g} s alone and stands still in the rest of "
+            f"{record.duration:.3g} s, where later parts of a record, which decide, show nothing: keep `part` "
+            f"{start:.3g}:{end:.3g}, or log motion throughout"
+        )
+        record = replace(record, notes=(*record.notes, note))
     scale = (columns or {}).get("u", Column()).relative_uncertainty
     record = replace(record, u_scale_uncertainty=scale, notes=(*loaded.notes, *record.notes))
     if reading.rate is not None:

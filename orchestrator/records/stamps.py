@@ -14,6 +14,7 @@ _ISO = re.compile(r"(\d{4})-(\d\d?)-(\d\d?)[T _]+(\d\d?):(\d\d)(?::(\d\d)(?:[.,]
 _GERMAN = re.compile(r"(\d\d?)\.(\d\d?)\.(\d{4})[T _]+(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d{1,12}))?)?")
 _CLOCK = re.compile(r"(\d\d?):(\d\d):(\d\d)(?:[.,](\d{1,12}))?")
 DAY = 86_400 * 10**9  # ns
+_NO_TIME = np.datetime64("NaT", "ns").astype(np.int64)
 
 
 def is_stamp(cell: str) -> bool:
@@ -29,13 +30,14 @@ def is_stamp(cell: str) -> bool:
     return any(pattern.fullmatch(plain) for pattern in (_ISO, _GERMAN, _CLOCK))
 
 
-def parse_stamps(cells: Sequence[str], label: str, path: Path) -> NDArray[Any]:
-    """Return the stamps as datetime64[ns]; a clock that passes midnight goes on.
+def parse_stamps(cells: Sequence[str], label: str, path: Path, before: int = 0) -> NDArray[Any]:
+    """Return the stamps as datetime64[ns], NaT for empty cells; a clock that passes midnight goes on.
 
     Args:
         cells: of one column.
         label: name of the column, for messages.
         path: of the file, for messages.
+        before: rows of the file before the first of these, for messages.
 
     Returns:
         Shape (n,).
@@ -44,16 +46,21 @@ def parse_stamps(cells: Sequence[str], label: str, path: Path) -> NDArray[Any]:
         RecordError: a cell is no stamp; the message names its row.
     """
     out = np.empty(len(cells), dtype=np.int64)
-    pattern = next((p for p in (_ISO, _GERMAN, _CLOCK) if cells and p.fullmatch(cells[0])), _ISO)
+    first = next((cell for cell in cells if cell), "")
+    pattern = next((p for p in (_ISO, _GERMAN, _CLOCK) if p.fullmatch(first)), _ISO)
     days: dict[tuple[str, str, str], int] = {}
     previous, shift = -(2**62), 0
     for n, cell in enumerate(cells):
+        if not cell:
+            out[n] = _NO_TIME
+            continue
         found = pattern.fullmatch(cell)
         if found is None:
             raise RecordError(
-                f"{path}: row {n + 1}, column `{label}` must be a time like the first row's, but is `{cell[:40]}`"
+                f"{path}: row {before + n + 1}, column `{label}` must be a time like the first row's, but is "
+                f"`{cell[:40]}`"
             )
-        value = _nanoseconds(found, pattern, days, label, path, n)
+        value = _nanoseconds(found, pattern, days, label, path, before + n)
         if pattern is _CLOCK:
             value += shift
             if value < previous - DAY // 2:

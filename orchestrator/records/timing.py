@@ -15,6 +15,7 @@ LARGEST_STEP = 0.5  # s
 NO_JITTER = 1e-6  # of a step: what is left of the arithmetic
 LARGEST_JITTER = 0.1  # of a step: stamps this close to the grid are on it
 LARGEST_MISSING = 0.2  # of the rows: with more, what is assumed in between decides
+GAP = 5.0  # median steps: a longer one is a gap, whose samples are missing
 RESAMPLING = ("uniform", "linear", "cubic")
 
 
@@ -202,9 +203,10 @@ def resampled_grid(time: Array) -> tuple[Array, float]:
         time: (n,) stamps [s].
 
     Returns:
-        The grid and its step [s].
+        The grid and its step [s], the mean one without gaps.
     """
-    step = float(np.median(np.diff(time)))
+    steps = np.diff(time)
+    step = float(np.mean(steps[steps <= GAP * np.median(steps)]))
     rows = max(math.floor((time[-1] - time[0]) / step + 1e-6) + 1, 2)
     return time[0] + step * np.arange(rows), step
 
@@ -219,14 +221,21 @@ def interpolated(grid: Array, time: Array, values: Array, how: str) -> Array:
         how: "linear" or "cubic".
 
     Returns:
-        Shape (m,).
+        Shape (m,); NaN within gaps.
     """
     good = np.isfinite(values)
+    known = time[good]
     if how == "cubic":
         from scipy.interpolate import CubicSpline
 
-        return np.asarray(CubicSpline(time[good], values[good])(grid))
-    return np.interp(grid, time[good], values[good])
+        out = np.asarray(CubicSpline(known, values[good])(grid))
+    else:
+        out = np.interp(grid, known, values[good])
+    after = np.clip(np.searchsorted(known, grid), 1, known.size - 1)
+    wide = known[after] - known[after - 1] > GAP * float(np.median(np.diff(time)))
+    inside = (grid > known[after - 1]) & (grid < known[after])
+    out[wide & inside] = np.nan
+    return out
 
 
 def interpolation_cost(grid: Array, time: Array, values: Array, how: str) -> float:
@@ -249,5 +258,5 @@ def interpolation_cost(grid: Array, time: Array, values: Array, how: str) -> flo
     if t.size < 8:
         return 0.0
     guess = interpolated(t[1:-1:2], t[::2], v[::2], how)[: t[1:-1:2].size]
-    error = float(np.sqrt(np.mean((guess - v[1:-1:2]) ** 2)))
+    error = float(np.sqrt(np.nanmean((guess - v[1:-1:2]) ** 2)))
     return error / (4.0 if how == "linear" else 16.0)

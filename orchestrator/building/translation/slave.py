@@ -73,7 +73,7 @@ def translate_slave(cls: Any, taken: frozenset[str] = frozenset(), fmi: int = 2)
     program.check_lengths()
     pairs = directional(program, owner) if hasattr(cls, "response") else None
     struct = _struct(program, owner)
-    tables = "\n\n".join((_variables(cls), _lists(program, owner), _settings(cls, owner, sampled, program), *hooks))
+    tables = "\n\n".join((variable_table(cls), _lists(program, owner), _settings(cls, owner, sampled, program), *hooks))
     if pairs is None:
         return TranslatedSlave(
             f"{program.types()}\n\n{struct}",
@@ -217,7 +217,15 @@ def _struct(program: Program, owner: Owner) -> str:
     return f"{comment}typedef struct {{\n" + "\n".join(fields) + f"\n}} {name};"
 
 
-def _variables(cls: Any) -> str:
+def variable_table(cls: Any) -> str:
+    """Return the C table of a slave's variables.
+
+    Args:
+        cls: the adapter.
+
+    Returns:
+        The definition.
+    """
     rows = []
     for variable in cls.table:
         low, high = variable.bounds

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 LARGEST = 1e15
 MOST_MISSING = 0.05  # of the rows: what is put in their place is no measurement
-LONGEST_GAP = 5  # rows
+LONGEST_GAP = 3  # rows
 Entry = InputEntry | OutputEntry | SignalEntry
 
 

@@ -58,6 +58,47 @@ class RecordSource(Protocol):
             RecordError: a value is not a number; the message names row and column.
         """
 
+    def times(self, place: int) -> NDArray[Any]:
+        """Return a channel as ``load`` does, with NaN or NaT where a text has no value.
+
+        Args:
+            place: of the channel.
+
+        Returns:
+            Shape (n,).
+
+        Raises:
+            RecordError: as ``load``.
+        """
+        return self.load([place])[0]
+
+    def within(self, rows: slice, raster: int) -> "RecordSource":
+        """Return the same file with some rows of one raster alone.
+
+        Args:
+            rows: to keep.
+            raster: whose rows they are.
+
+        Returns:
+            The part of the file.
+        """
+        return _Within(self, rows, raster)
+
+
+class _Within(RecordSource):
+    """Some rows of a file."""
+
+    def __init__(self, source: RecordSource, rows: slice, raster: int) -> None:
+        self._source, self._rows, self._raster = source, rows, raster
+        self.heads, self.dialect, self.rate = source.heads, source.dialect, source.rate
+
+    def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
+        """Return the values of some channels."""
+        return [
+            values[self._rows] if self.heads[place].raster == self._raster else values
+            for place, values in zip(places, self._source.load(places), strict=True)
+        ]
+
 
 def as_numbers(values: NDArray[Any], name: str, path: Path) -> NDArray[Any]:
     """Return a channel's values as float64, dates and times as datetime64[ns].

@@ -13,7 +13,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.formats.cells import TRUTHS, cells_of, is_number
 from orchestrator.records.formats.dialect import Dialect, detect
 from orchestrator.records.formats.source import Head, RecordSource
-from orchestrator.records.stamps import parse_stamps
+from orchestrator.records.stamps import is_stamp, parse_stamps
 
 MISSING = frozenset(("", "nan", "n/a", "na", "null", "none", "-", "--", "#n/a", "1.#qnan", "-nan", "nan(ind)"))
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
@@ -31,6 +31,25 @@ class TextSource(RecordSource):
         self.dialect = dialect.describe(encoding)
         found = _RATE.search("\n".join(dialect.preamble))
         self.rate = None if found is None else _stated_rate(found)
+        self._encoding, self._before = encoding, 0
+
+    def times(self, place: int) -> NDArray[Any]:
+        """Return a column as ``load`` does, with NaN or NaT where there is no value."""
+        cells = [row[place].strip('"') if place < len(row) else "" for row in self._rows()]
+        if self.heads[place].kind == "stamp":
+            return parse_stamps([c if is_stamp(c) else "" for c in cells], self._label(place), self._path)
+        sign = self._dialect.decimal
+        numbers = [c.replace(sign, ".") if is_number(c, sign) else "nan" for c in cells]
+        return np.array(numbers, dtype=float)
+
+    def within(self, rows: slice, raster: int) -> "TextSource":
+        """Return some rows; what stands in others is not looked at, and rows keep their numbers in messages."""
+        del raster
+        start = self._dialect.start
+        lines = [line for line in self._text[start:].split("\n") if line.strip()][rows]
+        part = TextSource(self._path, self._text[:start] + "\n".join(lines) + "\n", self._encoding, self._dialect)
+        part._before = self._before + (rows.start or 0)
+        return part
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """Return the values of some columns."""
@@ -40,7 +59,9 @@ class TextSource(RecordSource):
         found: dict[int, NDArray[Any]] = {}
         for place in stamps:
             cells = self._table((place,), "U48")[:, 0]
-            found[place] = parse_stamps([str(c).strip().strip('"') for c in cells], self._label(place), self._path)
+            found[place] = parse_stamps(
+                [str(c).strip().strip('"') for c in cells], self._label(place), self._path, self._before
+            )
         if numbers:
             try:
                 table = self._table(numbers, float)
@@ -83,7 +104,7 @@ class TextSource(RecordSource):
 
     def _refuse_other_widths(self, rows: list[list[str]]) -> None:
         width, separator = self._dialect.width, self._dialect.separator
-        for number, row in enumerate(rows, start=1):
+        for number, row in enumerate(rows, start=self._before + 1):
             if len(row) != width:
                 raise RecordError(
                     f"{self._path}: row {number} must have {width} fields like the header, but has {len(row)}"
@@ -107,8 +128,8 @@ class TextSource(RecordSource):
                 number = next(k for k, cell in enumerate(cells) if not is_number(cell, "."))
                 shown = short(rows[number][place])
                 raise RecordError(
-                    f"{self._path}: row {number + 1}, column `{self._label(place)}` must be a number, but is "
-                    f"`{shown}`{_number_hint(shown)}"
+                    f"{self._path}: row {self._before + number + 1}, column `{self._label(place)}` must be a number, "
+                    f"but is `{shown}`{_number_hint(shown)}"
                 ) from None
         return table
 
