@@ -17,7 +17,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Base of settings: immutable, unknown names refused."""
 
 
-def setting(why: str, ge: float | None = 0.0, le: float | None = None, gt: float | None = None) -> msgspec.Meta:
+def setting(why: str, ge: float | None = 0, le: float | None = None, gt: float | None = None) -> msgspec.Meta:
     """Return what a setting means and its bounds, for ``Annotated``.
 
     Args:

@@ -279,6 +279,8 @@ def test_the_command_writes_everything(csv_file: Path, tmp_path: Path, capsys: p
         "estimate_fit.png",
         "estimate_profile.png",
         "estimate_online.png",
+        "estimate_flanks.png",
+        "flanks.csv",
         "report.html",
     }
     shown = capsys.readouterr().out
@@ -330,7 +332,8 @@ def test_help_says_every_default(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["estimate", "--help"])
     shown = " ".join(capsys.readouterr().out.split())
-    for default in ("maximum_likelihood", "250", "50", "10", "200", "results/estimate"):
+    assert "(default: maximum_likelihood; two_encoders without a torque)" in shown
+    for default in ("250", "50", "10", "200", "results/estimate"):
         assert f"(default: {default})" in shown
 
 

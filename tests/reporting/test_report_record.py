@@ -50,7 +50,8 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     }
     hint = effect | {"name": "load_torque", "site": "load", "grade": "possible", "family": [], "lowered_by": ["size"]}
     test = {
-        "source": "record.csv", "rows": 300, "misfit": {"theta_m": MISFIT}, "worse": True, "r_squared": {"theta_m": 0.99},
+        "source": "record.csv", "rows": 300, "misfit": {"theta_m": MISFIT}, "worse": True,
+        "r_squared": {"theta_m": 0.99},
         "torque_left": {"nominal": 0.2, "parameters": 0.1, "final": 0.04},
     }  # fmt: skip
     results = {
@@ -159,7 +160,8 @@ def test_an_estimate_that_no_method_gives_says_so(tmp_path):
 
 def test_a_record_that_bounds_the_gap_on_one_side_only_is_a_page(tmp_path):
     entry = half_gap(0.0, interval=[0.0, None], visible=False, message="the gap cannot be seen")
-    write_result(tmp_path, "estimate", {}, None, {"estimates": {"maximum_likelihood": entry}} | entry)
+    method = "maximum_likelihood"
+    write_result(tmp_path, "estimate", {}, None, {"method": method, "estimates": {method: entry}} | entry)
     report = report_from_directory(tmp_path)
     assert report.summary.startswith("No gap is seen: it is with 95 % confidence between 0 and any size rad.")
     assert report.badge == ("neutral", "no gap is seen")
@@ -207,37 +209,41 @@ def test_the_page_of_an_ssp_file_that_was_written(tmp_path):
 
 def test_the_page_of_a_diagnosis_of_an_fmu_says_what_is_left_and_what_was_delivered(tmp_path):
     level = {"value": 0.8, "standard_error": 1e-4, "interval": [0.79, 0.81], "unit": "N.m"}
-    friction = {"name": "coulomb_friction", "site": "axis", "parameters": {"level": level}, "family": []}
+    friction = {
+        "name": "coulomb_friction",
+        "site": "axis",
+        "grade": "certain",
+        "parameters": {"level": level},
+        "explains": {"theta_m": 0.99},
+        "gain": 2.0,
+        "t": 30.0,
+        "family": [],
+    }
     part = {"name": "coulomb_friction_1", "effect": "coulomb_friction@axis", "values": {"q0": 0.8}}
     results = {
         "kind": "fmu",
         "verdict": "effects",
-        "statement": "effects explain the record but for a disturbance",
         "trust": {"level": "amber", "reasons": ["more than measurement noise is left"]},
+        "summary": [
+            "Record a.csv, 400 rows. The log has coulomb friction at the axis.",
+            "What is left follows nothing.",
+        ],
         "effects": [friction],
-        "suspects": [],
-        "parameters": {},
-        "misfit": {"theta_m": {"nominal": 50.0, "refitted": 40.0, "corrected": 1.1, "noise": 1e-4, "unit": "rad"}},
-        "where": [],
-        "warnings": [],
-        "candidates": [],
-        "remainder": {"explained": False, "disturbance": 1e-4, "reasons": [], "power": [[1.0], [1.1]]},
+        "notes": ["the record is short"],
+        "remaining": {"outputs": {"theta_m": 0.01}, "follows": []},
         "delivery": [{"file": "corrected.ssp", "parts": [part], "difference_over_noise": 0.5, "note": ""}],
-        "settings": {"search": {"penalty": 5.0}, "start": {"pays": 15.0}},
         "runs": 1994,
     }
     write_result(tmp_path, "diagnose", {}, None, results)
     report = report_from_directory(tmp_path)
-    assert report.summary == "Effects explain the record but for a disturbance. It lacks coulomb friction at axis."
+    assert report.summary == "The log has coulomb friction at the axis."
     assert report.badge == ("warn", "amber: effects are missing")
-    (trust,) = sections(report, Text)
-    assert trust.paragraphs[1:] == ("more than measurement noise is left.",)
+    texts = {text.title: text.paragraphs for text in sections(report, Text)}
+    assert texts["In words"] == ("What is left follows nothing.",)
+    assert texts["Take note"] == ("the record is short",)
     (left,) = sections(report, Facts)
-    assert left.items == (
-        ("kind", "measurement noise and a disturbance"),
-        ("disturbance, share of the drive [%]", 0.01),
-    )
-    delivered = sections(report, ReportTable)[-1]
-    assert delivered.rows[0][:3] == ("corrected.ssp", "coulomb_friction@axis", 0.5)
-    assert "Settings" not in [section.title for section in report.sections]
+    assert left.items == (("share of the power of theta_m [%]", 1.0),)
+    tables = {table.title: table.rows for table in sections(report, ReportTable)}
+    assert tables["What is missing"][0][:4] == ("coulomb friction", "axis", "certain", "level")
+    assert tables["Corrected system"][0][:3] == ("corrected.ssp", "coulomb_friction@axis", 0.5)
     assert ("runs of the FMU", 1994) in report.origin

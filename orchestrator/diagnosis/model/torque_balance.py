@@ -267,8 +267,9 @@ class TorqueBalance(ResidualModel):
 
     def _motion(self, p: Array) -> tuple[list[Array], list[Array], list[Array]]:
         """Return angles, speeds and accelerations of the bodies, from how the log has them."""
-        offsets = [float(p[self.plant.index(name)]) for name in self.plant.offsets]
-        angles = [angle - offset for angle, offset in zip(self._angles, offsets, strict=False)]
+        angles = list(self._angles)
+        for n, name in enumerate(self.plant.offsets[: len(angles)]):
+            angles[n] = angles[n] - float(p[self.plant.index(name)])
         speeds, accelerations = list(self._speeds), list(self._accelerations)
         late = self.plant.value(p, SHIFT.name) if SHIFT.name in self.plant.names else 0.0
         if late and len(angles) > 1:
