@@ -61,7 +61,7 @@ def run_tasks(
     open_tasks = [task for task in tasks if task.key not in rows]
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool, lines.open("ab") as file:
         for row in pool.map(work, open_tasks):
-            file.write(msgspec.json.encode(row) + b"\n")
+            file.write(msgspec.json.encode(row, enc_hook=float) + b"\n")
             file.flush()
             print(show(row), flush=True)
             rows[row.key] = row
