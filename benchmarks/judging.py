@@ -20,12 +20,14 @@ class Truth:
         allowed: labels that are neither right nor wrong.
         sizes: label -> parameter -> true value, and its own standard error.
         tested: names that the reference could have found; empty: all.
+        parameters: true values of the model's own parameters.
     """
 
     expected: tuple[tuple[str, ...], ...] = ()
     allowed: tuple[str, ...] = ()
     sizes: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)
     tested: tuple[str, ...] = ()
+    parameters: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -36,11 +38,13 @@ class Judgement:
         verdicts: label -> "right", "allowed", "wrong", or "untested" (wrong, but no reference could have found it).
         found: best grade under which each expected effect is named; "": not.
         sizes: (label, parameter, relative error, within the 95 % interval).
+        parameters: the same of the model's own parameters, name first.
     """
 
     verdicts: dict[str, str]
     found: tuple[str, ...]
     sizes: tuple[tuple[str, str, float, bool], ...]
+    parameters: tuple[tuple[str, float, bool], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,12 @@ def judge(outcome: Outcome, truth: Truth) -> Judgement:
             verdicts[label] = "allowed"
         else:
             verdicts[label] = "wrong" if not truth.tested or _is_among(label, truth.tested) else "untested"
-    return Judgement(verdicts, tuple(found), tuple(_sizes(outcome, truth)))
+    values = tuple(
+        (name, one.value / truth.parameters[name] - 1.0, one.low <= truth.parameters[name] <= one.high)
+        for name, one in outcome.parameters.items()
+        if name in truth.parameters
+    )
+    return Judgement(verdicts, tuple(found), tuple(_sizes(outcome, truth)), values)
 
 
 def _rank(grade: str) -> int:
@@ -152,12 +161,27 @@ def size_line(rows: Sequence[Row]) -> str:
     Returns:
         The line.
     """
-    sizes = [size for row in rows for size in row.judgement.sizes]
-    if not sizes:
-        return "sizes: none"
-    off, inside = np.abs([size[2] for size in sizes]), np.array([size[3] for size in sizes])
+    return _intervals("sizes", [size[2:] for row in rows for size in row.judgement.sizes])
+
+
+def parameter_line(rows: Sequence[Row]) -> str:
+    """Return the same of the model's own parameters.
+
+    Args:
+        rows: of records.
+
+    Returns:
+        The line.
+    """
+    return _intervals("parameters", [value[1:] for row in rows for value in row.judgement.parameters])
+
+
+def _intervals(title: str, values: Sequence[tuple[float, bool]]) -> str:
+    if not values:
+        return f"{title}: none"
+    off, inside = np.abs([value[0] for value in values]), np.array([value[1] for value in values])
     return (
-        f"sizes: {len(sizes)}, off by {100.0 * np.median(off):.1f} % (median), "
+        f"{title}: {len(values)}, off by {100.0 * np.median(off):.1f} % (median), "
         f"{100.0 * np.quantile(off, 0.9):.1f} % (90 %), "
         f"within their 95 % interval {100.0 * inside.mean():.1f} %"
     )

@@ -3,12 +3,15 @@
 This is the only module of the benchmarks that knows the result of ``oc.diagnose``.
 """
 
+import resource
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import orchestrator as oc
+from orchestrator.api.any_fmu import diagnose_fmu
 from orchestrator.errors import OrchestratorError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -45,6 +48,7 @@ class Outcome:
         misfit: signal -> rms on the test part of re-fitted parameters, and with the names.
         refused: why nothing is said; empty: something is.
         seconds: processor time.
+        verdict: of the diagnosis.
     """
 
     names: dict[str, NamedEffect] = field(default_factory=dict)
@@ -52,6 +56,7 @@ class Outcome:
     misfit: dict[str, tuple[float, float]] = field(default_factory=dict)
     refused: str = ""
     seconds: float = 0.0
+    verdict: str = ""
 
     def labels(self, grades: tuple[str, ...] = NAMED) -> list[str]:
         """Return the labels of some grades.
@@ -85,25 +90,49 @@ def diagnose_record(record: Record, model: Model, settings: Any = None, search: 
     return replace(outcome, seconds=time.process_time() - begun)
 
 
+def diagnose_with_fmu(record: Path, fmu: Path, map_path: Path) -> Outcome:
+    """Return what a diagnosis of any FMU says of a record; a refusal is an outcome.
+
+    Args:
+        record, fmu, map_path: the files.
+
+    Returns:
+        The outcome; its processor time is that of the FMU's processes too.
+    """
+    begun = _processor_time()
+    try:
+        result = diagnose_fmu(record, fmu, map_path)
+    except OrchestratorError as error:
+        return Outcome(refused=str(error), seconds=_processor_time() - begun)
+    result.close()
+    return replace(outcome_of(result), seconds=_processor_time() - begun)
+
+
+def _processor_time() -> float:
+    """Return the seconds that this process and its ended children have computed."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
 def outcome_of(result: Any) -> Outcome:
     """Return the outcome of one result of ``oc.diagnose``.
 
     Args:
-        result: of a plant of ours.
+        result: of a plant of ours, or of any FMU.
 
     Returns:
         The outcome.
     """
     diagnosis = result.diagnosis
     names = {}
-    for effect in (*diagnosis.effects, *diagnosis.nuisances):
+    for effect in (*diagnosis.effects, *getattr(diagnosis, "nuisances", ())):
         if effect.name == "drive_gain":  # never more than a remark: values that carry a torque take its place
             continue
         site = getattr(effect, "site", "")
         label = f"{effect.name}@{site}" if site else effect.name
         names[label] = NamedEffect(_grade(effect, diagnosis), _values(effect.parameters), _family(effect))
     parameters = _values({name: one for name, one in diagnosis.parameters.items() if one.value is not None})
-    return Outcome(names, parameters, _misfit(diagnosis))
+    return Outcome(names, parameters, _misfit(diagnosis), verdict=diagnosis.verdict)
 
 
 def _grade(effect: Any, diagnosis: Any) -> str:

@@ -41,10 +41,6 @@ class ProbeSettings(Settings, frozen=True):
     ] = 1e-4
     moves: Annotated[float, share("of a variable's size by which a parameter or a port must change it")] = 1e-9
     impulse: Annotated[float, share("of the drive: the pulse that measures a response")] = 0.5
-    grows: Annotated[
-        float,
-        setting("times its size at the start that a response may have within the record: beyond, motion is unstable"),
-    ] = 2.5
     pushed: Annotated[float, setting("by how much what is handed from FMU to FMU is moved, to see what follows")] = 1e-3
     shorter: Annotated[float, setting("how many times shorter the second such step is", gt=1.0)] = 4.0
     at_once: Annotated[float, share("of a response that the shorter step must leave, to depend at once")] = 0.5

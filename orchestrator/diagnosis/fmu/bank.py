@@ -68,16 +68,10 @@ class Kind:
         lower: smallest value of each.
         amplitudes: in how many of the values, the first ones, the response is linear, where it is not in all.
         needs: the simpler effect that it contains.
-        grows: that one's values, scene -> values to try in its place.
-        becomes: values, scene -> that one's values to try where its law is no other.
-        departs: values, scene -> share by which its law differs from that one's within the motion of the record.
         plausible: values -> False where the fit has left what the effect means.
         angular: only for angles.
-        shrinks: the response to a small value is proportional to it: what is smaller than the least start is found.
         scan: scene -> values of the last parameter, in order and so close that the best of them leads a fit to the
             right one: more than the FMU is run for, looked through with its surrogate.
-        small: scene -> values below those of the scan, in order: too many for it, they are sifted by one product each.
-        finer: values, scene -> small changes where they depend on the values themselves (default: ``scales``).
     """
 
     name: str
@@ -91,15 +85,9 @@ class Kind:
     lower: Values = ()
     amplitudes: int = 0
     needs: str = ""
-    grows: Callable[[Values, Surroundings], tuple[Values, ...]] = lambda values, scene: ()
-    becomes: Callable[[Values, Surroundings], tuple[Values, ...]] = lambda values, scene: ()
-    departs: Callable[[Values, Surroundings], float] = lambda values, scene: 0.0
     plausible: Callable[[Values, Surroundings], bool] = lambda values, scene: True
     angular: bool = False
-    shrinks: bool = False
     scan: Callable[[Surroundings], tuple[float, ...]] = lambda scene: ()
-    small: Callable[[Surroundings], Array] = lambda scene: np.zeros(0)
-    finer: Callable[[Values, Surroundings], Values] | None = None
 
 
 def _delays(s: Surroundings) -> tuple[Values, ...]:
@@ -146,16 +134,6 @@ def _all_quanta(s: Surroundings) -> tuple[float, ...]:
     return tuple(float(s.peak / count) for count in np.arange(60.0, 0.5, -0.25))
 
 
-def _small_quanta(s: Surroundings) -> Array:
-    """Return quanta of which the peak holds 2000 to 60, a quarter more or less each time."""
-    return np.asarray(s.peak / np.arange(2000.0, 60.0, -0.25))
-
-
-def _within_a_quantum(values: Values, s: Surroundings) -> Values:
-    """Return a change of a quantum that moves the peak by a small share of one."""
-    return (0.01 * values[0] ** 2 / s.peak,)
-
-
 def _friction(s: Surroundings) -> tuple[Values, ...]:
     walk = s.speed * s.h
     return tuple((0.05 * s.size, f * walk) for f in (0.1, 0.6, 3.0, 12.0, 60.0))
@@ -180,39 +158,23 @@ def _positive(values: Values, scene: Surroundings) -> bool:
     return values[0] > 0.0
 
 
-def _from_coulomb(values: Values, s: Surroundings) -> tuple[Values, ...]:
-    level, distance = values
-    return tuple((0.9 * level, 1.5 * level, share * s.speed, distance) for share in (0.05, 0.3))
-
-
-def _to_coulomb(values: Values, s: Surroundings) -> tuple[Values, ...]:
-    sliding, _, _, distance = values
-    return ((sliding, distance), (sliding, 0.2 * s.speed * s.h))
-
-
-def _falls(values: Values, s: Surroundings) -> float:
-    """Return the share of Stribeck's friction by which it falls from rest to the typical speed."""
-    sliding, breakaway, speed = values[:3]
-    return float((1.0 - sliding / breakaway) * (1.0 - np.exp(-(min(s.speed / speed, 100.0) ** 2))))
-
-
 _SERIES = (
     Kind("input_gain", INPUT, ("gain",), ("1",), lambda s: (0.01,), lambda s: ((0.01,),), True),
     Kind("input_offset", INPUT, ("offset",), ("effort",), _small(0.01), lambda s: ((0.01 * s.size,),), True),
-    Kind("input_delay", INPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),
-    Kind("input_lag", INPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,), shrinks=True),
+    Kind("input_delay", INPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,)),
+    Kind("input_lag", INPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,)),
     Kind("input_saturation", INPUT, ("limit",), ("effort",), lambda s: (0.003 * s.peak,), _limits, lower=(0.0,),
          scan=_all_limits),
     Kind("input_dead_zone", INPUT, ("width",), ("effort",), lambda s: (0.003 * s.peak,), _widths, lower=(0.0,),
-         shrinks=True, scan=_all_widths),
+         scan=_all_widths),
     Kind("input_rate_limit", INPUT, ("rate",), ("effort/s",), lambda s: (0.01 * _rates(s)[2][0],), _rates,
          lower=(1e-30,), scan=_all_rates),
     Kind("input_quantisation", INPUT, ("step",), ("effort",), lambda s: (0.01 * s.peak,), _quanta, lower=(0.0,),
-         scan=_all_quanta, small=_small_quanta, finer=_within_a_quantum),
+         scan=_all_quanta),
     Kind("output_gain", OUTPUT, ("gain",), ("1",), lambda s: (0.003,), lambda s: ((0.01,),), True),
     Kind("output_offset", OUTPUT, ("offset",), ("flow",), lambda s: (s.noise,), lambda s: ((s.noise,),), True),
-    Kind("output_delay", OUTPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,), shrinks=True),
-    Kind("output_lag", OUTPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,), shrinks=True),
+    Kind("output_delay", OUTPUT, ("delay",), ("s",), lambda s: (0.02 * s.h,), _delays, lower=(0.0,)),
+    Kind("output_lag", OUTPUT, ("time_constant",), ("s",), lambda s: (0.02 * s.h,), _lags, lower=(0.0,)),
     Kind("output_quantisation", OUTPUT, ("step",), ("flow",), lambda s: (s.noise,),
          lambda s: tuple((f * s.noise,) for f in (6.0, 15.0, 40.0, 100.0)), lower=(0.0,)),
 )  # fmt: skip
@@ -225,7 +187,7 @@ _FEEDBACK = (
          ("effort", "effort", "flow/s", "flow"),
          lambda s: (0.01 * s.size, 0.01 * s.size, 0.02 * s.speed, 0.2 * s.speed * s.h), lambda s: (),
          law=laws.STRIBECK, lower=(0.0, 0.0, 1e-300, 1e-300), needs="coulomb_friction",
-         grows=_from_coulomb, becomes=_to_coulomb, departs=_falls, plausible=lambda v, s: v[1] > max(1.03 * v[0], 0.0)),
+         plausible=lambda v, s: v[1] > max(1.03 * v[0], 0.0)),
     Kind("quadratic_drag", PORT, ("coefficient",), ("effort.s2/flow2",), lambda s: (0.01 * s.size / s.speed**2,),
          lambda s: ((0.01 * s.size / s.speed**2,),), True, laws.QUADRATIC, plausible=_positive),
     Kind("viscous_drag", PORT, ("coefficient",), ("effort.s/flow",), lambda s: (0.01 * s.size / s.speed,),
@@ -263,7 +225,7 @@ _INSIDE = (
 _BETWEEN = (
     Kind("backlash", CUT, ("width",), ("flow",), lambda s: (0.02 * s.size,),
          lambda s: tuple((f * s.size,) for f in (0.1, 0.4, 1.5, 6.0, 25.0)), law=laws.BACKLASH, lower=(0.0,),
-         shrinks=True, plausible=lambda v, s: 0.0 < v[0] < 0.5 * s.span),
+         plausible=lambda v, s: 0.0 < v[0] < 0.5 * s.span),
     Kind("compliance", CUT, ("compliance",), ("flow/effort",), lambda s: (0.01 * s.size / s.effort,),
          lambda s: ((0.01 * s.size / s.effort,),), True, law=laws.COMPLIANCE, plausible=_positive),
 )  # fmt: skip
@@ -290,38 +252,10 @@ class BoxEffect:
         """Return name and place."""
         return f"{self.kind.name}@{self.place}" + (f"({self.signal})" if self.signal else "")
 
-    def scales(self, values: Array) -> Values:
-        """Return what counts as a small change of each value.
-
-        Args:
-            values: of the effect's parameters.
-
-        Returns:
-            As many changes.
-        """
-        finer = self.kind.finer
-        return self.kind.scales(self.scene) if finer is None else finer(tuple(values), self.scene)
-
     @property
     def amplitudes(self) -> int:
         """Return in how many of its leading values the response to it is linear."""
         return len(self.kind.parameters) if self.kind.linear else self.kind.amplitudes
-
-    def means(self, values: Array, least: float) -> bool:
-        """Tell whether values are within what the effect means, and its effort is no matter of rounding.
-
-        Args:
-            values: of the effect's parameters.
-            least: share of what is first tried that an effort must have.
-
-        Returns:
-            True when they are.
-        """
-        starts, leading = self.kind.starts(self.scene), self.amplitudes
-        is_effort = self.kind.where in (INPUT, PORT) and leading > 0 and bool(starts)
-        if is_effort and np.all(np.abs(values[:leading]) < least * np.abs(starts[0][:leading])):
-            return False
-        return self.kind.plausible(tuple(values), self.scene)
 
     def bounded(self, values: Array) -> Array:
         """Return values no smaller than what the law allows.

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.diagnosis.fmu.loop import AWAY, GET, SET, STEP, run_loop
-from orchestrator.diagnosis.fmu.wire import Array, Batch, Guide, Job, Load
+from orchestrator.diagnosis.fmu.wire import Array, Batch, Job, Load
 from orchestrator.errors import FmuError, OrchestratorError, SlaveError
 from orchestrator.fmi.model_description import read_description
 from orchestrator.fmi.slave import FmuSlave
@@ -202,8 +202,7 @@ class Box:
         warned = np.zeros((len(self._members), 3), dtype=np.int64)
         status, call, k, n = run_loop(
             calls, counts, where, self._sent, self._read, into, self._outof, values, grid, self._wires, self._gains,
-            passing, passed, ports, sign, q, most, batch.lead, *_led(batch.guide, job.pulls), warned,
-            out,
+            passing, passed, ports, sign, q, most, batch.lead, warned, out,
         )  # fmt: skip
         members = list(self._members.values())
         for member, (count, first, at) in zip(members, warned.tolist(), strict=True):
@@ -257,11 +256,3 @@ class Box:
             values = self._sent[sent:].ctypes.data, self._read[read:].ctypes.data
             where.append([native.inputs[0].ctypes.data, values[0], native.outputs[0].ctypes.data, values[1]])
         return tuple(np.array(rows, dtype=np.int64) for rows in (calls, counts, where))  # type: ignore[return-value]
-
-
-def _led(guide: Guide | None, pulls: list[list[float]]) -> tuple[Array, Array, Array, int]:
-    """Return what leads a run along a record, as the loop takes it."""
-    if guide is None or not pulls:
-        return np.zeros((0, 2), dtype=np.int64), np.zeros((0, 2)), np.zeros((0, 0)), 1
-    places = np.array([guide.inputs, guide.reads], dtype=np.int64).T
-    return np.ascontiguousarray(places), np.array(pulls, dtype=float), guide.samples, guide.every

@@ -77,16 +77,6 @@ def _act(k, sent, read, into, outof, ports, sign, q, most, last, built, step, le
 
 
 @kept()
-def _guide(j, read, outof, guides, pulls, led, off, pull):  # type: ignore[no-untyped-def]
-    """Find the efforts that lead to the record, at sample ``j``, from how far the FMU is off it."""
-    for g in range(len(guides)):
-        behind = led[j, g] - read[outof[guides[g, 1]]]
-        before = off[g] if j > 0 else behind
-        pull[g] = pulls[g, 0] * behind + pulls[g, 1] * (behind - before)
-        off[g] = behind
-
-
-@kept()
 def _note(status, warned, n, call, k):  # type: ignore[no-untyped-def]
     """Count a warning of a member, and remember the first; return the status."""
     if status == 1:
@@ -119,7 +109,7 @@ def _step(calls, counts, where, time, step, k, warned):  # type: ignore[no-untyp
 @kept()
 def run_loop(  # type: ignore[no-untyped-def]
     calls, counts, where, sent, read, into, outof, table, grid, wires, gains, passing, passed, ports, sign, q, most,
-    lead, guides, pulls, led, every, warned, out,
+    lead, warned, out,
 ):  # fmt: skip
     """Run one record; return ``(status, call, step, member)``, status at most 1 when all went well.
 
@@ -141,16 +131,11 @@ def run_loop(  # type: ignore[no-untyped-def]
         q: (effects, 4) parameters.
         most: (effects,) effort at a port from which the run is given up: its loop is unstable.
         lead: steps by which the fed-back signal is extrapolated.
-        guides: (guides, 2) input, variable read that is led along the record.
-        pulls: (guides, 2) effort for being off, and for a change of that since the sample before.
-        led: (samples, guides) the record.
-        every: steps in a sample.
         warned: (members, 3) zeros: number of calls that returned a warning, call and step of the first.
         out: (rows, variables read), row 0 the initial values.
     """
     start, step, per_row = grid[0], grid[1], int(grid[2])
     last, built = np.zeros((len(ports), 2)), np.zeros(len(ports))
-    off, pull = np.zeros(len(guides)), np.zeros(len(guides))
     fed, handed = np.zeros((len(wires), 2)), np.zeros(len(wires))
     for n in range(len(calls)):
         status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
@@ -161,10 +146,6 @@ def run_loop(  # type: ignore[no-untyped-def]
     for k in range(len(table)):
         for i in range(len(into)):
             sent[into[i]] = table[k, i]
-        if len(guides) > 0 and k % every == 0:
-            _guide(k // every, read, outof, guides, pulls, led, off, pull)
-        for g in range(len(guides)):
-            sent[into[guides[g, 0]]] += pull[g]
         _hand_over(k, sent, read, into, outof, wires, gains, passing, passed, fed, handed, lead)
         if not _act(k, sent, read, into, outof, ports, sign, q, most, last, built, step, lead):
             return np.int32(2), AWAY, k, 0

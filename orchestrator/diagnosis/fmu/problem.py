@@ -12,7 +12,7 @@ from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.model import BoxModel, Data
 from orchestrator.diagnosis.fmu.passed import at_input, at_output
 from orchestrator.diagnosis.fmu.runner import Plan, Runner
-from orchestrator.diagnosis.fmu.wire import Feedback, Guide
+from orchestrator.diagnosis.fmu.wire import Feedback
 from orchestrator.diagnosis.fmu_settings import DEFAULT, FmuSettings
 from orchestrator.errors import SlaveError
 from orchestrator.master.protocol import Value
@@ -66,11 +66,6 @@ class BoxProblem:
         return self.h / self.m * (1.0 - self.short)
 
     @property
-    def guide(self) -> Guide | None:
-        """Return what leads runs along the record; None: they are free."""
-        return None
-
-    @property
     def nominal(self) -> BoxModel:
         """Return the model as the user gave it."""
         return BoxModel(np.array([u.value for u in self.map.uncertain]))
@@ -113,18 +108,6 @@ class BoxProblem:
         found = self._runs([self._plan(model, rows) for model in models])
         return [None if y is None else y[:: self.m] for y in found]
 
-    def read_finely(self, model: BoxModel, rows: int) -> Array | None:
-        """Return all that is read of a model after every communication step; None where the FMU failed.
-
-        Args:
-            model: parameters, effects and their values.
-            rows: samples to simulate.
-
-        Returns:
-            The values, (steps + 1, reads), in their own units.
-        """
-        return self._runs([self._plan(model, rows)])[0]
-
     def _plan(self, model: BoxModel, rows: int | None) -> Plan:
         plain = self._plain(self.n if rows is None else rows)
         return Plan(self.starts(model), self.table(model, plain), self._feedback(model))
@@ -147,7 +130,7 @@ class BoxProblem:
         places = {key: k for k, key in reversed(list(enumerate(keys)))}
         order = list(places)
         wanted, start = [plans[places[key]] for key in order], float(self.data.time[0])
-        found = self.runner.run(wanted, start, self.step, 1, guide=self.guide)
+        found = self.runner.run(wanted, start, self.step, 1)
         by_key = dict(zip(order, found, strict=True))
         return [by_key[key] for key in keys]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.fmu.subject import Subject
-from orchestrator.diagnosis.fmu.wire import Batch, Feedback, Guide, Job, Load, Through, Wire
+from orchestrator.diagnosis.fmu.wire import Batch, Feedback, Job, Load, Through, Wire
 from orchestrator.diagnosis.fmu_settings import DEFAULT, ProcessSettings
 from orchestrator.errors import ChildError, FmuError, OrchestratorError, SlaveError
 from orchestrator.master.protocol import Value
@@ -38,16 +38,14 @@ class Plan:
         starts: value by name of parameters and start values.
         table: (steps, inputs) input values, each held over a step.
         effects: in the loop around the FMU.
-        pulls: efforts that lead it along a record, for being off and for a change of that; empty: it runs freely.
     """
 
     starts: dict[str, Value]
     table: Array
     effects: tuple[Feedback, ...] = ()
-    pulls: tuple[tuple[float, float], ...] = ()
 
 
-Grid = tuple[float, float, int, float, bool, Guide | None]
+Grid = tuple[float, float, int, float, bool]
 
 
 class Runner:
@@ -124,7 +122,6 @@ class Runner:
         per_row: int,
         lead: float = 0.5,
         together: bool = False,
-        guide: Guide | None = None,
     ) -> list[Array | None]:
         """Return what each run gave, (rows, reads); None where it failed (``reason`` says why).
 
@@ -135,7 +132,6 @@ class Runner:
             per_row: steps for each row that is returned.
             lead: steps by which fed-back signals are extrapolated.
             together: one after the other in one process.
-            guide: leads them along a record.
 
         Returns:
             A run per plan.
@@ -154,7 +150,7 @@ class Runner:
         if together or (not self.lost and len(plans) * self.step_cost * len(plans[0].table) < own.small):
             size = len(plans)  # the latter: not worth a second child
         waiting = deque(list(range(k, min(k + size, len(plans)))) for k in range(0, len(plans), size))
-        grid = (start, step, per_row, lead, self.fresh, guide)
+        grid = (start, step, per_row, lead, self.fresh)
 
         def work() -> None:
             while True:
@@ -333,10 +329,9 @@ def _batch(chunk: list[int], plans: Sequence[Plan], grid: Grid, through: list[Th
         if id(plan.table) not in places:
             places[id(plan.table)] = len(tables)
             tables.append(np.ascontiguousarray(plan.table))
-        starts = dict(plan.starts)
-        jobs.append(Job(starts, places[id(plan.table)], list(plan.effects), [list(p) for p in plan.pulls]))
-    start, step, per_row, lead, fresh, guide = grid
-    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through, fresh, guide)
+        jobs.append(Job(dict(plan.starts), places[id(plan.table)], list(plan.effects)))
+    start, step, per_row, lead, fresh = grid
+    return Batch(float(start), float(step), int(per_row), tables, jobs, float(lead), through, fresh)
 
 
 def _worded(error: ChildError, allowed: float) -> str:
@@ -362,6 +357,6 @@ def _compile_loop() -> None:
     run_loop.compile(
         (whole[:, ::1], whole[:, ::1], whole[:, ::1], real[::1], real[::1], whole[::1], whole[::1], real[:, ::1],
          real[::1], whole[:, ::1], real[:, ::1], whole[:, ::1], real[::1], whole[:, ::1], real[::1], real[:, ::1],
-         real[::1], real, whole[:, ::1], real[:, ::1], real[:, ::1], whole, whole[:, ::1], real[:, ::1])
+         real[::1], real, whole[:, ::1], real[:, ::1])
     )  # fmt: skip
     _compiled.append(True)

@@ -64,41 +64,18 @@ class Feedback:
 
 @dataclass(frozen=True)
 class Job:
-    """One run: start values by name, number of the input table, effects in the loop.
-
-    ``pulls``: (guides, 2) efforts for being off the record, and for a change of that in a sample; empty: it is free.
-    """
+    """One run: start values by name, number of the input table, effects in the loop."""
 
     starts: dict[str, Value]
     table: int
     effects: list[Feedback]
-    pulls: list[list[float]] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Guide:
-    """Efforts that lead the FMU along a record, each held from sample to sample.
-
-    One is as many times how far what is read stays behind its sample as a job says, and as many times how that changed
-    since the sample before.
-
-    Attributes:
-        inputs, reads: places in the lists of inputs and of what is read.
-        samples: (rows, guides) the record.
-        every: communication steps in a sample.
-    """
-
-    inputs: list[int]
-    reads: list[int]
-    samples: Array
-    every: int
 
 
 @dataclass(frozen=True)
 class Batch:
     """Runs on one grid: ``step`` [s] of the communication, ``per_row`` of them for each row that is returned.
 
-    ``fresh``: a new instance for every run, no reset. ``guide``: leads each of them along the record.
+    ``fresh``: a new instance for every run, no reset.
     """
 
     start: float
@@ -109,4 +86,3 @@ class Batch:
     lead: float = 0.5
     through: list[Through] = field(default_factory=list)
     fresh: bool = False
-    guide: Guide | None = None
