@@ -119,7 +119,7 @@ def calibrate(
     Example:
         >>> fit = oc.calibrate("axis.csv", "axis.fmu", "axis_map.toml")
         >>> [*fit.calibration.diagnosis.parameters], fit.trust.level.word
-        (['J', 'b'], 'amber')
+        (['J', 'b'], 'red')
     """
     begun = time.monotonic()
     used = chosen_settings(settings, DiagnosisSettings)

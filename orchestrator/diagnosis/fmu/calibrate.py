@@ -11,12 +11,12 @@ from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.result import FmuDiagnosis
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.diagnosis.report.estimates import value_covariance
+from orchestrator.diagnosis.report.judgement import is_missed
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 
 CONFOUNDED = 0.95  # correlation from which two parameters count as not told apart
 LEARNED = 0.3  # share of its uncertainty below which the records have said little of a parameter
-LEFT = 1.5  # squared whitened error for each row from which more than noise is left
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class FmuCalibration:
         diagnosis: of the re-fitted model, no effect searched for.
         learned: name -> share of the granted uncertainty that the records have removed, 0 to 1.
         confounded: pairs that the records hardly tell apart.
-        explained: nothing but noise is left.
+        explained: free runs over test data miss no output by more than its noise, and what is left follows nothing.
         notes: sentences.
     """
 
@@ -82,7 +82,7 @@ def calibrate_fmu(
         f"`{name}` is hardly determined: excite what it acts on" for name, share in learned.items() if share < LEARNED
     ]
     notes += [f"`{a}` and `{b}` are hardly told apart: excite them at other frequencies" for a, b in pairs]
-    explained = float(fitted.residual @ fitted.residual) < LEFT * fitted.residual.size
+    explained = found.verdict != "unknown" and not any(is_missed(one) for test in found.test for one in test.signals)
     if not explained:
         notes.append("something else is missing: `diagnose` says what")
     return FmuCalibration(found, learned, pairs, explained, tuple(notes))

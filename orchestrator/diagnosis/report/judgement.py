@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from orchestrator.diagnosis.model.interface import ModelPoint
-from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, TestMisfit
+from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, SignalMisfit, TestMisfit
 from orchestrator.diagnosis.selection.grading import Grade, RecordEvidence
 from orchestrator.diagnosis.selection.remaining import Dependence
 from orchestrator.diagnosis.selection.search import SearchResult
@@ -86,7 +86,7 @@ def judge_trust(
         if one.is_worse(settings.report.worse, settings.report.of_noise):
             red.append(f"the final model predicts the test part of {one.source} worse than re-fitted parameters do")
         for signal in one.signals:
-            if signal.final > NOTABLE * signal.noise:
+            if is_missed(signal):
                 amber.append(
                     f"free runs on the test part of {one.source} miss {signal.signal} by "
                     f"{signal.final / signal.noise:.3g} times its noise"
@@ -101,6 +101,18 @@ def judge_trust(
                 f"`{known.name}` lies outside the range that the model file states: its value, or a unit, may be wrong"
             )
     return trust_of([*(Reason(Level.RED, text) for text in red), *(Reason(Level.AMBER, text) for text in amber)])
+
+
+def is_missed(signal: SignalMisfit) -> bool:
+    """Tell whether free runs of the final model miss a signal by more than its noise, as an engineer sees it.
+
+    Args:
+        signal: misfits on test data.
+
+    Returns:
+        Whether they do.
+    """
+    return signal.final > NOTABLE * signal.noise
 
 
 def _is_far(estimate: ParameterEstimate, uncertainty: float) -> bool:
