@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.checking.archive import FmuFiles
-from orchestrator.checking.binaries import MAXIMUM_BYTES, here, inspect, library_name, misfit
-from orchestrator.checking.description import Description, Interface, ScalarVariable, number
+from orchestrator.checking.binaries import MAXIMUM_BYTES, PLATFORMS, here, inspect, library_name, misfit
+from orchestrator.checking.description import Description, Interface, Variable, number
 from orchestrator.checking.findings import Execution, Finding
 from orchestrator.checking.layered import ReferenceResult
 from orchestrator.checking.probing import probes, probes_compare, probes_misuse, probes_reference, trajectory
@@ -54,13 +54,13 @@ def obstacle(d: Description, files: FmuFiles) -> str:
     Returns:
         The reason, in words.
     """
-    interface = d.cosimulation
+    interface = d.interface("CoSimulation")
     if interface is None:
         return "it has no co-simulation interface"
     path = library_name(interface.identifier or "", here())
     if path not in files.names():
         return f"there is no {path}, which this machine would load"
-    unfit = misfit(inspect(files.read(path, MAXIMUM_BYTES)), path, here())
+    unfit = misfit(inspect(files.read(path, MAXIMUM_BYTES)), path, PLATFORMS["2.0"][here()], native=True)
     return "" if unfit is None else unfit.message
 
 
@@ -83,7 +83,7 @@ def check_dynamic(
     Raises:
         OutputError: there is no room to unpack the FMU.
     """
-    interface = d.cosimulation
+    interface = d.interface("CoSimulation")
     assert interface is not None
     with Scratch("check") as scratch:
         fmu = scratch.path / "fmu"
@@ -262,7 +262,7 @@ def _or(value: float | None, default: float) -> float:
     return default if value is None or not math.isfinite(value) else value
 
 
-def _plain(v: ScalarVariable, reference: int) -> trajectory.ProbedVariable:
+def _plain(v: Variable, reference: int) -> trajectory.ProbedVariable:
     start: Any = v.start
     if start is not None:
         if v.base == "Boolean":

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
+from orchestrator.checking.companions import check_companions
 from orchestrator.checking.description import Description
 from orchestrator.checking.findings import Finding
 
@@ -39,24 +40,43 @@ class ReferenceResult:
     rows: tuple[tuple[float, ...], ...]
 
 
-def check_files(files: FmuFiles) -> Iterator[Finding]:
-    """Findings about the documentation and the icon.
+def check_files(d: Description, files: FmuFiles) -> Iterator[Finding]:
+    """Findings about the documentation, the icon, and the further files of FMI 3.0.
 
     Args:
+        d: the model description.
         files: of the FMU.
 
     Yields:
         Each finding.
     """
     names = set(files.names())
+    if d.dialect.version == "3.0":
+        yield from check_companions(d, files)
+        yield from _documents(d, names)
     documents = any(re.fullmatch(r"documentation/(?!licenses/|diagrams?/).+", n) for n in names)
-    entries = ("documentation/index.html", "documentation/_main.html")
+    entries = ("documentation/index.html", "documentation/_main.html")[: 2 if d.dialect.version == "2.0" else 1]
     if documents and not names & set(entries):
         yield Finding(
             "file.documentation", "documentation", f"documentation/ must have the entry {entries[0]}, but has not"
         )
     if "model.png" in names and files.read("model.png", 1 << 26)[:8] != b"\x89PNG\r\n\x1a\n":
         yield Finding("file.icon", "model.png", "the icon must be a PNG image, but is not")
+
+
+def _documents(d: Description, names: set[str]) -> Iterator[Finding]:
+    """FMI 3.0: entry pages of the folders of documentation."""
+    licences = [n for n in names if n.startswith("documentation/licenses/")]
+    if licences and not any(re.fullmatch(r"documentation/licenses/license\.(txt|html|spdx)", n) for n in licences):
+        message = "documentation/licenses must have the entry license.txt, .html or .spdx, but has not"
+        yield Finding("file.license", "documentation/licenses", message)
+    if "documentation/diagram.svg" in names and "documentation/diagram.png" not in names:
+        message = "a diagram in SVG must be there as PNG, too, but is not"
+        yield Finding("file.documentation", "documentation/diagram.svg", message)
+    external = {"documentation/externalDependencies.txt", "documentation/externalDependencies.html"}
+    if any(i.flag("needsExecutionTool") for i in d.interfaces) and not external & names:
+        message = "a tool that the FMU needs must be documented in documentation/externalDependencies.txt or .html"
+        yield Finding("file.external", "documentation", f"{message}, but is not")
 
 
 def check_layered(d: Description, files: FmuFiles) -> tuple[list[ReferenceResult], list[Finding]]:
@@ -78,7 +98,7 @@ def check_layered(d: Description, files: FmuFiles) -> tuple[list[ReferenceResult
         if root is None:
             continue
         folder = path.split("/")[1]
-        for attribute in ("fmi-ls-name", "fmi-ls-version"):
+        for attribute in ("fmi-ls-name", "fmi-ls-version", "fmi-ls-description"):
             if not root.get(_NAMESPACE + attribute):
                 findings.append(Finding("layered.manifest", path, f"the manifest must have {attribute}, but has not"))
         name = root.get(_NAMESPACE + "fmi-ls-name")

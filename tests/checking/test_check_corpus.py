@@ -72,7 +72,6 @@ NOT_IN_THE_CORPUS = {
     "model.vendor-annotation",
     "run.not-executed",
     "run.failed",
-    "schema.fmpy",
     "variable.alias-start",
     "variable.name-flat",
 }
