@@ -54,6 +54,8 @@ def obstacle(d: Description, files: FmuFiles) -> str:
     Returns:
         The reason, in words.
     """
+    if d.dialect.version != "2.0":
+        return f"FMUs of FMI {d.dialect.version} are not run yet"
     interface = d.interface("CoSimulation")
     if interface is None:
         return "it has no co-simulation interface"

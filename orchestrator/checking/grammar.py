@@ -2,10 +2,10 @@
 
 A line of a grammar (``tables.grammar2``, ``tables.grammar3``) is a type: ``name | children | attributes``.
 
-Children are a sequence of tags, each with ``?``, ``*`` or ``+`` as in a regular expression; ``(A|B)`` is a choice, ``ANY``
-allows whatever is well-formed. A tag is of the type of its name, or of the one behind a colon. Attributes are ``name``,
-``name:kind`` or ``name:kind*`` for a list; ``!`` makes one compulsory; ``a/b/c`` is a choice of words; ``@name`` takes over
-the attributes of a line, ``*`` allows attributes that the grammar does not have.
+Children are a sequence of tags, each with ``?``, ``*`` or ``+`` as in a regular expression; ``(A|B)`` is a choice,
+``ANY`` allows whatever is well-formed. A tag is of the type of its name, or of the one behind a colon. Attributes are
+``name``, ``name:kind`` or ``name:kind*`` for a list; ``!`` makes one compulsory; ``a/b/c`` is a choice of words;
+``@name`` takes over the attributes of a line, ``*`` allows attributes that the grammar does not have.
 """
 
 import functools

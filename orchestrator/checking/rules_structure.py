@@ -121,7 +121,7 @@ def _unknowns(d: Description, section: tuple[StructureEntry, ...]) -> Iterator[F
             yield Finding("structure.order", path, "InitialUnknowns must be sorted by index, but are not")
         seen.add(u.variable)
         last = max(last, u.variable)
-        yield from _kinds(u, v, initial and d.dialect.version == "3.0")
+        yield from _kinds(u, v, initial, d.dialect.version == "3.0")
         yield from _dependencies(d, u, initial)
 
 
@@ -131,7 +131,7 @@ def _wanted(d: Description) -> str:
     return "a value reference must be that of a variable"
 
 
-def _kinds(u: StructureEntry, v: Variable | None, initial: bool) -> Iterator[Finding]:
+def _kinds(u: StructureEntry, v: Variable | None, initial: bool, three: bool) -> Iterator[Finding]:
     if u.kinds is None:
         return
     path = u.path("dependenciesKind")
@@ -139,12 +139,12 @@ def _kinds(u: StructureEntry, v: Variable | None, initial: bool) -> Iterator[Fin
         count = "absent" if u.dependencies is None else f"{len(u.dependencies)} long"
         message = f"dependenciesKind ({len(u.kinds)} long) must go with dependencies of the same length, but"
         yield Finding("structure.dependencies-kind", path, f"{message} they are {count}")
-    elif initial and not set(u.kinds) <= set(_OF_INITIALISATION):
+    elif three and initial and not set(u.kinds) <= set(_OF_INITIALISATION):
         message = "dependenciesKind of an initial unknown must be dependent or constant, but is"
         yield Finding("structure.dependencies-kind", path, f"{message} {' '.join(u.kinds)}")
-    elif v is not None and v.kind not in REAL and set(u.kinds) - {"dependent"}:
+    elif three and v is not None and v.kind not in REAL and set(u.kinds) - {"dependent"}:
         message = f"dependenciesKind of `{v.name}`, which is no floating point variable, must be dependent, but is"
-        yield Finding("structure.dependencies-kind", path, f"{message} {' '.join(u.kinds)}")
+        yield Finding("structure.dependencies-kind-type", path, f"{message} {' '.join(u.kinds)}")
 
 
 def _dependencies(d: Description, u: StructureEntry, initial: bool) -> Iterator[Finding]:

@@ -106,7 +106,8 @@ def _combination(dialect: Dialect, v: Variable) -> Iterator[Finding]:
     pair = f'causality="{v.causality}", variability="{v.variability}"'
     if v.kind not in (*REAL, "") and v.variability == "continuous":
         declared = "" if "variability" in v.element.attrib else " (the default)"
-        message = f'only floating point variables can be continuous, but `{v.name}` is {v.kind} with variability="continuous"{declared}'
+        found = f'`{v.name}` is {v.kind} with variability="continuous"{declared}'
+        message = f"only floating point variables can be continuous, but {found}"
         yield Finding("variable.continuous-not-real", v.path("variability"), message)
     elif (v.causality, v.variability) not in dialect.initial:
         message = f"`{v.name}` has {pair}, which the standard does not allow"

@@ -101,7 +101,8 @@ structure.event-indicators | E | - | 2.4.8 | event indicators are continuous flo
 structure.duplicate | E | 2.2.8 | 2.4.8 | an entry is listed once | remove the repeated one
 structure.order | W | 2.2.8 | - | lists are sorted by index | sort them
 structure.dependencies | E | 2.2.8 | 2.4.8 | dependencies are possible knowns | correct the list
-structure.dependencies-kind | E | 2.2.8 | 2.4.8 | dependenciesKind is as long as dependencies, and of kinds that the unknown can have | give one kind per dependency
+structure.dependencies-kind | E | 2.2.8 | 2.4.8 | dependenciesKind is as long as dependencies, and of kinds that an initial unknown can have | give one kind per dependency
+structure.dependencies-kind-type | W | - | 2.4.8 | unknowns that are no floating point variables have dependencies of the kind dependent only | write dependent
 
 [files]
 file.source-missing | W | 2.3 | - | source files named are in sources/ | add the file, or remove it from SourceFiles
@@ -117,7 +118,7 @@ terminals.stream | E | - | 2.4.9.2 | a terminal with a stream has one inflow or 
 terminals.icon | W | - | 2.4.9.1 | icons that are named exist, as PNG | add the image
 terminals.coordinates | W | - | 2.4.9.1 | the coordinate system is one of the first quadrant | exchange the corners
 build.missing | E | - | 2.5.1.3 | sources come with a build description | add sources/buildDescription.xml
-build.identifier | E | - | 2.4.10 | build configurations are those of an interface | write its modelIdentifier
+build.identifier | W | - | 2.4.10 | build configurations are those of an interface | write its modelIdentifier
 build.file | E | - | 2.4.10 | source files that are named are in sources/ | add the file, or remove the entry
 build.include | W | - | 2.4.10 | folders of headers that are named are in sources/ | add the folder, or remove the entry
 layered.manifest | W | 2.3 | 2.6 | a layered standard's manifest is complete and in its folder | correct the attributes or the folder
