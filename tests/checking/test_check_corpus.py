@@ -7,6 +7,8 @@ import pytest
 
 from orchestrator.checking.check import check_fmu
 from orchestrator.checking.rules import RULES
+from tests.support.broken_ball3 import behavioural
+from tests.support.broken_ball3_xml import static
 from tests.support.broken_fmus import QUICK, Broken, corpus, good
 from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
 
@@ -59,7 +61,7 @@ def test_an_fmu_that_writes_to_our_pipe_forges_no_finding(tmp_path: Path) -> Non
 
 
 def test_the_corpus_is_large_and_covers_the_rules() -> None:
-    covered = {b.rule for b in CORPUS}
+    covered = {b.rule for b in CORPUS} | {m.rule for m in (*behavioural(), *static())}
     assert len(CORPUS) >= 40
     assert f"{len(CORPUS)} FMUs, each broken by one mutation" in DOCS.read_text(encoding="utf-8")
     assert len({b.name for b in CORPUS}) == len(CORPUS)

@@ -167,8 +167,9 @@ _CELL = st.text(st.characters(blacklist_categories=()), max_size=6) | st.floats(
 @settings(max_examples=200)
 def test_any_bytes_are_a_reference_result_or_refused(rows: list[list[str]], tail: bytes) -> None:
     data = b"time,x\n0,1\n" + "\n".join(",".join(r) for r in rows).encode(errors="replace") + tail
+    d = read_description(etree.fromstring(variables(real("x"))))
     try:
-        result = _read_csv("r.csv", data, {"x"})
+        result = _read_csv("r.csv", data, {v.name: v for v in d.variables}, d)
     except (ValueError, csv.Error):
         return
     assert result.names == ("x",)
