@@ -57,9 +57,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--version", choices=("2.0", "3.0"), default="2.0", help="of FMI")
     parser.add_argument("--count", type=int, default=10**9, help="FMUs at most")
-    parser.add_argument(
-        "--run-share", type=float, default=0.25, help="share of FMUs that are run, where they may"
-    )
+    parser.add_argument("--run-share", type=float, default=0.25, help="share of FMUs that are run, where they may")
     arguments = parser.parse_args()
     rng = random.Random(arguments.seed)
     named: Counter[str] = Counter()

@@ -4,7 +4,7 @@ import platform
 import posixpath
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from orchestrator.checking.archive import FmuFiles
@@ -128,6 +128,27 @@ def library_name(identifier: str, folder: str, version: Version = "2.0") -> str:
     """
     described = PLATFORMS[version].get(folder)
     return f"binaries/{folder}/{identifier}{described.suffix if described else ''}"
+
+
+def loadable(d: Description, interface: Interface, names: Collection[str]) -> str:
+    """The library of an interface for this machine.
+
+    Args:
+        d: the model description.
+        interface: whose library.
+        names: of the FMU's files.
+
+    Returns:
+        Its path; where none is named after the modelIdentifier, that of the only one there is; otherwise nothing.
+    """
+    version = d.dialect.version
+    folder = here(version)
+    path = library_name(interface.identifier or "", folder, version)
+    if path in names:
+        return path
+    suffix = PLATFORMS[version][folder].suffix if folder in PLATFORMS[version] else ""
+    others = [n for n in names if suffix and posixpath.dirname(n) == f"binaries/{folder}" and n.endswith(suffix)]
+    return others[0] if len(others) == 1 else ""
 
 
 def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from orchestrator.checking.archive import FmuFiles
-from orchestrator.checking.binaries import MAXIMUM_BYTES, PLATFORMS, here, inspect, library_name, misfit
+from orchestrator.checking.binaries import MAXIMUM_BYTES, PLATFORMS, here, inspect, library_name, loadable, misfit
 from orchestrator.checking.description import Description, Interface
 from orchestrator.checking.findings import Execution, Finding
 from orchestrator.checking.layered import ReferenceResult
@@ -66,9 +66,10 @@ def obstacle(d: Description, files: FmuFiles) -> str:
 
 def _obstacle(d: Description, interface: Interface, files: FmuFiles) -> str:
     version = d.dialect.version
-    path = library_name(interface.identifier or "", here(version), version)
-    if path not in files.names():
-        return f"there is no {path}, which this machine would load"
+    path = loadable(d, interface, set(files.names()))
+    if not path:
+        wanted = library_name(interface.identifier or "", here(version), version)
+        return f"there is no {wanted}, which this machine would load"
     unfit = misfit(inspect(files.read(path, MAXIMUM_BYTES)), path, PLATFORMS[version][here(version)], native=True)
     return "" if unfit is None else unfit.message
 
@@ -107,13 +108,14 @@ def check_dynamic(
             if reason:
                 executions.append(Execution(interface.kind, dict.fromkeys(("load", *names), reason)))
                 continue
+            library = loadable(d, interface, set(files.names()))
             rest = [] if executions or interface.kind == "ScheduledExecution" else references
             first = _Watcher(fmu, limits, walls, interface.kind if several else "")
-            found = first.run(make_job(d, interface, fmu, rest[0] if rest else None, limits), names)
+            found = first.run(make_job(d, interface, fmu, library, rest[0] if rest else None, limits), names)
             for reference in rest[1:]:
                 if any(f.severity == "error" for f in found):
                     break
-                job = make_job(d, interface, fmu, reference, limits)
+                job = make_job(d, interface, fmu, library, reference, limits)
                 found += _Watcher(fmu, limits, walls, interface.kind if several else "").run(job, ("reference",))
             findings += found
             executions.append(Execution(interface.kind, first.stages))

@@ -4,7 +4,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-from orchestrator.checking.binaries import here, library_name
 from orchestrator.checking.description import Description, Interface, Variable, number
 from orchestrator.checking.layered import ReferenceResult
 from orchestrator.checking.probing.binding import ProbedVariable
@@ -22,7 +21,7 @@ _FLAGS = (
 
 
 def make_job(
-    d: Description, interface: Interface, fmu: Path, reference: ReferenceResult | None, limits: Limits
+    d: Description, interface: Interface, fmu: Path, library: str, reference: ReferenceResult | None, limits: Limits
 ) -> ProbeJob:
     """What is to be run of an interface.
 
@@ -30,6 +29,7 @@ def make_job(
         d: the model description.
         interface: the one that is run.
         fmu: the folder of the unpacked FMU.
+        library: path of the shared library in it.
         reference: the result to be reproduced, or None.
         limits: of the child process.
 
@@ -54,7 +54,7 @@ def make_job(
     return ProbeJob(
         version=version,
         interface=interface.kind,
-        library=str(fmu / library_name(str(interface.identifier), here(version), version)),
+        library=str(fmu / library),
         token=d.root.get(d.dialect.token, ""),
         resources=resources,
         variables=variables,
