@@ -8,6 +8,9 @@
 #include <unistd.h>
 #include <signal.h>
 #include "fmi3Functions.h"
+#ifdef HOSTILE
+static void *volatile hoard;
+#endif
 #include "hostile.h"
 
 #ifndef TOKEN

@@ -35,7 +35,7 @@ static fmi3Status get64(Ball *b, fmi3ValueReference r, double *out, size_t *used
 FMI3_Export fmi3Status fmi3GetFloat64(fmi3Instance i, const fmi3ValueReference r[], size_t n, fmi3Float64 out[], size_t nOut) {
     Ball *b = i;
     double found[SIZE];
-    size_t used, at = 0;
+    size_t used, next = 0;
     AT(get);
 #ifdef FAULT_update_outside
     if (b->update && b->mode == STEP) { bool early = false; double when = 0.0; b->update(b->environment, b->s.time, false, true, false, false, &early, &when); }
@@ -51,14 +51,14 @@ FMI3_Export fmi3Status fmi3GetFloat64(fmi3Instance i, const fmi3ValueReference r
         if (r[k] > BIG) abort();
 #endif
 #ifdef FAULT_unknown_reference
-        if (r[k] > BIG) { out[at++] = 0.0; continue; }
+        if (r[k] > BIG) { out[next++] = 0.0; continue; }
 #endif
         if (get64(b, r[k], found, &used) != fmi3OK) return fmi3Error;
 #ifdef FAULT_value_count
-        if (at + used > nOut) return refuse(b, "too few values");
+        if (next + used > nOut) return refuse(b, "too few values");
 #else
-        if (at + used > nOut) return refuse(b, "too few values");
-        if (k + 1 == n && at + used != nOut) return refuse(b, "another number of values");
+        if (next + used > nOut) return refuse(b, "too few values");
+        if (k + 1 == n && next + used != nOut) return refuse(b, "another number of values");
 #endif
 #ifdef FAULT_random
         if (r[k] == X && b->s.steps) found[0] += 0.01 * (double)(++seed % 7);
@@ -69,8 +69,8 @@ FMI3_Export fmi3Status fmi3GetFloat64(fmi3Instance i, const fmi3ValueReference r
 #ifdef FAULT_out_of_range
         if (r[k] == X && b->s.steps > 5) found[0] += 100.0;
 #endif
-        memcpy(out + at, found, used * sizeof *found);
-        at += used;
+        memcpy(out + next, found, used * sizeof *found);
+        next += used;
     }
     return fmi3OK;
 }
