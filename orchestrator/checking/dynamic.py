@@ -20,6 +20,7 @@ from orchestrator.checking.probing import (
 from orchestrator.checking.probing.binding import PENDING, Library, StatusError, TerminatedError
 from orchestrator.checking.probing.describing import make_job
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.process import Process
 from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, OutputError
 from orchestrator.shared.isolation.jail import Jail
@@ -135,19 +136,21 @@ class _Watcher:
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
         before = _snapshot(self.fmu)
-        with Jail(
-            "orchestrator.checking.host:opened", write=[self.fmu], limits=self.limits, walls=self.walls, adopt=True
-        ) as jail:
-            library = Library(jail, job.version, job.variables)
+        with Process(self._started) as process:
+            library = Library(process, job.version, job.variables)
             try:
                 self._probes(library, job, names)
             except ChildError as error:
                 self._ended_early(error, library.current)
-            left = jail.finish()
+            left = process.jail.finish() or process.left
             self._skipped(names)
-            self._left_behind(before, jail, left)
+            self._left_behind(before, process.jail, left)
             self.stages |= dict.fromkeys(("run", "afterwards"), "")
         return self.findings
+
+    def _started(self) -> Jail:
+        entry = "orchestrator.checking.host:opened"
+        return Jail(entry, write=[self.fmu], limits=self.limits, walls=self.walls, adopt=True)
 
     def _probes(self, library: Library, job: ProbeJob, names: tuple[str, ...]) -> None:
         problem = library.load(job.library)

@@ -151,6 +151,9 @@ class FmiProcess(Protocol):
             The bytes.
         """
 
+    def renew(self) -> None:
+        """End the child and start another one."""
+
 
 class Library:
     """The shared library of an FMU.
@@ -167,6 +170,7 @@ class Library:
         self.current = ""
         self.ended = False
         self.messages: list[str] = []
+        self._path = ""
         self._known = {(_LETTERS.get(v.base, ""), v.reference): v.name for v in reversed(variables)}
 
     def load(self, path: str) -> str:
@@ -178,9 +182,15 @@ class Library:
         Returns:
             The reason, empty when it is loaded.
         """
+        self._path = path
         names = self.names
         freer = f"{names.prefix}FreeInstance"
         return str(self._ask("loading the library", "load", path, list(names.texts), list(names.makers), freer))
+
+    def renew(self) -> None:
+        """Load the library anew in another process; its instances and states are gone."""
+        self._host.renew()
+        self.load(self._path)
 
     def _ask(self, doing: str, *request: Any) -> Any:
         """Let the child do something; where that ends the child, ``current`` keeps what it was."""

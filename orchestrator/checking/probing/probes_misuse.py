@@ -17,6 +17,7 @@ def misuse(context: Context) -> None:
     """
     bench, job = context.bench, context.bench.job
     prefix = bench.library.names.prefix
+    bench.prepare()
     number = bench.driver.make(bench.library, "instance", "{a guid of another model}", job)
     if number is not None:
         bench.library.free(number)

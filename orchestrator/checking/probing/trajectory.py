@@ -36,6 +36,14 @@ class Bench:
         self.library = library
         self.report = report
         self.excited = True
+        self._once = "canBeInstantiatedOnlyOncePerProcess" in job.flags
+        self._used = False
+
+    def prepare(self) -> None:
+        """Make sure that an instance can be made: in another process where one has been made and only one may be."""
+        if self._once and self._used:
+            self.library.renew()
+        self._used = True
 
     @property
     def driver(self) -> type[Driver]:
@@ -57,6 +65,7 @@ class Bench:
         Raises:
             StatusError: it cannot be made or initialised.
         """
+        self.prepare()
         number = self.driver.make(self.library, name, self.job.token, self.job, **options)
         if number is None:
             said = f" ({'; '.join(self.library.messages)})" if self.library.messages else ""
