@@ -18,6 +18,7 @@ TYPES: dict[str, Any] = {
     "int32": ctypes.c_int32, "uint32": ctypes.c_uint32, "int64": ctypes.c_int64, "uint64": ctypes.c_uint64,
 }  # fmt: skip
 _MESSAGES = 4
+_ERRORS = (3, 4)  # Error and Fatal
 _MOST_UPDATES = 10_000
 _LONGEST_TEXT = 1 << 20
 _LOG = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
@@ -68,6 +69,7 @@ class Host:
         self._states: dict[int, c_void_p] = {}
         self._number = 0
         self._messages: list[str] = []
+        self._errors = 0
         self._function = ""
         self._updates: list[list[Any]] = []
         self._plan: list[Any] = [0, [], [], [], -1]
@@ -78,10 +80,12 @@ class Host:
         self._clock_update = _CLOCK_UPDATE(lambda _: None)
         self._lock, self._unlock = _LOCK(lambda: self._count(1)), _LOCK(lambda: self._count(-1))
 
-    def _log(self, _environment: int, _name: bytes, _status: int, _category: bytes, message: int, *rest: Any) -> None:
+    def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, message: int, *rest: Any) -> None:
+        self._errors += status in _ERRORS
         self._take(fill_in(message, rest))
 
-    def _log_3(self, _environment: int, _status: int, _category: bytes, message: bytes) -> None:
+    def _log_3(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
+        self._errors += status in _ERRORS
         self._take((message or b"").decode("utf-8", "replace").strip())
 
     def _take(self, text: str) -> None:
@@ -252,13 +256,13 @@ class Host:
             arguments: lists of kind and value, see ``_argument``.
 
         Returns:
-            Status, what the output arguments hold, and what was logged.
+            Status, what the output arguments hold, what was logged, and how many of that as errors.
         """
-        self._messages, self._function = [], function
+        self._messages, self._errors, self._function = [], 0, function
         made = [self._argument(*a) for a in arguments]
         values = [value for group, _ in made for value in group]
         status = getattr(self._handle, function)(self._instances[instance][0], *values)
-        return [int(status), [read() for _, read in made if read is not None], self._messages]
+        return [int(status), [read() for _, read in made if read is not None], self._messages, self._errors]
 
     def calls(self, instance: int, requests: list[list[Any]]) -> list[Any]:
         """Call several functions, up to the first that returns neither OK nor Warning.

@@ -162,6 +162,7 @@ class Library:
         current: the function under way; empty when none is.
         ended: whether the child process is gone.
         messages: the last few that an instance logged during the present call.
+        errors: how many it logged as errors during the present call.
     """
 
     def __init__(self, host: FmiProcess, version: Version = "2.0", variables: Sequence[ProbedVariable] = ()) -> None:
@@ -170,6 +171,9 @@ class Library:
         self.current = ""
         self.ended = False
         self.messages: list[str] = []
+        self.errors = 0
+        self.logged: list[tuple[list[str], int]] = []
+        """Messages and number of errors of each call that was done last in one go."""
         self._path = ""
         self._known = {(_LETTERS.get(v.base, ""), v.reference): v.name for v in reversed(variables)}
 
@@ -266,8 +270,8 @@ class Library:
     def _checked(self, answer: Any, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
         """An answer that has the shape of one."""
         match answer:
-            case [int() as status, list() as values, messages]:
-                self.messages = self._texts(messages)
+            case [int() as status, list() as values, messages, int() as errors]:
+                self.messages, self.errors = self._texts(messages), errors
                 if len(values) == sum(a[0].startswith(("out", "new", "free", "event")) for a in arguments):
                     return status, values
         raise odd(function)
@@ -289,11 +293,13 @@ class Library:
         """
         doing = ", ".join(dict.fromkeys(function for function, _ in requests))
         answers = self._ask(doing, "calls", number, [[f, [list(a) for a in arguments]] for f, arguments in requests])
-        done = []
+        done: list[tuple[int, list[Any]]] = []
+        self.logged = []
         if not isinstance(answers, list) or not 1 <= len(answers) <= len(requests):
             raise odd(doing)
         for answer, (function, arguments) in zip(answers, requests, strict=False):
             done.append(self._checked(answer, function, arguments))
+            self.logged.append((self.messages, self.errors))
         return done
 
     def plan(self, number: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:
@@ -354,6 +360,8 @@ class Instance:
         self.library = library
         self.number = number
         self.dead = False
+        self.remarks: dict[str, tuple[int, str]] = {}
+        """Warnings, and errors that were logged while a call went well: how many, and the first, by rule."""
         self.memory: dict[str, Any] = {}
         """What a driver keeps beside the FMU, saved and restored with its states."""
         self._memories: dict[int, dict[str, Any]] = {}
@@ -395,7 +403,15 @@ class Instance:
         status, values = self.raw(function, *arguments)
         if status not in (OK, WARNING):
             raise self.refused(function, status, when)
+        self._remark(self.library.names.prefix + function, status, self.library.messages, self.library.errors)
         return values
+
+    def _remark(self, function: str, status: int, messages: list[str], errors: int) -> None:
+        """Take note of a warning, and of an error that was logged although the call went well."""
+        if status == WARNING or errors:
+            rule = "run.warning" if status == WARNING else "run.logged-error"
+            count, first = self.remarks.get(rule, (0, f"{function} ({'; '.join(messages)})" if messages else function))
+            self.remarks[rule] = (count + 1, first)
 
     def call_many(self, requests: Sequence[Request], when: str = "") -> list[list[Any]]:
         """Call functions in one go, each of which must return OK or Warning.
@@ -422,6 +438,8 @@ class Instance:
             raise self.refused(requests[len(done) - 1][0], status, when)
         if len(done) < len(requests):
             raise odd(requests[len(done)][0])
+        for (function, _), (status, _), (messages, errors) in zip(requests, done, self.library.logged, strict=True):
+            self._remark(prefix + function, status, messages, errors)
         return [values for _, values in done]
 
     def refused(self, function: str, status: int, when: str = "") -> StatusError:

@@ -30,7 +30,7 @@ class CoSimulation2(Driver):
 
     def advance(self, t: float, size: float, when: str = "") -> None:
         status, _ = self.raw("DoStep", ("double", t), ("double", size), ("int", 0))
-        messages = self.library.messages
+        messages, errors = self.library.messages, self.library.errors
         if status == DISCARD:
             answer, ended = self.raw("GetBooleanStatus", ("int", _TERMINATED), ("out", "int", 1))
             if answer == OK and ended[0][0]:
@@ -40,6 +40,7 @@ class CoSimulation2(Driver):
         self.library.messages = messages
         if status not in (OK, WARNING):
             raise self.refused("DoStep", status, when)
+        self._remark("fmi2DoStep", status, messages, errors)
 
     def _wait(self) -> int:
         """Ask until the step is done; the child's limits end this when it takes too long."""

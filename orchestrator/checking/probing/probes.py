@@ -5,7 +5,7 @@ A probe that cannot be carried out on an FMU raises ``SkippedError`` with the re
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from orchestrator.checking.probing.binding import Library, ProbedVariable, StatusError, TerminatedError, finite
@@ -29,12 +29,14 @@ class Context:
         trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
             cannot be repeated, so that nothing can be compared with it.
         single: whether a second instance is known not to work.
+        remarked: rules of warnings that have been reported.
     """
 
     bench: Bench
     report: Callable[..., None]
     trace: list[list[Any]] | None = None
     single: bool = False
+    remarked: set[str] = field(default_factory=set)
 
     @property
     def names(self) -> list[str]:
@@ -123,6 +125,18 @@ def life_cycle(context: Context) -> None:
                 bench.job = replace(job, steps=n + 1)
                 break
         driver.terminate()
+        _remarks(context, driver)
+
+
+def _remarks(context: Context, driver: Driver) -> None:
+    """Report warnings, and errors that were logged while calls went well, each kind once."""
+    prefix = context.bench.library.names.prefix
+    wanted = {"run.warning": f"return {prefix}OK", "run.logged-error": "log errors only when they fail"}
+    found = {"run.warning": f"returned {prefix}Warning", "run.logged-error": f"logged an error and returned {prefix}OK"}
+    for rule, (count, first) in driver.remarks.items():
+        if rule not in context.remarked:
+            context.remarked.add(rule)
+            context.report(rule, f"calls must {wanted[rule]}, but {count} {found[rule]}, {first} first")
 
 
 def _start_values(context: Context, driver: Driver) -> None:
@@ -194,6 +208,7 @@ def inputs(context: Context) -> None:
         bench.excited = False
     with bench.instance() as driver:
         context.trace = bench.run(driver)
+        _remarks(context, driver)
 
 
 def setting(context: Context) -> None:
