@@ -11,7 +11,7 @@ from typing import Any
 
 from lxml import etree
 
-from orchestrator.checking.dialects import FMI2, FMI3, KINDS, REAL, Dialect
+from orchestrator.checking.dialects import FMI2, FMI3, KINDS, REAL, FmiDialect
 
 _FILE = "modelDescription.xml:/fmiModelDescription"
 
@@ -37,7 +37,7 @@ class Dimension:
 
 
 @dataclass(frozen=True)
-class Variable:
+class DescribedVariable:
     """A variable; ``index`` counts from 1 in the order of the file.
 
     ``initial`` is the effective value (declared, or the default of the standard's table), ``attributes`` those of the
@@ -165,10 +165,10 @@ class Interface:
 class Description:
     """What the rules look at."""
 
-    dialect: Dialect
+    dialect: FmiDialect
     root: etree._Element
-    variables: tuple[Variable, ...]
-    numbered: Mapping[int, Variable]
+    variables: tuple[DescribedVariable, ...]
+    numbered: Mapping[int, DescribedVariable]
     types: tuple[SimpleType, ...]
     units: Mapping[str, etree._Element]
     interfaces: tuple[Interface, ...]
@@ -189,7 +189,7 @@ class Description:
         """
         return next((i for i in self.interfaces if i.kind == kind), None)
 
-    def identity(self, v: Variable) -> int | None:
+    def identity(self, v: DescribedVariable) -> int | None:
         """The number by which ModelStructure names a variable.
 
         Args:
@@ -200,7 +200,7 @@ class Description:
         """
         return v.index if self.dialect is FMI2 else v.reference
 
-    def variable(self, number: int | None) -> Variable | None:
+    def variable(self, number: int | None) -> DescribedVariable | None:
         """The variable with a number of ModelStructure, or None when there is none.
 
         Args:
@@ -211,7 +211,7 @@ class Description:
         """
         return None if number is None else self.numbered.get(number)
 
-    def size(self, v: Variable) -> int | None:
+    def size(self, v: DescribedVariable) -> int | None:
         """Number of values of a variable at its initial dimensions.
 
         Args:
@@ -300,7 +300,7 @@ def read_description(root: etree._Element) -> Description:
     )
 
 
-def _simple_types(root: etree._Element, dialect: Dialect) -> Iterator[SimpleType]:
+def _simple_types(root: etree._Element, dialect: FmiDialect) -> Iterator[SimpleType]:
     for element in root.findall("TypeDefinitions/*"):
         holder = element if dialect is FMI3 else next(iter(element), None)
         if holder is not None:
@@ -309,7 +309,9 @@ def _simple_types(root: etree._Element, dialect: Dialect) -> Iterator[SimpleType
             yield SimpleType(element, holder, element.get("name", ""), kind, dict(holder.attrib), items)
 
 
-def _variables(root: etree._Element, dialect: Dialect, types: Mapping[str, SimpleType]) -> Iterator[Variable]:
+def _variables(
+    root: etree._Element, dialect: FmiDialect, types: Mapping[str, SimpleType]
+) -> Iterator[DescribedVariable]:
     path = "ModelVariables/ScalarVariable" if dialect is FMI2 else "ModelVariables/*"
     counts: Counter[str] = Counter()
     for index, element in enumerate(root.findall(path), 1):
@@ -319,8 +321,8 @@ def _variables(root: etree._Element, dialect: Dialect, types: Mapping[str, Simpl
 
 
 def _variable(
-    element: etree._Element, index: int, place: str, dialect: Dialect, types: Mapping[str, SimpleType]
-) -> Variable:
+    element: etree._Element, index: int, place: str, dialect: FmiDialect, types: Mapping[str, SimpleType]
+) -> DescribedVariable:
     inner: Any = element if dialect is FMI3 else next((e for e in element if e.tag in KINDS), None)
     own = {} if inner is None else dict(inner.attrib)
     kind = _tag(inner) if inner is not None and inner.tag in KINDS else ""
@@ -331,7 +333,7 @@ def _variable(
     declared_initial = element.get("initial")
     default = None if kind == "Clock" else dialect.initial.get((causality, variability), (None,))[0]
     clocks = element.get("clocks")
-    return Variable(
+    return DescribedVariable(
         element=element,
         place=place,
         index=index,
@@ -354,7 +356,7 @@ def _variable(
     )
 
 
-def _variability(kind: str, causality: str, dialect: Dialect) -> str:
+def _variability(kind: str, causality: str, dialect: FmiDialect) -> str:
     """The default."""
     if dialect is FMI2:
         return "continuous"
@@ -363,7 +365,7 @@ def _variability(kind: str, causality: str, dialect: Dialect) -> str:
     return "continuous" if kind in REAL else "discrete"
 
 
-def _starts(element: etree._Element, own: Mapping[str, str], dialect: Dialect) -> tuple[str, ...] | None:
+def _starts(element: etree._Element, own: Mapping[str, str], dialect: FmiDialect) -> tuple[str, ...] | None:
     text = own.get("start")
     if dialect is FMI2:
         return None if text is None else (text,)
@@ -371,7 +373,7 @@ def _starts(element: etree._Element, own: Mapping[str, str], dialect: Dialect) -
     return tuple(texts or ([] if text is None else text.split())) or None
 
 
-def _entries(root: etree._Element, dialect: Dialect, section: str) -> tuple[StructureEntry, ...]:
+def _entries(root: etree._Element, dialect: FmiDialect, section: str) -> tuple[StructureEntry, ...]:
     found = []
     for position, element in enumerate(root.findall(f"ModelStructure/{section}") if section else (), 1):
         dependencies, kinds = element.get("dependencies"), element.get("dependenciesKind")

@@ -16,7 +16,7 @@ InitialTable = Mapping[tuple[str, str], tuple[str | None, ...]]
 
 
 @dataclass(frozen=True)
-class Dialect:
+class FmiDialect:
     """One version of FMI.
 
     Attributes:
@@ -59,7 +59,7 @@ def _table(**inputs: tuple[str | None, ...]) -> dict[tuple[str, str], tuple[str 
 
 
 _CAUSALITIES = ("parameter", "calculatedParameter", "input", "output", "local", "independent")
-FMI2 = Dialect(
+FMI2 = FmiDialect(
     version="2.0",
     causalities=_CAUSALITIES,
     initial=_table(input=(None,)),
@@ -74,7 +74,7 @@ FMI2 = Dialect(
     naming="2.2.9",
     combinations="2.2.7",
 )
-FMI3 = Dialect(
+FMI3 = FmiDialect(
     version="3.0",
     causalities=(*_CAUSALITIES, "structuralParameter"),
     initial=_table(input=("exact",)) | {("structuralParameter", v): ("exact",) for v in ("fixed", "tunable")},

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.companions import check_companions
-from orchestrator.checking.description import Description, Variable
+from orchestrator.checking.description import DescribedVariable, Description
 from orchestrator.checking.findings import Finding
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -134,7 +134,7 @@ def _references(
     return results, findings
 
 
-def _read_csv(path: str, data: bytes, known: Mapping[str, Variable], d: Description) -> ReferenceResult:
+def _read_csv(path: str, data: bytes, known: Mapping[str, DescribedVariable], d: Description) -> ReferenceResult:
     if len(data) > _MAXIMUM_CSV:
         raise ValueError(f"a reference result must have at most {_MAXIMUM_CSV} bytes, but has more")
     rows = [r for r in csv.reader(io.StringIO(data.decode("utf-8-sig"))) if r]

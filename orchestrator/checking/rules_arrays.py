@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from orchestrator.checking.description import Description, Variable, number
+from orchestrator.checking.description import DescribedVariable, Description, number
 from orchestrator.checking.findings import Finding
 
 _PERIODIC = ("constant", "fixed", "tunable")
@@ -39,7 +39,7 @@ def check_arrays(d: Description) -> Iterator[Finding]:
             yield Finding("variable.intermediate-update", v.path("intermediateUpdate"), message)
 
 
-def _dimension(d: Description, v: Variable, size: int | None, reference: int | None) -> Iterator[Finding]:
+def _dimension(d: Description, v: DescribedVariable, size: int | None, reference: int | None) -> Iterator[Finding]:
     path = v.path() + "/Dimension"
     if (size is None) == (reference is None):
         found = "none" if size is None else "both"
@@ -85,7 +85,7 @@ def check_clocks(d: Description) -> Iterator[Finding]:
             previous.setdefault(v.previous, v.name)
 
 
-def _clock(v: Variable) -> Iterator[Finding]:
+def _clock(v: DescribedVariable) -> Iterator[Finding]:
     kind = v.attributes.get("intervalVariability", "")
     if v.causality not in ("input", "output", "local"):
         message = f"a clock must be an input, an output or local, but `{v.name}` is {v.causality}"
@@ -111,7 +111,7 @@ def _clock(v: Variable) -> Iterator[Finding]:
     yield from _fraction(v, kind, length)
 
 
-def _shift(v: Variable, kind: str) -> Iterator[Finding]:
+def _shift(v: DescribedVariable, kind: str) -> Iterator[Finding]:
     shift = number(v.own.get("shiftDecimal"), "Real")
     if shift is None:
         return
@@ -123,7 +123,7 @@ def _shift(v: Variable, kind: str) -> Iterator[Finding]:
         yield Finding("clock.shift", v.path("shiftDecimal"), message)
 
 
-def _fraction(v: Variable, kind: str, length: float | None) -> Iterator[Finding]:
+def _fraction(v: DescribedVariable, kind: str, length: float | None) -> Iterator[Finding]:
     counter, resolution, shift = (
         number(v.attributes.get(a), "Integer") for a in ("intervalCounter", "resolution", "shiftCounter")
     )
@@ -146,7 +146,7 @@ def _fraction(v: Variable, kind: str, length: float | None) -> Iterator[Finding]
         yield Finding("clock.fraction", v.path(), f"{wrong} (clock `{v.name}`)")
 
 
-def _priority(d: Description, v: Variable) -> Iterator[Finding]:
+def _priority(d: Description, v: DescribedVariable) -> Iterator[Finding]:
     scheduled = d.interface("ScheduledExecution") is not None
     if "priority" in v.attributes and v.causality == "output":
         message = f"an output clock must have no priority, but `{v.name}` has one"
@@ -156,7 +156,7 @@ def _priority(d: Description, v: Variable) -> Iterator[Finding]:
         yield Finding("clock.priority", v.path(), message)
 
 
-def _clocked(v: Variable, clocks: dict[int | None, Variable]) -> Iterator[Finding]:
+def _clocked(v: DescribedVariable, clocks: dict[int | None, DescribedVariable]) -> Iterator[Finding]:
     if "clocks" not in v.element.attrib:
         return
     path = v.path("clocks")
@@ -171,7 +171,7 @@ def _clocked(v: Variable, clocks: dict[int | None, Variable]) -> Iterator[Findin
             yield Finding("variable.clocks", path, f"{message} {reference} is none")
 
 
-def _previous(d: Description, v: Variable, earlier: dict[int, str]) -> Iterator[Finding]:
+def _previous(d: Description, v: DescribedVariable, earlier: dict[int, str]) -> Iterator[Finding]:
     before = d.variable(v.previous)
     wrong = ""
     if not v.clocks:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from itertools import pairwise
 
-from orchestrator.checking.description import Description, StructureEntry, Variable, number
+from orchestrator.checking.description import DescribedVariable, Description, StructureEntry, number
 from orchestrator.checking.dialects import REAL
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.xml_reading import xpath
@@ -54,7 +54,7 @@ def check_structure(d: Description) -> Iterator[Finding]:
             yield Finding("structure.event-indicators", u.path(d.dialect.identity), message)
 
 
-def _initial_unknowns(d: Description) -> list[Variable]:
+def _initial_unknowns(d: Description) -> list[DescribedVariable]:
     """The variables that the list of initial unknowns must have."""
     expected = [v for v in d.variables if v.causality == "output" and v.initial in _FREE and not v.clocks]
     expected += [v for v in d.variables if v.causality == "calculatedParameter"]
@@ -83,8 +83,8 @@ def _set(
     d: Description,
     where: str,
     found: tuple[StructureEntry, ...],
-    expected: list[Variable],
-    allowed: list[Variable],
+    expected: list[DescribedVariable],
+    allowed: list[DescribedVariable],
     rule: str,
     what: str,
 ) -> Iterator[Finding]:
@@ -131,7 +131,7 @@ def _wanted(d: Description) -> str:
     return "a value reference must be that of a variable"
 
 
-def _kinds(u: StructureEntry, v: Variable | None, initial: bool, three: bool) -> Iterator[Finding]:
+def _kinds(u: StructureEntry, v: DescribedVariable | None, initial: bool, three: bool) -> Iterator[Finding]:
     if u.kinds is None:
         return
     path = u.path("dependenciesKind")

@@ -5,8 +5,8 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping
 
-from orchestrator.checking.description import Description, SimpleType, Variable, number
-from orchestrator.checking.dialects import NUMERIC, REAL, VARIABILITIES, Dialect
+from orchestrator.checking.description import DescribedVariable, Description, SimpleType, number
+from orchestrator.checking.dialects import NUMERIC, REAL, VARIABILITIES, FmiDialect
 from orchestrator.checking.findings import Finding
 
 # EBNF of section 2.2.9.
@@ -46,7 +46,7 @@ def check_variables(d: Description) -> Iterator[Finding]:
     yield from _aliases(d) if d.dialect.version == "2.0" else _references(d)
 
 
-def _multiple_set(d: Description, v: Variable) -> Iterator[Finding]:
+def _multiple_set(d: Description, v: DescribedVariable) -> Iterator[Finding]:
     attribute = "canHandleMultipleSetPerTimeInstant"
     if d.dialect.version == "2.0":
         wrong = v.element.get(attribute) in ("true", "1") and d.interface("ModelExchange") is None
@@ -60,7 +60,7 @@ def _multiple_set(d: Description, v: Variable) -> Iterator[Finding]:
 
 def _references(d: Description) -> Iterator[Finding]:
     """FMI 3.0: one variable for each value reference; other names of it are Alias elements."""
-    seen: dict[int, Variable] = {}
+    seen: dict[int, DescribedVariable] = {}
     for v in d.variables:
         if v.reference in seen:
             message = f"value references must be unique, but {v.reference} is that of `{seen[v.reference].name}` and"
@@ -88,7 +88,7 @@ def _names(d: Description) -> Iterator[Finding]:
             yield from _display_unit(d, v, alias.get("displayUnit"))
 
 
-def _name(d: Description, structured: bool, name: str, v: Variable) -> Iterator[Finding]:
+def _name(d: Description, structured: bool, name: str, v: DescribedVariable) -> Iterator[Finding]:
     if structured and not _STRUCTURED.fullmatch(name):
         message = f"a structured name must follow the grammar of section {d.dialect.naming}, but `{name}` does not"
         yield Finding("variable.name-structured", v.path("name"), message)
@@ -100,7 +100,7 @@ def _name(d: Description, structured: bool, name: str, v: Variable) -> Iterator[
         yield Finding("variable.name-flat", v.path("name"), message)
 
 
-def _combination(dialect: Dialect, v: Variable) -> Iterator[Finding]:
+def _combination(dialect: FmiDialect, v: DescribedVariable) -> Iterator[Finding]:
     if v.causality not in dialect.causalities or v.variability not in VARIABILITIES:
         return  # the schema says so
     pair = f'causality="{v.causality}", variability="{v.variability}"'
@@ -121,7 +121,7 @@ def _combination(dialect: Dialect, v: Variable) -> Iterator[Finding]:
         yield Finding("variable.independent", v.path("causality"), message)
 
 
-def _start(dialect: Dialect, v: Variable) -> Iterator[Finding]:
+def _start(dialect: FmiDialect, v: DescribedVariable) -> Iterator[Finding]:
     if (v.causality, v.variability) not in dialect.initial:
         return
     needed = v.kind != "Clock" and (v.initial in ("exact", "approx") or v.causality == "input")
@@ -133,7 +133,7 @@ def _start(dialect: Dialect, v: Variable) -> Iterator[Finding]:
         yield Finding("variable.start-forbidden", v.path("start"), message)
 
 
-def _bounds(v: Variable) -> Iterator[Finding]:
+def _bounds(v: DescribedVariable) -> Iterator[Finding]:
     low, high = v.number("min"), v.number("max")
     starts = [x for x in (number(text, v.kind) for text in v.starts or ()) if x is not None]
     start = next((x for x in starts if not _or(low, -math.inf) <= x <= _or(high, math.inf)), None)
@@ -158,7 +158,7 @@ def _bounds(v: Variable) -> Iterator[Finding]:
             yield Finding("variable.not-finite", v.path(attribute), message)
 
 
-def _declared_type(types: Mapping[str, SimpleType], v: Variable) -> Iterator[Finding]:
+def _declared_type(types: Mapping[str, SimpleType], v: DescribedVariable) -> Iterator[Finding]:
     name = v.own.get("declaredType")
     if name is None:
         return
@@ -184,7 +184,7 @@ def _declared_type(types: Mapping[str, SimpleType], v: Variable) -> Iterator[Fin
             yield Finding("variable.bounds-exceed-type", v.path(attribute), message)
 
 
-def _real_only(d: Description, v: Variable, states: Collection[int | None]) -> Iterator[Finding]:
+def _real_only(d: Description, v: DescribedVariable, states: Collection[int | None]) -> Iterator[Finding]:
     unit = v.attributes.get("unit")
     if unit is not None and unit not in d.units:
         message = f"unit of `{v.name}` must be defined in UnitDefinitions, but `{unit}` is not"
@@ -205,7 +205,7 @@ def _real_only(d: Description, v: Variable, states: Collection[int | None]) -> I
         yield Finding("variable.reinit", v.path("reinit"), message)
 
 
-def _display_unit(d: Description, v: Variable, shown: str | None) -> Iterator[Finding]:
+def _display_unit(d: Description, v: DescribedVariable, shown: str | None) -> Iterator[Finding]:
     unit = v.attributes.get("unit")
     if shown is not None and unit is None:
         message = f"`{v.name}` must have a unit, because it has the displayUnit `{shown}`, but has none"
@@ -218,7 +218,7 @@ def _display_unit(d: Description, v: Variable, shown: str | None) -> Iterator[Fi
 
 
 def _aliases(d: Description) -> Iterator[Finding]:
-    groups: dict[tuple[str, int], list[Variable]] = defaultdict(list)
+    groups: dict[tuple[str, int], list[DescribedVariable]] = defaultdict(list)
     for v in d.variables:
         if v.reference is not None:
             groups[v.base, v.reference].append(v)
@@ -227,7 +227,7 @@ def _aliases(d: Description) -> Iterator[Finding]:
             yield from _alias_group(d, base, reference, group)
 
 
-def _alias_group(d: Description, base: str, reference: int, group: list[Variable]) -> Iterator[Finding]:
+def _alias_group(d: Description, base: str, reference: int, group: list[DescribedVariable]) -> Iterator[Finding]:
     names = ", ".join(f"`{v.name}`" for v in group)
     what = f"the {base} variables with value reference {reference} ({names})"
     settable = [v for v in group if _settable(v)]
@@ -268,7 +268,7 @@ def _base_unit(d: Description, unit: str | None) -> object:
     return frozenset((k, number(v, "Real")) for k, v in element.attrib.items() if v not in ("0", "0.0"))
 
 
-def _settable(v: Variable) -> bool:
+def _settable(v: DescribedVariable) -> bool:
     if v.variability == "constant":
         return False
     return v.causality in ("input", "parameter") or v.initial in ("exact", "approx")

@@ -353,7 +353,7 @@ def odd(function: str) -> ChildError:
     return ChildError(f"the answer to {function} is none", "protocol")
 
 
-class Instance:
+class FmuInstance:
     """One instance. After a fatal status nothing is called any more, as the standard demands."""
 
     def __init__(self, library: Library, number: int) -> None:

@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from orchestrator.checking.description import Description, Interface, Variable, number
+from orchestrator.checking.description import DescribedVariable, Description, Interface, number
 from orchestrator.checking.layered import ReferenceResult
 from orchestrator.checking.probing.binding import ProbedVariable
 from orchestrator.checking.probing.job import ProbedClock, ProbeJob
@@ -77,7 +77,7 @@ def _or(value: float | None, default: float) -> float:
     return default if value is None or not math.isfinite(value) else value
 
 
-def _count(d: Description, variables: list[Variable | None]) -> int | None:
+def _count(d: Description, variables: list[DescribedVariable | None]) -> int | None:
     sizes = [None if v is None else d.size(v) for v in variables]
     known = [size for size in sizes if size is not None]
     return sum(known) if len(known) == len(sizes) else None
@@ -89,7 +89,7 @@ def _indicators(d: Description) -> int | None:
     return _count(d, [d.variable(u.variable) for u in d.event_indicators])
 
 
-def _probed(d: Description, v: Variable) -> ProbedVariable:
+def _probed(d: Description, v: DescribedVariable) -> ProbedVariable:
     base = v.base if d.dialect.version == "2.0" else "Int64" if v.kind == "Enumeration" else v.kind
     size = d.size(v) or 0
     return ProbedVariable(
@@ -110,7 +110,7 @@ def _probed(d: Description, v: Variable) -> ProbedVariable:
     )
 
 
-def _starts(v: Variable, base: str, size: int, second: bool) -> tuple[Any, ...] | None:
+def _starts(v: DescribedVariable, base: str, size: int, second: bool) -> tuple[Any, ...] | None:
     if v.starts is None:
         # A text without a start value has the empty one, where it must have one.
         return None
@@ -137,7 +137,7 @@ def _value(text: str, base: str, second: bool) -> Any:
     return value if value is None or base != "Float32" else float(value)
 
 
-def _clock(v: Variable) -> ProbedClock:
+def _clock(v: DescribedVariable) -> ProbedClock:
     kind = v.attributes.get("intervalVariability", "")
     interval, shift = (number(v.attributes.get(a), "Real") for a in ("intervalDecimal", "shiftDecimal"))
     periodic = kind in ("constant", "fixed", "tunable") and interval is not None and 0.0 < interval < math.inf

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from orchestrator.checking.probing.binding import Instance, Library, ProbedVariable, odd
+from orchestrator.checking.probing.binding import FmuInstance, Library, ProbedVariable, odd
 from orchestrator.checking.probing.job import ProbeJob, references
 
 Report = Callable[..., None]
@@ -19,7 +19,7 @@ _TEXTS: tuple[type, ...] = (bytes, type(None))
 MOST_ITERATIONS = 100
 
 
-class Driver(Instance):
+class Driver(FmuInstance):
     """Base of the drivers.
 
     Attributes:
@@ -47,6 +47,9 @@ class Driver(Instance):
 
         Returns:
             Its number, or None when the FMU returns null.
+
+        Raises:
+            NotImplementedError: always; the drivers of the interfaces do it.
         """
         raise NotImplementedError
 
@@ -148,6 +151,9 @@ class Driver(Instance):
 
         Args:
             start, stop: of the experiment [s].
+
+        Raises:
+            NotImplementedError: always; the drivers of the interfaces do it.
         """
         raise NotImplementedError
 
