@@ -44,7 +44,7 @@ def check_structure(d: Description) -> Iterator[Finding]:
         clocked = [v for v in d.variables if v.clocks]
         where = d.dialect.initial_unknowns
         what = "outputs, states and derivatives with initial approx or calculated, and calculated parameters"
-        expected = _initial_unknowns(d)
+        expected = required_initial_unknowns(d)
         yield from _set(d, where, d.initial_unknowns, expected, clocked, "structure.initial-unknowns", what)
     yield from _clocked_states(d)
     for u in d.event_indicators:
@@ -54,8 +54,15 @@ def check_structure(d: Description) -> Iterator[Finding]:
             yield Finding("structure.event-indicators", u.path(d.dialect.identity), message)
 
 
-def _initial_unknowns(d: Description) -> list[DescribedVariable]:
-    """The variables that the list of initial unknowns must have."""
+def required_initial_unknowns(d: Description) -> list[DescribedVariable]:
+    """The variables that the list of initial unknowns must have.
+
+    Args:
+        d: the model description.
+
+    Returns:
+        The variables; one may be there twice.
+    """
     expected = [v for v in d.variables if v.causality == "output" and v.initial in _FREE and not v.clocks]
     expected += [v for v in d.variables if v.causality == "calculatedParameter"]
     for u in d.derivatives:

@@ -1,11 +1,12 @@
 """Builds the distribution: the parts of ``orchestrator`` that check FMUs, below a package of their own.
 
-They are copied out of the repository around this folder, so there is no source archive. Below ``fmu_check`` they meet no
-other installed package of the same name.
+They are copied out of the repository around this folder, so there is no source archive. Below ``fmu_check`` they meet
+no other installed package of the same name.
 """
 
 import re
 import shutil
+import tempfile
 from pathlib import Path
 
 from setuptools import setup
@@ -55,4 +56,7 @@ class Build(build_py):
 source = (REPOSITORY / "orchestrator" / "shared" / "version.py").read_text(encoding="utf-8")
 version = re.search(r'__version__ = "(.+)"', source)
 assert version is not None
-setup(version=version[1], cmdclass={"build_py": Build})
+# Not beside the sources, where it would stay, and meet a build of another process.
+with tempfile.TemporaryDirectory() as folder:
+    options = {"build": {"build_base": folder}, "egg_info": {"egg_base": folder}}
+    setup(version=version[1], cmdclass={"build_py": Build}, options=options)

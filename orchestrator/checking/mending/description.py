@@ -7,12 +7,14 @@ from datetime import UTC, datetime
 from lxml import etree
 
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.mending.members import DESCRIPTION
 
 # Attributes that may be left out: what is wrong is removed, and the standard's default holds.
 _OPTIONAL = frozenset(
     f"variable.{name}"
     for name in ("initial", "start-forbidden", "nominal", "reinit", "multiple-set", "display-unit")
 ) | {"model.experiment"}  # fmt: skip
+_DATE = "generationDateAndTime"
 _BEFORE_UNITS = ("ModelExchange", "CoSimulation", "ScheduledExecution")
 
 
@@ -28,6 +30,8 @@ def mend_description(root: etree._Element, findings: Iterable[Finding]) -> list[
     """
     repairs = []
     for finding in findings:
+        if finding.path.startswith(DESCRIPTION) and _DATE in finding.message:
+            repairs.append(_mend_date(root))
         repair = _REPAIRS.get(finding.rule)
         found = _at(root, finding.path) if repair else None
         if repair and found is not None:
@@ -65,7 +69,9 @@ def _discrete(_: etree._Element, element: etree._Element, __: str) -> str:
 
 
 def _define_unit(root: etree._Element, element: etree._Element, attribute: str) -> str:
-    name = element.get(attribute or "unit")
+    if attribute == "displayUnit":  # its factor is not known
+        return _remove(root, element, attribute)
+    name = element.get("unit")
     if not name:
         return ""
     units = root.find("UnitDefinitions")
@@ -78,16 +84,17 @@ def _define_unit(root: etree._Element, element: etree._Element, attribute: str) 
     return f"added the unit {name}, without its dimension"
 
 
-def _date(_: etree._Element, element: etree._Element, attribute: str) -> str:
-    text = element.get(attribute, "")
+def _mend_date(root: etree._Element) -> str:
+    text = root.get(_DATE, "")
     try:
         read = datetime.fromisoformat(text)
     except ValueError:
-        return _remove(_, element, attribute)
+        return _remove(root, root, _DATE)
     utc = read.replace(tzinfo=UTC) if read.tzinfo is None else read.astimezone(UTC)
-    element.set(attribute, utc.strftime("%Y-%m-%dT%H:%M:%SZ"))
+    mended = utc.strftime("%Y-%m-%dT%H:%M:%SZ")
+    root.set(_DATE, mended)
     taken = ", taken as UTC" if read.tzinfo is None else ""
-    return f"wrote {attribute} {text} as {element.get(attribute)}{taken}"
+    return "" if mended == text else f"wrote {_DATE} {text} as {mended}{taken}"
 
 
 def _named(element: etree._Element) -> str:
@@ -105,7 +112,6 @@ _REPAIRS: Mapping[str, Callable[[etree._Element, etree._Element, str], str]] = {
     **dict.fromkeys(("structure.dependencies", "structure.dependencies-kind"), _remove_dependencies),
     **dict.fromkeys(("variable.unit", "type.unit"), _define_unit),
     "variable.continuous-not-real": _discrete,
-    "model.date": _date,
 }
 
 _GUID = re.compile(rb"\{?[0-9a-fA-F]{8}(?:-[0-9a-fA-F]{4}){3}-[0-9a-fA-F]{12}\}?")

@@ -17,6 +17,10 @@ MENDED = frozenset(
 DESCRIPTION = "modelDescription.xml"
 
 
+class UnmendableError(FmuError):
+    """An FMU has a fault that cannot be mended, which the check finds too."""
+
+
 def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], list[str]]:
     """Read an FMU.
 
@@ -28,14 +32,14 @@ def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], l
         Content by path in the FMU, and what was mended.
 
     Raises:
-        FmuError: the archive has a fault that cannot be mended.
+        UnmendableError: the archive has a fault that cannot be mended.
     """
     files, findings = open_fmu(path, limits)
     if files is not None:
         files.close()
     for finding in findings:
         if finding.severity == "error" and finding.rule not in MENDED:
-            raise FmuError(f"{path.name} must be mended, but this cannot be: {_place(finding)}{finding.message}")
+            raise UnmendableError(f"{path.name} must be mended, but this cannot be: {_place(finding)}{finding.message}")
     repairs: list[str] = []
     members: dict[str, bytes] = {}
     for name, data in _entries(path, limits):
@@ -43,7 +47,7 @@ def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], l
         if plain != name:
             repairs.append(f"renamed {name} to {plain}")
         if members.setdefault(plain, data) != data:
-            raise FmuError(f"{path.name} must be mended, but has two different files {plain}")
+            raise UnmendableError(f"{path.name} must be mended, but has two different files {plain}")
     names = [finding.path for finding in findings if finding.rule == "archive.duplicate"]
     if names:
         repairs.append(f"removed repeated entries: {_listed(names)}")
@@ -65,7 +69,7 @@ def _entries(path: Path, limits: ArchiveLimits) -> Iterator[tuple[str, bytes]]:
                 try:
                     yield entry.filename, archive.read(entry)
                 except Exception as error:  # zlib.error, BadZipFile, EOFError, NotImplementedError ...
-                    raise FmuError(
+                    raise UnmendableError(
                         f"{path.name} must be mended, but {entry.filename} cannot be read: {error}"
                     ) from None
 
@@ -81,7 +85,7 @@ def _lifted(path: Path, members: dict[str, bytes], repairs: list[str]) -> dict[s
     folders = {name.partition("/")[0] for name in members}
     folder = folders.pop() if len(folders) == 1 else ""
     if f"{folder}/{DESCRIPTION}" not in members:
-        raise FmuError(f"{path.name} must be mended, but has no {DESCRIPTION} at its top or in its only folder")
+        raise UnmendableError(f"{path.name} must be mended, but has no {DESCRIPTION} at its top or in its only folder")
     repairs.append(f"moved all files out of the folder {folder}")
     return {name.partition("/")[2]: data for name, data in members.items()}
 

@@ -11,7 +11,7 @@ from lxml import etree
 from orchestrator.building.archive import write_archive
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.mending.description import mend_description, mend_token
-from orchestrator.checking.mending.members import DESCRIPTION, read_members
+from orchestrator.checking.mending.members import DESCRIPTION, UnmendableError, read_members
 from orchestrator.checking.mending.python_library import mend_library
 from orchestrator.checking.mending.structure import mend_structure
 from orchestrator.checking.static import check_static
@@ -47,7 +47,8 @@ def mend_fmu(path: Path, target: Path, limits: ArchiveLimits | None = None) -> R
         What was mended, and what was not.
 
     Raises:
-        FmuError: the archive or the XML has a fault that cannot be mended, or ``target`` is ``path``.
+        UnmendableError: the archive or the XML has a fault that cannot be mended.
+        FmuError: ``target`` is ``path``, or cannot be written.
     """
     limits = limits or ArchiveLimits()
     if target.exists() and target.samefile(path):
@@ -57,9 +58,9 @@ def mend_fmu(path: Path, target: Path, limits: ArchiveLimits | None = None) -> R
     with tempfile.TemporaryDirectory(prefix="fmu-check-") as folder:
         for number in range(_MOST_ROUNDS):
             findings = _findings(Path(folder) / f"{number}.fmu", members, limits)
-            mended = _mend_xml(members, findings)
+            guid, mended = _mend_xml(members, findings)
             if number == 0:
-                library, left = mend_library(members, findings)
+                library, left = mend_library(members, guid, findings)
                 mended += library
             done += mended
             if not mended:
@@ -80,13 +81,14 @@ def _findings(path: Path, members: Mapping[str, bytes], limits: ArchiveLimits) -
     return result.findings
 
 
-def _mend_xml(members: dict[str, bytes], findings: list[Finding]) -> list[str]:
+def _mend_xml(members: dict[str, bytes], findings: list[Finding]) -> tuple[str, list[str]]:
+    """Mend the description; return the guid of FMI 2.0, and what was mended."""
     root, problems = parse(members[DESCRIPTION], DESCRIPTION)
     if root is None:
-        raise FmuError(f"{DESCRIPTION} must be mended, but this cannot be: {problems[0].message}")
+        raise UnmendableError(f"{DESCRIPTION} must be mended, but this cannot be: {problems[0].message}")
     done = [f"wrote {DESCRIPTION} in UTF-8" for problem in problems if problem.rule == "xml.encoding"]
     done += mend_description(root, findings) + mend_token(root, members) + mend_structure(root, findings)
     if done:
         etree.indent(root)
         members[DESCRIPTION] = etree.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return done
+    return root.get("guid", ""), done

@@ -9,13 +9,15 @@ from orchestrator.checking.findings import Finding
 
 _MARK = "resources/slavemodule.txt"  # by which PythonFMU's library finds the class
 _FOLDER = "binaries/linux64"
+_GUID = "resources/guid.txt"  # with which the launcher compares what a host hands over
 
 
-def mend_library(members: dict[str, bytes], findings: Iterable[Finding]) -> tuple[list[str], list[str]]:
+def mend_library(members: dict[str, bytes], guid: str, findings: Iterable[Finding]) -> tuple[list[str], list[str]]:
     """Put the launcher in the place of PythonFMU's Linux library, which then lies beside it.
 
     Args:
         members: content by path in the FMU; it is changed.
+        guid: of the FMU.
         findings: of the static checks.
 
     Returns:
@@ -32,4 +34,5 @@ def mend_library(members: dict[str, bytes], findings: Iterable[Finding]) -> tupl
     wrapper = f"pythonfmu-{hashlib.sha256(library).hexdigest()[:12]}.so"
     members[place] = compile_launcher(toolchain, wrapper)
     members[f"{_FOLDER}/{wrapper}"] = library
+    members[_GUID] = guid.encode()
     return [f"put a launcher in the place of {place}, which brings a Python to programs that have none"], []

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 from lxml import etree
 
-from orchestrator.checking.description import Description, Variable, read_description
+from orchestrator.checking.description import DescribedVariable, Description, read_description
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.rules_structure import required_initial_unknowns
 
@@ -34,7 +34,9 @@ def mend_structure(root: etree._Element, findings: Iterable[Finding]) -> list[st
     return repairs + _write(d, d.dialect.initial_unknowns, required_initial_unknowns(d), clocked)
 
 
-def _write(d: Description, place: str, wanted: Sequence[Variable], allowed: Sequence[Variable]) -> list[str]:
+def _write(
+    d: Description, place: str, wanted: Sequence[DescribedVariable], allowed: Sequence[DescribedVariable]
+) -> list[str]:
     """Make the entries of one list those of ``wanted``; entries of ``allowed`` may stay."""
     structure = d.root.find("ModelStructure")
     section, _, tag = place.rpartition("/")
