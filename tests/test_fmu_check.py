@@ -12,6 +12,7 @@ import sys
 import time
 from pathlib import Path
 
+import jsonschema
 import pytest
 import yaml
 from lxml import etree
@@ -27,7 +28,6 @@ MOST_MEBIBYTES = 60
 HEAVY = {"fmpy", "matplotlib", "numba", "numpy", "rich", "scipy"}
 ACTION_SCHEMA = "https://json.schemastore.org/github-action.json"
 GITLAB_SCHEMA = "https://gitlab.com/gitlab-org/gitlab/-/raw/master/app/assets/javascripts/editor/schema/ci.json"
-HOOKS_SCHEMA = "https://json.schemastore.org/pre-commit-hooks.json"
 
 
 def run(words, folder, **environment):
@@ -63,6 +63,14 @@ def commit(folder):
     for words in (["init", "-q"], ["add", "-A"], ["commit", "-qm", "all"]):
         done = run(["git", *who, *words], folder)
         assert done.returncode == 0, done.stderr
+
+
+def fmu_of_version_3(folder):
+    """Build one of our FMUs of FMI 3.0."""
+    words = ["build", "LqrController", "--native", "--fmi", "3", "--directory", folder]
+    done = run([sys.executable, "-m", "orchestrator", *words, "--out", folder / "out"], ROOT)
+    assert done.returncode == 0, done.stderr
+    return folder / "LqrController.fmu"
 
 
 def assert_reports(junit, said):
@@ -166,8 +174,6 @@ def test_the_hook_runs_under_pre_commit(repository, user, tmp_path):
 
 
 def test_the_files_of_the_integrations_are_valid():
-    import jsonschema
-
     action = yaml.safe_load((ROOT / PLACE / "action.yml").read_text(encoding="utf-8"))
     jsonschema.validate(action, json_schema(ACTION_SCHEMA))
     _, job = yaml.safe_load_all((ROOT / PLACE / "gitlab.yml").read_text(encoding="utf-8"))
