@@ -180,15 +180,15 @@ class _Watcher:
 
     def _ended_early(self, error: ChildError, function: str) -> None:
         where = f"during {function}" if function else f"in the probe `{self.probe}`"
-        if error.reason == "time":
+        if self.probe == "misuse" and function and error.reason not in ("memory", "disk"):
+            self._add("misuse.crash", f"a call that is to be refused must return, but {error} {where}")
+        elif error.reason == "time":
             self._add("limits.time", f"a call must take at most {self.limits.time:g} s, but took longer {where}")
         elif error.reason == "memory":
             allowed = self.limits.memory >> 20
             self._add("limits.memory", f"the process must use at most {allowed} MiB, but used more {where}")
         elif error.reason == "disk":
             self._add("limits.output", f"text and files must stay below {self.limits.disk >> 20} MiB, but do not")
-        elif self.probe == "misuse" and function:
-            self._add("misuse.crash", f"a call that is to be refused must not end the process, but {error} {where}")
         elif function:
             self._add("run.crash", f"no call must end the process, but {error} {where}")
         else:

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.checking.check import check_fmu
+from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.checking.rules import RULES
+from orchestrator.shared.isolation.limits import Limits
 from tests.support.broken_ball3 import behavioural
 from tests.support.broken_ball3_xml import static
 from tests.support.broken_fmus import QUICK, Broken, corpus, good
@@ -53,6 +54,11 @@ def test_what_the_flags_do_not_promise_is_not_asked_for(behaviour: str, old: str
     report = check_fmu(path, QUICK)
     assert report.findings == ()
     assert report.executed
+
+
+def test_a_hang_after_misuse_is_a_warning_as_a_crash_is(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "hang_negative_step"), CheckOptions(limits=Limits(time=10.0)))
+    assert {f.rule for f in report.findings if f.severity != "info"} == {"misuse.crash"}
 
 
 def test_an_fmu_that_writes_to_our_pipe_forges_no_finding(tmp_path: Path) -> None:

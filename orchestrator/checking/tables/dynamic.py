@@ -93,7 +93,7 @@ resources.step-leak | W | * | * | memory does not grow with steps | free what is
 
 [misuse]
 misuse.guid | W | 2.1.5 | 2.3.1 | a wrong guid or token is refused | compare it at instantiation
-misuse.crash | W | * | * | misuse does not end the process | check the arguments and the state of the instance
+misuse.crash | W | * | * | misuse neither ends the process nor hangs it | check the arguments and the state of the instance
 misuse.step-before-init | W | 4.2.4 | 4.2 | a step before initialisation is refused | return an error
 misuse.negative-step | W | 4.2.4 | 4.2.1 | a negative step is refused | return an error
 misuse.value-reference | W | 2.1.7 | 2.2.7.2 | unknown value references are refused | return an error
