@@ -2,8 +2,8 @@
 
     python -m benchmarks.fuzz_check --seconds 600
 
-FMUs whose library is damaged are checked with ``--static`` only: what a random machine program does is no
-business of a test.
+With ``--version 3.0`` FMUs of FMI 3.0. FMUs whose library is damaged are checked with ``--static`` only: what a random
+machine program does is no business of a test.
 """
 
 import argparse
@@ -23,7 +23,9 @@ from tests.support.fuzz_fmu import damaged
 SLOW = 60.0
 
 
-def one_case(rng: random.Random, folder: Path, run_share: float = 0.25) -> tuple[int, set[str], float]:
+def one_case(
+    rng: random.Random, folder: Path, run_share: float = 0.25, version: str = "2.0"
+) -> tuple[int, set[str], float]:
     """Check one damaged FMU as the command line does.
 
     Returns:
@@ -31,7 +33,7 @@ def one_case(rng: random.Random, folder: Path, run_share: float = 0.25) -> tuple
     """
     path, out = folder / "damaged.fmu", folder / "out"
     shutil.rmtree(out, ignore_errors=True)
-    may_run = damaged(rng, path)
+    may_run = damaged(rng, path, version)
     words = ["check", str(path), "--out", str(out), "--json", str(folder / "f.json"), "--junit", str(folder / "f.xml")]
     if not (may_run and rng.random() < run_share):
         words.append("--static")
@@ -53,6 +55,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--version", choices=("2.0", "3.0"), default="2.0", help="of FMI")
+    parser.add_argument("--count", type=int, default=10**9, help="FMUs at most")
+    parser.add_argument("--run-share", type=float, default=0.25, help="share of FMUs that are run, where they may")
     arguments = parser.parse_args()
     rng = random.Random(arguments.seed)
     named: Counter[str] = Counter()
@@ -60,8 +65,8 @@ def main() -> None:
     slowest = 0.0
     end = time.monotonic() + arguments.seconds
     folder = Path(tempfile.mkdtemp(prefix="fuzz-check-"))
-    while time.monotonic() < end:
-        code, rules, duration = one_case(rng, folder)
+    while time.monotonic() < end and codes.total() < arguments.count:
+        code, rules, duration = one_case(rng, folder, arguments.run_share, arguments.version)
         assert duration < SLOW, f"took {duration:.0f} s"
         codes[code] += 1
         named.update(rules)

@@ -23,6 +23,7 @@ def main() -> int:
     parser.add_argument("--part", default="1/1", metavar="K/N", help="every nth behaviour, from the kth on")
     parser.add_argument("--time-limit", type=float, default=4.0)
     parser.add_argument("--at", type=int, default=3, help="which call of fmi2DoStep misbehaves (default: %(default)s)")
+    parser.add_argument("--version", choices=("2.0", "3.0"), default="2.0", help="of FMI; 3.0 with --commands check")
     arguments = parser.parse_args()
     first, _, every = arguments.part.partition("/")
     chosen = [b for b in BEHAVIOURS if not arguments.only or arguments.only in b[1]][int(first) - 1 :: int(every)]
@@ -31,7 +32,7 @@ def main() -> int:
         contained = 0
         for place, action in chosen:
             with tempfile.TemporaryDirectory(prefix="hostile-") as folder:
-                world = World(Path(folder) / "world")
+                world = World(Path(folder) / "world", arguments.version)
                 try:
                     wrong = verdict(world, kind, place, action, arguments.time_limit, arguments.at)
                 finally:

@@ -46,18 +46,17 @@ def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
         if not reason:
             assert result.description is not None
             assert result.files is not None
-            probed, execution = check_dynamic(
+            probed, executions = check_dynamic(
                 result.description, result.files, result.references, options.limits, not options.trust
             )
             findings += probed
-            executions = (execution,)
         elif not options.static and not has_errors(findings):
             findings.append(Finding("run.not-executed", "", f"the FMU must be executed to pass, but is not: {reason}"))
     finally:
         if result.files is not None:
             result.files.close()
     facts = result.facts | ({"walls": _walls(options.trust)} if executions else {})
-    version = "2.0" if result.description is not None else ""
+    version = "" if result.description is None else result.description.dialect.version
     return FmuFindings(str(path), ordered(findings), version, result.stages, executions, reason, facts)
 
 

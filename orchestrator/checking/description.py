@@ -1,37 +1,27 @@
-"""The modelDescription.xml of an FMI 2.0 FMU as plain data, with the defaults of the standard filled in.
+"""The modelDescription.xml of an FMU as plain data, with the defaults of the standard filled in.
 
 Whatever the schema would refuse is read as None here, so that a rule is never violated twice.
 """
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import prod
 from typing import Any
 
 from lxml import etree
 
-NUMERIC = ("Real", "Integer", "Enumeration")
-CAUSALITIES = ("parameter", "calculatedParameter", "input", "output", "local", "independent")
-VARIABILITIES = ("constant", "fixed", "tunable", "discrete", "continuous")
+from orchestrator.checking.dialects import FMI2, FMI3, KINDS, REAL, FmiDialect
 
-# Table of section 2.2.7: (causality, variability) -> initial values allowed, the default first.
-INITIAL: dict[tuple[str, str], tuple[str | None, ...]] = {
-    **{("parameter", v): ("exact",) for v in ("fixed", "tunable")},
-    **{("calculatedParameter", v): ("calculated", "approx") for v in ("fixed", "tunable")},
-    **{("input", v): (None,) for v in ("discrete", "continuous")},
-    ("output", "constant"): ("exact",),
-    **{("output", v): ("calculated", "exact", "approx") for v in ("discrete", "continuous")},
-    ("local", "constant"): ("exact",),
-    **{("local", v): ("calculated", "approx") for v in ("fixed", "tunable")},
-    **{("local", v): ("calculated", "exact", "approx") for v in ("discrete", "continuous")},
-    ("independent", "continuous"): (None,),
-}
+_FILE = "modelDescription.xml:/fmiModelDescription"
 
 
 @dataclass(frozen=True)
 class SimpleType:
-    """An element of TypeDefinitions."""
+    """An element of TypeDefinitions; ``holder`` is the one that has its attributes."""
 
     element: etree._Element
+    holder: etree._Element
     name: str
     kind: str
     attributes: Mapping[str, str]
@@ -39,14 +29,24 @@ class SimpleType:
 
 
 @dataclass(frozen=True)
-class ScalarVariable:
-    """A ScalarVariable; ``index`` counts from 1 as ModelStructure does.
+class Dimension:
+    """A dimension of an array: a size, or the value reference of the variable that has it; None where absent."""
 
-    ``initial`` is the effective value (declared, or the default of the standard's table), ``attributes`` those
-    of the type element after the declared type's have been filled in.
+    size: int | None
+    reference: int | None
+
+
+@dataclass(frozen=True)
+class DescribedVariable:
+    """A variable; ``index`` counts from 1 in the order of the file.
+
+    ``initial`` is the effective value (declared, or the default of the standard's table), ``attributes`` those of the
+    element that has its type after the declared type's have been filled in. ``starts`` are its start values as they
+    are written, None when there are none; ``clocks`` and ``previous`` are value references.
     """
 
     element: etree._Element
+    place: str
     index: int
     name: str
     reference: int | None
@@ -57,6 +57,11 @@ class ScalarVariable:
     initial: str | None
     attributes: Mapping[str, str]
     own: Mapping[str, str]
+    starts: tuple[str, ...] | None = None
+    dimensions: tuple[Dimension, ...] = ()
+    clocks: tuple[int, ...] | None = None
+    previous: int | None = None
+    aliases: tuple[etree._Element, ...] = ()
 
     def number(self, attribute: str) -> float | int | None:
         """A numeric attribute, or None when it is absent or no number.
@@ -71,13 +76,24 @@ class ScalarVariable:
 
     @property
     def start(self) -> str | None:
-        """The start attribute as it is written."""
-        return self.own.get("start")
+        """The first start value as it is written."""
+        return None if not self.starts else self.starts[0]
 
     @property
     def base(self) -> str:
-        """The type of the function that accesses the variable."""
+        """The type of the function of FMI 2.0 that accesses the variable."""
         return "Integer" if self.kind == "Enumeration" else self.kind
+
+    def flag(self, name: str) -> bool:
+        """A flag among its attributes; absent means false.
+
+        Args:
+            name: of the attribute.
+
+        Returns:
+            True when it is set.
+        """
+        return self.attributes.get(name) in ("true", "1")
 
     def path(self, attribute: str = "") -> str:
         """XPath of the variable; attributes of the type element are looked for there.
@@ -90,19 +106,21 @@ class ScalarVariable:
         Returns:
             The path, after the file's name and a colon.
         """
-        path = f"modelDescription.xml:/fmiModelDescription/ModelVariables/ScalarVariable[{self.index}]"
-        if attribute and attribute not in self.element.attrib and self.kind:
+        path = self.place
+        if attribute and attribute not in self.element.attrib and self.element.tag == "ScalarVariable" and self.kind:
             path += f"/{self.kind}"
         return path + (f"/@{attribute}" if attribute else "")
 
 
 @dataclass(frozen=True)
 class StructureEntry:
-    """An entry of ModelStructure; ``dependencies`` and ``kinds`` are None when absent or unreadable."""
+    """An entry of ModelStructure; ``variable`` names it as the version does (index, or value reference).
 
-    section: str
-    position: int
-    index: int | None
+    ``dependencies`` and ``kinds`` are None when absent or unreadable.
+    """
+
+    place: str
+    variable: int | None
     dependencies: tuple[int, ...] | None
     kinds: tuple[str, ...] | None
 
@@ -115,17 +133,21 @@ class StructureEntry:
         Returns:
             The path, after the file's name and a colon.
         """
-        place = f"/fmiModelDescription/ModelStructure/{self.section}/Unknown[{self.position}]"
-        return f"modelDescription.xml:{place}/@{attribute}"
+        return f"{self.place}/@{attribute}"
 
 
 @dataclass(frozen=True)
 class Interface:
-    """The CoSimulation or ModelExchange element."""
+    """The element CoSimulation, ModelExchange or ScheduledExecution."""
 
     element: etree._Element
     identifier: str | None
     sources: tuple[tuple[etree._Element, str], ...]
+
+    @property
+    def kind(self) -> str:
+        """The element's tag."""
+        return str(self.element.tag)
 
     def flag(self, name: str) -> bool:
         """A capability flag; absent means false.
@@ -143,33 +165,78 @@ class Interface:
 class Description:
     """What the rules look at."""
 
+    dialect: FmiDialect
     root: etree._Element
-    variables: tuple[ScalarVariable, ...]
+    variables: tuple[DescribedVariable, ...]
+    numbered: Mapping[int, DescribedVariable]
     types: tuple[SimpleType, ...]
     units: Mapping[str, etree._Element]
-    cosimulation: Interface | None
-    model_exchange: Interface | None
+    interfaces: tuple[Interface, ...]
     outputs: tuple[StructureEntry, ...]
     derivatives: tuple[StructureEntry, ...]
     initial_unknowns: tuple[StructureEntry, ...]
+    clocked_states: tuple[StructureEntry, ...]
+    event_indicators: tuple[StructureEntry, ...]
 
-    @property
-    def interfaces(self) -> tuple[Interface, ...]:
-        """The interfaces that the FMU has."""
-        return tuple(i for i in (self.cosimulation, self.model_exchange) if i is not None)
-
-    def variable(self, index: int | None) -> ScalarVariable | None:
-        """The variable with an index of ModelStructure, or None when there is none.
+    def interface(self, kind: str) -> Interface | None:
+        """An interface of the FMU.
 
         Args:
-            index: counted from 1.
+            kind: "CoSimulation", "ModelExchange" or "ScheduledExecution".
+
+        Returns:
+            The interface, or None when the FMU has it not.
+        """
+        return next((i for i in self.interfaces if i.kind == kind), None)
+
+    def identity(self, v: DescribedVariable) -> int | None:
+        """The number by which ModelStructure names a variable.
+
+        Args:
+            v: the variable.
+
+        Returns:
+            Its index, counted from 1, or its value reference.
+        """
+        return v.index if self.dialect is FMI2 else v.reference
+
+    def variable(self, number: int | None) -> DescribedVariable | None:
+        """The variable with a number of ModelStructure, or None when there is none.
+
+        Args:
+            number: see ``identity``.
 
         Returns:
             The variable.
         """
-        if index is None or not 1 <= index <= len(self.variables):
-            return None
-        return self.variables[index - 1]
+        return None if number is None else self.numbered.get(number)
+
+    def size(self, v: DescribedVariable) -> int | None:
+        """Number of values of a variable at its initial dimensions.
+
+        Args:
+            v: the variable.
+
+        Returns:
+            The number, or None when it cannot be told.
+        """
+        sizes = [self.extent(dimension) for dimension in v.dimensions]
+        known = [size for size in sizes if size is not None]
+        return prod(known) if len(known) == len(sizes) else None
+
+    def extent(self, dimension: Dimension) -> int | None:
+        """Initial size of a dimension.
+
+        Args:
+            dimension: of an array.
+
+        Returns:
+            The size, or None when it cannot be told.
+        """
+        if dimension.size is not None or dimension.reference is None:
+            return dimension.size
+        holder = self.variable(dimension.reference)
+        return None if holder is None else _integer(holder.start)
 
     def experiment(self, name: str) -> float | None:
         """A number of DefaultExperiment.
@@ -190,7 +257,7 @@ def number(text: str | None, kind: str) -> float | int | None:
 
     Args:
         text: as the XML has it.
-        kind: "Real", "Integer" and so on, as the XML names the type.
+        kind: "Real", "Int32" and so on, as the XML names the type.
 
     Returns:
         The number.
@@ -198,7 +265,7 @@ def number(text: str | None, kind: str) -> float | int | None:
     if text is None:
         return None
     try:
-        return float(text) if kind == "Real" else int(text)
+        return float(text) if kind in REAL else int(text)
     except ValueError:
         return None
 
@@ -212,40 +279,63 @@ def read_description(root: etree._Element) -> Description:
     Returns:
         The description; what is missing or wrong is None or empty.
     """
-    types = tuple(_simple_type(e) for e in root.findall("TypeDefinitions/SimpleType") if len(e))
+    dialect = FMI2 if root.get("fmiVersion") == "2.0" else FMI3
+    types = tuple(_simple_types(root, dialect))
     by_name = {t.name: t for t in types}
-    elements = root.findall("ModelVariables/ScalarVariable")
+    variables = tuple(_variables(root, dialect, by_name))
+    numbers = ((v.index if dialect is FMI2 else v.reference, v) for v in reversed(variables))
     return Description(
+        dialect=dialect,
         root=root,
-        variables=tuple(_variable(e, i, by_name) for i, e in enumerate(elements, 1)),
+        variables=variables,
+        numbered={number: v for number, v in numbers if number is not None},
         types=types,
         units={e.get("name", ""): e for e in root.findall("UnitDefinitions/Unit")},
-        cosimulation=_interface(root.find("CoSimulation")),
-        model_exchange=_interface(root.find("ModelExchange")),
-        outputs=_unknowns(root, "Outputs"),
-        derivatives=_unknowns(root, "Derivatives"),
-        initial_unknowns=_unknowns(root, "InitialUnknowns"),
+        interfaces=tuple(_interfaces(root)),
+        outputs=_entries(root, dialect, dialect.outputs),
+        derivatives=_entries(root, dialect, dialect.derivatives),
+        initial_unknowns=_entries(root, dialect, dialect.initial_unknowns),
+        clocked_states=_entries(root, dialect, dialect.clocked_states),
+        event_indicators=_entries(root, dialect, dialect.event_indicators),
     )
 
 
-def _simple_type(element: etree._Element) -> SimpleType:
-    inner = element[0]
-    items = tuple((i.get("name", ""), _integer(i.get("value"))) for i in inner.findall("Item"))
-    return SimpleType(element, element.get("name", ""), _tag(inner), dict(inner.attrib), items)
+def _simple_types(root: etree._Element, dialect: FmiDialect) -> Iterator[SimpleType]:
+    for element in root.findall("TypeDefinitions/*"):
+        holder = element if dialect is FMI3 else next(iter(element), None)
+        if holder is not None:
+            items = tuple((i.get("name", ""), _integer(i.get("value"))) for i in holder.findall("Item"))
+            kind = _tag(holder).removesuffix("Type")
+            yield SimpleType(element, holder, element.get("name", ""), kind, dict(holder.attrib), items)
 
 
-def _variable(element: etree._Element, index: int, types: Mapping[str, SimpleType]) -> ScalarVariable:
-    inner: Any = next((e for e in element if e.tag in (*NUMERIC, "Boolean", "String")), None)
+def _variables(
+    root: etree._Element, dialect: FmiDialect, types: Mapping[str, SimpleType]
+) -> Iterator[DescribedVariable]:
+    path = "ModelVariables/ScalarVariable" if dialect is FMI2 else "ModelVariables/*"
+    counts: Counter[str] = Counter()
+    for index, element in enumerate(root.findall(path), 1):
+        tag = _tag(element)
+        counts[tag] += 1
+        yield _variable(element, index, f"{_FILE}/ModelVariables/{tag}[{counts[tag]}]", dialect, types)
+
+
+def _variable(
+    element: etree._Element, index: int, place: str, dialect: FmiDialect, types: Mapping[str, SimpleType]
+) -> DescribedVariable:
+    inner: Any = element if dialect is FMI3 else next((e for e in element if e.tag in KINDS), None)
     own = {} if inner is None else dict(inner.attrib)
-    kind = "" if inner is None else _tag(inner)
+    kind = _tag(inner) if inner is not None and inner.tag in KINDS else ""
     declared = types.get(own.get("declaredType", ""))
     inherited = dict(declared.attributes) if declared is not None and declared.kind == kind else {}
     causality = element.get("causality", "local")
-    variability = element.get("variability", "continuous")
+    variability = element.get("variability", _variability(kind, causality, dialect))
     declared_initial = element.get("initial")
-    default = INITIAL.get((causality, variability), (None,))[0]
-    return ScalarVariable(
+    default = None if kind == "Clock" else dialect.initial.get((causality, variability), (None,))[0]
+    clocks = element.get("clocks")
+    return DescribedVariable(
         element=element,
+        place=place,
         index=index,
         name=element.get("name", ""),
         reference=_integer(element.get("valueReference")),
@@ -254,35 +344,57 @@ def _variable(element: etree._Element, index: int, types: Mapping[str, SimpleTyp
         variability=variability,
         declared_initial=declared_initial,
         initial=declared_initial if declared_initial is not None else default,
-        attributes=inherited | own,
+        attributes={**inherited, **own},
         own=own,
+        starts=_starts(element, own, dialect),
+        dimensions=tuple(
+            Dimension(_integer(e.get("start")), _integer(e.get("valueReference"))) for e in element.findall("Dimension")
+        ),
+        clocks=None if clocks is None else _integers(clocks),
+        previous=_integer(element.get("previous")),
+        aliases=tuple(element.findall("Alias")),
     )
 
 
-def _unknowns(root: etree._Element, section: str) -> tuple[StructureEntry, ...]:
+def _variability(kind: str, causality: str, dialect: FmiDialect) -> str:
+    """The default."""
+    if dialect is FMI2:
+        return "continuous"
+    if causality in ("parameter", "structuralParameter", "calculatedParameter"):
+        return "fixed"
+    return "continuous" if kind in REAL else "discrete"
+
+
+def _starts(element: etree._Element, own: Mapping[str, str], dialect: FmiDialect) -> tuple[str, ...] | None:
+    text = own.get("start")
+    if dialect is FMI2:
+        return None if text is None else (text,)
+    texts = [e.get("value", "") for e in element.findall("Start")]
+    return tuple(texts or ([] if text is None else text.split())) or None
+
+
+def _entries(root: etree._Element, dialect: FmiDialect, section: str) -> tuple[StructureEntry, ...]:
     found = []
-    for position, element in enumerate(root.findall(f"ModelStructure/{section}/Unknown"), 1):
-        text = element.get("dependencies")
-        parts = None if text is None else tuple(_integer(p) for p in text.split())
-        dependencies = None if parts is None or None in parts else parts
-        kinds = element.get("dependenciesKind")
+    for position, element in enumerate(root.findall(f"ModelStructure/{section}") if section else (), 1):
+        dependencies, kinds = element.get("dependencies"), element.get("dependenciesKind")
+        place = f"{_FILE}/ModelStructure/{section}[{position}]"
         found.append(
             StructureEntry(
-                section,
-                position,
-                _integer(element.get("index")),
-                dependencies,  # type: ignore[arg-type]
+                place,
+                _integer(element.get(dialect.identity)),
+                None if dependencies is None else _integers(dependencies),
                 None if kinds is None else tuple(kinds.split()),
             )
         )
     return tuple(found)
 
 
-def _interface(element: etree._Element | None) -> Interface | None:
-    if element is None:
-        return None
-    sources = tuple((e, e.get("name", "")) for e in element.findall("SourceFiles/File"))
-    return Interface(element, element.get("modelIdentifier"), sources)
+def _interfaces(root: etree._Element) -> Iterator[Interface]:
+    for kind in ("CoSimulation", "ModelExchange", "ScheduledExecution"):
+        element = root.find(kind)
+        if element is not None:
+            sources = tuple((e, e.get("name", "")) for e in element.findall("SourceFiles/File"))
+            yield Interface(element, element.get("modelIdentifier"), sources)
 
 
 def _tag(element: etree._Element) -> str:
@@ -294,3 +406,9 @@ def _integer(text: str | None) -> int | None:
         return None if text is None else int(text)
     except ValueError:
         return None
+
+
+def _integers(text: str) -> tuple[int, ...] | None:
+    found = [_integer(part) for part in text.split()]
+    known = tuple(value for value in found if value is not None)
+    return known if len(known) == len(found) else None

@@ -1,19 +1,27 @@
 """The dynamic checks: what a child process is asked to run, and how its ending becomes a finding."""
 
 import contextlib
-import math
 import os
 from pathlib import Path
-from typing import Any
 
 from orchestrator.checking.archive import FmuFiles
-from orchestrator.checking.binaries import MAXIMUM_BYTES, here, inspect, library_name, misfit
-from orchestrator.checking.description import Description, Interface, ScalarVariable, number
+from orchestrator.checking.binaries import MAXIMUM_BYTES, PLATFORMS, here, inspect, library_name, loadable, misfit
+from orchestrator.checking.description import Description, Interface
 from orchestrator.checking.findings import Execution, Finding
 from orchestrator.checking.layered import ReferenceResult
-from orchestrator.checking.probing import probes, probes_compare, probes_misuse, probes_reference, trajectory
+from orchestrator.checking.probing import (
+    probes,
+    probes_3,
+    probes_compare,
+    probes_misuse,
+    probes_reference,
+    trajectory,
+)
 from orchestrator.checking.probing.binding import PENDING, Library, StatusError, TerminatedError
-from orchestrator.checking.probing.trajectory import ProbeJob
+from orchestrator.checking.probing.describing import make_job
+from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.process import Process
+from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, OutputError
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import Limits
@@ -28,24 +36,23 @@ _PROBES: dict[str, probes.Probe] = {
     "reset": probes_compare.reset,
     "state": probes_compare.state,
     "variable steps": probes_compare.variable_steps,
+    "early return": probes_3.early_return,
+    "intermediate update": probes_3.intermediate,
+    "clocks": probes_3.clocks,
+    "configuration": probes_3.structure,
     "reference": probes_reference.reference,
     "memory": probes.memory,
     "misuse": probes_misuse.misuse,
 }
-PROBES = tuple(_PROBES)
-_STEPS = 200
+PROBES: dict[Version, tuple[str, ...]] = {
+    "2.0": tuple(n for n in _PROBES if n not in ("early return", "intermediate update", "clocks", "configuration")),
+    "3.0": tuple(_PROBES),
+}
 _MOST_FINDINGS = 10_000
-_FLAGS = (
-    "canGetAndSetFMUstate",
-    "canSerializeFMUstate",
-    "canHandleVariableCommunicationStepSize",
-    "canBeInstantiatedOnlyOncePerProcess",
-    "canRunAsynchronuously",
-)
 
 
 def obstacle(d: Description, files: FmuFiles) -> str:
-    """Why an FMU cannot be executed here; empty when it can.
+    """Why an FMU cannot be executed here; empty when one of its interfaces can.
 
     Args:
         d: the model description.
@@ -54,27 +61,31 @@ def obstacle(d: Description, files: FmuFiles) -> str:
     Returns:
         The reason, in words.
     """
-    interface = d.cosimulation
-    if interface is None:
-        return "it has no co-simulation interface"
-    path = library_name(interface.identifier or "", here())
-    if path not in files.names():
-        return f"there is no {path}, which this machine would load"
-    unfit = misfit(inspect(files.read(path, MAXIMUM_BYTES)), path, here())
+    reasons = [_obstacle(d, interface, files) for interface in d.interfaces]
+    return "it has no interface" if not reasons else "" if "" in reasons else reasons[0]
+
+
+def _obstacle(d: Description, interface: Interface, files: FmuFiles) -> str:
+    version = d.dialect.version
+    path = loadable(d, interface, set(files.names()))
+    if not path:
+        wanted = library_name(interface.identifier or "", here(version), version)
+        return f"there is no {wanted}, which this machine would load"
+    unfit = misfit(inspect(files.read(path, MAXIMUM_BYTES)), path, PLATFORMS[version][here(version)], native=True)
     return "" if unfit is None else unfit.message
 
 
 def check_dynamic(
     d: Description, files: FmuFiles, references: list[ReferenceResult], limits: Limits, walls: bool = True
-) -> tuple[list[Finding], Execution]:
-    """Run the FMU in a child process and report what it did.
+) -> tuple[list[Finding], tuple[Execution, ...]]:
+    """Run each interface of the FMU in a child process and report what it did.
 
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
 
     Args:
         d, files: of an FMU without an ``obstacle``.
-        references: reference results; each is simulated.
-        limits: of the child process.
+        references: reference results; each is simulated, by the first interface that is run.
+        limits: of a child process.
         walls: whether the kernel shall keep the FMU from files, network and other processes.
 
     Returns:
@@ -83,28 +94,41 @@ def check_dynamic(
     Raises:
         OutputError: there is no room to unpack the FMU.
     """
-    interface = d.cosimulation
-    assert interface is not None
+    findings: list[Finding] = []
+    executions: list[Execution] = []
+    several = len(d.interfaces) > 1
     with Scratch("check") as scratch:
         fmu = scratch.path / "fmu"
         try:
             files.extract(fmu)
         except OSError as error:
             raise OutputError(f"the FMU must be unpacked to {scratch.path}, but cannot be: {error.strerror}") from None
-        first = _Watcher(fmu, limits, walls)
-        findings = first.run(_job(d, interface, fmu, references[0] if references else None, limits), PROBES)
-        for reference in references[1:]:
-            if any(f.severity == "error" for f in findings):
-                break
-            findings += _Watcher(fmu, limits, walls).run(_job(d, interface, fmu, reference, limits), ("reference",))
-    return findings, Execution(interface.element.tag, first.stages)
+        for interface in d.interfaces:
+            names = PROBES[d.dialect.version]
+            reason = _obstacle(d, interface, files)
+            if reason:
+                executions.append(Execution(interface.kind, dict.fromkeys(("load", *names), reason)))
+                continue
+            library = loadable(d, interface, set(files.names()))
+            rest = [] if executions or interface.kind == "ScheduledExecution" else references
+            first = _Watcher(fmu, limits, walls, interface.kind if several else "")
+            found = first.run(make_job(d, interface, fmu, library, rest[0] if rest else None, limits), names)
+            for reference in rest[1:]:
+                if any(f.severity == "error" for f in found):
+                    break
+                job = make_job(d, interface, fmu, library, reference, limits)
+                found += _Watcher(fmu, limits, walls, interface.kind if several else "").run(job, ("reference",))
+            findings += found
+            executions.append(Execution(interface.kind, first.stages))
+    return findings, tuple(executions)
 
 
 class _Watcher:
     """Asks one child and collects the findings."""
 
-    def __init__(self, fmu: Path, limits: Limits, walls: bool) -> None:
+    def __init__(self, fmu: Path, limits: Limits, walls: bool, interface: str = "") -> None:
         self.fmu, self.limits, self.walls = fmu, limits, walls
+        self.interface = f"{interface}, " if interface else ""
         self.findings: list[Finding] = []
         self.probe = "load"
         self.stages: dict[str, str] = {}
@@ -112,19 +136,21 @@ class _Watcher:
     def run(self, job: ProbeJob, names: tuple[str, ...]) -> list[Finding]:
         """The findings of one child."""
         before = _snapshot(self.fmu)
-        with Jail(
-            "orchestrator.checking.host:opened", write=[self.fmu], limits=self.limits, walls=self.walls, adopt=True
-        ) as jail:
-            library = Library(jail, "canRunAsynchronuously" in job.flags)
+        with Process(self._started) as process:
+            library = Library(process, job.version, job.variables)
             try:
                 self._probes(library, job, names)
             except ChildError as error:
                 self._ended_early(error, library.current)
-            left = jail.finish()
+            left = process.jail.finish() or process.left
             self._skipped(names)
-            self._left_behind(before, jail, left)
+            self._left_behind(before, process.jail, left)
             self.stages |= dict.fromkeys(("run", "afterwards"), "")
         return self.findings
+
+    def _started(self) -> Jail:
+        entry = "orchestrator.checking.host:opened"
+        return Jail(entry, write=[self.fmu], limits=self.limits, walls=self.walls, adopt=True)
 
     def _probes(self, library: Library, job: ProbeJob, names: tuple[str, ...]) -> None:
         problem = library.load(job.library)
@@ -134,7 +160,7 @@ class _Watcher:
         probes.load(library, self._add)
         self.stages["load"] = ""
         single = "canBeInstantiatedOnlyOncePerProcess" in job.flags
-        context = probes.Context(probes.Bench(job, library), self._add, single=single)
+        context = probes.Context(trajectory.Bench(job, library, self._add), self._add, single=single)
         for self.probe in names:
             try:
                 _PROBES[self.probe](context)
@@ -150,19 +176,19 @@ class _Watcher:
 
     def _add(self, rule: str, message: str, path: str = "") -> None:
         if len(self.findings) < _MOST_FINDINGS:
-            self.findings.append(Finding(rule, path or f"({self.probe})", message))
+            self.findings.append(Finding(rule, path or f"({self.interface}{self.probe})", message))
 
     def _ended_early(self, error: ChildError, function: str) -> None:
         where = f"during {function}" if function else f"in the probe `{self.probe}`"
-        if error.reason == "time":
+        if self.probe == "misuse" and function and error.reason not in ("memory", "disk"):
+            self._add("misuse.crash", f"a call that is to be refused must return, but {error} {where}")
+        elif error.reason == "time":
             self._add("limits.time", f"a call must take at most {self.limits.time:g} s, but took longer {where}")
         elif error.reason == "memory":
             allowed = self.limits.memory >> 20
             self._add("limits.memory", f"the process must use at most {allowed} MiB, but used more {where}")
         elif error.reason == "disk":
             self._add("limits.output", f"text and files must stay below {self.limits.disk >> 20} MiB, but do not")
-        elif self.probe == "misuse" and function:
-            self._add("misuse.crash", f"a call that is to be refused must not end the process, but {error} {where}")
         elif function:
             self._add("run.crash", f"no call must end the process, but {error} {where}")
         else:
@@ -196,9 +222,12 @@ class _Watcher:
 
 
 def _rule_of(error: StatusError) -> str:
-    if error.function == "fmi2Instantiate":
+    if error.rule:
+        return error.rule
+    if "Instantiate" in error.function:
         return "run.instantiate"
-    return "run.pending" if error.status == PENDING else "run.status"
+    pending = error.status == PENDING and error.function.startswith("fmi2")
+    return "run.pending" if pending else "run.status"
 
 
 def _files(folder: Path, left_out: str) -> list[str]:
@@ -227,57 +256,3 @@ def _snapshot(folder: Path) -> dict[str, tuple[int, int]]:
             info = os.lstat(folder / name)
             found[Path(name).as_posix()] = (info.st_size, info.st_mtime_ns)
     return found
-
-
-def _job(
-    d: Description, interface: Interface, fmu: Path, reference: ReferenceResult | None, limits: Limits
-) -> ProbeJob:
-    start = _or(d.experiment("startTime"), 0.0)
-    stop = d.experiment("stopTime")
-    if stop is not None and not start < stop < math.inf:
-        stop = None  # a finding already
-    length = (stop if stop is not None else start + 1.0) - start
-    step = d.experiment("stepSize") or length / _STEPS
-    if not 0.0 < step <= length:
-        step = length / _STEPS
-    # Steps beyond the stop time may be refused, so a fraction of one is left out.
-    steps = max(1, math.floor(min(_STEPS, length / step + 1e-6)))
-    return ProbeJob(
-        library=str(fmu / library_name(str(interface.identifier), here())),
-        guid=d.root.get("guid", ""),
-        resources=(fmu / "resources").as_uri(),
-        variables=tuple(_plain(v, v.reference) for v in d.variables if v.reference is not None and v.kind),
-        start=start,
-        stop=stop,
-        step=step,
-        tolerance=d.experiment("tolerance"),
-        steps=steps,
-        budget=min(2.0, 0.2 * limits.time),
-        flags=frozenset(f for f in _FLAGS if interface.flag(f)),
-        reference=reference,
-    )
-
-
-def _or(value: float | None, default: float) -> float:
-    return default if value is None or not math.isfinite(value) else value
-
-
-def _plain(v: ScalarVariable, reference: int) -> trajectory.ProbedVariable:
-    start: Any = v.start
-    if start is not None:
-        if v.base == "Boolean":
-            start = int(start in ("true", "1"))
-        elif v.base != "String":
-            start = number(start, v.kind)
-    return trajectory.ProbedVariable(
-        name=v.name,
-        reference=reference,
-        base=v.base,
-        causality=v.causality,
-        variability=v.variability,
-        initial=v.initial,
-        start=start,
-        minimum=v.number("min"),
-        maximum=v.number("max"),
-        nominal=v.number("nominal"),
-    )

@@ -7,18 +7,31 @@ own to choose anyway.
 import ctypes
 import sys
 from collections.abc import Callable
-from ctypes import c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from ctypes import POINTER, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from typing import Any
 
 from orchestrator.checking.probing.varargs import LOGGER, fill_in
 
-_TYPES: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int, "String": c_char_p}
+TYPES: dict[str, Any] = {
+    "double": c_double, "float": ctypes.c_float, "int": c_int, "bool": c_bool, "size": c_size_t, "text": c_char_p,
+    "int8": ctypes.c_int8, "uint8": ctypes.c_uint8, "int16": ctypes.c_int16, "uint16": ctypes.c_uint16,
+    "int32": ctypes.c_int32, "uint32": ctypes.c_uint32, "int64": ctypes.c_int64, "uint64": ctypes.c_uint64,
+}  # fmt: skip
 _MESSAGES = 4
-_ERRORS = (3, 4)  # fmi2Error and fmi2Fatal
+_ERRORS = (3, 4)  # Error and Fatal
+_MOST_UPDATES = 10_000
 _LONGEST_TEXT = 1 << 20
+_LOG = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
+_UPDATE = ctypes.CFUNCTYPE(
+    None, c_void_p, c_double, c_bool, c_bool, c_bool, c_bool, POINTER(c_bool), POINTER(c_double)
+)  # fmt: skip
+_CLOCK_UPDATE = ctypes.CFUNCTYPE(None, c_void_p)
+_LOCK = ctypes.CFUNCTYPE(None)
 
 
 class _Callbacks(ctypes.Structure):
+    """Those of FMI 2.0."""
+
     _fields_ = (
         ("logger", LOGGER),
         ("allocateMemory", c_void_p),
@@ -26,6 +39,12 @@ class _Callbacks(ctypes.Structure):
         ("stepFinished", c_void_p),
         ("componentEnvironment", c_void_p),
     )
+
+
+class _EventInfo(ctypes.Structure):
+    """``fmi2EventInfo``."""
+
+    _fields_ = (*((f"flag{i}", c_int) for i in range(5)), ("next", c_double))
 
 
 def opened(_: Any) -> Callable[[Any], Any]:
@@ -46,27 +65,45 @@ class Host:
 
     def __init__(self) -> None:
         self._handle: Any = None
-        self._instances: dict[int, tuple[c_void_p, _Callbacks]] = {}
+        self._instances: dict[int, Any] = {}
         self._states: dict[int, c_void_p] = {}
         self._number = 0
         self._messages: list[str] = []
         self._errors = 0
-        self._logger = LOGGER(self._log)
+        self._function = ""
+        self._updates: list[list[Any]] = []
+        self._plan: list[Any] = [0, [], [], [], -1]
+        self._locks = 0
+        # Kept here, for the library keeps pointers to them.
+        self._logger, self._log3 = LOGGER(self._log), _LOG(self._log_3)
+        self._update = _UPDATE(self._intermediate)
+        self._clock_update = _CLOCK_UPDATE(lambda _: None)
+        self._lock, self._unlock = _LOCK(lambda: self._count(1)), _LOCK(lambda: self._count(-1))
 
     def _log(self, _environment: int, _name: bytes, status: int, _category: bytes, message: int, *rest: Any) -> None:
         self._errors += status in _ERRORS
         self._take(fill_in(message, rest))
+
+    def _log_3(self, _environment: int, status: int, _category: bytes, message: bytes) -> None:
+        self._errors += status in _ERRORS
+        self._take((message or b"").decode("utf-8", "replace").strip())
 
     def _take(self, text: str) -> None:
         """Keep a message, the last few of a call."""
         if text:
             self._messages = [*self._messages[1 - _MESSAGES :], text[:200]]
 
-    def load(self, path: str) -> str:
+    def _count(self, change: int) -> None:
+        self._locks += change
+
+    def load(self, path: str, texts: list[str], makers: list[str], freer: str) -> str:
         """Load the library; return why that fails, or nothing.
 
         Args:
             path: of the shared library.
+            texts: functions that return a text.
+            makers: functions that return an instance.
+            freer: the function that frees one.
 
         Returns:
             The reason, empty when it is loaded.
@@ -75,14 +112,15 @@ class Host:
             self._handle = ctypes.CDLL(path)
         except OSError as error:
             return str(error)
-        for name in ("fmi2GetTypesPlatform", "fmi2GetVersion"):
+        for name in texts:
             getattr(self._handle, name).restype = c_char_p
-        self._handle.fmi2Instantiate.restype = c_void_p
-        self._handle.fmi2FreeInstance.restype = None
+        for name in makers:
+            getattr(self._handle, name).restype = c_void_p
+        getattr(self._handle, freer).restype = None
         return ""
 
     def text(self, function: str) -> str | None:
-        """Call fmi2GetVersion or fmi2GetTypesPlatform.
+        """Call a function without arguments that returns a text.
 
         Args:
             function: its name.
@@ -93,11 +131,12 @@ class Host:
         value = getattr(self._handle, function)()
         return None if value is None else value[:_LONGEST_TEXT].decode("utf-8", "replace")
 
-    def instantiate(self, name: str, guid: str, resources: str) -> list[Any]:
-        """Make an instance; return its number (``None``: the FMU returned null) and what it logged.
+    def instantiate_2(self, name: str, kind: int, guid: str, resources: str) -> list[Any]:
+        """Make an instance of FMI 2.0; return its number (``None``: the FMU returned null) and what it logged.
 
         Args:
             name: of the instance.
+            kind: 0 for model exchange, 1 for co-simulation.
             guid: of the model.
             resources: URI of the unpacked resources.
 
@@ -109,21 +148,104 @@ class Host:
         callbacks = _Callbacks(self._logger, allocate, free, None, None)
         self._messages = []
         component = self._handle.fmi2Instantiate(
-            name.encode(), 1, guid.encode(), resources.encode(), ctypes.byref(callbacks), 0, 1
+            name.encode(), kind, guid.encode(), resources.encode(), ctypes.byref(callbacks), 0, 1
         )
+        return self._made(component, callbacks)
+
+    def instantiate_3(
+        self, function: str, name: str, token: str, resources: str | None, flags: list[bool], required: list[int]
+    ) -> list[Any]:
+        """Make an instance of FMI 3.0; return its number (``None``: the FMU returned null) and what it logged.
+
+        Args:
+            function: the one that makes it.
+            name: of the instance.
+            token: instantiation token.
+            resources: path of the unpacked resources, with a separator at its end, or None.
+            flags: for co-simulation: eventModeUsed, earlyReturnAllowed, whether intermediate updates are wanted.
+            required: value references of the required intermediate variables.
+
+        Returns:
+            Number (or None) and messages.
+        """
+        self._messages, self._function = [], function
+        head: tuple[Any, ...] = (
+            name.encode(),
+            token.encode(),
+            None if resources is None else resources.encode(),
+            c_bool(False),
+            c_bool(True),
+        )
+        rest: tuple[Any, ...] = ()
+        if function.endswith("CoSimulation"):
+            wanted = self._update if flags[2] else _UPDATE()
+            references = (c_uint * max(len(required), 1))(*required)
+            head += (c_bool(flags[0]), c_bool(flags[1]), references, c_size_t(len(required)))
+            rest = (wanted,)
+        elif function.endswith("ScheduledExecution"):
+            rest = (self._clock_update, self._lock, self._unlock)
+        component = getattr(self._handle, function)(*head, c_void_p(), self._log3, *rest)
+        return self._made(component, rest)
+
+    def _made(self, component: int | None, kept: Any) -> list[Any]:
         if not component:
             return [None, self._messages]
         self._number += 1
-        self._instances[self._number] = (c_void_p(component), callbacks)  # the FMU keeps a pointer to them
+        self._instances[self._number] = (c_void_p(component), kept)
         return [self._number, self._messages]
 
-    def free(self, instance: int) -> None:
+    def free(self, instance: int, function: str) -> None:
         """Free an instance.
 
         Args:
             instance: its number.
+            function: that does it.
         """
-        self._handle.fmi2FreeInstance(self._instances[instance][0])
+        getattr(self._handle, function)(self._instances[instance][0])
+
+    def plan(self, instance: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:
+        """Say what to do in intermediate updates.
+
+        Args:
+            instance: whose.
+            reads, writes: value references of Float64 variables.
+            values: of those that are written.
+            early: at which update, counted from 0, an early return is asked for; -1 for never.
+        """
+        self._plan = [instance, reads, writes, values, early]
+
+    def updates(self) -> list[Any]:
+        """What the intermediate updates since the last call were.
+
+        Returns:
+            Rows of function under way, time, the four flags, status of getting and of setting (None: not done); and
+            how often preemption was locked without being unlocked.
+        """
+        found, self._updates = self._updates, []
+        return [found, self._locks]
+
+    def _intermediate(
+        self, _environment: int, time: float, wants: bool, gives: bool, done: bool, early: bool, asked: Any, when: Any
+    ) -> None:
+        instance, reads, writes, values, at = self._plan
+        row = [self._function, time, wants, gives, done, early, None, None]
+        if instance in self._instances and not done:
+            component = self._instances[instance][0]
+            if gives and reads:
+                buffer = (c_double * len(reads))()
+                row[6] = self._access("fmi3GetFloat64", component, reads, buffer)
+            if wants and writes:
+                row[7] = self._access("fmi3SetFloat64", component, writes, (c_double * len(values))(*values))
+        asked[0] = early and at == len(self._updates)
+        if asked[0]:
+            when[0] = time
+        if len(self._updates) < _MOST_UPDATES:
+            self._updates.append(row)
+
+    def _access(self, function: str, component: c_void_p, references: list[int], buffer: Any) -> int:
+        numbers = (c_uint * len(references))(*references)
+        size = c_size_t(len(buffer))
+        return int(getattr(self._handle, function)(component, numbers, c_size_t(len(references)), buffer, size))
 
     def call(self, instance: int, function: str, arguments: list[Any]) -> list[Any]:
         """Call a function.
@@ -131,47 +253,74 @@ class Host:
         Args:
             instance: its number.
             function: its name.
-            arguments: numbers by kind, see ``_argument``.
+            arguments: lists of kind and value, see ``_argument``.
 
         Returns:
             Status, what the output arguments hold, what was logged, and how many of that as errors.
         """
-        self._messages, self._errors = [], 0
+        self._messages, self._errors, self._function = [], 0, function
         made = [self._argument(*a) for a in arguments]
-        values = [value for value, _ in made]
+        values = [value for group, _ in made for value in group]
         status = getattr(self._handle, function)(self._instances[instance][0], *values)
         return [int(status), [read() for _, read in made if read is not None], self._messages, self._errors]
 
-    def _argument(self, kind: str, value: Any = None) -> tuple[Any, Callable[[], Any] | None]:
-        """Return an argument, and how to read it afterwards when it is an output."""
+    def calls(self, instance: int, requests: list[list[Any]]) -> list[Any]:
+        """Call several functions, up to the first that returns neither OK nor Warning.
+
+        Args:
+            instance: its number.
+            requests: pairs of function and arguments.
+
+        Returns:
+            For each function that was called what ``call`` returns.
+        """
+        done = []
+        for function, arguments in requests:
+            done.append(self.call(instance, function, arguments))
+            if done[-1][0] not in (0, 1):
+                break
+        return done
+
+    def _argument(self, kind: str, *value: Any) -> tuple[tuple[Any, ...], Callable[[], Any] | None]:
+        """Return the arguments that a description stands for, and how to read them afterwards when they are outputs."""
         match kind:
-            case "double" | "int" | "size":
-                return {"double": c_double, "int": c_int, "size": c_size_t}[kind](value), None
-            case "references":
-                return (c_uint * len(value))(*value), None
+            case "in":
+                return ((TYPES[value[0]] * max(len(value[1]), 1))(*value[1]),), None
+            case "out":
+                return self._output(TYPES[value[0]], value[1], value[2] if len(value) > 2 else None)
             case "bytes":
-                return value, None
-            case "Real" | "Integer" | "Boolean" | "String":
-                return (_TYPES[kind] * len(value))(*value), None
+                return (value[0],), None
+            case "in binaries":
+                sizes = (c_size_t * max(len(value[0]), 1))(*map(len, value[0]))
+                return (sizes, (c_char_p * max(len(value[0]), 1))(*value[0])), None
+            case "out binaries":
+                lengths, pointers = (c_size_t * max(value[0], 1))(), (c_void_p * max(value[0], 1))()
+                return (lengths, pointers), lambda: [
+                    ctypes.string_at(p, min(n, _LONGEST_TEXT)) if p else (b"" if n == 0 else None)
+                    for n, p in list(zip(lengths, pointers, strict=True))[: value[0]]
+                ]
             case "state":
-                return self._states[value], None
+                return (self._states[value[0]],), None
             case "free state":
-                state = self._states[value]
-                return ctypes.byref(state), lambda: not state
+                state = self._states[value[0]]
+                return (ctypes.byref(state),), lambda: not state
             case "new state":
                 fresh = c_void_p()
-                return ctypes.byref(fresh), lambda: self._kept(fresh)
-            case "out int" | "out size":
-                number = c_int(value or 0) if kind == "out int" else c_size_t()
-                return ctypes.byref(number), lambda: number.value
+                return (ctypes.byref(fresh),), lambda: self._kept(fresh)
             case "out bytes":
-                data = (ctypes.c_char * value)()
-                return data, lambda: data.raw
+                data = (ctypes.c_char * value[0])()
+                return (data,), lambda: data.raw
+            case "event info":
+                info = _EventInfo()
+                return (ctypes.byref(info),), lambda: [*(bool(getattr(info, f"flag{i}")) for i in range(5)), info.next]
             case _:
-                values = (_TYPES[kind.removeprefix("out ")] * value)()
-                return values, lambda: [
-                    v if v is None or not isinstance(v, bytes) else v[:_LONGEST_TEXT] for v in values
-                ]
+                return (TYPES[kind](value[0]),), None
+
+    def _output(self, kind: Any, count: int, initial: Any) -> tuple[tuple[Any, ...], Callable[[], Any]]:
+        values = (kind * max(count, 1))()
+        if initial is not None:
+            values[0] = initial
+        return (values,), lambda: [v[:_LONGEST_TEXT] if isinstance(v, bytes) else v for v in list(values)[:count]]
 
     def _kept(self, state: c_void_p) -> int:
         self._number += 1

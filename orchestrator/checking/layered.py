@@ -5,12 +5,13 @@ import io
 import math
 import posixpath
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
-from orchestrator.checking.description import Description
+from orchestrator.checking.companions import check_companions
+from orchestrator.checking.description import DescribedVariable, Description
 from orchestrator.checking.findings import Finding
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -30,8 +31,8 @@ class ReferenceResult:
 
     Attributes:
         path: CSV file in the FMU.
-        names: columns after the time.
-        rows: rows of time and values.
+        names: of the variables of the values after the time; an array's stands as often as it has values.
+        rows: rows of time and values, Boolean ones as 0 and 1; columns of texts are left out.
     """
 
     path: str
@@ -39,24 +40,43 @@ class ReferenceResult:
     rows: tuple[tuple[float, ...], ...]
 
 
-def check_files(files: FmuFiles) -> Iterator[Finding]:
-    """Findings about the documentation and the icon.
+def check_files(d: Description, files: FmuFiles) -> Iterator[Finding]:
+    """Findings about the documentation, the icon, and the further files of FMI 3.0.
 
     Args:
+        d: the model description.
         files: of the FMU.
 
     Yields:
         Each finding.
     """
     names = set(files.names())
+    if d.dialect.version == "3.0":
+        yield from check_companions(d, files)
+        yield from _documents(d, names)
     documents = any(re.fullmatch(r"documentation/(?!licenses/|diagrams?/).+", n) for n in names)
-    entries = ("documentation/index.html", "documentation/_main.html")
+    entries = ("documentation/index.html", "documentation/_main.html")[: 2 if d.dialect.version == "2.0" else 1]
     if documents and not names & set(entries):
         yield Finding(
             "file.documentation", "documentation", f"documentation/ must have the entry {entries[0]}, but has not"
         )
     if "model.png" in names and files.read("model.png", 1 << 26)[:8] != b"\x89PNG\r\n\x1a\n":
         yield Finding("file.icon", "model.png", "the icon must be a PNG image, but is not")
+
+
+def _documents(d: Description, names: set[str]) -> Iterator[Finding]:
+    """FMI 3.0: entry pages of the folders of documentation."""
+    licences = [n for n in names if n.startswith("documentation/licenses/")]
+    if licences and not any(re.fullmatch(r"documentation/licenses/license\.(txt|html|spdx)", n) for n in licences):
+        message = "documentation/licenses must have the entry license.txt, .html or .spdx, but has not"
+        yield Finding("file.license", "documentation/licenses", message)
+    if "documentation/diagram.svg" in names and "documentation/diagram.png" not in names:
+        message = "a diagram in SVG must be there as PNG, too, but is not"
+        yield Finding("file.documentation", "documentation/diagram.svg", message)
+    external = {"documentation/externalDependencies.txt", "documentation/externalDependencies.html"}
+    if any(i.flag("needsExecutionTool") for i in d.interfaces) and not external & names:
+        message = "a tool that the FMU needs must be documented in documentation/externalDependencies.txt or .html"
+        yield Finding("file.external", "documentation", f"{message}, but is not")
 
 
 def check_layered(d: Description, files: FmuFiles) -> tuple[list[ReferenceResult], list[Finding]]:
@@ -78,7 +98,7 @@ def check_layered(d: Description, files: FmuFiles) -> tuple[list[ReferenceResult
         if root is None:
             continue
         folder = path.split("/")[1]
-        for attribute in ("fmi-ls-name", "fmi-ls-version"):
+        for attribute in ("fmi-ls-name", "fmi-ls-version", "fmi-ls-description"):
             if not root.get(_NAMESPACE + attribute):
                 findings.append(Finding("layered.manifest", path, f"the manifest must have {attribute}, but has not"))
         name = root.get(_NAMESPACE + "fmi-ls-name")
@@ -108,13 +128,13 @@ def _references(
             findings.append(Finding("layered.missing", where, f"a related file must be in the FMU, but {path} is not"))
         elif role == "result" and related.get("type") == "text/csv":
             try:
-                results.append(_read_csv(path, files.read(path, _MAXIMUM_CSV), {v.name for v in d.variables}))
+                results.append(_read_csv(path, files.read(path, _MAXIMUM_CSV), {v.name: v for v in d.variables}, d))
             except (ValueError, csv.Error) as error:
                 findings.append(Finding("layered.result", path, str(error)))
     return results, findings
 
 
-def _read_csv(path: str, data: bytes, known: set[str]) -> ReferenceResult:
+def _read_csv(path: str, data: bytes, known: Mapping[str, DescribedVariable], d: Description) -> ReferenceResult:
     if len(data) > _MAXIMUM_CSV:
         raise ValueError(f"a reference result must have at most {_MAXIMUM_CSV} bytes, but has more")
     rows = [r for r in csv.reader(io.StringIO(data.decode("utf-8-sig"))) if r]
@@ -126,14 +146,29 @@ def _read_csv(path: str, data: bytes, known: set[str]) -> ReferenceResult:
         raise ValueError(f"the columns must be variables of the FMU, but {unknown[0]!r} is none")
     if header[0] != "time" or len(set(header)) < len(header):
         raise ValueError("the first column must be `time` and no name may come twice, but it is not so")
-    values = []
+    sizes = {h: d.size(known[h]) or 1 for h in header[1:] if known[h].kind not in ("String", "Binary")}
+    values: list[tuple[float, ...]] = []
     for number, row in enumerate(rows[1:], 2):
-        try:
-            values.append(tuple(float(c) for c in row))
-        except ValueError:
-            raise ValueError(f"line {number} must have numbers only, but has not") from None
-        if len(row) != len(header) or not all(map(math.isfinite, values[-1])):
-            raise ValueError(f"line {number} must have {len(header)} finite numbers, but has not")
+        if len(row) != len(header):
+            raise ValueError(f"line {number} must have {len(header)} values, but has {len(row)}")
+        found = _numbers(row[0], 1, number)
+        for name, cell in zip(header[1:], row[1:], strict=True):
+            if name in sizes:
+                found += _numbers(cell, sizes[name], number)
+        values.append(found)
         if len(values) > 1 and values[-1][0] < values[-2][0]:
             raise ValueError(f"time must not decrease, but does in line {number}")
-    return ReferenceResult(path, tuple(header[1:]), tuple(values))
+    names = tuple(name for name, size in sizes.items() for _ in range(size))
+    return ReferenceResult(path, names, tuple(values))
+
+
+def _numbers(cell: str, size: int, line: int) -> tuple[float, ...]:
+    """The numbers of a cell: as many as the variable has values."""
+    words = {"true": "1", "false": "0"}
+    try:
+        found = tuple(float(words.get(word, word)) for word in cell.split())
+    except ValueError:
+        raise ValueError(f"line {line} must have numbers only, but has not") from None
+    if len(found) != size or not all(map(math.isfinite, found)):
+        raise ValueError(f"line {line} must have {size} finite number{'s' * (size > 1)} in each cell, but has not")
+    return found

@@ -1,14 +1,14 @@
-"""Rules of FMI 2.0.x about the head of the modelDescription, its types, units and ModelStructure."""
+"""Rules about the head of the modelDescription, its types and units."""
 
 import math
 import re
 from collections.abc import Iterator
-from itertools import pairwise
 
 from lxml import etree
 
-from orchestrator.checking.description import Description, ScalarVariable, StructureEntry, number
+from orchestrator.checking.description import Description, Interface, number
 from orchestrator.checking.findings import Finding
+from orchestrator.checking.grammar import known_attributes
 from orchestrator.checking.units import dimension_of
 from orchestrator.checking.xml_reading import xpath
 
@@ -22,7 +22,7 @@ _C_KEYWORD = re.compile(
 
 
 def check_model(d: Description) -> Iterator[Finding]:
-    """Findings about everything but ModelVariables.
+    """Findings about everything but ModelVariables and ModelStructure.
 
     Args:
         d: the model description.
@@ -34,13 +34,15 @@ def check_model(d: Description) -> Iterator[Finding]:
     yield from _experiment(d)
     yield from _types(d)
     yield from _units(d)
-    yield from _structure(d)
 
 
 def _head(d: Description) -> Iterator[Finding]:
     root = d.root
-    if root.get("guid") is not None and not root.get("guid", "").strip():
-        yield Finding("model.guid", xpath(root, "guid"), "the guid must not be empty, but is")
+    token = d.dialect.token
+    if root.get(token) is not None and not root.get(token, "").strip():
+        yield Finding("model.guid", xpath(root, token), f"the {token} must not be empty, but is")
+    if not d.interfaces:
+        yield Finding("model.interface", xpath(root), "an FMU must have at least one interface, but has none")
     date = root.get("generationDateAndTime")
     if date is not None and _ANY_DATE.fullmatch(date) and not _DATE.fullmatch(date):
         message = f"generationDateAndTime should be YYYY-MM-DDThh:mm:ssZ (UTC), but is {date!r}"
@@ -48,16 +50,33 @@ def _head(d: Description) -> Iterator[Finding]:
     yield from _unique(root.findall("LogCategories/Category"), "model.log-category", "log category")
     yield from _unique(root.findall("VendorAnnotations/Tool"), "model.vendor-annotation", "vendor annotation")
     for interface in d.interfaces:
-        name = interface.identifier
-        if name is not None and (not C_NAME.fullmatch(name) or _C_KEYWORD.fullmatch(name)):
-            message = f"modelIdentifier must be a C identifier, but is {name!r}"
-            yield Finding("model.identifier", xpath(interface.element, "modelIdentifier"), message)
-        if interface.flag("canSerializeFMUstate") and not interface.flag("canGetAndSetFMUstate"):
-            message = "canSerializeFMUstate must not be true without canGetAndSetFMUstate, but is"
-            yield Finding("model.capability", xpath(interface.element, "canSerializeFMUstate"), message)
-        if interface.flag("needsExecutionTool"):
-            message = "the FMU says that it needs an execution tool: it is no stand-alone FMU"
-            yield Finding("model.execution-tool", xpath(interface.element, "needsExecutionTool"), message)
+        yield from _interface(d, interface)
+
+
+def _interface(d: Description, interface: Interface) -> Iterator[Finding]:
+    element, name = interface.element, interface.identifier
+    if name is not None and (not C_NAME.fullmatch(name) or _C_KEYWORD.fullmatch(name)):
+        message = f"modelIdentifier must be a C identifier, but is {name!r}"
+        yield Finding("model.identifier", xpath(element, "modelIdentifier"), message)
+    save, serialise = d.dialect.state_flags
+    needs = {serialise: save, "canReturnEarlyAfterIntermediateUpdate": "providesIntermediateUpdate"}
+    for flag, needed in needs.items():
+        if interface.flag(flag) and not interface.flag(needed):
+            message = f"{flag} must not be true without {needed}, but is"
+            yield Finding("model.capability", xpath(element, flag), message)
+    fixed = number(element.get("fixedInternalStepSize"), "Real")
+    if fixed is not None and not 0.0 < fixed < math.inf:
+        message = f"fixedInternalStepSize must be positive, but is {fixed:g}"
+        yield Finding("model.capability", xpath(element, "fixedInternalStepSize"), message)
+    if interface.flag("needsExecutionTool"):
+        message = "the FMU says that it needs an execution tool: it is no stand-alone FMU"
+        yield Finding("model.execution-tool", xpath(element, "needsExecutionTool"), message)
+    if d.dialect.version == "3.0":
+        known = known_attributes(interface.kind, "3.0")
+        for attribute in element.attrib:
+            if str(attribute) not in known and not str(attribute).startswith("{"):
+                message = f"an attribute that the standard has not must have a namespace, but `{attribute}` has none"
+                yield Finding("model.unknown-flag", xpath(element, str(attribute)), message)
 
 
 def _experiment(d: Description) -> Iterator[Finding]:
@@ -85,7 +104,7 @@ def _experiment(d: Description) -> Iterator[Finding]:
 
 def _types(d: Description) -> Iterator[Finding]:
     yield from _unique([t.element for t in d.types], "type.name", "type")
-    names = {v.name for v in d.variables}
+    names = {v.name for v in d.variables} | {a.get("name") for v in d.variables for a in v.aliases}
     for t in d.types:
         if t.name in names:
             message = f"the names of types and variables must differ, but `{t.name}` is both"
@@ -93,14 +112,14 @@ def _types(d: Description) -> Iterator[Finding]:
         unit, shown = t.attributes.get("unit"), t.attributes.get("displayUnit")
         if unit is not None and unit not in d.units:
             message = f"unit of the type `{t.name}` must be defined in UnitDefinitions, but `{unit}` is not"
-            yield Finding("type.unit", xpath(t.element[0], "unit"), message)
+            yield Finding("type.unit", xpath(t.holder, "unit"), message)
         elif shown is not None and (unit is None or not _has_display_unit(d.units[unit], unit, shown)):
             message = f"displayUnit of the type `{t.name}` must be defined for its unit, but `{shown}` is not"
-            yield Finding("type.unit", xpath(t.element[0], "displayUnit"), message)
+            yield Finding("type.unit", xpath(t.holder, "displayUnit"), message)
         low, high = (number(t.attributes.get(a), t.kind) for a in ("min", "max"))
         if low is not None and high is not None and low > high:
             message = f"min of the type `{t.name}` must be at most max, but {low:g} > {high:g}"
-            yield Finding("type.bounds", xpath(t.element[0], "min"), message)
+            yield Finding("type.bounds", xpath(t.holder, "min"), message)
         for what, values in (("names", [n for n, _ in t.items]), ("values", [v for _, v in t.items])):
             if len(set(values)) < len(values):
                 message = f"the {what} of the items of `{t.name}` must be unique, but are not"
@@ -139,100 +158,3 @@ def _unique(elements: list[etree._Element], rule: str, what: str) -> Iterator[Fi
         if name in seen:
             yield Finding(rule, xpath(element, "name"), f"the name of a {what} must be unique, but `{name}` is not")
         seen.add(name)
-
-
-def _structure(d: Description) -> Iterator[Finding]:
-    if d.root.find("ModelStructure") is None:
-        return
-    indices_valid = True
-    for section in (d.outputs, d.derivatives, d.initial_unknowns):
-        for finding in _unknowns(d, section):
-            indices_valid = indices_valid and finding.rule != "structure.index"
-            yield finding
-    if not indices_valid:
-        return  # sets of indices would be off for the same reason
-    outputs = {v.index for v in d.variables if v.causality == "output"}
-    yield from _set(d, "Outputs", d.outputs, outputs, "structure.outputs", "all variables with causality output")
-    derived = True
-    for u in d.derivatives:
-        variable = d.variable(u.index)
-        if variable is not None and "derivative" not in variable.own:
-            derived = False
-            message = f"an entry of Derivatives must have the attribute derivative, but `{variable.name}` has not"
-            yield Finding("structure.derivatives", u.path("index"), message)
-    if derived:
-        expected = _initial_unknowns(d)
-        yield from _set(
-            d, "InitialUnknowns", d.initial_unknowns, expected, "structure.initial-unknowns",
-            "outputs, states and derivatives with initial approx or calculated, and calculated parameters",
-        )  # fmt: skip
-
-
-def _initial_unknowns(d: Description) -> set[int]:
-    """Indices of the variables that InitialUnknowns must list (section 2.2.8)."""
-    free = ("approx", "calculated")
-    expected = {v.index for v in d.variables if v.causality == "output" and v.initial in free}
-    expected |= {v.index for v in d.variables if v.causality == "calculatedParameter"}
-    for u in d.derivatives:
-        derivative = d.variable(u.index)
-        state = (
-            None if derivative is None else d.variable(int(number(derivative.own.get("derivative"), "Integer") or 0))
-        )
-        expected |= {v.index for v in (derivative, state) if isinstance(v, ScalarVariable) and v.initial in free}
-    return expected
-
-
-def _set(
-    d: Description, section: str, found: tuple[StructureEntry, ...], expected: set[int], rule: str, what: str
-) -> Iterator[Finding]:
-    indices = {u.index for u in found if u.index is not None}
-    structure = d.root.find("ModelStructure")
-    where = structure.find(section)
-    path = xpath(structure if where is None else where)
-    for words, difference in (("lacks", expected - indices), ("has too many, namely", indices - expected)):
-        if difference:
-            names = ", ".join(f"`{d.variables[i - 1].name}`" for i in sorted(difference))
-            yield Finding(rule, path, f"{section} must list exactly {what}, but {words} {names}")
-
-
-def _unknowns(d: Description, section: tuple[StructureEntry, ...]) -> Iterator[Finding]:
-    last = 0
-    seen: set[int] = set()
-    initial = bool(section) and section is d.initial_unknowns
-    for u in section:
-        if u.index is None:
-            continue
-        if d.variable(u.index) is None:
-            message = f"an index must be from 1 to {len(d.variables)}, but is {u.index}"
-            yield Finding("structure.index", u.path("index"), message)
-        elif u.index in seen:
-            message = f"a variable must be listed once, but `{d.variables[u.index - 1].name}` is listed again"
-            yield Finding("structure.duplicate", u.path("index"), message)
-        elif initial and u.index < last:
-            yield Finding("structure.order", u.path("index"), "InitialUnknowns must be sorted by index, but are not")
-        seen.add(u.index)
-        last = max(last, u.index)
-        yield from _dependencies(d, u, initial)
-
-
-def _dependencies(d: Description, u: StructureEntry, initial: bool) -> Iterator[Finding]:
-    if u.kinds is not None and (u.dependencies is None or len(u.kinds) != len(u.dependencies)):
-        count = "absent" if u.dependencies is None else f"{len(u.dependencies)} long"
-        message = (
-            f"dependenciesKind ({len(u.kinds)} long) must go with dependencies of the same length, but they are {count}"
-        )
-        yield Finding("structure.dependencies-kind", u.path("dependenciesKind"), message)
-    for index in u.dependencies or ():
-        known = d.variable(index)
-        if known is None:
-            message = f"a dependency must be an index from 1 to {len(d.variables)}, but is {index}"
-            yield Finding("structure.dependencies", u.path("dependencies"), message)
-        elif initial and known.causality in ("output", "local", "calculatedParameter") and known.initial != "exact":
-            message = (
-                f"a dependency must be an input, a parameter or have initial exact, but `{known.name}` is none of these"
-            )
-            yield Finding("structure.dependencies", u.path("dependencies"), message)
-    listed = u.dependencies or ()
-    if any(a >= b for a, b in pairwise(listed)):
-        message = "dependencies must be sorted and without repeats, but are not"
-        yield Finding("structure.order", u.path("dependencies"), message)

@@ -1,20 +1,12 @@
-"""Rules of FMI 2.0.x section 2.2.7: names, causality, variability, initial, start, bounds, aliases."""
+"""Rules about variables: names, causality, variability, initial, start, bounds, aliases."""
 
 import math
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping
 
-from orchestrator.checking.description import (
-    CAUSALITIES,
-    INITIAL,
-    NUMERIC,
-    VARIABILITIES,
-    Description,
-    ScalarVariable,
-    SimpleType,
-    number,
-)
+from orchestrator.checking.description import DescribedVariable, Description, SimpleType, number
+from orchestrator.checking.dialects import NUMERIC, REAL, VARIABILITIES, FmiDialect
 from orchestrator.checking.findings import Finding
 
 # EBNF of section 2.2.9.
@@ -37,20 +29,44 @@ def check_variables(d: Description) -> Iterator[Finding]:
     types = {t.name: t for t in d.types}
     states = {_as_int(v.own.get("derivative")) for v in d.variables}
     for v in d.variables:
-        yield from _combination(v)
-        yield from _start(v)
+        yield from _combination(d.dialect, v)
+        yield from _start(d.dialect, v)
         if v.kind in NUMERIC:
             yield from _bounds(v)
         yield from _declared_type(types, v)
         yield from _real_only(d, v, states)
-        if v.element.get("canHandleMultipleSetPerTimeInstant") in ("true", "1") and d.model_exchange is None:
-            message = f"`{v.name}` must not set canHandleMultipleSetPerTimeInstant, because only model exchange has it"
-            yield Finding("variable.multiple-set", v.path("canHandleMultipleSetPerTimeInstant"), message)
+        yield from _multiple_set(d, v)
     independent = [v for v in d.variables if v.causality == "independent"]
+    if d.dialect.version == "3.0" and not independent:
+        message = "there must be one independent variable, but there is none"
+        yield Finding("variable.independent", "modelDescription.xml:/fmiModelDescription/ModelVariables", message)
     for v in independent[1:]:
         message = f"there must be at most one independent variable, but `{v.name}` is a further one"
         yield Finding("variable.independent", v.path("causality"), message)
-    yield from _aliases(d)
+    yield from _aliases(d) if d.dialect.version == "2.0" else _references(d)
+
+
+def _multiple_set(d: Description, v: DescribedVariable) -> Iterator[Finding]:
+    attribute = "canHandleMultipleSetPerTimeInstant"
+    if d.dialect.version == "2.0":
+        wrong = v.element.get(attribute) in ("true", "1") and d.interface("ModelExchange") is None
+        why = "only model exchange has it"
+    else:
+        wrong, why = attribute in v.element.attrib and v.causality != "input", "only inputs have it"
+    if wrong:
+        message = f"`{v.name}` must not set {attribute}, because {why}"
+        yield Finding("variable.multiple-set", v.path(attribute), message)
+
+
+def _references(d: Description) -> Iterator[Finding]:
+    """FMI 3.0: one variable for each value reference; other names of it are Alias elements."""
+    seen: dict[int, DescribedVariable] = {}
+    for v in d.variables:
+        if v.reference in seen:
+            message = f"value references must be unique, but {v.reference} is that of `{seen[v.reference].name}` and"
+            yield Finding("variable.reference-duplicate", v.path("valueReference"), f"{message} `{v.name}`")
+        elif v.reference is not None:
+            seen[v.reference] = v
 
 
 def _names(d: Description) -> Iterator[Finding]:
@@ -61,43 +77,54 @@ def _names(d: Description) -> Iterator[Finding]:
             message = f"variable names must be unique, but `{v.name}` is also variable {seen[v.name]}"
             yield Finding("variable.name-duplicate", v.path("name"), message)
         seen.setdefault(v.name, v.index)
-        if structured and not _STRUCTURED.fullmatch(v.name):
-            message = f"a structured name must follow the grammar of section 2.2.9, but `{v.name}` does not"
-            yield Finding("variable.name-structured", v.path("name"), message)
-        elif structured and v.name.startswith("der(") and v.kind not in ("Real", ""):
-            message = f"a derivative must be Real, but `{v.name}` is {v.kind}"
-            yield Finding("variable.name-structured", v.path("name"), message)
-        elif not v.name or any(ord(c) < 32 for c in v.name):
-            message = f"a name must have at least one character and no control character, but is {v.name!r}"
-            yield Finding("variable.name-flat", v.path("name"), message)
+        yield from _name(d, structured, v.name, v)
+        for alias in v.aliases:
+            name = alias.get("name", "")
+            if name in seen:
+                message = f"variable names must be unique, but the alias `{name}` is also variable {seen[name]}"
+                yield Finding("variable.name-duplicate", v.path("name"), message)
+            seen.setdefault(name, v.index)
+            yield from _name(d, structured, name, v)
+            yield from _display_unit(d, v, alias.get("displayUnit"))
 
 
-def _combination(v: ScalarVariable) -> Iterator[Finding]:
-    if v.causality not in CAUSALITIES or v.variability not in VARIABILITIES:
+def _name(d: Description, structured: bool, name: str, v: DescribedVariable) -> Iterator[Finding]:
+    if structured and not _STRUCTURED.fullmatch(name):
+        message = f"a structured name must follow the grammar of section {d.dialect.naming}, but `{name}` does not"
+        yield Finding("variable.name-structured", v.path("name"), message)
+    elif structured and name.startswith("der(") and v.kind not in (*REAL, ""):
+        message = f"a derivative must be a floating point variable, but `{name}` is {v.kind}"
+        yield Finding("variable.name-structured", v.path("name"), message)
+    elif not name or any(ord(c) < 32 for c in name):
+        message = f"a name must have at least one character and no control character, but is {name!r}"
+        yield Finding("variable.name-flat", v.path("name"), message)
+
+
+def _combination(dialect: FmiDialect, v: DescribedVariable) -> Iterator[Finding]:
+    if v.causality not in dialect.causalities or v.variability not in VARIABILITIES:
         return  # the schema says so
     pair = f'causality="{v.causality}", variability="{v.variability}"'
-    if v.kind not in ("Real", "") and v.variability == "continuous":
+    if v.kind not in (*REAL, "") and v.variability == "continuous":
         declared = "" if "variability" in v.element.attrib else " (the default)"
-        message = (
-            f'only Real variables can be continuous, but `{v.name}` is {v.kind} with variability="continuous"{declared}'
-        )
+        found = f'`{v.name}` is {v.kind} with variability="continuous"{declared}'
+        message = f"only floating point variables can be continuous, but {found}"
         yield Finding("variable.continuous-not-real", v.path("variability"), message)
-    elif (v.causality, v.variability) not in INITIAL:
+    elif (v.causality, v.variability) not in dialect.initial:
         message = f"`{v.name}` has {pair}, which the standard does not allow"
         yield Finding("variable.causality-variability", v.path("causality"), message)
-    elif v.declared_initial is not None and v.declared_initial not in INITIAL[v.causality, v.variability]:
-        allowed = " or ".join(str(i) for i in INITIAL[v.causality, v.variability] if i) or "absent"
+    elif v.declared_initial is not None and v.declared_initial not in dialect.initial[v.causality, v.variability]:
+        allowed = " or ".join(str(i) for i in dialect.initial[v.causality, v.variability] if i) or "absent"
         message = f'`initial` of `{v.name}` ({pair}) must be {allowed}, but is "{v.declared_initial}"'
         yield Finding("variable.initial", v.path("initial"), message)
-    if v.causality == "independent" and v.kind not in ("Real", ""):
-        message = f"the independent variable must be Real, but `{v.name}` is {v.kind}"
+    if v.causality == "independent" and v.kind not in (*REAL, ""):
+        message = f"the independent variable must be of a floating point type, but `{v.name}` is {v.kind}"
         yield Finding("variable.independent", v.path("causality"), message)
 
 
-def _start(v: ScalarVariable) -> Iterator[Finding]:
-    if (v.causality, v.variability) not in INITIAL:
+def _start(dialect: FmiDialect, v: DescribedVariable) -> Iterator[Finding]:
+    if (v.causality, v.variability) not in dialect.initial:
         return
-    needed = v.initial in ("exact", "approx") or v.causality == "input"
+    needed = v.kind != "Clock" and (v.initial in ("exact", "approx") or v.causality == "input")
     why = f'initial="{v.initial}"' if v.initial else f'causality="{v.causality}"'
     if needed and v.start is None:
         yield Finding("variable.start-missing", v.path(), f"`{v.name}` must have a start value ({why}), but has none")
@@ -106,14 +133,16 @@ def _start(v: ScalarVariable) -> Iterator[Finding]:
         yield Finding("variable.start-forbidden", v.path("start"), message)
 
 
-def _bounds(v: ScalarVariable) -> Iterator[Finding]:
-    low, high, start = v.number("min"), v.number("max"), v.number("start")
+def _bounds(v: DescribedVariable) -> Iterator[Finding]:
+    low, high = v.number("min"), v.number("max")
+    starts = [x for x in (number(text, v.kind) for text in v.starts or ()) if x is not None]
+    start = next((x for x in starts if not _or(low, -math.inf) <= x <= _or(high, math.inf)), None)
     if low is not None and high is not None and low > high:
         if not {"min", "max"} & set(v.own):
             return  # the declared type is at fault
         message = f"min of `{v.name}` must be at most max, but {low:g} > {high:g}"
         yield Finding("variable.bounds", v.path("min"), message)
-    elif start is not None and not (_or(low, -math.inf) <= start <= _or(high, math.inf)):
+    elif start is not None:
         message = (
             f"start of `{v.name}` must lie in [{_or(low, -math.inf):g}, {_or(high, math.inf):g}], but is {start:g}"
         )
@@ -122,14 +151,14 @@ def _bounds(v: ScalarVariable) -> Iterator[Finding]:
     if nominal is not None and not nominal > 0:
         message = f"nominal of `{v.name}` must be positive, but is {nominal:g}"
         yield Finding("variable.nominal", v.path("nominal"), message)
-    for attribute in ("start", "nominal"):
-        value = v.number(attribute)
-        if isinstance(value, float) and not math.isfinite(value) and attribute in v.own:
-            message = f"{attribute} of `{v.name}` must be finite, but is {value}"
+    for attribute, values in (("start", starts), ("nominal", [nominal] if "nominal" in v.own else [])):
+        wild = next((x for x in values if isinstance(x, float) and not math.isfinite(x)), None)
+        if wild is not None:
+            message = f"{attribute} of `{v.name}` must be finite, but is {wild}"
             yield Finding("variable.not-finite", v.path(attribute), message)
 
 
-def _declared_type(types: Mapping[str, SimpleType], v: ScalarVariable) -> Iterator[Finding]:
+def _declared_type(types: Mapping[str, SimpleType], v: DescribedVariable) -> Iterator[Finding]:
     name = v.own.get("declaredType")
     if name is None:
         return
@@ -143,8 +172,9 @@ def _declared_type(types: Mapping[str, SimpleType], v: ScalarVariable) -> Iterat
         yield Finding("variable.declared-type", v.path("declaredType"), message)
         return
     values = [value for _, value in declared.items]
-    if v.kind == "Enumeration" and v.start is not None and values and v.number("start") not in values:
-        message = f"start of `{v.name}` must be the value of an item of `{name}`, but is {v.start}"
+    odd = [text for text in v.starts or () if number(text, v.kind) not in values]
+    if v.kind == "Enumeration" and odd and values:
+        message = f"start of `{v.name}` must be the value of an item of `{name}`, but is {odd[0]}"
         yield Finding("variable.start-range", v.path("start"), message)
     for attribute, sign in (("min", 1), ("max", -1)):
         outer = _as_float(declared.attributes.get(attribute))
@@ -154,13 +184,29 @@ def _declared_type(types: Mapping[str, SimpleType], v: ScalarVariable) -> Iterat
             yield Finding("variable.bounds-exceed-type", v.path(attribute), message)
 
 
-def _real_only(d: Description, v: ScalarVariable, states: Collection[int | None]) -> Iterator[Finding]:
+def _real_only(d: Description, v: DescribedVariable, states: Collection[int | None]) -> Iterator[Finding]:
     unit = v.attributes.get("unit")
     if unit is not None and unit not in d.units:
         message = f"unit of `{v.name}` must be defined in UnitDefinitions, but `{unit}` is not"
         if "unit" in v.own:
             yield Finding("variable.unit", v.path("unit"), message)
-    shown = v.own.get("displayUnit")
+    yield from _display_unit(d, v, v.own.get("displayUnit"))
+    if "derivative" in v.own:
+        target = d.variable(_as_int(v.own["derivative"]))
+        if target is None or target is v or target.kind not in REAL or v.variability != "continuous":
+            message = f"`{v.name}` must be continuous and the derivative of another floating point variable, but is not"
+            yield Finding("variable.derivative", v.path("derivative"), message)
+        elif d.size(target) != d.size(v):
+            message = f"`{v.name}` must have the dimensions of `{target.name}`, its integral, but has not"
+            yield Finding("variable.derivative", v.path("derivative"), message)
+    misplaced = d.identity(v) not in states or (d.dialect.version == "2.0" and d.interface("ModelExchange") is None)
+    if v.own.get("reinit") in ("true", "1") and misplaced:
+        message = f"only continuous-time states of model exchange can have reinit, but `{v.name}` is none"
+        yield Finding("variable.reinit", v.path("reinit"), message)
+
+
+def _display_unit(d: Description, v: DescribedVariable, shown: str | None) -> Iterator[Finding]:
+    unit = v.attributes.get("unit")
     if shown is not None and unit is None:
         message = f"`{v.name}` must have a unit, because it has the displayUnit `{shown}`, but has none"
         yield Finding("variable.display-unit", v.path("displayUnit"), message)
@@ -169,18 +215,10 @@ def _real_only(d: Description, v: ScalarVariable, states: Collection[int | None]
         if shown not in known:
             message = f"displayUnit of `{v.name}` must be defined for the unit `{unit}`, but `{shown}` is not"
             yield Finding("variable.display-unit", v.path("displayUnit"), message)
-    if "derivative" in v.own:
-        target = d.variable(_as_int(v.own["derivative"]))
-        if target is None or target is v or target.kind != "Real" or v.variability != "continuous":
-            message = f"`{v.name}` must be continuous and the derivative of another Real variable, but is not"
-            yield Finding("variable.derivative", v.path("derivative"), message)
-    if v.own.get("reinit") in ("true", "1") and (d.model_exchange is None or v.index not in states):
-        message = f"only continuous-time states of model exchange can have reinit, but `{v.name}` is none"
-        yield Finding("variable.reinit", v.path("reinit"), message)
 
 
 def _aliases(d: Description) -> Iterator[Finding]:
-    groups: dict[tuple[str, int], list[ScalarVariable]] = defaultdict(list)
+    groups: dict[tuple[str, int], list[DescribedVariable]] = defaultdict(list)
     for v in d.variables:
         if v.reference is not None:
             groups[v.base, v.reference].append(v)
@@ -189,7 +227,7 @@ def _aliases(d: Description) -> Iterator[Finding]:
             yield from _alias_group(d, base, reference, group)
 
 
-def _alias_group(d: Description, base: str, reference: int, group: list[ScalarVariable]) -> Iterator[Finding]:
+def _alias_group(d: Description, base: str, reference: int, group: list[DescribedVariable]) -> Iterator[Finding]:
     names = ", ".join(f"`{v.name}`" for v in group)
     what = f"the {base} variables with value reference {reference} ({names})"
     settable = [v for v in group if _settable(v)]
@@ -230,7 +268,7 @@ def _base_unit(d: Description, unit: str | None) -> object:
     return frozenset((k, number(v, "Real")) for k, v in element.attrib.items() if v not in ("0", "0.0"))
 
 
-def _settable(v: ScalarVariable) -> bool:
+def _settable(v: DescribedVariable) -> bool:
     if v.variability == "constant":
         return False
     return v.causality in ("input", "parameter") or v.initial in ("exact", "approx")

@@ -1,19 +1,24 @@
 """All checks that execute nothing."""
 
+import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import ArchiveLimits, FmuFiles, open_fmu
-from orchestrator.checking.binaries import SUFFIXES, check_binaries
+from orchestrator.checking.binaries import PLATFORMS, check_binaries
 from orchestrator.checking.description import Description, read_description
 from orchestrator.checking.findings import Facts, Finding
+from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.layered import ReferenceResult, check_files, check_layered
+from orchestrator.checking.rules_arrays import check_arrays, check_clocks
 from orchestrator.checking.rules_model import check_model
+from orchestrator.checking.rules_structure import check_structure
 from orchestrator.checking.rules_variables import check_variables
-from orchestrator.checking.schema import check_schema, check_with_fmpy
 
 STAGES = ("archive", "xml", "schema", "description", "files", "binaries")
+_COVERED = re.compile(r"2\.0|3\.\d+(\.\d+)?")
 
 
 @dataclass(frozen=True)
@@ -21,7 +26,7 @@ class StaticResult:
     """What the static checks found, and what the dynamic ones need.
 
     Attributes:
-        files, description: None when they cannot be read or are not FMI 2.0.
+        files, description: None when they cannot be read or are of a version that is not covered.
         stages: what was carried out (empty) and what not, with the reason.
         references: reference results fit for comparison.
     """
@@ -56,40 +61,46 @@ def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
         return StaticResult(findings, stages, files)
     version = root.get("fmiVersion", "")
     facts: Facts = {"modelName": root.get("modelName", ""), "fmiVersion": version}
-    if version != "2.0":
-        findings += _other_version(path, version, root)
+    if root.tag != "fmiModelDescription" or not _COVERED.fullmatch(version):
+        findings.append(_not_covered(root, version))
         stages = {name: reason and f"FMI {version} is not covered" for name, reason in stages.items()}
         return StaticResult(findings, stages, files, facts=facts)
-    findings += check_schema(root)
     description = read_description(root)
     facts |= _facts(description, files)
-    findings += check_variables(description)
-    findings += check_model(description)
+    findings += check_grammar(root, description.dialect.version)
+    findings += _check_description(description)
     findings += check_binaries(description, files)
-    findings += check_files(files)
+    findings += check_files(description, files)
     references, problems = check_layered(description, files)
     findings += problems
-    if description.cosimulation is None and description.model_exchange is not None:
-        where = xml_reading.xpath(root)
-        findings.append(Finding("model.no-co-simulation", where, "the FMU has model exchange only: it is not run"))
-    if not any(f.severity == "error" for f in findings):
-        findings += check_with_fmpy(path, len(description.variables))
     return StaticResult(findings, dict.fromkeys(STAGES, ""), files, description, references, facts)
 
 
-def _other_version(path: Path, version: str, root: "xml_reading.etree._Element") -> list[Finding]:
+def _check_description(d: Description) -> Iterator[Finding]:
+    yield from check_variables(d)
+    yield from check_model(d)
+    yield from check_structure(d)
+    if d.dialect.version == "3.0":
+        yield from check_arrays(d)
+        yield from check_clocks(d)
+
+
+def _not_covered(root: "xml_reading.etree._Element", version: str) -> Finding:
     where = xml_reading.xpath(root, "fmiVersion")
-    if version != "1.0" and not version.startswith("3."):
-        return [Finding("model.fmi-version", where, f"fmiVersion must be 1.0, 2.0 or 3.x, but is {version!r}")]
-    message = f"the FMU is one of FMI {version}: only its archive and FMPy's validation are checked, nothing is run"
-    return [Finding("model.not-covered", where, message), *check_with_fmpy(path)]
+    if root.tag != "fmiModelDescription":
+        return Finding("schema.invalid", where, f"the root must be <fmiModelDescription>, but is <{root.tag}>")
+    if not re.fullmatch(r"1\.0|3\..*", version):
+        return Finding("model.fmi-version", where, f"fmiVersion must be 2.0 or 3.0, but is {version!r}")
+    message = f"the FMU is one of FMI {version}: only its archive is checked, nothing is run"
+    return Finding("model.not-covered", where, message)
 
 
 def _facts(d: Description, files: FmuFiles) -> Facts:
     names = files.names()
+    folders = dict.fromkeys((*PLATFORMS["2.0"], *PLATFORMS["3.0"]))
     return {
         "generationTool": d.root.get("generationTool", ""),
-        "interfaces": [i.element.tag for i in d.interfaces],
+        "interfaces": [i.kind for i in d.interfaces],
         "variables": len(d.variables),
-        "platforms": [p for p in SUFFIXES if any(n.startswith(f"binaries/{p}/") for n in names)],
+        "platforms": [p for p in folders if any(n.startswith(f"binaries/{p}/") for n in names)],
     }

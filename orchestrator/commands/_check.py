@@ -17,11 +17,13 @@ from orchestrator.checking.formats.code_quality import as_code_quality
 from orchestrator.checking.formats.github import as_annotations, as_summary
 from orchestrator.checking.formats.junit import as_junit
 from orchestrator.checking.formats.sarif import as_sarif
-from orchestrator.checking.formats.text import as_lines, as_results
+from orchestrator.checking.formats.text import as_lines, as_results, plain
+from orchestrator.checking.mending.members import UnmendableError
+from orchestrator.checking.mending.mend import Repair, mend_fmu
 from orchestrator.checking.policy import FILE_NAME, Policy
 from orchestrator.checking.verdict import Verdict, baseline_of
 from orchestrator.commands._trust import add_trust, positive
-from orchestrator.errors import InputError, OutputError
+from orchestrator.errors import FmuError, InputError, OutputError
 from orchestrator.shared.isolation.archives import ArchiveLimits
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
 from orchestrator.shared.results import as_plain
@@ -52,6 +54,9 @@ def add_check_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--write-baseline", type=Path, metavar="FILE", help="write all findings as known ones")
     for name, (what, _) in _REPORTS.items():
         parser.add_argument(f"--{name}", type=Path, metavar="FILE", help=f"also write the findings as {what}")
+    parser.add_argument(
+        "--fix", type=Path, metavar="DIR", help="mend FMUs into this folder, and check what was mended in their place"
+    )
     parser.add_argument("--github", action="store_true", help="also print annotations and write the step's summary")
     limits, archive = Limits(), ArchiveLimits()
     for name, default, metavar, what in (
@@ -102,6 +107,44 @@ def read_arguments(args: argparse.Namespace) -> Policy:
     policy = chosen_policy(args.policy or (usual if usual.is_file() else None))
     given = {"fail_on": args.fail_on, "baseline": args.baseline and str(args.baseline)}
     return msgspec.structs.replace(policy, **{name: value for name, value in given.items() if value})
+
+
+def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
+    """Mend FMUs, where that was asked for, and say what was mended.
+
+    Args:
+        args: of the command line.
+        paths: of the FMUs.
+
+    Returns:
+        What to check: the mended FMUs, and those with nothing to mend.
+
+    Raises:
+        FmuError: two FMUs have one name.
+        OutputError: the folder cannot be made.
+    """
+    if args.fix is None:
+        return list(paths)
+    targets = [args.fix / path.with_suffix(".fmu").name for path in paths]
+    if len(set(targets)) < len(targets):
+        raise FmuError("`--fix` must be given FMUs of different names, but two have the same")
+    try:
+        args.fix.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"`--fix` must be a folder that can be written, but is not: {error.strerror}") from None
+    found = []
+    for path, target in zip(paths, targets, strict=True):
+        try:
+            repair = mend_fmu(path, target, chosen_options(args).archive)
+        except UnmendableError as error:  # the check says the same as a finding
+            print(plain(f"{path}: not mended: {error}"))
+            repair = Repair((), ())
+        if repair.done:
+            print(plain(f"{path}: mended as {target}"))
+        for line in (*repair.done, *(f"not mended: {text}" for text in repair.left)):
+            print(plain(f"  {line}"))
+        found.append(target if repair.done else path)
+    return found
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from orchestrator.checking.batch import check_fmus, find_fmus
 from orchestrator.commands._check import (
     add_check_arguments,
     chosen_options,
+    mend_fmus,
     read_arguments,
     verdicts_shown,
     write_reports,
@@ -36,6 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     def run() -> int:
         paths = find_fmus(args.fmus)
         policy = read_arguments(args)
+        paths = mend_fmus(args, paths)
         if not (args.static or args.trust):
             note_missing_walls()
         with verdicts_shown(len(paths)) as progress:

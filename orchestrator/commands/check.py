@@ -5,7 +5,7 @@ from pathlib import Path
 
 from orchestrator.api.build import build
 from orchestrator.api.check import check, find_fmus
-from orchestrator.commands._check import add_check_arguments, read_arguments, verdicts_shown, write_reports
+from orchestrator.commands._check import add_check_arguments, mend_fmus, read_arguments, verdicts_shown, write_reports
 from orchestrator.commands._trust import note_missing_walls
 from orchestrator.shared.output import staged
 
@@ -33,6 +33,7 @@ def run(args: argparse.Namespace) -> int:
     """
     paths = find_fmus(args.fmus) if args.fmus else list(build().paths.values())
     policy = read_arguments(args)
+    paths = mend_fmus(args, paths)
     if not (args.static or args.trust):
         note_missing_walls()
     with staged(args.out) as folder:

@@ -5,8 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.checking.check import check_fmu
+from orchestrator.checking.check import CheckOptions, check_fmu
 from orchestrator.checking.rules import RULES
+from orchestrator.shared.isolation.limits import Limits
+from tests.support.broken_ball3 import behavioural
+from tests.support.broken_ball3_xml import static
 from tests.support.broken_fmus import QUICK, Broken, corpus, good
 from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
 
@@ -53,13 +56,18 @@ def test_what_the_flags_do_not_promise_is_not_asked_for(behaviour: str, old: str
     assert report.executed
 
 
+def test_a_hang_after_misuse_is_a_warning_as_a_crash_is(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "hang_negative_step"), CheckOptions(limits=Limits(time=10.0)))
+    assert {f.rule for f in report.findings if f.severity != "info"} == {"misuse.crash"}
+
+
 def test_an_fmu_that_writes_to_our_pipe_forges_no_finding(tmp_path: Path) -> None:
     report = check_fmu(build_c_fmu(tmp_path, "forged_messages"), QUICK)
     assert report.findings == ()
 
 
 def test_the_corpus_is_large_and_covers_the_rules() -> None:
-    covered = {b.rule for b in CORPUS}
+    covered = {b.rule for b in CORPUS} | {m.rule for m in (*behavioural(), *static())}
     assert len(CORPUS) >= 40
     assert f"{len(CORPUS)} FMUs, each broken by one mutation" in DOCS.read_text(encoding="utf-8")
     assert len({b.name for b in CORPUS}) == len(CORPUS)
@@ -72,7 +80,6 @@ NOT_IN_THE_CORPUS = {
     "model.vendor-annotation",
     "run.not-executed",
     "run.failed",
-    "schema.fmpy",
     "variable.alias-start",
     "variable.name-flat",
 }

@@ -185,19 +185,8 @@ _FMI_1 = b"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="1.0" modelName="Old" modelIdentifier="Old" guid="{1}" numberOfContinuousStates="0"
     numberOfEventIndicators="0"><ModelVariables/></fmiModelDescription>
 """
-_FMI_3 = b"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="3.0" modelName="New" instantiationToken="{3}">
-  <CoSimulation modelIdentifier="New"/>
-  <ModelVariables>
-    <Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
-  </ModelVariables>
-  <ModelStructure/>
-</fmiModelDescription>
-"""
-
 FILE_CHANGES: list[tuple[str, str, Callable[[Files], None]]] = [
     ("FMI 1.0", "model.not-covered", _set(XML, _FMI_1)),
-    ("FMI 3.0", "model.not-covered", _set(XML, _FMI_3)),
     ("documentation without entry", "file.documentation", _undocumented),
     ("icon", "file.icon", _set("model.png", b"GIF89a")),
     ("manifest without version", "layered.manifest", replacing('fmi-ls:fmi-ls-version="1.0.0-alpha.1"', "", MANIFEST)),

@@ -23,6 +23,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 #ifndef FAULT_step_before_init
     if (self->phase != STEPPING) return refuse(self, "fmi2DoStep must come after initialisation");
 #endif
+#ifdef FAULT_hang_negative_step
+    if (step < 0.0) for (;;) usleep(1000);
+#endif
 #ifndef FAULT_negative_step
     if (!(step > 0.0)) return refuse(self, "communicationStepSize must be positive");
 #else

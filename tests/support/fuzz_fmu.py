@@ -9,9 +9,11 @@ from pathlib import Path
 
 from lxml import etree
 
+from tests.support import ball3
 from tests.support.c_fmu import LIBRARY, REFERENCE, fmu_files, write_fmu
 
 _TEXTS = ("modelDescription.xml", f"{REFERENCE}/fmi-ls-manifest.xml", f"{REFERENCE}/MassSpring_out.csv")
+_TEXTS_3 = (ball3.XML, ball3.TERMINALS, ball3.BUILD, ball3.MANIFEST, f"{ball3.REFERENCE}/Ball_out.csv")
 _ODD = (
     "", " ", "-1", "0", "1e400", "NaN", "INF", "-INF", "99999999999999999999", "4294967296", "true", "x" * 5000, "\t",
     "é", "\U0001f600", "../..", "&amp;", "1 2 3", "fixed", "constant", "input", "independent", "Real", "der(x)", "2.0",
@@ -43,7 +45,7 @@ def _field(rng: random.Random, data: bytes) -> bytes:
     return bytes(changed)
 
 
-def _tree(rng: random.Random, data: bytes) -> bytes:
+def damaged_tree(rng: random.Random, data: bytes) -> bytes:
     """Well-formed XML with odd values, missing, repeated or moved attributes and elements."""
     root = etree.fromstring(data)
     for _ in range(rng.choice((1, 1, 1, 2, 5))):
@@ -73,32 +75,36 @@ def _table(rng: random.Random, data: bytes) -> bytes:
     return "\n".join(",".join(row) for row in rows).encode()
 
 
-def damaged(rng: random.Random, path: Path) -> bool:
+def damaged(rng: random.Random, path: Path, version: str = "2.0") -> bool:
     """Write a damaged FMU to ``path``; whether its library is untouched, so that it may be run."""
-    files = fmu_files()
+    if version == "2.0":
+        files, texts, library = fmu_files(), _TEXTS, LIBRARY
+    else:
+        interface = rng.choice(list(ball3.INTERFACES))
+        files, texts, library = ball3.ball_files("", interface), _TEXTS_3, ball3.LIBRARY
     kind = rng.randrange(10)
     if kind < 5:
-        name = rng.choice(_TEXTS[:1] * 4 + _TEXTS[1:])
-        files[name] = (_table if name.endswith(".csv") else _tree)(rng, files[name])
+        name = rng.choice(texts[:1] * 4 + texts[1:])
+        files[name] = (_table if name.endswith(".csv") else damaged_tree)(rng, files[name])
         write_fmu(path, files)
         return True
     if kind == 5:
-        name = rng.choice(_TEXTS)
+        name = rng.choice(texts)
         files[name] = rng.choice((_flip, _cut))(rng, files[name])
         write_fmu(path, files)
         return True
     if kind == 6:
-        files[LIBRARY] = rng.choice((_flip, _cut))(rng, files[LIBRARY])
+        files[library] = rng.choice((_flip, _cut))(rng, files[library])
         write_fmu(path, files)
         return False
     write_fmu(path, files)
     path.write_bytes(rng.choice((_flip, _cut, _field, _field))(rng, path.read_bytes()))
-    return _same_library(path, files[LIBRARY])
+    return _same_library(path, library, files[library])
 
 
-def _same_library(path: Path, library: bytes) -> bool:
+def _same_library(path: Path, name: str, library: bytes) -> bool:
     try:
         with zipfile.ZipFile(io.BytesIO(path.read_bytes())) as archive:
-            return archive.read(LIBRARY) == library
+            return archive.read(name) == library
     except Exception:
         return False

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.api.ssp import export_ssp
+from tests.support.ball3 import ball_files
 from tests.support.c_fmu import IDENTIFIER, fmu_files, write_fmu
 
 ROOT = Path(__file__).parents[2]
@@ -90,9 +91,12 @@ run()
 """The seconds that a run may take are settings; their defaults are far more than an idle machine needs."""
 
 
-def hostile_fmu(folder: Path, place: str, action: str, target: str = "-", port: int = 0, at: int = 3) -> Path:
+def hostile_fmu(
+    folder: Path, place: str, action: str, target: str = "-", port: int = 0, at: int = 3, version: str = "2.0"
+) -> Path:
     """Write an FMU that does ``action`` in the function ``place``; in ``step``, at its ``at``-th call."""
-    files = fmu_files("hostile") | {"resources/hostile.txt": f"{place} {action} {target} {port} {at}\n".encode()}
+    files = fmu_files("hostile") if version == "2.0" else ball_files("hostile")
+    files |= {"resources/hostile.txt": f"{place} {action} {target} {port} {at}\n".encode()}
     return write_fmu(folder / f"{IDENTIFIER}.fmu", files)
 
 
@@ -101,6 +105,7 @@ class World:
     """What a hostile FMU may be after: files, sockets, processes; see ``harm``."""
 
     folder: Path
+    version: str = "2.0"
     mark: str = field(default_factory=lambda: uuid.uuid4().hex)
 
     def __post_init__(self) -> None:
@@ -127,7 +132,7 @@ class World:
     def fmu(self, place: str, action: str, at: int = 3) -> Path:
         """Write the FMU, aimed at this world."""
         target = self.unix_path if action == "unix" else str(self.precious)
-        return hostile_fmu(self.folder / "inputs", place, action, target, self.port, at)
+        return hostile_fmu(self.folder / "inputs", place, action, target, self.port, at, self.version)
 
     def environment(self) -> dict[str, str]:
         """The environment of a command in this world."""

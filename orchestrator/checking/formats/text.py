@@ -29,7 +29,7 @@ def summary(verdict: Verdict) -> str:
 def _extent(report: FmuFindings) -> str:
     """How far the FMU was executed, in a few words."""
     if not report.executed:
-        return "not executed"
+        return f"not executed: {report.not_executed}" if report.not_executed else "not executed"
     runs = (f"{e.interface}: {len(e.carried_out)} of {len(e.stages)} stages" for e in report.executions)
     return f"executed, {', '.join(runs)}"
 

@@ -1,26 +1,115 @@
-"""FMI 2.0 for co-simulation on an FMU in a child process, with every status and every value looked at.
+"""FMI on an FMU in a child process, with every status and every value looked at.
 
 The child does the calls (``checking.host``); what it says is taken for what the FMU returned, once it has the right
 types and sizes, and nothing more.
 """
 
 import math
-import time
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, SimulationError
 
 OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
-STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
-_DO_STEP_STATUS, _TERMINATED = 0, 3
+_STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 _LARGEST_STATE = 64 << 20
-_KINDS: dict[str, tuple[type, ...]] = {
-    "Real": (float,),
-    "Integer": (int,),
-    "Boolean": (int,),
-    "String": (bytes, type(None)),
-}
+Request = tuple[str, Sequence[Sequence[Any]]]
+"""A function and its arguments."""
+_REFERENCE = re.compile(r"#([ribs])(\d+)#")
+_LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b", "String": "s"}
+
+
+@dataclass(frozen=True)
+class Names:
+    """What the functions of a version are called; the rest differs by the prefix alone."""
+
+    version: Version
+    texts: tuple[str, ...]
+    makers: tuple[str, ...]
+    get_state: str
+    set_state: str
+    free_state: str
+    state_size: str
+    serialise: str
+    deserialise: str
+
+    @property
+    def prefix(self) -> str:
+        """The first letters of every function."""
+        return f"fmi{self.version[0]}"
+
+
+NAMES: Mapping[Version, Names] = {
+    "2.0": Names(
+        "2.0", ("fmi2GetTypesPlatform", "fmi2GetVersion"), ("fmi2Instantiate",), "GetFMUstate", "SetFMUstate",
+        "FreeFMUstate", "SerializedFMUstateSize", "SerializeFMUstate", "DeSerializeFMUstate",
+    ),
+    "3.0": Names(
+        "3.0", ("fmi3GetVersion",),
+        tuple(f"fmi3Instantiate{kind}" for kind in ("CoSimulation", "ModelExchange", "ScheduledExecution")),
+        "GetFMUState", "SetFMUState", "FreeFMUState", "SerializedFMUStateSize", "SerializeFMUState",
+        "DeserializeFMUState",
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ProbedVariable:
+    """A variable as the model description has it.
+
+    Attributes:
+        base: suffix of the functions that access it, such as "Real" or "Int32".
+        size: number of its values at the initial dimensions.
+        start: its values at the start, None when the description has none.
+        clocks: value references of its clocks; it is accessed while one of them ticks.
+        intermediate: whether it can be accessed in intermediate updates.
+        extents: its dimensions: a size, or minus one less the value reference of the parameter that has it.
+    """
+
+    name: str
+    reference: int
+    base: str
+    causality: str
+    variability: str
+    initial: str | None
+    start: tuple[Any, ...] | None
+    minimum: float | None
+    maximum: float | None
+    nominal: float | None
+    size: int = 1
+    clocks: tuple[int, ...] = ()
+    intermediate: bool = False
+    extents: tuple[int, ...] = ()
+
+    def resized(self, sizes: Mapping[int, int]) -> "ProbedVariable":
+        """The variable after structural parameters have changed.
+
+        Args:
+            sizes: by value reference of the structural parameter.
+
+        Returns:
+            The variable with its new size.
+        """
+        lengths = (e if e >= 0 else sizes.get(-1 - e, 1) for e in self.extents)
+        return replace(self, size=math.prod(lengths))
+
+    @property
+    def real(self) -> bool:
+        """Whether its values are floating point numbers."""
+        return self.base in ("Real", "Float32", "Float64")
+
+    @property
+    def numeric(self) -> bool:
+        """Whether its values are numbers, Boolean ones left out."""
+        return self.real or "Int" in self.base
+
+    @property
+    def labels(self) -> list[str]:
+        """A name for each of its values."""
+        return [self.name] if self.size == 1 else [f"{self.name}[{i}]" for i in range(self.size)]
 
 
 class StatusError(Exception):
@@ -28,16 +117,18 @@ class StatusError(Exception):
 
     Attributes:
         function, status: what was called and what came back.
+        rule: the rule that is broken, where that is no matter of the status.
     """
 
-    def __init__(self, function: str, status: int, detail: str) -> None:
+    def __init__(self, function: str, status: int, detail: str, rule: str = "") -> None:
         super().__init__(detail)
         self.function = function
         self.status = status
+        self.rule = rule
 
 
 class TerminatedError(Exception):
-    """The slave asks for the simulation to end (fmi2Discard with fmi2Terminated); that is no fault."""
+    """The slave asks for the simulation to end, or cannot be followed further; that is no fault."""
 
 
 class FmiProcess(Protocol):
@@ -60,6 +151,9 @@ class FmiProcess(Protocol):
             The bytes.
         """
 
+    def renew(self) -> None:
+        """End the child and start another one."""
+
 
 class Library:
     """The shared library of an FMU.
@@ -67,18 +161,21 @@ class Library:
     Attributes:
         current: the function under way; empty when none is.
         ended: whether the child process is gone.
-        asynchronous: whether fmi2DoStep may return fmi2Pending.
         messages: the last few that an instance logged during the present call.
         errors: how many it logged as errors during the present call.
     """
 
-    def __init__(self, host: FmiProcess, asynchronous: bool = False) -> None:
+    def __init__(self, host: FmiProcess, version: Version = "2.0", variables: Sequence[ProbedVariable] = ()) -> None:
         self._host = host
-        self.asynchronous = asynchronous
+        self.names = NAMES[version]
         self.current = ""
         self.ended = False
         self.messages: list[str] = []
         self.errors = 0
+        self.logged: list[tuple[list[str], int]] = []
+        """Messages and number of errors of each call that was done last in one go."""
+        self._path = ""
+        self._known = {(_LETTERS.get(v.base, ""), v.reference): v.name for v in reversed(variables)}
 
     def load(self, path: str) -> str:
         """Load the library at ``path``; return why that fails, or nothing.
@@ -89,7 +186,15 @@ class Library:
         Returns:
             The reason, empty when it is loaded.
         """
-        return str(self._ask("loading the library", "load", path))
+        self._path = path
+        names = self.names
+        freer = f"{names.prefix}FreeInstance"
+        return str(self._ask("loading the library", "load", path, list(names.texts), list(names.makers), freer))
+
+    def renew(self) -> None:
+        """Load the library anew in another process; its instances and states are gone."""
+        self._host.renew()
+        self.load(self._path)
 
     def _ask(self, doing: str, *request: Any) -> Any:
         """Let the child do something; where that ends the child, ``current`` keeps what it was."""
@@ -105,36 +210,36 @@ class Library:
         return answer
 
     def text(self, function: str) -> str:
-        """Call fmi2GetVersion or fmi2GetTypesPlatform.
+        """Call a function that returns a text.
 
         Args:
-            function: its FMI name.
+            function: its name without prefix.
 
         Returns:
             What it returned; "null" for a null pointer.
         """
-        value = self._ask(function, "text", function)
+        name = self.names.prefix + function
+        value = self._ask(name, "text", name)
         return "null" if value is None else str(value)
 
-    def instantiate(self, name: str, guid: str, resources: str) -> "ProbedSlave | None":
-        """Make an instance for co-simulation; None when the FMU returns null.
+    def make(self, function: str, *request: Any) -> int | None:
+        """Make an instance; None when the FMU returns null.
 
         Args:
-            name: of the instance.
-            guid: that of the description.
-            resources: URI of its folder of resources.
+            function: that makes it, with prefix.
+            request: to the host.
 
         Returns:
-            The instance, or None.
+            The instance's number, or None.
 
         Raises:
             ChildError: the answer of the child is none that the function can have.
         """
-        match self._ask("fmi2Instantiate", "instantiate", name, guid, resources):
+        match self._ask(function, *request):
             case [number, messages]:
-                self.messages = _texts(messages)
-                return ProbedSlave(self, number) if isinstance(number, int) else None
-        raise _odd("fmi2Instantiate")
+                self.messages = self._texts(messages)
+                return number if isinstance(number, int) else None
+        raise odd(function)
 
     def free(self, number: int) -> None:
         """Free an instance.
@@ -142,7 +247,8 @@ class Library:
         Args:
             number: of the instance.
         """
-        self._ask("fmi2FreeInstance", "free", number)
+        name = f"{self.names.prefix}FreeInstance"
+        self._ask(name, "free", number, name)
 
     def raw(self, number: int, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
         """Call a function of an instance; return its status and what its output arguments hold.
@@ -158,12 +264,68 @@ class Library:
         Raises:
             ChildError: the answer of the child is none that the function can have.
         """
-        match self._ask(function, "call", number, function, [list(a) for a in arguments]):
+        answer = self._ask(function, "call", number, function, [list(a) for a in arguments])
+        return self._checked(answer, function, arguments)
+
+    def _checked(self, answer: Any, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
+        """An answer that has the shape of one."""
+        match answer:
             case [int() as status, list() as values, messages, int() as errors]:
-                self.messages, self.errors = _texts(messages), errors
-                if len(values) == sum(a[0].startswith(("out", "new", "free")) for a in arguments):
+                self.messages, self.errors = self._texts(messages), errors
+                if len(values) == sum(a[0].startswith(("out", "new", "free", "event")) for a in arguments):
                     return status, values
-        raise _odd(function)
+        raise odd(function)
+
+    def raw_many(
+        self, number: int, requests: Sequence[tuple[str, Sequence[Sequence[Any]]]]
+    ) -> list[tuple[int, list[Any]]]:
+        """Call functions of an instance in one go, up to the first that fails.
+
+        Args:
+            number: of the instance.
+            requests: function and arguments of each.
+
+        Returns:
+            Status and values of each that was called.
+
+        Raises:
+            ChildError: the answer of the child is none that the functions can have.
+        """
+        doing = ", ".join(dict.fromkeys(function for function, _ in requests))
+        answers = self._ask(doing, "calls", number, [[f, [list(a) for a in arguments]] for f, arguments in requests])
+        done: list[tuple[int, list[Any]]] = []
+        self.logged = []
+        if not isinstance(answers, list) or not 1 <= len(answers) <= len(requests):
+            raise odd(doing)
+        for answer, (function, arguments) in zip(answers, requests, strict=False):
+            done.append(self._checked(answer, function, arguments))
+            self.logged.append((self.messages, self.errors))
+        return done
+
+    def plan(self, number: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:
+        """Say what the host does in intermediate updates; see there.
+
+        Args:
+            number: of the instance.
+            reads, writes: value references.
+            values: to be written.
+            early: at which update an early return is asked for; -1 for never.
+        """
+        self._ask("", "plan", number, reads, writes, values, early)
+
+    def updates(self) -> tuple[list[list[Any]], int]:
+        """The intermediate updates since the last call, and locks of preemption that are open; see the host.
+
+        Returns:
+            Rows, and a number.
+
+        Raises:
+            ChildError: the answer of the child is none that it can have.
+        """
+        match self._ask("", "updates"):
+            case [list() as rows, int() as locks] if all(isinstance(r, list) and len(r) == 8 for r in rows):
+                return rows, locks
+        raise odd("an intermediate update")
 
     def resident(self) -> int:
         """Resident memory of the child in bytes, as the system tells; 0 where it does not.
@@ -173,52 +335,63 @@ class Library:
         """
         return self._host.resident()
 
+    def _texts(self, messages: Any) -> list[str]:
+        """Messages with the names of the variables that they refer to."""
+        texts = [str(m)[:200] for m in messages[:4]] if isinstance(messages, list) else []
+        return [_REFERENCE.sub(lambda m: self._known.get((m[1], int(m[2])), m[0]), text) for text in texts]
 
-def _texts(messages: Any) -> list[str]:
-    return [str(m)[:200] for m in messages[:4]] if isinstance(messages, list) else []
 
+def odd(function: str) -> ChildError:
+    """The error of an answer that a function cannot have.
 
-def _odd(function: str) -> ChildError:
+    Args:
+        function: what was called.
+
+    Returns:
+        The error, to be raised.
+    """
     return ChildError(f"the answer to {function} is none", "protocol")
 
 
-class ProbedSlave:
-    """One instance. After fmi2Fatal nothing is called any more, as the standard demands."""
+class FmuInstance:
+    """One instance. After a fatal status nothing is called any more, as the standard demands."""
 
     def __init__(self, library: Library, number: int) -> None:
         self.library = library
-        self._number = number
+        self.number = number
         self.dead = False
         self.remarks: dict[str, tuple[int, str]] = {}
+        """Warnings, and errors that were logged while a call went well: how many, and the first, by rule."""
+        self.memory: dict[str, Any] = {}
+        """What a driver keeps beside the FMU, saved and restored with its states."""
+        self._memories: dict[int, dict[str, Any]] = {}
 
-    def raw(self, function: str, *arguments: Sequence[Any]) -> int:
-        """Call a function and return its status.
+    def raw(self, function: str, *arguments: Sequence[Any]) -> tuple[int, list[Any]]:
+        """Call a function and return its status and what its output arguments hold.
 
         Args:
-            function: its FMI name.
+            function: its FMI name without prefix.
+            arguments: kind and value of each.
 
         Returns:
-            The ``fmi2Status``.
-        """
-        return self._raw(function, arguments)[0]
+            Status and values.
 
-    def _raw(self, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
+        Raises:
+            StatusError: the instance must not be called any more.
+        """
+        name = self.library.names.prefix + function
         if self.dead:
-            raise StatusError(function, FATAL, f"{function} was not called, because a call before returned fmi2Fatal")
-        status, values = self.library.raw(self._number, function, arguments)
+            raise StatusError(name, FATAL, f"{name} was not called, because a call before returned a fatal error")
+        status, values = self.library.raw(self.number, name, arguments)
         self.dead = status == FATAL
-        said = f"{function} ({'; '.join(self.library.messages)})" if self.library.messages else function
-        rule = "run.warning" if status == WARNING else "run.logged-error"
-        if status == WARNING or (status == OK and self.library.errors):
-            count, first = self.remarks.get(rule, (0, said))
-            self.remarks[rule] = (count + 1, first)
         return status, values
 
     def call(self, function: str, *arguments: Sequence[Any], when: str = "") -> list[Any]:
-        """Call a function that must return fmi2OK or fmi2Warning; return what its output arguments hold.
+        """Call a function that must return OK or Warning; return what its output arguments hold.
 
         Args:
-            function: its FMI name.
+            function: its FMI name without prefix.
+            arguments: kind and value of each.
             when: words for the message of an error.
 
         Returns:
@@ -227,104 +400,71 @@ class ProbedSlave:
         Raises:
             StatusError: it did not.
         """
-        status, values = self._raw(function, arguments)
+        status, values = self.raw(function, *arguments)
         if status not in (OK, WARNING):
-            raise StatusError(function, status, self._complaint(function, status, when))
+            raise self.refused(function, status, when)
+        self._remark(self.library.names.prefix + function, status, self.library.messages, self.library.errors)
         return values
 
-    def _complaint(self, function: str, status: int, when: str) -> str:
-        name = STATUS[status] if 0 <= status < len(STATUS) else f"the status {status}, which does not exist"
+    def _remark(self, function: str, status: int, messages: list[str], errors: int) -> None:
+        """Take note of a warning, and of an error that was logged although the call went well."""
+        if status == WARNING or errors:
+            rule = "run.warning" if status == WARNING else "run.logged-error"
+            count, first = self.remarks.get(rule, (0, f"{function} ({'; '.join(messages)})" if messages else function))
+            self.remarks[rule] = (count + 1, first)
+
+    def call_many(self, requests: Sequence[Request], when: str = "") -> list[list[Any]]:
+        """Call functions in one go, each of which must return OK or Warning.
+
+        Args:
+            requests: name without prefix, and arguments, of each.
+            when: words for the message of an error.
+
+        Returns:
+            What the output arguments of each hold.
+
+        Raises:
+            StatusError: one did not, or the instance must not be called any more.
+        """
+        if not requests:
+            return []
+        prefix = self.library.names.prefix
+        if self.dead:
+            raise StatusError(prefix, FATAL, f"nothing was called {when}, because a call before returned a fatal error")
+        done = self.library.raw_many(self.number, [(prefix + function, list(a)) for function, a in requests])
+        status = done[-1][0]
+        self.dead = status == FATAL
+        if status not in (OK, WARNING):
+            raise self.refused(requests[len(done) - 1][0], status, when)
+        if len(done) < len(requests):
+            raise odd(requests[len(done)][0])
+        for (function, _), (status, _), (messages, errors) in zip(requests, done, self.library.logged, strict=True):
+            self._remark(prefix + function, status, messages, errors)
+        return [values for _, values in done]
+
+    def refused(self, function: str, status: int, when: str = "") -> StatusError:
+        """The error of a status that is not wanted.
+
+        Args:
+            function: its FMI name without prefix.
+            status: what it returned.
+            when: words for the message.
+
+        Returns:
+            The error, to be raised.
+        """
+        prefix = self.library.names.prefix
+        known = 0 <= status < len(_STATUS) and not (prefix == "fmi3" and status == PENDING)
+        name = prefix + _STATUS[status] if known else f"the status {status}, which does not exist"
         said = f" ({'; '.join(self.library.messages)})" if self.library.messages else ""
-        return f"{function}{' ' + when if when else ''} must return fmi2OK, but returned {name}{said}"
+        text = f"{prefix}{function}{' ' + when if when else ''} must return {prefix}OK, but returned {name}{said}"
+        return StatusError(prefix + function, status, text)
 
     def free(self) -> None:
         """Free the instance, unless that is forbidden."""
         if not self.dead and not self.library.ended:
-            self.library.free(self._number)
+            self.library.free(self.number)
             self.dead = True
-
-    def setup(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        """fmi2SetupExperiment.
-
-        Args:
-            start: of the experiment [s].
-            stop: its end [s], if it is known.
-            tolerance: relative, if one is asked for.
-        """
-        self.call(
-            "fmi2SetupExperiment", ("int", int(tolerance is not None)), ("double", tolerance or 0.0),
-            ("double", start), ("int", int(stop is not None)), ("double", stop or 0.0),
-        )  # fmt: skip
-
-    def get(self, base: str, references: Sequence[int], when: str = "") -> list[Any]:
-        """Read variables of one base type (Real, Integer, Boolean, String); a null string is None.
-
-        Args:
-            base: Real, Integer, Boolean or String.
-            references: of the variables.
-            when: for messages.
-
-        Returns:
-            One value for each reference.
-
-        Raises:
-            ChildError: the answer of the child is none that the function can have.
-        """
-        if not references:
-            return []
-        n, function = len(references), f"fmi2Get{base}"
-        (values,) = self.call(function, ("references", list(references)), ("size", n), (f"out {base}", n), when=when)
-        if not isinstance(values, list) or len(values) != n or not all(isinstance(v, _KINDS[base]) for v in values):
-            raise _odd(function)
-        return values
-
-    def set(self, base: str, references: Sequence[int], values: Sequence[Any], when: str = "") -> None:
-        """Write variables of one base type.
-
-        Args:
-            base: "Real", "Integer", "Boolean" or "String".
-            references: value references.
-            values: one per reference.
-            when: words for the message of an error.
-        """
-        if references:
-            head = (("references", list(references)), ("size", len(references)))
-            self.call(f"fmi2Set{base}", *head, (base, list(values)), when=when)
-
-    def step(self, t: float, size: float, when: str = "") -> None:
-        """fmi2DoStep, with the earlier states kept.
-
-        Args:
-            t: beginning of the step [s].
-            size: its length [s].
-            when: words for the message of an error.
-
-        Raises:
-            StatusError: it was not done.
-            TerminatedError: the slave ended the simulation.
-        """
-        status = self.raw("fmi2DoStep", ("double", t), ("double", size), ("int", 0))
-        messages = self.library.messages
-        if status == DISCARD:
-            answer, ended = self._raw("fmi2GetBooleanStatus", (("int", _TERMINATED), ("out int",)))
-            if answer == OK and ended[0]:
-                raise TerminatedError
-        elif status == PENDING and self.library.asynchronous:
-            status = self._wait()
-        self.library.messages = messages
-        if status not in (OK, WARNING):
-            raise StatusError("fmi2DoStep", status, self._complaint("fmi2DoStep", status, when))
-
-    def _wait(self) -> int:
-        """Ask until the step is done; the child's limits end this when it takes too long."""
-        status: Any = PENDING
-        while status == PENDING:
-            answer, values = self._raw("fmi2GetStatus", (("int", _DO_STEP_STATUS), ("out int", PENDING)))
-            if answer not in (OK, PENDING):
-                break
-            status = values[0]
-            time.sleep(0.001)
-        return int(status)
 
     def get_state(self) -> int:
         """A new FMU state, by its number.
@@ -332,7 +472,9 @@ class ProbedSlave:
         Returns:
             The number.
         """
-        return int(self.call("fmi2GetFMUstate", ("new state",))[0])
+        state = int(self.call(self.library.names.get_state, ("new state",))[0])
+        self._memories[state] = dict(self.memory)
+        return state
 
     def set_state(self, state: int) -> None:
         """Restore a state.
@@ -340,7 +482,8 @@ class ProbedSlave:
         Args:
             state: its number.
         """
-        self.call("fmi2SetFMUstate", ("state", state))
+        self.call(self.library.names.set_state, ("state", state))
+        self.memory = dict(self._memories[state])
 
     def free_state(self, state: int) -> bool:
         """Free a state; whether the pointer was set to null.
@@ -351,7 +494,7 @@ class ProbedSlave:
         Returns:
             True when it was.
         """
-        return bool(self.call("fmi2FreeFMUstate", ("free state", state))[0])
+        return bool(self.call(self.library.names.free_state, ("free state", state))[0])
 
     def serialise(self, state: int) -> bytes:
         """The bytes of a state.
@@ -364,27 +507,32 @@ class ProbedSlave:
 
         Raises:
             StatusError: a call failed, or the size is zero.
+            ChildError: the answer of the child is none that the function can have.
         """
-        function = "fmi2SerializedFMUstateSize"
-        size = int(self.call(function, ("state", state), ("out size",))[0])
+        names = self.library.names
+        (size,) = self.call(names.state_size, ("state", state), ("out", "size", 1))[0]
         if not 0 < size <= _LARGEST_STATE:
-            text = f"{function} must be positive and at most {_LARGEST_STATE}, but is {size}"
-            raise StatusError(function, OK, text)
-        data = self.call("fmi2SerializeFMUstate", ("state", state), ("out bytes", size), ("size", size))[0]
+            text = f"{names.prefix}{names.state_size} must be positive and at most {_LARGEST_STATE}, but is {size}"
+            raise StatusError(names.prefix + names.state_size, OK, text)
+        data = self.call(names.serialise, ("state", state), ("out bytes", size), ("size", size))[0]
         if not isinstance(data, bytes):
-            raise _odd("fmi2SerializeFMUstate")
+            raise odd(names.serialise)
         return data
 
-    def deserialise(self, data: bytes) -> int:
+    def deserialise(self, data: bytes, memory: dict[str, Any]) -> int:
         """A state from bytes, by its number.
 
         Args:
             data: what ``serialise`` gave.
+            memory: of the instance at that time.
 
         Returns:
             The number.
         """
-        return int(self.call("fmi2DeSerializeFMUstate", ("bytes", data), ("size", len(data)), ("new state",))[0])
+        names = self.library.names
+        state = int(self.call(names.deserialise, ("bytes", data), ("size", len(data)), ("new state",))[0])
+        self._memories[state] = dict(memory)
+        return state
 
 
 def finite(value: Any) -> bool:

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from orchestrator.checking.probing.binding import ProbedSlave, StatusError
+from orchestrator.checking.probing.binding import ProbedVariable, StatusError
+from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
-from orchestrator.checking.probing.trajectory import ProbedVariable
 
 _STEP_TOLERANCE = 0.1
 _FEWEST_PAIRS = 10
@@ -16,8 +16,8 @@ def determinism(context: Context) -> None:
     Args:
         context: the FMU, its job and where findings go.
     """
-    with context.bench.instance() as slave:
-        difference = context.compare(context.trace or [], context.bench.run(slave))
+    with context.bench.instance() as driver:
+        difference = context.compare(context.trace or [], context.bench.run(driver))
     if difference is not None:
         context.report("run.determinism", f"two equal runs must give the same, but {difference}")
         context.report("run.skipped", "instances, reset and state are not checked, because runs cannot be compared")
@@ -47,9 +47,9 @@ def instances(context: Context) -> None:
                     t = job.start + n * job.step
                     bench.excite(one, t)
                     bench.excite(other, t, phase=2.0)
-                    one.step(t, job.step, f"at t = {t:g} with a second instance")
-                    other.step(t, job.step, f"at t = {t:g} in the second instance")
-                    rows.append(bench.read(one, outputs))
+                    one.advance(t, job.step, f"at t = {t:g} with a second instance")
+                    other.advance(t, job.step, f"at t = {t:g} in the second instance")
+                    rows.append(one.read(outputs))
         except StatusError as error:
             context.single = True
             context.report("instances.second", str(error))
@@ -73,18 +73,18 @@ def reset(context: Context) -> None:
     bench = context.bench
     if context.trace is None:
         raise SkippedError(NOT_COMPARABLE)
-    with bench.instance() as slave:
-        bench.run(slave, 0, max(bench.job.steps // 2, 1))
+    with bench.instance() as driver:
+        bench.run(driver, 0, max(bench.job.steps // 2, 1))
         try:
             for moment in ("in mid-run", "at the end"):
-                slave.call("fmi2Reset")
-                bench.initialise(slave)
-                difference = context.compare(context.trace, bench.run(slave))
+                driver.reset()
+                driver.initialise()
+                difference = context.compare(context.trace, bench.run(driver))
                 if difference is not None:
                     wanted = f"an instance that is reset {moment} must run as a fresh one"
                     context.report_difference("run.reset", wanted, difference)
                     break
-                slave.call("fmi2Terminate")
+                driver.terminate()
         except StatusError as error:
             context.report("run.reset", str(error))
 
@@ -101,54 +101,54 @@ def state(context: Context) -> None:
     bench, job = context.bench, context.bench.job
     if context.trace is None:
         raise SkippedError(NOT_COMPARABLE)
-    if "canGetAndSetFMUstate" not in job.flags:
-        raise SkippedError("canGetAndSetFMUstate is false")
+    if not job.saves:
+        raise SkippedError("states cannot be saved, as the flags say")
     half = max(job.steps // 2, 1) if job.steps > 1 else 0
-    with bench.instance() as slave:
-        bench.run(slave, 0, half)
+    with bench.instance() as driver:
+        bench.run(driver, 0, half)
         try:
-            saved = slave.get_state()
+            saved = driver.get_state()
             try:
-                _restore(context, slave, saved, half)
+                _restore(context, driver, saved, half)
             finally:
-                nulled = slave.free_state(saved)
+                nulled = driver.free_state(saved)
             if not nulled:
                 context.report("state.free", "fmi2FreeFMUstate must set the state to null, but does not")
         except StatusError as error:
             context.report("state.status", str(error))
 
 
-def _restore(context: Context, slave: ProbedSlave, saved: Any, half: int) -> None:
+def _restore(context: Context, driver: Driver, saved: Any, half: int) -> None:
     """Three times, for a state that is kept by reference is right the first time only; then through bytes."""
     bench = context.bench
     for _ in range(3):
-        bench.run(slave, half)
-        slave.set_state(saved)
-        if not _continues(context, slave, half, "state.restore", "a restored state must continue as before"):
+        bench.run(driver, half)
+        driver.set_state(saved)
+        if not _continues(context, driver, half, "state.restore", "a restored state must continue as before"):
             return
-        slave.set_state(saved)
-    if "canSerializeFMUstate" not in bench.job.flags:
+        driver.set_state(saved)
+    if not bench.job.serialises:
         return
-    data = slave.serialise(saved)
+    data, memory = driver.serialise(saved), dict(driver.memory)
     if context.single:
-        _deserialise(context, slave, data, half)
+        _deserialise(context, driver, data, memory, half)
         return
     with bench.instance(name="restored") as other:
-        _deserialise(context, other, data, half)
+        _deserialise(context, other, data, memory, half)
 
 
-def _deserialise(context: Context, slave: ProbedSlave, data: bytes, half: int) -> None:
-    copy = slave.deserialise(data)
+def _deserialise(context: Context, driver: Driver, data: bytes, memory: dict[str, Any], half: int) -> None:
+    copy = driver.deserialise(data, memory)
     try:
-        slave.set_state(copy)
-        _continues(context, slave, half, "state.serialise", "a serialised state must continue as before")
+        driver.set_state(copy)
+        _continues(context, driver, half, "state.serialise", "a serialised state must continue as before")
     finally:
-        slave.free_state(copy)
+        driver.free_state(copy)
 
 
-def _continues(context: Context, slave: ProbedSlave, half: int, rule: str, wanted: str) -> bool:
+def _continues(context: Context, driver: Driver, half: int, rule: str, wanted: str) -> bool:
     """Whether the rest of the run is as it was; a difference is reported."""
-    difference = context.compare((context.trace or [])[half:], context.bench.run(slave, half))
+    difference = context.compare((context.trace or [])[half:], context.bench.run(driver, half))
     if difference is not None:
         context.report_difference(rule, wanted, difference)
     return difference is None
@@ -170,7 +170,7 @@ def variable_steps(context: Context) -> None:
         raise SkippedError("canHandleVariableCommunicationStepSize is false")
     if job.steps < _FEWEST_PAIRS * 2:
         raise SkippedError("the run has too few steps")
-    outputs = [v for v in job.outputs() if v.base == "Real"]
+    outputs = [v for v in job.outputs() if v.real and v.size == 1 and not v.clocks]
     pairs = job.steps // 2
     even = _run_in_pairs(context, outputs, (1.0, 1.0))
     try:
@@ -193,12 +193,12 @@ def _run_in_pairs(context: Context, outputs: list[ProbedVariable], sizes: tuple[
     """Outputs after every two communication steps, which are done in steps of ``sizes`` times the usual one."""
     bench, job = context.bench, context.bench.job
     rows = []
-    with bench.instance() as slave:
+    with bench.instance() as driver:
         for n in range(job.steps // 2):
             t, end = (job.start + m * job.step for m in (2 * n, 2 * n + 2))
             for i, size in enumerate(sizes, 1):
                 goal = end if i == len(sizes) else t + size * job.step
-                slave.step(t, goal - t, f"with {size:g} times the usual step at t = {t:g}")
+                driver.advance(t, goal - t, f"with {size:g} times the usual step at t = {t:g}")
                 t = goal
-            rows.append(bench.read(slave, outputs))
+            rows.append(driver.read(outputs))
     return rows

@@ -1,31 +1,86 @@
-"""Calls that a slave must refuse. They come last, for a slave may break on them."""
+"""Calls that an FMU must refuse. They come last, for an FMU may break on them."""
+
+from typing import Any
 
 from orchestrator.checking.probing.binding import OK, WARNING
+from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context
+
+_NOT_REFUSED = (OK, WARNING)
 
 
 def misuse(context: Context) -> None:
-    """Wrong guid, a step too early, a negative step, an unknown value reference.
+    """Wrong token, a step too early, a negative step, an unknown value reference, values too many, and more.
 
     Args:
         context: the FMU, its job and where findings go.
     """
     bench, job = context.bench, context.bench.job
-    slave = bench.library.instantiate("instance", "{a guid of another model}", job.resources)
-    if slave is not None:
-        slave.free()
-        context.report("misuse.guid", "fmi2Instantiate must refuse a wrong guid, but accepts it")
-    with bench.instance(initialised=False) as slave:
-        status = slave.raw("fmi2DoStep", ("double", job.start), ("double", job.step), ("int", 0))
-        if status in (OK, WARNING):
-            context.report("misuse.step-before-init", "fmi2DoStep must be refused before initialisation, but is not")
-    with bench.instance() as slave:
-        status = slave.raw("fmi2DoStep", ("double", job.start), ("double", -job.step), ("int", 0))
-        if status in (OK, WARNING):
-            context.report("misuse.negative-step", "fmi2DoStep must refuse a negative step, but does not")
-    with bench.instance() as slave:
-        unknown = max((v.reference for v in job.variables if v.base == "Real"), default=0) + 12345
-        status = slave.raw("fmi2GetReal", ("references", [unknown]), ("size", 1), ("out Real", 1))
-        if status in (OK, WARNING):
-            message = f"fmi2GetReal must refuse the unknown value reference {unknown}, but does not"
+    prefix = bench.library.names.prefix
+    bench.prepare()
+    number = bench.driver.make(bench.library, "instance", "{a guid of another model}", job)
+    if number is not None:
+        bench.library.free(number)
+        context.report("misuse.guid", f"{prefix}Instantiate must refuse a wrong token, but accepts it")
+    if job.interface == "CoSimulation":
+        _steps(context)
+    with bench.instance() as driver:
+        real = next((v.base for v in job.variables if v.real), "Real" if job.version == "2.0" else "Float64")
+        unknown = max((v.reference for v in job.variables), default=0) + 12345
+        if _get(driver, real, [unknown], 1) in _NOT_REFUSED:
+            message = f"{prefix}Get{real} must refuse the unknown value reference {unknown}, but does not"
             context.report("misuse.value-reference", message)
+    if job.version == "3.0":
+        _of_version_3(context)
+
+
+def _get(driver: Driver, base: str, references: list[int], size: int) -> int:
+    kind = {"Float32": "float"}.get(base, "double")
+    tail = (("size", size),) if driver.job.version == "3.0" else ()
+    head = (("in", "uint32", references), ("size", len(references)), ("out", kind, max(size, len(references))))
+    return driver.raw(f"Get{base}", *head, *tail)[0]
+
+
+def _steps(context: Context) -> None:
+    bench, job = context.bench, context.bench.job
+    name = f"{bench.library.names.prefix}DoStep"
+    with bench.instance(initialised=False) as driver:
+        if driver.raw("DoStep", *_step(job.version, job.start, job.step))[0] in _NOT_REFUSED:
+            context.report("misuse.step-before-init", f"{name} must be refused before initialisation, but is not")
+    with bench.instance() as driver:
+        if driver.raw("DoStep", *_step(job.version, job.start, -job.step))[0] in _NOT_REFUSED:
+            context.report("misuse.negative-step", f"{name} must refuse a negative step, but does not")
+
+
+def _step(version: str, t: float, size: float) -> list[tuple[Any, ...]]:
+    head: list[tuple[Any, ...]] = [("double", t), ("double", size)]
+    if version == "2.0":
+        return [*head, ("int", 0)]
+    return [*head, ("bool", True), *[("out", "bool", 1)] * 3, ("out", "double", 1)]
+
+
+def _of_version_3(context: Context) -> None:
+    bench, job = context.bench, context.bench.job
+    scalar = next((v for v in job.variables if v.real and v.size == 1 and not v.clocks), None)
+    if scalar is not None:
+        with bench.instance() as driver:
+            if _get(driver, scalar.base, [scalar.reference], 2) in _NOT_REFUSED:
+                message = f"fmi3Get{scalar.base} must refuse two values for the scalar `{scalar.name}`, but does not"
+                context.report("misuse.value-count", message)
+    output = next((v for v in job.variables if v.real and v.causality == "output" and not v.clocks), None)
+    if output is not None:
+        with bench.instance() as driver:
+            status, _ = driver.raw(f"Set{output.base}", *_one(output, 1.0))
+            if status in _NOT_REFUSED:
+                message = f"fmi3Set{output.base} must refuse to set the output `{output.name}`, but does not"
+                context.report("misuse.set-output", message)
+    if job.interface == "CoSimulation":
+        with bench.instance(events=False) as driver:
+            if driver.raw("EnterEventMode")[0] in _NOT_REFUSED:
+                message = "fmi3EnterEventMode must be refused where event mode is not used, but is not"
+                context.report("misuse.event-mode", message)
+
+
+def _one(v: Any, value: float) -> list[tuple[Any, ...]]:
+    kind = "float" if v.base == "Float32" else "double"
+    return [("in", "uint32", [v.reference]), ("size", 1), ("in", kind, [value] * v.size), ("size", v.size)]

@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-from orchestrator.checking.probing.binding import ProbedSlave, TerminatedError
+from orchestrator.checking.probing.binding import ProbedVariable, TerminatedError
+from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context, SkippedError
-from orchestrator.checking.probing.trajectory import ProbedVariable
 from orchestrator.shared.stopwatch import Stopwatch
 
 _RELATIVE = 0.02
 _OUTSIDE = 0.02
-_PATIENCE = 20.0
+_PATIENCE = 40.0
 
 Row = tuple[float, ...]
 Columns = list[tuple[int, ProbedVariable]]
@@ -58,9 +58,9 @@ def reference(context: Context) -> None:
     job = context.bench.job
     if job.reference is None:
         raise SkippedError("the FMU has no reference result")
-    names, rows, path = job.reference.names, job.reference.rows, job.reference.path
+    rows, path = job.reference.rows, job.reference.path
     by_name = {v.name: v for v in job.variables}
-    columns = [(i, by_name[n]) for i, n in enumerate(names, 1) if by_name[n].base != "String"]
+    columns = [(i, by_name[name]) for i, name in enumerate(job.reference.names, 1) if name in by_name]
     inputs = [c for c in columns if c[1].causality == "input"]
     parameters = [c for c in columns if c[1].causality == "parameter"]
     rest = [c for c in columns if c[1].causality not in ("input", "parameter", "independent")]
@@ -75,27 +75,26 @@ def reference(context: Context) -> None:
 def _simulate(context: Context, rows: Sequence[Row], parameters: Columns, inputs: Columns, tube: Tube) -> bool:
     """Run over the times of ``rows``; False when it takes too long."""
     bench, job = context.bench, context.bench.job
-    variables = [v for _, v in tube.columns]
+    variables = list(dict.fromkeys(v for _, v in tube.columns))
     budget = Stopwatch(_PATIENCE * job.budget)
-    with bench.instance(initialised=False) as slave:
-        _set(slave, parameters + inputs, rows[0])
-        slave.setup(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]), job.tolerance)
-        slave.call("fmi2EnterInitializationMode")
-        slave.call("fmi2ExitInitializationMode")
-        tube.compare(bench.read(slave, variables, "after initialisation"), rows[0])
+    with bench.instance(initialised=False) as driver:
+        _set(driver, parameters + inputs, rows[0])
+        driver.enter_initialisation(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]))
+        driver.exit_initialisation()
+        tube.compare(driver.read(variables, "after initialisation"), rows[0])
         for row, following in pairwise(rows):
-            _set(slave, inputs, row)
+            _set(driver, inputs, row)
             try:
-                _advance(slave, row[0], following[0], job.step)
+                _advance(driver, row[0], following[0], job.step)
             except TerminatedError:
                 break
-            tube.compare(bench.read(slave, variables, f"at t = {following[0]:g}"), following)
+            tube.compare(driver.read(variables, f"at t = {following[0]:g}"), following)
             if budget.over:
                 return False
     return True
 
 
-def _advance(slave: ProbedSlave, t: float, end: float, step: float) -> None:
+def _advance(driver: Driver, t: float, end: float, step: float) -> None:
     """Go from ``t`` to ``end`` (not at all when they are equal) in steps of the default experiment when they fit."""
     if end <= t:
         return
@@ -104,12 +103,13 @@ def _advance(slave: ProbedSlave, t: float, end: float, step: float) -> None:
         n = 1
     points = [*(t + i * (end - t) / n for i in range(n)), end]
     for a, b in pairwise(points):
-        slave.step(a, b - a, f"at t = {a:g}")
+        driver.advance(a, b - a, f"at t = {a:g}")
 
 
-def _set(slave: ProbedSlave, columns: Columns, row: Row) -> None:
-    for i, v in columns:
-        slave.set(v.base, [v.reference], [row[i] if v.base == "Real" else int(row[i])], f"at t = {row[0]:g}")
+def _set(driver: Driver, columns: Columns, row: Row) -> None:
+    for v in dict.fromkeys(v for _, v in columns):
+        values = [row[i] if v.real else int(row[i]) for i, other in columns if other is v]
+        driver.set([v], values, f"at t = {row[0]:g}")
 
 
 def _half_width(column: list[float], v: ProbedVariable) -> float:

@@ -1,95 +1,63 @@
-"""Running a slave over a grid of time, and what to feed it with."""
+"""Running an FMU over a grid of time, and what to feed it with."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.checking.layered import ReferenceResult
-from orchestrator.checking.probing.binding import Library, ProbedSlave, StatusError
+from orchestrator.checking.probing.binding import Library, ProbedVariable, StatusError
+from orchestrator.checking.probing.cosimulation2 import CoSimulation2
+from orchestrator.checking.probing.cosimulation3 import CoSimulation3
+from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.model_exchange import ModelExchange
+from orchestrator.checking.probing.scheduled import ScheduledExecution
 
-_BASES = ("Real", "Integer", "Boolean", "String")
-
-
-@dataclass(frozen=True)
-class ProbedVariable:
-    """A variable as the model description has it."""
-
-    name: str
-    reference: int
-    base: str
-    causality: str
-    variability: str
-    initial: str | None
-    start: Any
-    minimum: float | None
-    maximum: float | None
-    nominal: float | None
-
-
-@dataclass(frozen=True)
-class ProbeJob:
-    """What is to be run.
-
-    Attributes:
-        start, stop, step: the experiment in s; ``stop`` is None when the FMU does not say.
-        steps: number of communication steps of a test run.
-        budget: seconds that a test run may take, of a :class:`Stopwatch`.
-        flags: capability flags that are true.
-        reference: the result to be reproduced, or None.
-    """
-
-    library: str
-    guid: str
-    resources: str
-    variables: tuple[ProbedVariable, ...]
-    start: float
-    stop: float | None
-    step: float
-    tolerance: float | None
-    steps: int
-    budget: float
-    flags: frozenset[str]
-    reference: ReferenceResult | None
-
-    def outputs(self) -> list[ProbedVariable]:
-        """What a run records: the outputs, or all local variables when there are none.
-
-        Returns:
-            Variables, in the order of the description.
-        """
-        chosen = [v for v in self.variables if v.causality == "output"]
-        return chosen or [v for v in self.variables if v.causality == "local"]
-
-    def inputs(self) -> list[ProbedVariable]:
-        """Real inputs.
-
-        Returns:
-            Variables, in the order of the description.
-        """
-        return [v for v in self.variables if v.causality == "input" and v.base == "Real"]
+_DRIVERS: dict[tuple[str, str], type[Driver]] = {
+    ("2.0", "CoSimulation"): CoSimulation2,
+    ("2.0", "ModelExchange"): ModelExchange,
+    ("3.0", "CoSimulation"): CoSimulation3,
+    ("3.0", "ModelExchange"): ModelExchange,
+    ("3.0", "ScheduledExecution"): ScheduledExecution,
+}
 
 
 class Bench:
     """One loaded FMU and the job: makes instances that are freed whatever happens.
 
     Attributes:
+        report: called with rule, message and path.
         excited: whether inputs are moved in runs that are compared.
     """
 
-    def __init__(self, job: ProbeJob, library: Library) -> None:
+    def __init__(self, job: ProbeJob, library: Library, report: Callable[..., None]) -> None:
         self.job = job
         self.library = library
+        self.report = report
         self.excited = True
+        self._once = "canBeInstantiatedOnlyOncePerProcess" in job.flags
+        self._used = False
+
+    def prepare(self) -> None:
+        """Make sure that an instance can be made: in another process where one has been made and only one may be."""
+        if self._once and self._used:
+            self.library.renew()
+        self._used = True
+
+    @property
+    def driver(self) -> type[Driver]:
+        """The class that drives the interface."""
+        return _DRIVERS[self.job.version, self.job.interface]
 
     @contextmanager
-    def instance(self, initialised: bool = True, name: str = "instance") -> Iterator[ProbedSlave]:
-        """An instance, in step mode when ``initialised``.
+    def instance(self, initialised: bool = True, name: str = "instance", **options: bool) -> Iterator[Driver]:
+        """An instance, at its first communication point when ``initialised``.
 
         Args:
-            initialised: whether it is brought into step mode.
+            initialised: whether it is initialised.
             name: of the instance.
+            options: of the interface.
 
         Yields:
             The instance.
@@ -97,103 +65,80 @@ class Bench:
         Raises:
             StatusError: it cannot be made or initialised.
         """
-        slave = self.library.instantiate(name, self.job.guid, self.job.resources)
-        if slave is None:
+        self.prepare()
+        number = self.driver.make(self.library, name, self.job.token, self.job, **options)
+        if number is None:
             said = f" ({'; '.join(self.library.messages)})" if self.library.messages else ""
-            raise StatusError("fmi2Instantiate", 0, f"fmi2Instantiate must return an instance, but returned null{said}")
+            function = f"{self.library.names.prefix}Instantiate"
+            raise StatusError(function, 0, f"{function} must return an instance, but returned null{said}")
+        made = self.driver(self.library, number, self.job, self.report)
+        made.options(**options)
         try:
             if initialised:
-                self.initialise(slave)
-            yield slave
+                made.initialise()
+            yield made
         finally:
-            slave.free()
+            made.free()
 
-    def initialise(self, slave: ProbedSlave) -> None:
-        """Bring a new or reset instance into step mode.
-
-        Args:
-            slave: the instance.
-        """
-        slave.setup(self.job.start, self.job.stop, self.job.tolerance)
-        slave.call("fmi2EnterInitializationMode")
-        slave.call("fmi2ExitInitializationMode")
-
-    def read(self, slave: ProbedSlave, variables: Sequence[ProbedVariable], when: str = "") -> list[Any]:
-        """Values of ``variables``, in their order.
+    def excite(self, driver: Driver, t: float, phase: float = 0.0) -> None:
+        """Set the floating point inputs to a smooth signal inside their bounds, so that something happens.
 
         Args:
-            slave: the instance.
-            variables: what to read, of any type.
-            when: words for the message of an error.
-
-        Returns:
-            The values.
-        """
-        values: dict[int, Any] = {}
-        for base in _BASES:
-            group = [(i, v) for i, v in enumerate(variables) if v.base == base]
-            read = slave.get(base, [v.reference for _, v in group], when)
-            values.update(zip((i for i, _ in group), read, strict=True))
-        return [values[i] for i in range(len(variables))]
-
-    def excite(self, slave: ProbedSlave, t: float, phase: float = 0.0) -> None:
-        """Set the Real inputs to a smooth signal inside their bounds, so that something happens.
-
-        Args:
-            slave: the instance.
+            driver: of the instance.
             t: time [s].
             phase: of the signal [rad].
         """
         inputs = self.job.inputs() if self.excited else []
-        values = [excitation(v, t - self.job.start, self.duration, phase) for v in inputs]
-        slave.set("Real", [v.reference for v in inputs], values, f"at t = {t:g}")
+        for base in dict.fromkeys(v.base for v in inputs):
+            group = [v for v in inputs if v.base == base]
+            values = [x for v in group for x in excitation(v, t - self.job.start, self.duration, phase)]
+            driver.set(group, values, f"at t = {t:g}")
 
     @property
     def duration(self) -> float:
         """Seconds of simulated time of a test run."""
         return self.job.step * self.job.steps
 
-    def run(self, slave: ProbedSlave, first: int = 0, last: int | None = None, excited: bool = True) -> list[list[Any]]:
-        """Do the steps ``first`` to ``last`` and return the outputs after each one, [step][output].
+    def run(self, driver: Driver, first: int = 0, last: int | None = None, excited: bool = True) -> list[list[Any]]:
+        """Do the steps ``first`` to ``last`` and return the outputs after each one, [step][value].
 
         Args:
-            slave: the instance.
+            driver: of the instance.
             first: first step, from 0.
             last: step to stop before; the job's number of steps when None.
             excited: whether inputs move.
 
         Returns:
-            Outputs, [step][output].
+            Outputs, [step][value].
         """
         outputs = self.job.outputs()
         rows = []
         for n in range(first, self.job.steps if last is None else last):
             t = self.job.start + n * self.job.step
             if excited:
-                self.excite(slave, t)
-            slave.step(t, self.job.step, f"at t = {t:g} (step {n + 1})")
-            rows.append(self.read(slave, outputs, f"at t = {t + self.job.step:g}"))
+                self.excite(driver, t)
+            driver.advance(t, self.job.step, f"at t = {t:g} (step {n + 1})")
+            rows.append(driver.read(outputs, f"at t = {t + self.job.step:g}"))
         return rows
 
 
-def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0) -> float:
-    """A sine of two periods over the run around the start value, a tenth of the nominal value high.
+def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0) -> list[float]:
+    """A sine of two periods over the run around each start value, a tenth of the nominal value high.
 
     Args:
-        v: a Real input.
+        v: a floating point input.
         t: time [s].
         duration: of the run [s].
         phase: of the signal [rad].
 
     Returns:
-        The value at ``t``, in the input's unit, within its bounds.
+        The values at ``t``, in the input's unit, within its bounds.
     """
-    start = float(v.start or 0.0)
-    height = 0.1 * (v.nominal or max(abs(start), 1.0))
-    value = start + height * math.sin(4.0 * math.pi * t / duration + phase + 0.3)
     low = -math.inf if v.minimum is None else v.minimum
     high = math.inf if v.maximum is None else v.maximum
-    return min(max(value, low), high)
+    wave = math.sin(4.0 * math.pi * t / duration + phase + 0.3)
+    starts = [float(x) for x in v.start or (0.0,) * v.size]
+    return [min(max(x + 0.1 * (v.nominal or max(abs(x), 1.0)) * wave, low), high) for x in starts]
 
 
 def same(a: Any, b: Any) -> bool:

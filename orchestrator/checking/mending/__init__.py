@@ -1,0 +1,1 @@
+"""Repairs of FMUs that need no source: of the archive, of modelDescription.xml and of what lies beside it."""

@@ -1,0 +1,100 @@
+"""The files of an FMU in memory, with the faults of its archive mended."""
+
+import posixpath
+import zipfile
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from orchestrator.checking.archive import FmuFiles, open_fmu
+from orchestrator.checking.findings import Finding
+from orchestrator.errors import FmuError
+from orchestrator.shared.isolation.archives import ArchiveLimits
+
+MENDED = frozenset(
+    f"archive.{name}" for name in ("backslash", "odd-name", "duplicate", "compression", "no-model-description")
+)
+"""Rules of the archive whose faults are mended by writing it anew."""
+DESCRIPTION = "modelDescription.xml"
+
+
+class UnmendableError(FmuError):
+    """An FMU has a fault that cannot be mended, which the check finds too."""
+
+
+def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], list[str]]:
+    """Read an FMU.
+
+    Args:
+        path: the FMU's file or folder.
+        limits: the most bytes and files that are unpacked.
+
+    Returns:
+        Content by path in the FMU, and what was mended.
+
+    Raises:
+        UnmendableError: the archive has a fault that cannot be mended.
+    """
+    files, findings = open_fmu(path, limits)
+    if files is not None:
+        files.close()
+    for finding in findings:
+        if finding.severity == "error" and finding.rule not in MENDED:
+            raise UnmendableError(f"{path.name} must be mended, but this cannot be: {_place(finding)}{finding.message}")
+    repairs: list[str] = []
+    members: dict[str, bytes] = {}
+    for name, data in _entries(path, limits):
+        plain = _plain_name(name)
+        if plain != name:
+            repairs.append(f"renamed {name} to {plain}")
+        if members.setdefault(plain, data) != data:
+            raise UnmendableError(f"{path.name} must be mended, but has two different files {plain}")
+    names = [finding.path for finding in findings if finding.rule == "archive.duplicate"]
+    if names:
+        repairs.append(f"removed repeated entries: {_listed(names)}")
+    packed = [finding.path for finding in findings if finding.rule == "archive.compression"]
+    if packed:
+        repairs.append(f"packed with deflate: {_listed(packed)}")
+    return _lifted(path, members, repairs), repairs
+
+
+def _entries(path: Path, limits: ArchiveLimits) -> Iterator[tuple[str, bytes]]:
+    if path.is_dir():
+        files: FmuFiles | None = open_fmu(path, limits)[0]
+        assert files is not None
+        yield from ((name, files.read(name, limits.total)) for name in files.names())
+        return
+    with zipfile.ZipFile(path) as archive:
+        for entry in archive.infolist():
+            if not entry.is_dir() and not entry.filename.endswith("\\"):
+                try:
+                    yield entry.filename, archive.read(entry)
+                except Exception as error:  # zlib.error, BadZipFile, EOFError, NotImplementedError ...
+                    raise UnmendableError(
+                        f"{path.name} must be mended, but {entry.filename} cannot be read: {error}"
+                    ) from None
+
+
+def _plain_name(name: str) -> str:
+    return posixpath.normpath(name.replace("\\", "/"))
+
+
+def _lifted(path: Path, members: dict[str, bytes], repairs: list[str]) -> dict[str, bytes]:
+    """Take the files out of the one folder that they are all in."""
+    if DESCRIPTION in members:
+        return members
+    folders = {name.partition("/")[0] for name in members}
+    folder = folders.pop() if len(folders) == 1 else ""
+    if f"{folder}/{DESCRIPTION}" not in members:
+        raise UnmendableError(f"{path.name} must be mended, but has no {DESCRIPTION} at its top or in its only folder")
+    repairs.append(f"moved all files out of the folder {folder}")
+    return {name.partition("/")[2]: data for name, data in members.items()}
+
+
+def _place(finding: Finding) -> str:
+    return f"{finding.path}: " if finding.path else ""
+
+
+def _listed(names: Iterable[str]) -> str:
+    distinct = list(dict.fromkeys(names))
+    more = f" and {len(distinct) - 5} more" if len(distinct) > 5 else ""
+    return ", ".join(distinct[:5]) + more

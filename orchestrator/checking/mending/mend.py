@@ -1,0 +1,94 @@
+"""The repair of one FMU: archive, description, token, library; what is mended shows what else is wrong."""
+
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from lxml import etree
+
+from orchestrator.building.archive import write_archive
+from orchestrator.checking.findings import Finding
+from orchestrator.checking.mending.description import mend_description, mend_token
+from orchestrator.checking.mending.members import DESCRIPTION, UnmendableError, read_members
+from orchestrator.checking.mending.python_library import mend_library
+from orchestrator.checking.mending.structure import mend_structure
+from orchestrator.checking.static import check_static
+from orchestrator.checking.xml_reading import parse
+from orchestrator.errors import FmuError
+from orchestrator.shared.isolation.archives import ArchiveLimits
+
+_MOST_ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Repair:
+    """What became of one FMU.
+
+    Attributes:
+        done: what was mended, a line each; empty: nothing, and no file was written.
+        left: what could not be mended, and why.
+    """
+
+    done: tuple[str, ...]
+    left: tuple[str, ...]
+
+
+def mend_fmu(path: Path, target: Path, limits: ArchiveLimits | None = None) -> Repair:
+    """Write an FMU anew without the faults that can be mended without its source. Nothing of it is executed.
+
+    Args:
+        path: the FMU's file or folder.
+        target: the file of the mended FMU.
+        limits: the most bytes and files that are unpacked (default: those of the check).
+
+    Returns:
+        What was mended, and what was not.
+
+    Raises:
+        UnmendableError: the archive or the XML has a fault that cannot be mended.
+        FmuError: ``target`` is ``path``, or cannot be written.
+    """
+    limits = limits or ArchiveLimits()
+    if target.exists() and target.samefile(path):
+        raise FmuError(f"the mended FMU must be another file, but is {path} itself")
+    members, done = read_members(path, limits)
+    left: list[str] = []
+    with tempfile.TemporaryDirectory(prefix="fmu-check-") as folder:
+        for number in range(_MOST_ROUNDS):
+            findings = _findings(Path(folder) / f"{number}.fmu", members, limits)
+            guid, mended = _mend_xml(members, findings)
+            if number == 0:
+                library, left = mend_library(members, guid, findings)
+                mended += library
+            done += mended
+            if not mended:
+                break
+    if done:
+        write_archive(target, members)
+    return Repair(tuple(dict.fromkeys(done)), tuple(left))
+
+
+def _findings(path: Path, members: Mapping[str, bytes], limits: ArchiveLimits) -> list[Finding]:
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    result = check_static(path, limits)
+    if result.files is not None:
+        result.files.close()
+    path.unlink()
+    return result.findings
+
+
+def _mend_xml(members: dict[str, bytes], findings: list[Finding]) -> tuple[str, list[str]]:
+    """Mend the description; return the guid of FMI 2.0, and what was mended."""
+    root, problems = parse(members[DESCRIPTION], DESCRIPTION)
+    if root is None:
+        raise UnmendableError(f"{DESCRIPTION} must be mended, but this cannot be: {problems[0].message}")
+    done = [f"wrote {DESCRIPTION} in UTF-8" for problem in problems if problem.rule == "xml.encoding"]
+    done += mend_description(root, findings) + mend_token(root, members) + mend_structure(root, findings)
+    if done:
+        etree.indent(root)
+        members[DESCRIPTION] = etree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return root.get("guid", ""), done

@@ -1,0 +1,54 @@
+"""The driver of co-simulation of FMI 2.0."""
+
+import time
+from typing import Any
+
+from orchestrator.checking.probing.binding import DISCARD, OK, PENDING, WARNING, Library, TerminatedError
+from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.job import ProbeJob
+
+_DO_STEP_STATUS, _TERMINATED = 0, 3
+
+
+class CoSimulation2(Driver):
+    """Co-simulation of FMI 2.0."""
+
+    maker = "fmi2Instantiate"
+    kind = 1
+
+    @classmethod
+    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
+        return library.make(cls.maker, "instantiate_2", name, cls.kind, token, job.resources)
+
+    def enter_initialisation(self, start: float, stop: float | None) -> None:
+        tolerance = self.job.tolerance
+        self.call(
+            "SetupExperiment", ("int", int(tolerance is not None)), ("double", tolerance or 0.0),
+            ("double", start), ("int", int(stop is not None)), ("double", stop or 0.0),
+        )  # fmt: skip
+        self.call("EnterInitializationMode")
+
+    def advance(self, t: float, size: float, when: str = "") -> None:
+        status, _ = self.raw("DoStep", ("double", t), ("double", size), ("int", 0))
+        messages, errors = self.library.messages, self.library.errors
+        if status == DISCARD:
+            answer, ended = self.raw("GetBooleanStatus", ("int", _TERMINATED), ("out", "int", 1))
+            if answer == OK and ended[0][0]:
+                raise TerminatedError
+        elif status == PENDING and "canRunAsynchronuously" in self.job.flags:
+            status = self._wait()
+        self.library.messages = messages
+        if status not in (OK, WARNING):
+            raise self.refused("DoStep", status, when)
+        self._remark("fmi2DoStep", status, messages, errors)
+
+    def _wait(self) -> int:
+        """Ask until the step is done; the child's limits end this when it takes too long."""
+        status: Any = PENDING
+        while status == PENDING:
+            answer, values = self.raw("GetStatus", ("int", _DO_STEP_STATUS), ("out", "int", 1, PENDING))
+            if answer not in (OK, PENDING):
+                break
+            status = values[0][0]
+            time.sleep(0.001)
+        return int(status)

@@ -1,0 +1,113 @@
+"""The driver of co-simulation of FMI 3.0: steps, early return, event mode and clocks."""
+
+from typing import Any
+
+from orchestrator.checking.probing.binding import Library, StatusError, TerminatedError
+from orchestrator.checking.probing.events import EventDriver
+from orchestrator.checking.probing.job import ProbeJob
+
+_MOST_RETURNS = 1000
+_SMALL = 1e-9
+
+
+class CoSimulation3(EventDriver):
+    """Co-simulation of FMI 3.0.
+
+    Attributes:
+        early: whether early return was allowed at instantiation.
+        events: whether event mode is used.
+    """
+
+    maker = "fmi3InstantiateCoSimulation"
+    early = True
+    events = True
+
+    def options(self, **options: bool) -> None:
+        self.early = options.get("early", True)
+        self.events = options.get("events", "hasEventMode" in self.job.flags)
+
+    @classmethod
+    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
+        events = options.get("events", "hasEventMode" in job.flags)
+        flags = [events, options.get("early", True), options.get("intermediate", False)]
+        required = [v.reference for v in job.variables if v.intermediate] if flags[2] else []
+        return library.make(cls.maker, "instantiate_3", cls.maker, name, token, job.resources, flags, required)
+
+    def enter_initialisation(self, start: float, stop: float | None) -> None:
+        enter_initialisation_3(self, start, stop)
+        self.start_clocks()
+
+    def exit_initialisation(self) -> None:
+        self.call("ExitInitializationMode")
+        if self.events:
+            self.settle(self.job.start, "after initialisation")
+            self.call("EnterStepMode")
+
+    def advance(self, t: float, size: float, when: str = "") -> None:
+        end = t + size
+        slack = _SMALL * max(abs(end), size)
+        for _ in range(_MOST_RETURNS):
+            goal = min(end, self.next_instant(end)) if self.events else end
+            wanted = False
+            if goal > t + slack:
+                wanted, reached = self._step(t, goal, slack, when)
+                t = reached if reached < goal - slack else goal
+            if self.events and (wanted or self.next_instant(end + size) <= t + slack):
+                self._event(t, wanted, when)
+            if t >= end - slack:
+                return
+        text = f"fmi3DoStep must get on, but returned early {_MOST_RETURNS} times {when}"
+        raise StatusError("fmi3DoStep", 0, text, "step.no-progress")
+
+    def _step(self, t: float, goal: float, slack: float, when: str) -> tuple[bool, float]:
+        """One call of fmi3DoStep: whether an event is to be handled, and the time that was reached."""
+        found = self.call(
+            "DoStep", ("double", t), ("double", goal - t), ("bool", True), *(("out", "bool", 1),) * 3,
+            ("out", "double", 1, goal), when=when,
+        )  # fmt: skip
+        event, terminate, early, last = (values[0] for values in found)
+        if not t - slack <= last <= goal + slack:
+            text = f"lastSuccessfulTime must lie in the step from {t:g} to {goal:g}, but is {last:g} {when}"
+            raise StatusError("fmi3DoStep", 0, text, "step.last-time")
+        if early and not (self.early and self._may_return_early()):
+            why = "mightReturnEarlyFromDoStep is not set" if self.early else "earlyReturnAllowed was false"
+            self.report("step.early-return", f"fmi3DoStep must not return early, because {why}, but does {when}")
+        if event and not self.events:
+            self.report("event.not-used", f"no event must be announced where event mode is not used, but one is {when}")
+        if terminate:
+            raise TerminatedError
+        return bool(event), float(last) if early else goal
+
+    def _may_return_early(self) -> bool:
+        flags = {"mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate"}
+        return bool(flags & self.job.flags)
+
+    def _event(self, t: float, wanted: bool, when: str) -> None:
+        """Handle an event; say so when the FMU asked for it and it changes nothing."""
+        announced = self.memory.get("next")
+        expected = announced is not None and announced <= t + _SMALL * max(abs(t), self.job.step)
+        watched = self.job.watched() if wanted and not expected and not self.due(t) else []
+        before = self.read(watched, when)
+        self.call("EnterEventMode", when=when)
+        outcomes = self.settle(t, when)
+        idle = not any(o.again or o.nominals_changed or o.states_changed for o in outcomes)
+        same_next = announced == self.memory["next"]
+        if watched and idle and same_next and before == self.read(watched, when) and not self.memory.get("idle"):
+            self.memory["idle"] = True
+            text = f"an event must have a cause, but the one at t = {t:g} changes no output and no local variable"
+            self.report("event.without-cause", text)
+        self.call("EnterStepMode", when=when)
+
+
+def enter_initialisation_3(driver: Any, start: float, stop: float | None) -> None:
+    """Into initialisation mode of FMI 3.0.
+
+    Args:
+        driver: of an instance.
+        start, stop: of the experiment [s].
+    """
+    tolerance = driver.job.tolerance
+    driver.call(
+        "EnterInitializationMode", ("bool", tolerance is not None), ("double", tolerance or 0.0), ("double", start),
+        ("bool", stop is not None), ("double", stop or 0.0),
+    )  # fmt: skip

@@ -1,0 +1,153 @@
+"""From the description of an FMU to what is to be run."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from orchestrator.checking.description import DescribedVariable, Description, Interface, number
+from orchestrator.checking.layered import ReferenceResult
+from orchestrator.checking.probing.binding import ProbedVariable
+from orchestrator.checking.probing.job import ProbedClock, ProbeJob
+from orchestrator.shared.isolation.limits import Limits
+
+_STEPS = 100
+_MOST_VALUES = 1 << 20
+_BUDGET = 0.5  # s of a run; there are about fifteen
+_FLAGS = (
+    "canGetAndSetFMUstate", "canSerializeFMUstate", "canGetAndSetFMUState", "canSerializeFMUState",
+    "canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess", "canRunAsynchronuously",
+    "hasEventMode", "mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate",
+)  # fmt: skip
+
+
+def make_job(
+    d: Description, interface: Interface, fmu: Path, library: str, reference: ReferenceResult | None, limits: Limits
+) -> ProbeJob:
+    """What is to be run of an interface.
+
+    Args:
+        d: the model description.
+        interface: the one that is run.
+        fmu: the folder of the unpacked FMU.
+        library: path of the shared library in it.
+        reference: the result to be reproduced, or None.
+        limits: of the child process.
+
+    Returns:
+        The job; what the description has wrong is replaced by what makes sense.
+    """
+    start = _or(d.experiment("startTime"), 0.0)
+    stop = d.experiment("stopTime")
+    if stop is not None and not start < stop < math.inf:
+        stop = None  # a finding already
+    length = (stop if stop is not None else start + 1.0) - start
+    step = d.experiment("stepSize") or length / _STEPS
+    if not 0.0 < step <= length:
+        step = length / _STEPS
+    fixed = number(interface.element.get("fixedInternalStepSize"), "Real")
+    if fixed is not None and 0.0 < fixed <= length:
+        step = fixed * max(1, round(step / fixed))
+    version, folder = d.dialect.version, fmu / "resources"
+    resources = folder.as_uri() if version == "2.0" else f"{folder}/" if folder.is_dir() else None
+    known = [v for v in d.variables if v.reference is not None and v.kind]
+    variables = tuple(p for p in (_probed(d, v) for v in known) if 0 < p.size <= _MOST_VALUES)
+    return ProbeJob(
+        version=version,
+        interface=interface.kind,
+        library=str(fmu / library),
+        token=d.root.get(d.dialect.token, ""),
+        resources=resources,
+        variables=variables,
+        clocks=tuple(_clock(v) for v in known if v.kind == "Clock"),
+        states=_count(d, [d.variable(u.variable) for u in d.derivatives]),
+        indicators=_indicators(d),
+        start=start,
+        stop=stop,
+        step=step,
+        tolerance=d.experiment("tolerance"),
+        # Steps beyond the stop time may be refused, so a fraction of one is left out.
+        steps=max(1, math.floor(min(_STEPS, length / step + 1e-6))),
+        budget=min(_BUDGET, 0.2 * limits.time) / len(d.interfaces),
+        flags=frozenset(f for f in _FLAGS if interface.flag(f)),
+        reference=reference,
+    )
+
+
+def _or(value: float | None, default: float) -> float:
+    return default if value is None or not math.isfinite(value) else value
+
+
+def _count(d: Description, variables: list[DescribedVariable | None]) -> int | None:
+    sizes = [None if v is None else d.size(v) for v in variables]
+    known = [size for size in sizes if size is not None]
+    return sum(known) if len(known) == len(sizes) else None
+
+
+def _indicators(d: Description) -> int | None:
+    if d.dialect.version == "2.0":
+        return int(number(d.root.get("numberOfEventIndicators"), "Integer") or 0)
+    return _count(d, [d.variable(u.variable) for u in d.event_indicators])
+
+
+def _probed(d: Description, v: DescribedVariable) -> ProbedVariable:
+    base = v.base if d.dialect.version == "2.0" else "Int64" if v.kind == "Enumeration" else v.kind
+    size = d.size(v) or 0
+    return ProbedVariable(
+        name=v.name,
+        reference=v.reference or 0,
+        base=base,
+        causality=v.causality,
+        variability=v.variability,
+        initial=v.initial,
+        start=_starts(v, base, size, d.dialect.version == "2.0"),
+        minimum=v.number("min"),
+        maximum=v.number("max"),
+        nominal=v.number("nominal"),
+        size=size,
+        clocks=v.clocks or (),
+        intermediate=v.flag("intermediateUpdate"),
+        extents=tuple(-1 - e.reference if e.reference is not None else e.size or 0 for e in v.dimensions),
+    )
+
+
+def _starts(v: DescribedVariable, base: str, size: int, second: bool) -> tuple[Any, ...] | None:
+    if v.starts is None:
+        # A text without a start value has the empty one, where it must have one.
+        return None
+    try:
+        found = tuple(_value(text, base, second) for text in v.starts)
+    except (ValueError, OverflowError):
+        return None
+    if None in found:
+        return None
+    return found * size if len(found) == 1 else found if len(found) == size else None
+
+
+def _value(text: str, base: str, second: bool) -> Any:
+    if base == "Boolean":
+        true = text in ("true", "1")
+        return int(true) if second else true
+    if base == "String":
+        return text.encode()
+    if base == "Binary":
+        return bytes.fromhex(text)
+    if base == "Clock":
+        return None
+    value = number(text, "Real" if base in ("Real", "Float32", "Float64") else "Integer")
+    return value if value is None or base != "Float32" else float(value)
+
+
+def _clock(v: DescribedVariable) -> ProbedClock:
+    kind = v.attributes.get("intervalVariability", "")
+    interval, shift = (number(v.attributes.get(a), "Real") for a in ("intervalDecimal", "shiftDecimal"))
+    periodic = kind in ("constant", "fixed", "tunable") and interval is not None and 0.0 < interval < math.inf
+    return ProbedClock(
+        name=v.name,
+        reference=v.reference or 0,
+        kind=kind,
+        causality=v.causality,
+        interval=float(interval) if periodic and interval is not None else None,
+        shift=float(shift) if shift is not None else (0.0 if periodic else None),
+        priority=int(number(v.attributes.get("priority"), "Integer") or 0),
+        clocks=v.clocks or (),
+    )

@@ -1,0 +1,190 @@
+"""An instance with the sequence of calls of its interface: what probes do is the same for all of them."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from orchestrator.checking.probing.binding import FmuInstance, Library, ProbedVariable, odd
+from orchestrator.checking.probing.job import ProbeJob, references
+
+Report = Callable[..., None]
+_CTYPES = {
+    "2.0": {"Real": "double", "Integer": "int", "Boolean": "int", "String": "text"},
+    "3.0": {
+        "Float64": "double", "Float32": "float", "Boolean": "bool", "String": "text", "Clock": "bool",
+        **{f"{sign}Int{bits}": f"{sign.lower()}int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)},
+    },
+}  # fmt: skip
+_PYTHON: dict[str, tuple[type, ...]] = {"double": (float,), "float": (float,), "bool": (bool,)}
+_TEXTS: tuple[type, ...] = (bytes, type(None))
+MOST_ITERATIONS = 100
+
+
+class Driver(FmuInstance):
+    """Base of the drivers.
+
+    Attributes:
+        job: what is run.
+        report: called with rule, message and path.
+    """
+
+    maker = ""
+
+    def __init__(self, library: Library, number: int, job: ProbeJob, report: Report) -> None:
+        super().__init__(library, number)
+        self.job = job
+        self.report = report
+
+    @classmethod
+    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
+        """Ask the FMU for an instance.
+
+        Args:
+            library: of the FMU.
+            name: of the instance.
+            token: guid or instantiation token.
+            job: what is run.
+            options: of the interface.
+
+        Returns:
+            Its number, or None when the FMU returns null.
+
+        Raises:
+            NotImplementedError: always; the drivers of the interfaces do it.
+        """
+        raise NotImplementedError
+
+    def options(self, **options: bool) -> None:
+        """Take note of the options of the instantiation.
+
+        Args:
+            options: of the interface.
+        """
+
+    def get(self, variables: Sequence[ProbedVariable], when: str = "") -> list[Any]:
+        """Read variables of one base type; a null text is None.
+
+        Args:
+            variables: all with the same ``base``.
+            when: words for the message of an error.
+
+        Returns:
+            All values, one variable after the other.
+
+        Raises:
+            StatusError: it is refused.
+            ChildError: the answer of the child is none that the function can have.
+        """
+        if not variables:
+            return []
+        function, arguments = self._getting(variables)
+        (values,) = self.call(function, *arguments, when=when)
+        return self._got(variables, values)
+
+    def _getting(self, variables: Sequence[ProbedVariable]) -> tuple[str, list[Any]]:
+        """Function and arguments that read variables of one base type."""
+        base, size = variables[0].base, sum(v.size for v in variables)
+        out = ("out binaries", size) if base == "Binary" else ("out", _CTYPES[self.job.version][base], size)
+        arguments = [("in", "uint32", references(variables)), ("size", len(variables)), out]
+        if self.job.version == "3.0" and base != "Clock":
+            arguments.append(("size", size))
+        return f"Get{base}", arguments
+
+    def _got(self, variables: Sequence[ProbedVariable], values: Any) -> list[Any]:
+        """Values that are of the type and number that was asked for."""
+        base, size = variables[0].base, sum(v.size for v in variables)
+        ctype = "text" if base == "Binary" else _CTYPES[self.job.version][base]
+        kinds = _TEXTS if ctype == "text" else _PYTHON.get(ctype, (int,))
+        if not isinstance(values, list) or len(values) != size or not all(isinstance(v, kinds) for v in values):
+            raise odd(f"Get{base}")
+        return values
+
+    def set(self, variables: Sequence[ProbedVariable], values: Sequence[Any], when: str = "") -> None:
+        """Write variables of one base type.
+
+        Args:
+            variables: all with the same ``base``.
+            values: all values, one variable after the other.
+            when: words for the message of an error.
+
+        Raises:
+            StatusError: it is refused.
+        """
+        if not variables:
+            return
+        base = variables[0].base
+        head = (("in", "uint32", references(variables)), ("size", len(variables)))
+        tail = (("size", len(values)),) if self.job.version == "3.0" and base != "Clock" else ()
+        if base == "Binary":
+            self.call("SetBinary", *head, ("in binaries", list(values)), *tail, when=when)
+        else:
+            self.call(f"Set{base}", *head, ("in", _CTYPES[self.job.version][base], list(values)), *tail, when=when)
+
+    def read(self, variables: Sequence[ProbedVariable], when: str = "") -> list[Any]:
+        """Values of variables of any type, one after the other; those of clocked variables at their last tick.
+
+        Args:
+            variables: what to read.
+            when: words for the message of an error.
+
+        Returns:
+            The values.
+        """
+        found: dict[int, list[Any]] = {}
+        held = self.memory.get("held", {})
+        groups = [
+            [(i, v) for i, v in enumerate(variables) if v.base == base]
+            for base in dict.fromkeys(v.base for v in variables if not v.clocks)
+        ]
+        groups = [[(i, v) for i, v in group if not v.clocks] for group in groups]
+        answers = self.call_many([self._getting([v for _, v in group]) for group in groups], when)
+        for group, (answer,) in zip(groups, answers, strict=True):
+            values = self._got([v for _, v in group], answer)
+            for i, v in group:
+                found[i], values = values[: v.size], values[v.size :]
+        for i, v in enumerate(variables):
+            if v.clocks:
+                found[i] = list(held.get(v.reference, [None] * v.size))
+        return [value for i in range(len(variables)) for value in found[i]]
+
+    def enter_initialisation(self, start: float, stop: float | None) -> None:
+        """From a new or reset instance into initialisation.
+
+        Args:
+            start, stop: of the experiment [s].
+
+        Raises:
+            NotImplementedError: always; the drivers of the interfaces do it.
+        """
+        raise NotImplementedError
+
+    def exit_initialisation(self) -> None:
+        """From initialisation to the first communication point."""
+        self.call("ExitInitializationMode")
+
+    def initialise(self) -> None:
+        """Bring a new or reset instance to the first communication point."""
+        self.enter_initialisation(self.job.start, self.job.stop)
+        self.exit_initialisation()
+
+    def advance(self, t: float, size: float, when: str = "") -> None:
+        """Go from one communication point to the next.
+
+        Args:
+            t: beginning of the step [s].
+            size: its length [s].
+            when: words for the message of an error.
+
+        Raises:
+            StatusError: it was not done.
+            TerminatedError: the slave ended the simulation.
+        """
+        raise NotImplementedError
+
+    def terminate(self) -> None:
+        """End the simulation."""
+        self.call("Terminate")
+
+    def reset(self) -> None:
+        """Back to a new instance."""
+        self.call("Reset")
+        self.memory = {}

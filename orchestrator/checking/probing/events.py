@@ -1,0 +1,226 @@
+"""Event mode: what model exchange and co-simulation share, in both versions of FMI."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from orchestrator.checking.probing.binding import OK, WARNING, StatusError, TerminatedError
+from orchestrator.checking.probing.driver import MOST_ITERATIONS, Driver
+from orchestrator.checking.probing.job import ProbedClock
+
+_NOT_YET_KNOWN, _UNCHANGED, _CHANGED = range(3)
+_SMALL = 1e-9
+
+
+@dataclass(frozen=True)
+class EventOutcome:
+    """What one update of the discrete states said."""
+
+    again: bool
+    terminate: bool
+    nominals_changed: bool
+    states_changed: bool
+    next_time: float | None
+
+
+class EventDriver(Driver):
+    """A driver with event mode and clocks.
+
+    ``memory`` holds "next" (time of the next event that the FMU knows [s]), "ticks" (time of the next tick by reference
+    of the clock), "periods" (interval by reference) and "held" (values of clocked variables at their last tick).
+    """
+
+    def start_clocks(self) -> None:
+        """Ask for what the description does not say of the clocks; in initialisation mode."""
+        self.memory |= {"ticks": {}, "periods": {}, "held": {}, "next": None}
+        for clock in self.job.clocks:
+            if clock.causality != "input" or clock.kind == "triggered":
+                continue
+            interval, shift = clock.interval, clock.shift
+            qualifier = _CHANGED
+            if interval is None:
+                interval, qualifier = self._interval(clock)
+            if shift is None:
+                shift = self._shift(clock) if clock.kind in ("fixed", "tunable") else 0.0
+            if qualifier == _NOT_YET_KNOWN:
+                continue
+            if clock.kind in ("constant", "fixed", "tunable"):
+                self.memory["periods"][clock.reference] = interval
+                self.memory["ticks"][clock.reference] = self.job.start + shift
+            elif qualifier == _CHANGED:
+                self.memory["ticks"][clock.reference] = self.job.start + interval
+
+    def _interval(self, clock: ProbedClock) -> tuple[float, int]:
+        """Interval and qualifier of a clock."""
+        arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("out", "double", 1), ("out", "int", 1))
+        (interval,), (qualifier,) = self.call("GetIntervalDecimal", *arguments, when=f"for the clock `{clock.name}`")
+        if qualifier not in (_NOT_YET_KNOWN, _UNCHANGED, _CHANGED):
+            text = f"the qualifier of the interval of `{clock.name}` must be 0, 1 or 2, but is {qualifier}"
+            raise StatusError("fmi3GetIntervalDecimal", 0, text, "clock.interval-value")
+        positive = 0.0 < interval < math.inf or (interval == 0.0 and clock.kind == "countdown")
+        if qualifier == _CHANGED and not positive:
+            text = f"the interval of the clock `{clock.name}` must be positive, but is {interval:g}"
+            raise StatusError("fmi3GetIntervalDecimal", 0, text, "clock.interval-value")
+        return interval, qualifier
+
+    def described_intervals(self) -> list[str]:
+        """Ask for the intervals that the description has; what differs from it.
+
+        An FMU that refuses to tell is left alone; it must not be called any further then.
+
+        Returns:
+            Sentences.
+        """
+        wrong = []
+        for clock in self.job.clocks:
+            if clock.interval is None or clock.kind != "constant":
+                continue
+            arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("out", "double", 1), ("out", "int", 1))
+            status, values = self.raw("GetIntervalDecimal", *arguments)
+            if status not in (OK, WARNING):
+                break
+            found = values[0][0]
+            if abs(found - clock.interval) > 1e-6 * clock.interval:
+                wrong.append(f"the interval of `{clock.name}` must be {clock.interval:g}, but is {found:g}")
+        return wrong
+
+    def _shift(self, clock: ProbedClock) -> float:
+        arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("out", "double", 1))
+        ((shift,),) = self.call("GetShiftDecimal", *arguments, when=f"for the clock `{clock.name}`")
+        if not 0.0 <= shift < math.inf:
+            text = f"the shift of the clock `{clock.name}` must not be negative, but is {shift:g}"
+            raise StatusError("fmi3GetShiftDecimal", 0, text, "clock.interval-value")
+        return float(shift)
+
+    def next_instant(self, end: float) -> float:
+        """The next time at which event mode must be entered, ``end`` at the latest.
+
+        Args:
+            end: of the communication step [s].
+
+        Returns:
+            The time [s].
+        """
+        times = [*self.memory.get("ticks", {}).values(), end]
+        if self.memory.get("next") is not None:
+            times.append(self.memory["next"])
+        return float(min(times))
+
+    def due(self, t: float) -> list[ProbedClock]:
+        """The clocks that tick at a time.
+
+        Args:
+            t: time [s].
+
+        Returns:
+            Clocks, the most urgent first.
+        """
+        ticks = self.memory.get("ticks", {})
+        slack = _SMALL * max(abs(t), self.job.step)
+        chosen = [c for c in self.job.clocks if c.reference in ticks and ticks[c.reference] <= t + slack]
+        return sorted(chosen, key=lambda c: c.priority)
+
+    def settle(self, t: float, when: str) -> list[EventOutcome]:
+        """In event mode: tick what is due, then update the discrete states until nothing is left to do.
+
+        Args:
+            t: time [s].
+            when: words for the message of an error.
+
+        Returns:
+            What each update said.
+
+        Raises:
+            StatusError: a call is refused, or there is no end.
+            TerminatedError: the FMU ends the simulation.
+        """
+        ticking = self.due(t)
+        outcomes: list[EventOutcome] = []
+        for position in range(MOST_ITERATIONS):
+            active = {c.reference for c in ticking} if position == 0 else set()
+            if active:
+                chosen = [c.reference for c in ticking]
+                head = (("in", "uint32", chosen), ("size", len(chosen)))
+                self.call("SetClock", *head, ("in", "bool", [True] * len(chosen)), when=when)
+            active |= self._triggered(when)
+            self._hold(active, when)
+            outcomes.append(self.update(t, when))
+            self._advance_clocks(ticking if position == 0 else [], t)
+            if outcomes[-1].terminate:
+                raise TerminatedError
+            if not outcomes[-1].again:
+                break
+        else:
+            text = f"the discrete states must settle, but want more than {MOST_ITERATIONS} updates {when}"
+            raise StatusError("UpdateDiscreteStates", 0, text, "event.endless")
+        still = self._triggered(when)
+        if still:
+            names = ", ".join(c.name for c in self.job.clocks if c.reference in still)
+            text = f"a clock must be inactive after the update of the discrete states, but {names} is not {when}"
+            self.report("clock.deactivation", text)
+        self.memory["next"] = outcomes[-1].next_time
+        return outcomes
+
+    def _triggered(self, when: str) -> set[int]:
+        """The output clocks that are active."""
+        chosen = [c.reference for c in self.job.clocks if c.causality == "output"]
+        if not chosen:
+            return set()
+        head = (("in", "uint32", chosen), ("size", len(chosen)))
+        (values,) = self.call("GetClock", *head, ("out", "bool", len(chosen)), when=when)
+        return {reference for reference, value in zip(chosen, values, strict=True) if value}
+
+    def _hold(self, active: set[int], when: str) -> None:
+        """Set and read the variables of the clocks that are active."""
+        clocked = [v for v in self.job.variables if v.clocks and active & set(v.clocks) and v.base != "Clock"]
+        for v in clocked:
+            if v.causality == "input" and v.start is not None:
+                self.set([v], v.start, when)
+        held = dict(self.memory.get("held", {}))
+        for v in clocked:
+            if v.causality == "output":
+                held[v.reference] = self.get([v], when)
+        self.memory["held"] = held
+
+    def _advance_clocks(self, ticking: list[ProbedClock], t: float) -> None:
+        """The next ticks of the clocks that ticked, and those of countdown clocks."""
+        ticks, periods = dict(self.memory.get("ticks", {})), self.memory.get("periods", {})
+        for clock in self.job.clocks:
+            if clock.causality != "input" or clock.kind == "triggered":
+                continue
+            ticked = clock in ticking
+            if ticked and clock.reference in periods:
+                ticks[clock.reference] += periods[clock.reference]
+            elif ticked:
+                del ticks[clock.reference]
+            if clock.kind == "countdown" or (clock.kind == "changing" and ticked):
+                interval, qualifier = self._interval(clock)
+                if qualifier == _CHANGED:
+                    ticks[clock.reference] = t + interval
+        self.memory["ticks"] = ticks
+
+    def update(self, t: float, when: str) -> EventOutcome:
+        """Update the discrete states once.
+
+        Args:
+            t: time [s].
+            when: words for the message of an error.
+
+        Returns:
+            What it said.
+
+        Raises:
+            StatusError: a call is refused, or the next event is not later than ``t``.
+        """
+        if self.job.version == "2.0":
+            ((again, terminate, nominals, states, defined, time),) = self.call(
+                "NewDiscreteStates", ("event info",), when=when
+            )
+        else:
+            found = self.call("UpdateDiscreteStates", *(("out", "bool", 1),) * 5, ("out", "double", 1), when=when)
+            again, terminate, nominals, states, defined, time = (values[0] for values in found)
+        if defined and not time > t - _SMALL * max(abs(t), self.job.step):
+            text = f"the time of the next event must be later than t = {t:g}, but is {time:g} {when}"
+            raise StatusError("UpdateDiscreteStates", 0, text, "event.next-time")
+        next_time: Any = float(time) if defined else None
+        return EventOutcome(again, terminate, nominals, states, next_time)

@@ -1,0 +1,122 @@
+"""What is to be run: an interface of an FMU, its variables, clocks and experiment."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from orchestrator.checking.layered import ReferenceResult
+from orchestrator.checking.probing.binding import ProbedVariable
+from orchestrator.checking.rules import Version
+
+
+@dataclass(frozen=True)
+class ProbedClock:
+    """A clock that the importer knows from the description.
+
+    Attributes:
+        kind: "constant", "fixed", "tunable", "changing", "countdown" or "triggered".
+        interval, shift: [s]; None where the FMU has to be asked.
+        priority: smaller is more urgent.
+        clocks: value references of clocks that must tick for this one to tick.
+    """
+
+    name: str
+    reference: int
+    kind: str
+    causality: str
+    interval: float | None
+    shift: float | None
+    priority: int = 0
+    clocks: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class ProbeJob:
+    """What is to be run.
+
+    Attributes:
+        interface: "CoSimulation", "ModelExchange" or "ScheduledExecution".
+        token: guid or instantiation token.
+        resources: the folder of resources as the version hands it over; None when there is none.
+        states: number of continuous states, None when the FMU has to be asked.
+        indicators: number of event indicators, likewise.
+        start, stop, step: the experiment in s; ``stop`` is None when the FMU does not say.
+        steps: number of communication steps of a test run.
+        budget: seconds that a test run may take, of a :class:`Stopwatch`.
+        flags: capability flags that are true.
+        reference: the result to be reproduced, or None.
+    """
+
+    version: Version
+    interface: str
+    library: str
+    token: str
+    resources: str | None
+    variables: tuple[ProbedVariable, ...]
+    clocks: tuple[ProbedClock, ...]
+    states: int | None
+    indicators: int | None
+    start: float
+    stop: float | None
+    step: float
+    tolerance: float | None
+    steps: int
+    budget: float
+    flags: frozenset[str]
+    reference: ReferenceResult | None
+
+    @property
+    def saves(self) -> bool:
+        """Whether states can be saved and restored."""
+        return bool(self.flags & {"canGetAndSetFMUstate", "canGetAndSetFMUState"})
+
+    @property
+    def serialises(self) -> bool:
+        """Whether states can be serialised."""
+        return bool(self.flags & {"canSerializeFMUstate", "canSerializeFMUState"})
+
+    def outputs(self) -> list[ProbedVariable]:
+        """What a run records: the outputs, or all local variables when there are none; clocks are left out.
+
+        Returns:
+            Variables, in the order of the description.
+        """
+        open_ = [v for v in self.variables if v.base != "Clock"]
+        chosen = [v for v in open_ if v.causality == "output"]
+        return chosen or [v for v in open_ if v.causality == "local" and not v.clocks]
+
+    def labels(self) -> list[str]:
+        """Names of the recorded values.
+
+        Returns:
+            One for each value.
+        """
+        return [label for v in self.outputs() for label in v.labels]
+
+    def inputs(self) -> list[ProbedVariable]:
+        """Floating point inputs that may be set at any communication point.
+
+        Returns:
+            Variables, in the order of the description.
+        """
+        return [v for v in self.variables if v.causality == "input" and v.real and not v.clocks]
+
+    def watched(self) -> list[ProbedVariable]:
+        """What an event can change, as far as it can be read: outputs and local variables without clocks.
+
+        Returns:
+            Variables, in the order of the description.
+        """
+        kinds = ("output", "local")
+        return [v for v in self.variables if v.causality in kinds and not v.clocks and v.base != "Clock"]
+
+
+def references(variables: Sequence[ProbedVariable]) -> list[int]:
+    """Value references.
+
+    Args:
+        variables: of any type.
+
+    Returns:
+        One for each.
+    """
+    return [v.reference for v in variables]

@@ -1,0 +1,166 @@
+"""The driver of model exchange of both versions: integrates the states, and handles events.
+
+Steps of an embedded pair of order 2 (Heun) with order 1 (Euler) are short enough for a relative error of
+``_TOLERANCE``; what needs more than ``_MOST_STEPS`` of them to the next communication point is not followed further.
+"""
+
+import math
+from typing import Any
+
+from orchestrator.checking.probing.binding import Library, StatusError, TerminatedError
+from orchestrator.checking.probing.cosimulation2 import CoSimulation2
+from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
+from orchestrator.checking.probing.events import EventDriver
+from orchestrator.checking.probing.job import ProbeJob
+
+_TOLERANCE = 1e-3
+_MOST_STEPS = 300
+_LOCATED = 1e-5
+_SMALL = 1e-9
+_DERIVATIVES = {"2.0": "GetDerivatives", "3.0": "GetContinuousStateDerivatives"}
+
+
+class ModelExchange(EventDriver):
+    """Model exchange of FMI 2.0 and 3.0."""
+
+    @classmethod
+    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
+        if job.version == "2.0":
+            return library.make("fmi2Instantiate", "instantiate_2", name, 0, token, job.resources)
+        function = "fmi3InstantiateModelExchange"
+        return library.make(function, "instantiate_3", function, name, token, job.resources, [], [])
+
+    def enter_initialisation(self, start: float, stop: float | None) -> None:
+        if self.job.version == "2.0":
+            CoSimulation2.enter_initialisation(self, start, stop)  # type: ignore[arg-type]
+        else:
+            enter_initialisation_3(self, start, stop)
+            self.start_clocks()
+
+    def exit_initialisation(self) -> None:
+        self.call("ExitInitializationMode")
+        self.settle(self.job.start, "after initialisation")
+        self.call("EnterContinuousTimeMode")
+        self.memory["states"] = self._count("ContinuousStates", self.job.states, "states.count")
+        self.memory["indicators"] = self._count("EventIndicators", self.job.indicators, "indicators.count")
+        nominals = self._values("GetNominalsOfContinuousStates", "states", "after initialisation")
+        if not all(math.isfinite(x) and x > 0.0 for x in nominals):
+            self.report("states.nominal", f"nominal values of states must be positive, but are {nominals[:5]}")
+        self.memory["nominals"] = [x if math.isfinite(x) and x > 0.0 else 1.0 for x in nominals]
+        self.memory["signs"] = self._signs("after initialisation")
+
+    def _count(self, what: str, described: int | None, rule: str) -> int:
+        """How many there are; what the FMU says must be what the description says."""
+        if self.job.version == "2.0":
+            return described or 0
+        ((count,),) = self.call(f"GetNumberOf{what}", ("out", "size", 1))
+        if described is not None and count != described:
+            text = f"fmi3GetNumberOf{what} must return {described} as ModelStructure says, but returns {count}"
+            raise StatusError(f"fmi3GetNumberOf{what}", 0, text, rule)
+        return int(count)
+
+    def _values(self, function: str, kind: str, when: str) -> list[float]:
+        count = self.memory[kind]
+        if not count:
+            return []
+        (values,) = self.call(function, ("out", "double", count), ("size", count), when=when)
+        return list(values)
+
+    def _signs(self, when: str) -> list[bool]:
+        return [z > 0.0 for z in self._values("GetEventIndicators", "indicators", when)]
+
+    def _place(self, t: float, x: list[float], when: str) -> tuple[list[float], list[bool]]:
+        """Put the FMU to a time and states; their derivatives, and the signs of the event indicators."""
+        requests: list[tuple[str, Any]] = [("SetTime", [("double", t)])]
+        if x:
+            requests.append(("SetContinuousStates", [("in", "double", x), ("size", len(x))]))
+            requests.append((_DERIVATIVES[self.job.version], [("out", "double", len(x)), ("size", len(x))]))
+        if self.memory["indicators"]:
+            count = self.memory["indicators"]
+            requests.append(("GetEventIndicators", [("out", "double", count), ("size", count)]))
+        answers = self.call_many(requests, when)
+        signs = [z > 0.0 for z in answers[-1][0]] if self.memory["indicators"] else []
+        return (list(answers[2][0]) if x else []), signs
+
+    def advance(self, t: float, size: float, when: str = "") -> None:
+        end, h = t + size, min(self.memory.get("h") or size, size)
+        slack = _SMALL * max(abs(end), size)
+        x = self._values("GetContinuousStates", "states", when)
+        for _ in range(_MOST_STEPS):
+            goal = self.next_instant(end)
+            h = min(h, goal - t) if x else goal - t
+            if h > slack:
+                x, t, h, signs = self._try(t, x, h, when)
+                entered, terminate = (v[0] for v in self.call(
+                    "CompletedIntegratorStep", (self._truth, True), ("out", self._truth, 1), ("out", self._truth, 1),
+                    when=when,
+                ))  # fmt: skip
+                if terminate:
+                    raise TerminatedError
+                crossed = signs != self.memory["signs"]
+            else:
+                t, entered, crossed = goal, False, False
+            if entered or crossed or self.next_instant(end + size) <= t + slack:
+                x = self._event(t, when)
+                h = size
+            if t >= end - slack:
+                self.memory["h"] = h
+                return
+        raise TerminatedError
+
+    @property
+    def _truth(self) -> str:
+        """The C type of truth values."""
+        return "int" if self.job.version == "2.0" else "bool"
+
+    def _try(self, t: float, x: list[float], h: float, when: str) -> tuple[list[float], float, float, list[bool]]:
+        """Do a step of at most ``h`` that is exact enough and passes no event by far.
+
+        Args:
+            t, x: time [s] and states.
+            h: size of the step [s].
+            when: words for the message of an error.
+
+        Returns:
+            States, time, the size of the next step, and the signs of the event indicators.
+        """
+        slope, _ = self._place(t, x, when)
+        shortest = 1e-4 * h
+        while True:
+            guess = [a + h * b for a, b in zip(x, slope, strict=True)]
+            second, _ = self._place(t + h, guess, when)
+            scaled = zip(slope, second, guess, self.memory["nominals"], strict=True)
+            error = max((0.5 * h * abs(b - a) / (_TOLERANCE * (n + abs(g))) for a, b, g, n in scaled), default=0.0)
+            if error <= 1.0 or h <= shortest or not all(map(math.isfinite, slope)):
+                break
+            h *= max(0.1, 0.9 / math.sqrt(error)) if math.isfinite(error) else 0.25
+        new = [a + 0.5 * h * (b + c) for a, b, c in zip(x, slope, second, strict=True)]
+        _, signs = self._place(t + h, new, when)
+        if signs != self.memory["signs"]:
+            new, h, signs = self._locate(t, x, new, h, when)
+        grown = h * min(2.0, 0.9 / math.sqrt(max(error, 1e-6))) if math.isfinite(error) else h
+        return new, t + h, grown, signs
+
+    def _locate(
+        self, t: float, x: list[float], new: list[float], h: float, when: str
+    ) -> tuple[list[float], float, list[bool]]:
+        """Halve a step until the change of sign of an indicator is close to its end."""
+        low, high = 0.0, 1.0
+        while high - low > _LOCATED:
+            middle = 0.5 * (low + high)
+            _, signs = self._place(t + middle * h, [a + middle * (b - a) for a, b in zip(x, new, strict=True)], when)
+            if signs == self.memory["signs"]:
+                low = middle
+            else:
+                high = middle
+        found = [a + high * (b - a) for a, b in zip(x, new, strict=True)]
+        _, signs = self._place(t + high * h, found, when)
+        return found, high * h, signs
+
+    def _event(self, t: float, when: str) -> list[float]:
+        """Handle an event; the states after it."""
+        self.call("EnterEventMode", when=when)
+        self.settle(t, when)
+        self.call("EnterContinuousTimeMode", when=when)
+        self.memory["signs"] = self._signs(when)
+        return self._values("GetContinuousStates", "states", when)

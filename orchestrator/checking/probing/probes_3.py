@@ -1,0 +1,190 @@
+"""Probes of what FMI 3.0 brings: early return, intermediate updates, clocks, structural parameters."""
+
+from typing import Any
+
+from orchestrator.checking.probing.binding import OK, WARNING, StatusError, TerminatedError
+from orchestrator.checking.probing.events import EventDriver
+from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
+
+_SMALL = 1e-9
+_FEW_STEPS = 20
+_LARGEST = 8
+
+
+def early_return(context: Context) -> None:
+    """Without earlyReturnAllowed, and without event mode where it can be: no step ends early, no event is announced.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Raises:
+        SkippedError: it does not apply.
+    """
+    bench, job = context.bench, context.bench.job
+    if job.interface != "CoSimulation":
+        raise SkippedError("the interface has no steps")
+    with bench.instance(early=False, events=bool(job.clocks)) as driver:  # clocks need event mode
+        bench.run(driver)
+
+
+def intermediate(context: Context) -> None:
+    """Intermediate updates: only in steps, in the order of time, with values that can be read and then set.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Raises:
+        SkippedError: it does not apply.
+    """
+    bench, job = context.bench, context.bench.job
+    if job.interface != "CoSimulation":
+        raise SkippedError("the interface has no intermediate updates")
+    provided = "providesIntermediateUpdate" in job.flags
+    chosen = [v for v in job.variables if v.intermediate and v.base == "Float64" and v.size == 1]
+    reads = [v.reference for v in chosen if v.causality in ("output", "local")]
+    inputs = [v for v in chosen if v.causality == "input" and v.start]
+    seen = 0
+    with bench.instance(initialised=False, intermediate=True) as driver:
+        values = [float((v.start or (0.0,))[0]) for v in inputs]
+        bench.library.plan(driver.number, reads, [v.reference for v in inputs], values, -1)
+        driver.initialise()
+        bench.library.updates()
+        for n in range(min(job.steps, _FEW_STEPS)):
+            t = job.start + n * job.step
+            driver.advance(t, job.step, f"at t = {t:g} (step {n + 1})")
+            driver.read(job.outputs())
+            rows, _ = bench.library.updates()
+            seen += len(rows)
+            _judge(context, rows, t, t + job.step)
+    if seen and not provided:
+        message = "intermediateUpdate must not be called without providesIntermediateUpdate, but is"
+        context.report("intermediate.unexpected", message)
+    elif provided and not seen:
+        message = "intermediateUpdate must be called, as providesIntermediateUpdate says, but is not"
+        context.report("intermediate.missing", message)
+    elif "canReturnEarlyAfterIntermediateUpdate" in job.flags:
+        _asked_to_return(context)
+
+
+def _judge(context: Context, rows: list[list[Any]], begin: float, end: float) -> None:
+    slack = _SMALL * max(abs(end), end - begin)
+    last = begin
+    for function, time, _, _, _, _, got, was_set in rows:
+        if function != "fmi3DoStep":
+            context.report(
+                "intermediate.unexpected", f"intermediateUpdate must be called in steps only, not in {function}"
+            )
+        elif not begin - slack <= time <= end + slack:
+            message = f"an intermediate update must lie in the step from {begin:g} to {end:g}, but is at {time:g}"
+            context.report("intermediate.time", message)
+        elif time < last - slack:
+            message = f"intermediate updates must go forward in time, but one at {time:g} follows one at {last:g}"
+            context.report("intermediate.time", message)
+        if got not in (OK, WARNING, None):
+            message = "variables with intermediateUpdate must be readable in an update, but are refused"
+            context.report("intermediate.access", message)
+        if was_set not in (OK, WARNING, None):
+            message = "continuous inputs with intermediateUpdate must be settable in an update, but are refused"
+            context.report("intermediate.access", message)
+        last = max(last, time)
+
+
+def _asked_to_return(context: Context) -> None:
+    """An early return that is asked for in the first update must come."""
+    bench, job = context.bench, context.bench.job
+    with bench.instance(intermediate=True) as driver:
+        bench.library.updates()
+        bench.library.plan(driver.number, [], [], [], 0)
+        found = driver.call(
+            "DoStep", ("double", job.start), ("double", job.step), ("bool", True), *(("out", "bool", 1),) * 3,
+            ("out", "double", 1),
+        )  # fmt: skip
+        rows, _ = bench.library.updates()
+        bench.library.plan(driver.number, [], [], [], -1)
+    may = bool(rows) and bool(rows[0][5]) and rows[0][1] < job.start + job.step * (1.0 - _SMALL)
+    if may and not found[2][0]:
+        message = "a step must end early when an intermediate update asks for it, but goes on"
+        context.report("intermediate.early-return", message)
+
+
+def clocks(context: Context) -> None:
+    """The intervals are those of the description, and event mode without a tick leaves clocked outputs as they are.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Raises:
+        SkippedError: it does not apply.
+    """
+    bench, job = context.bench, context.bench.job
+    if not job.clocks:
+        raise SkippedError("the FMU has no clocks")
+    if context.trace is None:
+        raise SkippedError(NOT_COMPARABLE)
+    with bench.instance(initialised=False) as driver:
+        assert isinstance(driver, EventDriver)
+        driver.enter_initialisation(job.start, job.stop)
+        for wrong in driver.described_intervals():
+            context.report("clock.interval-value", wrong)
+    if job.interface == "ScheduledExecution":
+        raise SkippedError("there is no event mode")
+    rows = []
+    outputs = job.outputs()
+    with bench.instance() as driver:
+        assert isinstance(driver, EventDriver)
+        for n in range(job.steps):
+            t = job.start + n * job.step
+            bench.excite(driver, t)
+            driver.advance(t, job.step, f"at t = {t:g} (step {n + 1})")
+            rows.append(driver.read(outputs))
+            driver.call("EnterEventMode")
+            driver.settle(t + job.step, "in event mode without a cause")
+            driver.call("EnterStepMode" if job.interface == "CoSimulation" else "EnterContinuousTimeMode")
+    difference = context.compare(context.trace, rows)
+    if difference is not None:
+        wanted = "clocked variables must change only while their clock is active"
+        context.report_difference("clock.inactive-change", wanted, difference)
+
+
+def structure(context: Context) -> None:
+    """Structural parameters can be set in configuration mode, and arrays then have the size that follows.
+
+    Args:
+        context: the FMU, its job and where findings go.
+
+    Raises:
+        SkippedError: it does not apply.
+    """
+    bench, job = context.bench, context.bench.job
+    chosen = [v for v in job.variables if v.causality == "structuralParameter" and v.base == "UInt64"]
+    if not chosen:
+        raise SkippedError("the FMU has no structural parameters")
+    for change in (0, 1):
+        with bench.instance(initialised=False) as driver:
+            try:
+                driver.call("EnterConfigurationMode")
+                sizes = {v.reference: _size(v, change) for v in chosen}
+                for v in chosen:
+                    driver.set([v], [sizes[v.reference]], f"for `{v.name}` in configuration mode")
+                found = driver.read(chosen, "in configuration mode")
+                if found != list(sizes.values()):
+                    message = f"structural parameters must keep what was set, {list(sizes.values())}, but are {found}"
+                    context.report("configuration.value", message)
+                    return
+                driver.call("ExitConfigurationMode")
+                arrays = [v for v in job.variables if v.extents and not v.clocks and v.base != "Binary"]
+                for v in arrays:
+                    driver.get([v.resized(sizes)], f"for `{v.name}` of the new size")
+            except (StatusError, TerminatedError) as error:
+                context.report("configuration.status", str(error))
+                return
+
+
+def _size(v: Any, change: int) -> int:
+    """The start value, or another one within the bounds."""
+    start = int((v.start or (1,))[0])
+    more = start + change
+    most = _LARGEST if v.maximum is None else min(int(v.maximum), start + _LARGEST)
+    if more <= most:
+        return more
+    return max(start - change, int(v.minimum or 1), 1)

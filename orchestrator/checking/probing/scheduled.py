@@ -1,0 +1,36 @@
+"""The driver of scheduled execution: model partitions are activated when their clocks tick."""
+
+from orchestrator.checking.probing.binding import Library
+from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
+from orchestrator.checking.probing.events import EventDriver
+from orchestrator.checking.probing.job import ProbeJob
+
+
+class ScheduledExecution(EventDriver):
+    """Scheduled execution of FMI 3.0."""
+
+    maker = "fmi3InstantiateScheduledExecution"
+
+    @classmethod
+    def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
+        return library.make(cls.maker, "instantiate_3", cls.maker, name, token, job.resources, [], [])
+
+    def enter_initialisation(self, start: float, stop: float | None) -> None:
+        enter_initialisation_3(self, start, stop)
+        self.start_clocks()
+
+    def advance(self, t: float, size: float, when: str = "") -> None:
+        end = t + size
+        while self.next_instant(end) < end:
+            now = self.next_instant(end)
+            for clock in self.due(now):
+                at = f"for the clock `{clock.name}` at t = {now:g}"
+                self.call("ActivateModelPartition", ("uint32", clock.reference), ("double", now), when=at)
+                self._hold({clock.reference}, at)
+                self._advance_clocks([clock], now)
+        _, locks = self.library.updates()
+        if locks and not self.memory.get("locked"):
+            self.memory["locked"] = True
+            self.report(
+                "partition.preemption", f"preemption must be unlocked as often as it is locked, but is not {when}"
+            )

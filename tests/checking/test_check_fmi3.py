@@ -1,0 +1,101 @@
+"""FMI 3.0: the good FMU has no finding, and every broken one is named by the rule that is meant."""
+
+import random
+import sys
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from lxml import etree
+
+from benchmarks.fuzz_check import one_case
+from orchestrator.checking.check import check_fmu
+from orchestrator.checking.grammar import check_grammar
+from tests.support.ball3 import INTERFACES, build_ball, model_description
+from tests.support.broken_ball3 import QUICK, Mutant, behavioural
+from tests.support.broken_ball3_xml import static
+from tests.support.c_fmu import have_compiler
+from tests.support.c_fmu import model_description as model_description_2
+from tests.support.fuzz_fmu import damaged_tree
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
+)
+STATIC = static()
+BEHAVIOURAL = behavioural()
+FIRST = {mutant.rule: mutant.name for mutant in reversed(BEHAVIOURAL)}
+NOBODYS = (
+    # What none of four other checkers saw.
+    "xml identifier of no library", "files library is text", "files folder misspelt", "xml build file missing",
+    "files sources without build description", "files neither binary nor sources", "xml start values too few",
+    "xml constant without interval", "xml continuous clocked variable", "xml serialise without save", "xml empty token",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("interface", INTERFACES)
+def test_the_good_fmu_has_no_finding(interface: str, tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "", interface), QUICK)
+    assert report.findings == ()
+    assert report.executed
+    assert report.version == "3.0"
+
+
+def _named(mutant: Mutant, folder: Path) -> set[str]:
+    path = folder / "broken.fmu"
+    mutant.make(path)
+    return {f.rule for f in check_fmu(path, mutant.options).findings}
+
+
+@pytest.mark.parametrize("mutant", STATIC, ids=lambda m: m.name)
+def test_what_is_read_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:
+    assert mutant.rule in _named(mutant, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "mutant",
+    [pytest.param(m, marks=() if FIRST[m.rule] == m.name else pytest.mark.slow) for m in BEHAVIOURAL],
+    ids=lambda m: m.name,
+)
+def test_behaviour_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:
+    assert mutant.rule in _named(mutant, tmp_path)
+
+
+def test_there_are_many_and_each_has_a_name() -> None:
+    assert len({m.name for m in (*STATIC, *BEHAVIOURAL)}) == len(STATIC) + len(BEHAVIOURAL)
+    assert len(STATIC) >= 150
+    assert len(BEHAVIOURAL) >= 40
+
+
+@pytest.mark.parametrize("name", NOBODYS)
+def test_no_green_for_what_nobody_sees(name: str, tmp_path: Path) -> None:
+    (mutant,) = (m for m in STATIC if m.name == name)
+    path = tmp_path / "broken.fmu"
+    mutant.make(path)
+    report = check_fmu(path, replace(QUICK, static=False))
+    assert mutant.rule in {f.rule for f in report.findings}
+    assert not report.ok
+
+
+@pytest.mark.parametrize("version", ["2", "3"])
+def test_the_grammar_accepts_what_the_schema_accepts(version: str) -> None:
+    path = Path(str(files("fmpy"))) / "schema" / f"fmi{version}" / f"fmi{version}ModelDescription.xsd"
+    schema = etree.XMLSchema(etree.parse(str(path)))
+    good = (model_description() if version == "3" else model_description_2()).encode()
+    rng = random.Random(3)
+    valid = 0
+    for _ in range(300):
+        root = etree.fromstring(damaged_tree(rng, good))
+        if root.tag != "fmiModelDescription" or (version == "2" and root.get("fmiVersion") != "2.0"):
+            continue
+        accepted = bool(schema.validate(root))
+        valid += accepted
+        assert accepted == (not list(check_grammar(root, f"{version}.0"))), etree.tostring(root)
+    assert valid > 10
+
+
+def test_damage_gives_findings_and_nothing_else(tmp_path: Path) -> None:
+    rng = random.Random(7)
+    codes = [one_case(rng, tmp_path, run_share=0.05, version="3.0")[0] for _ in range(40)]
+    assert set(codes) <= {0, 1}
+    assert 1 in codes

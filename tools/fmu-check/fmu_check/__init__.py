@@ -1,0 +1,1 @@
+"""Checks of FMUs; the code is in the folder ``code`` beside this file."""
