@@ -102,7 +102,7 @@ def parts_of(problem: BoxProblem, model: BoxModel) -> tuple[Part, ...]:
             given |= {"series": -1, "law": effect.kind.law, "sign": problem.sign.get(effect.place, 1.0), "lead": 0.5}
         elif effect.kind.where == PARAMETER:
             given |= {"series": SERIES.index(effect.kind.name.partition("_")[2])}
-            given |= {"q1": problem.starts(model)[effect.place], "q2": float(problem.data.time[0])}
+            given |= {"q1": float(problem.starts(model)[effect.place]), "q2": float(problem.data.time[0])}
             if effect.signal:
                 given["q2"] = problem.map.signals[effect.signal].reference
         else:

@@ -1,5 +1,7 @@
 """The files of a corrected system as SSP 1.0: its structure and its parameter sets."""
 
+from collections.abc import Mapping
+
 from lxml import etree
 
 from orchestrator.diagnosis.fmu.bank import CUT, INPUT, OUTPUT, PARAMETER, PORT
@@ -26,7 +28,7 @@ def owner_and_connector(problem: BoxProblem, variable: str) -> tuple[str, str]:
     return member or PLANT, name
 
 
-def parameter_values(values: dict[str, float | int | bool]) -> bytes:
+def parameter_values(values: Mapping[str, float | int | bool | str]) -> bytes:
     """Return a parameter set (SSV) of values.
 
     Args:
@@ -42,12 +44,18 @@ def parameter_values(values: dict[str, float | int | bool]) -> bytes:
     parameters = etree.SubElement(root, tag("ssv", "Parameters"))
     for name, value in values.items():
         parameter = etree.SubElement(parameters, tag("ssv", "Parameter"), name=name)
-        kind = "Boolean" if isinstance(value, bool) else "Integer" if isinstance(value, int) else "Real"
-        etree.SubElement(
-            parameter, tag("ssv", kind), value=str(value).lower() if isinstance(value, bool) else repr(value)
-        )
+        kind, text = _kind_and_text(value)
+        etree.SubElement(parameter, tag("ssv", kind), value=text)
     require_valid(root, "ssv", "values")
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
+
+
+def _kind_and_text(value: float | int | bool | str) -> tuple[str, str]:
+    if isinstance(value, str):
+        return "String", value
+    if isinstance(value, bool):
+        return "Boolean", str(value).lower()
+    return ("Integer" if isinstance(value, int) else "Real"), repr(value)
 
 
 def border_name(name: str, way: str) -> str:
