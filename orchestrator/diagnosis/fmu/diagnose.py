@@ -126,7 +126,7 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     verdict = form_verdict(found, graded, remaining, record, settings)
     trust = judge_trust(verdict, graded, record, test, parameters, problem.map.uncertain, settings)
     left = torque_shares(found.problem, found.final.point)
-    notes = list(workings.probe.notes)
+    notes = [*workings.probe.notes, *problem.runner.remarks]
     if not found.complete:
         notes.append("the time limit ended the search: effects that were not tried may be missing")
     return FmuDiagnosis(

@@ -8,7 +8,7 @@ from orchestrator.diagnosis.model.interface import LawArgument
 
 
 def port_arguments(models: Sequence[FmuResiduals]) -> list[LawArgument]:
-    """Return what an effort at a port may be a function of: position and speed there, each input, time.
+    """Return what an effort at a port may be a function of: position and speed there (or the flow), each input, time.
 
     Args:
         models: one for each record.
@@ -19,15 +19,17 @@ def port_arguments(models: Sequence[FmuResiduals]) -> list[LawArgument]:
     problem = models[0].problem
     found = []
     for port, entry in problem.map.ports.items():
-        position, effort = problem.units.get(entry.position, ""), problem.units.get(entry.input, "")
-        signals = [
-            (f"position at {port}", position, [model.motions[port].x for model in models]),
-            (f"speed at {port}", f"{position or '1'}/s", [model.motions[port].v for model in models]),
-            ("time", "s", [model.problem.data.time - model.problem.data.time[0] for model in models]),
-        ]
+        unit, effort = problem.units.get(entry.position, ""), problem.units.get(entry.input, "")
+        speeds = [model.motions[port].v for model in models]
+        signals = [("time", "s", [model.problem.data.time - model.problem.data.time[0] for model in models])]
+        if entry.flow_only:
+            signals.append((f"flow at {port}", unit, speeds))
+        else:
+            signals.append((f"position at {port}", unit, [model.motions[port].x for model in models]))
+            signals.append((f"speed at {port}", f"{unit or '1'}/s", speeds))
         for k, name in enumerate(problem.inputs):
             signals.append((name, problem.units.get(name, ""), [model.problem.data.inputs[:, k] for model in models]))
-        for name, unit, values in signals:
+        for name, of_name, values in signals:
             responses = tuple(partial(model.respond_to_effort, port) for model in models)
-            found.append(LawArgument(name, port, unit, effort, tuple(values), responses))
+            found.append(LawArgument(name, port, of_name, effort, tuple(values), responses))
     return found

@@ -33,7 +33,8 @@ def effect_units(problem: BoxProblem, effect: BoxEffect) -> Mapping[str, str]:
     """
     if effect.kind.where == PORT:
         port = problem.map.ports[effect.place]
-        names = {"effort": problem.units.get(port.input, ""), "flow": problem.units.get(port.position, "")}
+        flow = problem.units.get(port.position, "")
+        names = {"effort": problem.units.get(port.input, ""), "flow": f"({flow or '1'}.s)" if port.flow_only else flow}
     elif effect.kind.where == CUT:
         cut = problem.map.cuts[effect.place]
         names = {"effort": problem.units.get(cut.effort or "", ""), "flow": problem.units.get(cut.input, "")}

@@ -12,6 +12,7 @@ from orchestrator.diagnosis.fmu.draft import drafted
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
 from orchestrator.diagnosis.fmu.sites import OF_POSITION, effects_of
 from orchestrator.diagnosis.fmu.subject import Subject, subject_of
+from orchestrator.diagnosis.selection.grading import Grade
 from orchestrator.errors import ScenarioError
 from orchestrator.master.protocol import ModelInterface, Variable
 from tests.support.answers_fmu import build_answers_fmu
@@ -47,11 +48,11 @@ def test_a_resistance_that_grows_with_the_current_is_named_by_its_flow_alone(tmp
     (tmp_path / "map.toml").write_text(text + '[ports.coil]\ninput = "U"\nvelocity = "i"\n')
     found = diagnose(path, fmu, tmp_path / "map.toml")
     try:
-        assert [f.effect.label for f in found.effects] == ["quadratic_drag@coil"]
-        value = found.effects[0].estimates[0]
+        assert [effect.label for effect in found.diagnosis.graded(Grade.LIKELY)] == ["quadratic_drag@coil"]
+        value = found.effects[0].parameters["coefficient"]
         assert (value.value, value.unit) == (pytest.approx(size, rel=0.05), "V.s2/(A.s)2")
-        assert max(m.corrected for m in found.outcome.misfit) < 1.3
-        problem = found.outcome.problem
+        assert max(one.final / one.noise for one in found.test[0].signals) < 1.3
+        problem = found.diagnosis.workings.problem
         offered = {e.kind.name for e in effects_of(problem, problem.must_read(problem.nominal)) if e.place == "coil"}
         assert {"viscous_drag", "quadratic_drag", "load"} <= offered
         assert not offered & set(OF_POSITION)
@@ -102,8 +103,8 @@ def test_values_that_are_set_act_and_warnings_are_among_the_notes(tmp_path: Path
     x = np.concatenate([[0.0], np.cumsum(0.02 * (2.0 * 2.06 * u + 3.0))[:-1]]) + 1e-3 * rng.standard_normal(400)
     np.savetxt(tmp_path / "r.csv", np.column_stack([t, u, x]), delimiter=",", header="time,u,x", comments="")
     found = calibrate(tmp_path / "r.csv", fmu, tmp_path / "map.toml").calibration
-    assert found.parameters[0].value == pytest.approx(2.06, abs=3e-3)
-    assert any("returned Warning: near the limit" in text for text in found.warnings)
+    assert found.diagnosis.parameters["gain"].value == pytest.approx(2.06, abs=3e-3)
+    assert any("returned Warning: near the limit" in text for text in found.notes)
 
 
 @compiled
