@@ -169,12 +169,13 @@ def test_a_record_that_bounds_the_gap_on_one_side_only_is_a_page(tmp_path):
 
 def test_the_page_of_a_calibration_says_whether_the_parameters_suffice(tmp_path):
     value = {"value": 1.05, "standard_error": 0.01, "interval": [1.03, 1.07], "unit": "kg.m2", "nominal": 1.0}
+    misfit = {"nominal": 40.0, "parameters": 5.0, "final": 5.0, "noise": 1e-4, "unit": "rad"}
     results = {
         "explained": False,
         "parameters": {"J": value | {"learned": 0.8}},
         "not_told_apart": [],
-        "misfit": {"theta": {"nominal": 40.0, "calibrated": 5.0, "noise": 1e-4}},
-        "warnings": ["something else is missing"],
+        "test": [{"source": "a.csv", "rows": 150, "worse": False, "misfit": {"theta": misfit}}],
+        "notes": ["something else is missing"],
         "seconds": 1.0,
     }
     for explained, badge in ((True, "good"), (False, "bad")):
@@ -185,6 +186,7 @@ def test_the_page_of_a_calibration_says_whether_the_parameters_suffice(tmp_path)
     assert report_from_directory(tmp_path).badge == ("warn", "amber: the parameters do not explain the record")
     rows = {t.title: t.rows for t in sections(report, ReportTable)}
     assert rows["Parameters"] == (("J", 1.0, 1.05, 0.01, 1.03, 1.07, "kg.m2", 80.0),)
+    assert rows["Misfit on test data"] == (("a.csv", "theta", 40.0, 5.0, 1e-4, "rad"),)
 
 
 def test_the_page_of_an_ssp_file_says_what_ran(tmp_path):

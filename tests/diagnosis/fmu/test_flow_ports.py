@@ -11,6 +11,7 @@ from orchestrator.api.diagnose import diagnose
 from orchestrator.diagnosis.fmu.draft import drafted
 from orchestrator.diagnosis.fmu.mapping import Map, read_map
 from orchestrator.diagnosis.fmu.sites import OF_POSITION, effects_of
+from orchestrator.diagnosis.fmu.ssp_structure import parameter_values
 from orchestrator.diagnosis.fmu.subject import Subject, subject_of
 from orchestrator.diagnosis.selection.grading import Grade
 from orchestrator.errors import ScenarioError
@@ -81,6 +82,12 @@ def test_a_port_needs_a_position_or_a_velocity(tmp_path: Path) -> None:
                                               ('label = { value = "abc" }', "abc"), ("on = {}", False)])  # fmt: skip
 def test_values_of_any_type_are_set(tmp_path: Path, entry: str, value: object) -> None:
     assert mapped(tmp_path, entry).fixed == {entry.partition(" ")[0]: value}
+
+
+def test_a_corrected_system_holds_values_of_any_type() -> None:
+    text = parameter_values({"on": True, "mode": 3, "label": "abc", "gain": 2.0}).decode()
+    for entry in ('Boolean value="true"', 'Integer value="3"', 'String value="abc"', 'Real value="2.0"'):
+        assert f"<ssv:{entry}/>" in text
 
 
 @compiled
