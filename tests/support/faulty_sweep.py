@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.engine import Case, ResultColumn, Work
+from orchestrator.errors import SlaveError
 from orchestrator.fmi.instances import fmu_instance
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
@@ -39,4 +40,7 @@ def prepare(payload: Any, files: Mapping[str, Path]) -> Session:
 def run(session: Session, case: Case) -> dict[str, float]:
     """Run for one second of simulated time."""
     start = {name: int(value) if name.endswith("fault") else value for name, value in case.parameters.items()}
-    return {"y": float(session.run(start)["faulty.y"][-1])}
+    found = session.run(start)
+    if len(found["faulty.y"]) <= STEPS:
+        raise SlaveError(str(found.remarks[0]))
+    return {"y": float(found["faulty.y"][-1])}
