@@ -210,6 +210,8 @@ class FitProblem:
         steps = [SMALL_SHARE if isinstance(one, int) else 1.0 for one in coordinates]
         points = [self.moved(point, [one], np.array([s])) for one, s in zip(coordinates, steps, strict=True)]
         columns = self.whitened(points)
+        if not columns:  # nothing is uncertain
+            return np.zeros((residual.size, 0))
         return np.column_stack([(found - residual) / s for found, s in zip(columns, steps, strict=True)])
 
     def prior(self, point: ModelPoint, coordinates: Sequence[Coordinate]) -> tuple[Array, Array]:
