@@ -130,6 +130,7 @@ class _Watcher:
         self.fmu, self.limits, self.walls = fmu, limits, walls
         self.interface = f"{interface}, " if interface else ""
         self.findings: list[Finding] = []
+        self._said: set[tuple[str, str]] = set()
         self.probe = "load"
         self.stages: dict[str, str] = {}
 
@@ -175,7 +176,8 @@ class _Watcher:
             self.stages[self.probe] = ""
 
     def _add(self, rule: str, message: str, path: str = "") -> None:
-        if len(self.findings) < _MOST_FINDINGS:
+        if (rule, message) not in self._said and len(self.findings) < _MOST_FINDINGS:
+            self._said.add((rule, message))
             self.findings.append(Finding(rule, path or f"({self.interface}{self.probe})", message))
 
     def _ended_early(self, error: ChildError, function: str) -> None:

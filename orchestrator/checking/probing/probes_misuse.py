@@ -74,7 +74,7 @@ def _of_version_3(context: Context) -> None:
             if status in _NOT_REFUSED:
                 message = f"fmi3Set{output.base} must refuse to set the output `{output.name}`, but does not"
                 context.report("misuse.set-output", message)
-    if job.interface == "CoSimulation":
+    if job.interface == "CoSimulation" and not job.clocks:  # with clocks event mode must be used
         with bench.instance(events=False) as driver:
             if driver.raw("EnterEventMode")[0] in _NOT_REFUSED:
                 message = "fmi3EnterEventMode must be refused where event mode is not used, but is not"
