@@ -134,7 +134,9 @@ UNUSABLE: dict[str, tuple[Make, str, str, str]] = {
     "no names": (_text(lambda s: s[s.index("\n") + 1 :]), "", "has no names", '[columns.time] name = "#1"'),
     "semicolon head": (_head("time;u;theta_m;theta_l"), "", "must have 4 names", "like the rows below it"),
     "unknown names": (_head("a,b,c,d"), "", "column `time` must be there", '[columns.time] name = "..."'),
-    "no torque": (_columns(lambda t: _without(_without(t, "u"), "theta_l")), "", "column `u` must be there", '[columns.u] name = "..."'),
+    "no torque": (
+        _columns(lambda t: _without(_without(t, "u"), "theta_l")), "", "column `u` must", '[columns.u] name = "..."',
+    ),
     "two torques": (_head("time,torque 1,theta_m,torque 2"), "", "both look like", '[columns.u] name = "torque 1"'),
     "twice": (_head("time,u,theta_m,theta_m"), "", "must appear once", '[columns.theta_m] name = "#3"'),
     "named, not there": (_text(str), '[columns.u]\nname = "trq"\n', "column `trq`", "there is `time,u,theta_m"),

@@ -241,6 +241,12 @@ def _pushed(problem: BoxProblem) -> Probe:
     """Return what ports and parameters do."""
     fresh = problem.runner.fresh
     base = problem.must_read(problem.nominal)
+    for n, name in enumerate(problem.outputs):
+        if np.ptp(base[:, n]) == 0.0 < np.ptp(problem.data.outputs[:, n]):
+            raise FmuError(
+                f"{problem.runner.path}: output `{name}` must follow the inputs of {problem.data.source}, but stays at "
+                f"{base[0, n]:g}: map the variable that was measured, and the inputs that move it"
+            )
     size = np.maximum(np.max(np.abs(base), axis=0), 1e-300)
     notes = ["reset is not followed: a new instance is made for every run"] if fresh else []
     wanted = steps_of(problem.map.options.substeps, problem.data.factor)
