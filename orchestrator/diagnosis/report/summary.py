@@ -196,10 +196,10 @@ def grade_reasons(effect: GradedEffect) -> str:
         text = f"on data left out it takes {percent(evidence.gain)} of the error, "
         text += f"{evidence.t:.1f} times its uncertainty"
     rules = {rule.name: rule.reason for rule in GRADE_RULES}
-    lowered = [rules[name] for name in effect.lowered_by if rules[name] != "the same"]
+    lowered = [rules[name] for name in effect.lowered_by]
     if evidence.family:
         text += f"; the record does not tell it from {listed(evidence.family)}"
-    return text + (f"; not surer because {'; '.join(dict.fromkeys(lowered))}" if lowered else "")
+    return text + (f"; not surer: {'; '.join(dict.fromkeys(lowered))}" if lowered else "")
 
 
 def nuisance_words(nuisance: Nuisance) -> str:

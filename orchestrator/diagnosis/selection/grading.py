@@ -129,7 +129,7 @@ def _explains_much(effect: EffectEvidence, s: GradeSettings) -> bool:
 GRADE_RULES: tuple[GradeRule, ...] = (
     GradeRule(
         "surely better", Grade.LIKELY, lambda e, r, s: e.t >= s.grades.certain_t, "paired gain over its error",
-        "grades.certain_t", "blocks agree that the effect predicts better",
+        "grades.certain_t", "a sure effect predicts better in nearly every block",
     ),
     GradeRule(
         "better", Grade.POSSIBLE, lambda e, r, s: e.t >= s.grades.likely_t or e.size_t >= s.grades.sure_size_t,
@@ -143,7 +143,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     GradeRule(
         "enough share", Grade.POSSIBLE, lambda e, r, s: _explains_enough(e, s.grades),
         "share of the missing torque, or of what is left without it", "grades.likely_share",
-        "the same; waves, limits, constants and what is late follow whatever another law leaves",
+        "waves, limits, constants and what is late follow whatever another law leaves",
     ),
     GradeRule(
         "large gain", Grade.LIKELY, lambda e, r, s: e.gain >= s.grades.certain_gain,
@@ -155,7 +155,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     ),
     GradeRule(
         "size", Grade.POSSIBLE, lambda e, r, s: e.size_t >= s.grades.likely_size_t, "size over its error",
-        "grades.likely_size_t", "the same",
+        "grades.likely_size_t", "a size that may be zero is no likely effect",
     ),
     GradeRule(
         "explained", Grade.LIKELY, lambda e, r, s: r.left < s.grades.most_left, "share of the torque that is left",
