@@ -101,7 +101,6 @@ CO_SIMULATION = {
     "unknown_reference": "misuse.value-reference",
     "value_count": "misuse.value-count",
     "set_output": "misuse.set-output",
-    "event_mode": "misuse.event-mode",
     "crash_unknown": "misuse.crash",
     "write_file": "files.written",
     "write_resources": "files.changed",
@@ -132,13 +131,13 @@ def _behaviour(fault: str, interface: str) -> Callable[[Path], object]:
     return lambda path: write_fmu(path, ball_files(fault, interface))
 
 
-def _without_clocks(path: Path) -> None:
+def _without_clocks(fault: str) -> Callable[[Path], object]:
     """Without clocks event mode need not be used."""
     text = ball_files()[XML].decode()
     text = re.sub(r"(?s)    <Clock.*?/>\n", "", text)
     text = re.sub(r'    <\w+ name="\w+"[^>]*clocks="100"[^>]*/>\n', "", text)
     text = re.sub(r'    <(Output|ClockedState) valueReference="(16|20|101)"/>\n', "", text)
-    write_fmu(path, ball_files("event_not_used") | {XML: text.encode()})
+    return lambda path: write_fmu(path, ball_files(fault) | {XML: text.encode()})
 
 
 def _flags(fault: str, old: str, new: str) -> Callable[[Path], object]:
@@ -163,5 +162,8 @@ def behavioural() -> list[Mutant]:
         for interface, faults in kinds.items()
         for fault, rule in faults.items()
     ]
-    found.append(Mutant("CoSimulation event_not_used", "event.not-used", _without_clocks))
+    found += [
+        Mutant(f"CoSimulation {fault}", rule, _without_clocks(fault))
+        for fault, rule in (("event_not_used", "event.not-used"), ("event_mode", "misuse.event-mode"))
+    ]
     return found + [Mutant(f"flags {n}", rule, _flags(n, old, new)) for n, (rule, old, new) in FLAGS.items()]
