@@ -10,18 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
-from scipy.signal import butter, decimate, filtfilt
-
-from pyfmu_sources import servo_axis_parameters as sa
 
 Array = NDArray[np.float64]
 
 FOLDER = Path(os.environ.get("EMPS_DATA", str(Path(__file__).resolve().parents[3] / "shared" / "data" / "emps")))
 RECORDS = {"estimation": "DATA_EMPS.mat", "test": "DATA_EMPS_PULSES.mat"}
-STEP = 1e-3  # s
-CUT_OFF = 100.0  # Hz, the authors' zero-phase Butterworth filter of order 4
-DECIMATION = 10
-BORDER = 50  # samples at either end that the authors leave out
 
 
 def available() -> bool:
@@ -42,22 +35,3 @@ def write_csv(path: Path, which: str) -> None:
     data = read(which)
     rows = zip(data["time"], data["force"], data["position"], strict=True)
     path.write_text("time,force,position\n" + "".join(f"{t:.6f},{u:.9g},{y:.9g}\n" for t, u, y in rows))
-
-
-def force_error(p: Array, which: str) -> float:
-    """Return the relative error of the inverse model's force, filtered and decimated as the authors do."""
-    data = read(which)
-    b, a = butter(4, CUT_OFF * 2.0 * STEP)
-    speed = np.gradient(filtfilt(b, a, data["position"]), STEP)
-    acceleration = np.gradient(speed, STEP)
-    force = p[sa.P_J] * acceleration + p[sa.P_B] * speed + p[sa.P_COULOMB] * np.sign(speed) + p[sa.P_LOAD_TORQUE]
-    force = force + p[sa.P_DIRECTION] * np.abs(speed)
-    force = force - p[sa.P_RIPPLE] * np.sin(p[sa.P_RIPPLE_N] * data["position"] + p[sa.P_RIPPLE_PHASE])
-    inside = slice(BORDER, -BORDER)
-    model, measured = (decimate(f[inside], DECIMATION, zero_phase=True) for f in (force, data["force"]))
-    return float(np.linalg.norm(measured - model) / np.linalg.norm(measured))
-
-
-def r_squared(simulated: Array, measured: Array) -> float:
-    """Return the coefficient of determination."""
-    return 1.0 - float(np.sum((simulated - measured) ** 2) / np.sum((measured - measured.mean()) ** 2))
