@@ -16,7 +16,7 @@ from orchestrator.checking.binaries import inspect
 from tests.support.native_hosts import ARM_LIBRARIES, StepHost, last_outputs
 
 ZIG = importlib.util.find_spec("ziglang") is not None
-LARGEST = 160_000
+LARGEST = 200_000
 NAMES = ("Drivetrain", "LqrController")
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2", "-fPIC", "-shared")
 RUNNERS = {
