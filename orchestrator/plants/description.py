@@ -14,13 +14,13 @@ from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 
 Array = NDArray[np.float64]
 
-STATES = 8  # places of the predictor's state, as in ``pyfmu_sources.equations``
+STATES = 8  # places of the state, as in ``pyfmu_sources.equations``
 STEP = 0.35  # of the fastest oscillation: a Runge-Kutta step, whose error then lies far below an encoder's count
 FADING = 1.0  # of the fastest time constant of what only fades, where an error of a step fades too
 
 
 class CompiledEquations(NamedTuple):
-    """The compiled equations of a plant, as the predictor takes them.
+    """The compiled equations of a plant, as the analysis takes them.
 
     Attributes:
         friction: ``friction(x, p)``: levels of dry friction [N.m] of the first and the second body.
@@ -100,7 +100,7 @@ def _nothing_refused(values: Mapping[str, float]) -> str:
 class Plant:
     """One plant that records can be compared with.
 
-    The predictor's state has eight places (as in ``pyfmu_sources.equations``), of which a plant may use fewer.
+    The state of the analysis has eight places (as in ``pyfmu_sources.equations``), of which a plant may use fewer.
 
     Attributes:
         name: of the FMU.
@@ -114,18 +114,16 @@ class Plant:
         bank: the effects that it may lack.
         stage: returns the compiled equations.
         runner: returns the compiled, event-located simulation
-            ``run(start, p, early, late, first, h, out)``; see :mod:`orchestrator.diagnosis.proof.simulation`. The start
-            has the eight states and a ninth entry, the request [N.m] behind a second lag and a limited rate.
+            ``run(start, p, early, late, first, h, out)``; see :mod:`orchestrator.diagnosis.report.simulation`. The
+            start has the eight states and a ninth entry, the request [N.m] behind a second lag and a limited rate.
         shaft: between the two bodies; None: a single body.
         resonance: an added inertia; None: the plant has none.
         followers: (place, followed place): states that are shifted with another when that is corrected.
-        nuisances: parameters of the predictor alone, appended to the table.
-        events: names of what makes the equations switch.
+        nuisances: parameters of the analysis alone, appended to the table.
         enumerations: names of parameters whose FMU variable counts from one.
         spread: relative uncertainty of each linear parameter where a model file states none.
         refused: values by name -> why records cannot be diagnosed against such a plant; "": they can.
-        realised: predictor's parameters -> those of the FMU (n,), with what the predictor alone has fitted put in.
-        inverse: (position, speed, acceleration, p) -> torque [N.m] that such a motion needs; None: not defined.
+        realised: parameters of the analysis -> those of the FMU (n,), with what it alone has fitted put in.
         learned: a law that was learned is part of its equations.
         seldom: names of parameters that few models have off their defaults, and that cost time in all: where none is,
             equations run in which they are constants.
@@ -146,12 +144,10 @@ class Plant:
     resonance: Resonance | None = None
     followers: tuple[tuple[int, int], ...] = ()
     nuisances: tuple[Parameter, ...] = ()
-    events: tuple[str, ...] = ()
     enumerations: tuple[str, ...] = ()
     spread: float = 0.0
     refused: Callable[[Mapping[str, float]], str] = _nothing_refused
     realised: Callable[[Array], Array] | None = None
-    inverse: Callable[[Array, Array, Array, Array], Array] | None = None
     learned: bool = False
     seldom: tuple[str, ...] = ()
     _index: dict[str, int] = field(default_factory=dict, repr=False)
@@ -162,30 +158,19 @@ class Plant:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Return the parameters' names in table order, then those of the predictor alone."""
+        """Return the parameters' names in table order, then those of the analysis alone."""
         return tuple(entry.name for entry in (*self.table, *self.nuisances))
-
-    @property
-    def measured(self) -> tuple[int, ...]:
-        """Return the places of the angles that encoders measure."""
-        return tuple(body.angle for body in self.bodies)
 
     @property
     def encoders(self) -> tuple[str, ...]:
         """Return the names of the encoders: columns of a record, outputs of the FMU."""
         return tuple(body.encoder for body in self.bodies)
 
-    @property
-    def sites(self) -> tuple[str, ...]:
-        """Return the names of the places at which an unknown torque may act, as in :meth:`torque_columns`."""
-        first, *others = (body.name for body in self.bodies)
-        return (first, "shaft", *others) if self.shaft else (first,)
-
     def entry(self, place: int) -> Parameter:
         """Return the table row of a parameter.
 
         Args:
-            place: in the predictor's tuple.
+            place: in the tuple of the analysis.
 
         Returns:
             Name, default, bounds and unit.
@@ -212,7 +197,7 @@ class Plant:
         """Return the value of a parameter.
 
         Args:
-            p: the predictor's parameters, (n,).
+            p: the parameters of the analysis, (n,).
             name: of the parameter.
 
         Returns:
@@ -220,59 +205,19 @@ class Plant:
         """
         return float(p[self.index(name)])
 
-    def body(self, site: str) -> Body:
-        """Return the body at a site; that of the driven one for sites that have none of their own.
-
-        Args:
-            site: name of a body, or of another part of the machine.
-
-        Returns:
-            The body.
-        """
-        return next((body for body in self.bodies if body.name == site), self.bodies[0])
-
     def ratio(self, p: Array) -> float:
         """Return the gear ratio: angle of the motor over that of the load; 1.0 without a gear.
 
         Args:
-            p: the predictor's parameters, (n,).
+            p: the parameters of the analysis, (n,).
 
         Returns:
             The ratio.
         """
         return self.value(p, self.shaft.ratio) if self.shaft else 1.0
 
-    def twist(self, p: Array, x: Array) -> Array:
-        """Return the shaft's twist (n,) [rad, load side], the gap's play included, of states (n, 8).
-
-        Args:
-            p: the predictor's parameters, (n,).
-            x: states.
-
-        Returns:
-            The twist.
-
-        Raises:
-            ValueError: the plant has no shaft.
-        """
-        motor, load = self._ends()
-        return np.asarray(x[:, motor.angle] / self.ratio(p) - x[:, load.angle])
-
-    def twist_rate(self, p: Array, x: Array) -> Array:
-        """Return the rate (n,) [rad/s] of :meth:`twist`.
-
-        Args:
-            p: the predictor's parameters, (n,).
-            x: states (n, 8).
-
-        Returns:
-            The rate.
-        """
-        motor, load = self._ends()
-        return np.asarray(x[:, motor.speed] / self.ratio(p) - x[:, load.speed])
-
     def extended(self, values: Sequence[float]) -> Array:
-        """Return the plant's values followed by the predictor's own parameters at their defaults.
+        """Return the plant's values followed by the analysis's own parameters at their defaults.
 
         Args:
             values: of the table's parameters, in its order.
@@ -283,10 +228,10 @@ class Plant:
         return np.array([*values, *(entry.default for entry in self.nuisances)])
 
     def own(self, p: Array) -> Array:
-        """Return the FMU's parameters (n,) of the predictor's ``p``.
+        """Return the FMU's parameters (n,) of the ``p`` of the analysis.
 
         Args:
-            p: the predictor's parameters, (n,).
+            p: the parameters of the analysis, (n,).
 
         Returns:
             The parameters, in the order of the table.
@@ -319,30 +264,11 @@ class Plant:
             request, means[n] = follow(request, asked, lag, rate, h)
         return means, begins
 
-    def transition(self, p: Array, h: float) -> Array:
-        """Return the discrete transition matrix of the linear plant (every effect off) for a step ``h`` [s].
-
-        Args:
-            p: the predictor's parameters, (n,).
-            h: [s].
-
-        Returns:
-            Shape (states, states), in the order of ``states``.
-        """
-        from scipy.linalg import expm
-
-        A = np.asarray(expm(self.jacobian(p) * h))
-        if p[self.index(self.drive.lag)] == 0.0:
-            # Without a lag there is no drive state; its place would stand for an integrator.
-            row = self.states.index(self.drive.torque)
-            A[row, :] = A[:, row] = 0.0
-        return A
-
     def jacobian(self, p: Array) -> Array:
         """Return the matrix of the linear plant, by differences of its own (linear) rates.
 
         Args:
-            p: the predictor's parameters, (n,).
+            p: the parameters of the analysis, (n,).
 
         Returns:
             Shape (states, states), in the order of ``states``.
@@ -360,7 +286,7 @@ class Plant:
         """Return (states,): what a unit request of the drive does to the rates of the linear plant.
 
         Args:
-            p: the predictor's parameters, (n,).
+            p: the parameters of the analysis, (n,).
 
         Returns:
             The column that belongs to :meth:`jacobian`.
@@ -369,40 +295,17 @@ class Plant:
         return np.array([rate[s] for s in self.states])
 
     def _plain(self, p: Array) -> Array:
-        """Return the predictor's parameters with every effect off."""
+        """Return the parameters of the analysis with every effect off."""
         plain = self.extended([entry.default for entry in self.table])
         for name in self.linear:
             plain[self.index(name)] = p[self.index(name)]
         return plain
 
-    def torque_columns(self, p: Array) -> Array:
-        """Return (states, sites): what a unit torque at each of :attr:`sites` does to the rates.
-
-        The shaft's column is that of a unit twist error times the stiffness.
-
-        Args:
-            p: the predictor's parameters, (n,).
-
-        Returns:
-            The columns.
-        """
-        at = {place: row for row, place in enumerate(self.states)}
-        columns = np.zeros((len(self.states), len(self.sites)))
-        first = self.bodies[0]
-        columns[at[first.speed], 0] = 1.0 / p[self.index(first.inertia)]
-        if self.shaft:
-            motor, load = self._ends()
-            k, ratio = p[self.index(self.shaft.stiffness)], p[self.index(self.shaft.ratio)]
-            columns[at[motor.speed], 1] = -k / ratio / p[self.index(motor.inertia)]
-            columns[at[load.speed], 1] = k / p[self.index(load.inertia)]
-            columns[at[load.speed], 2] = 1.0 / p[self.index(load.inertia)]
-        return columns
-
     def substeps(self, p: Array, h: float) -> int:
         """Return how many Runge-Kutta steps a sample of ``h`` [s] needs.
 
         Args:
-            p: the predictor's parameters, (n,).
+            p: the parameters of the analysis, (n,).
             h: [s].
 
         Returns:
@@ -417,14 +320,9 @@ class Plant:
         """Return the largest rate [1/s] of the linear plant's modes.
 
         Args:
-            p: the predictor's parameters, (n,).
+            p: the parameters of the analysis, (n,).
 
         Returns:
             The rate.
         """
         return float(np.max(np.abs(np.linalg.eigvals(self.jacobian(p)))))
-
-    def _ends(self) -> tuple[Body, Body]:
-        if self.shaft:
-            return self.bodies[0], self.bodies[1]
-        raise ValueError(f"{self.name} has no shaft")

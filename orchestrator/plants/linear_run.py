@@ -18,7 +18,7 @@ def is_linear(plant: Plant, p: Array) -> bool:
 
     Args:
         plant: the plant.
-        p: the predictor's parameters.
+        p: the parameters of the analysis.
 
     Returns:
         True where no gap is open, no law was learned, and all effects but a limit, a delay and offsets are off.
@@ -39,7 +39,7 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
 
     Args:
         plant: the plant.
-        p: the predictor's parameters.
+        p: the parameters of the analysis.
         first: length of the first piece [s].
         h: length of a sample [s].
 
@@ -67,7 +67,7 @@ def moving(plant: Plant, p: Array) -> tuple[int, ...]:
 
     Args:
         plant: the plant.
-        p: the predictor's parameters.
+        p: the parameters of the analysis.
 
     Returns:
         The places, in the order of the plant's states.

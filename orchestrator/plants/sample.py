@@ -241,7 +241,7 @@ def is_usual(plant: Plant, p: Any) -> bool:
 
     Args:
         plant: the plant.
-        p: the predictor's parameters.
+        p: the parameters of the analysis.
 
     Returns:
         True when each of ``plant.seldom`` is its default.

@@ -9,18 +9,10 @@ from numpy.typing import NDArray
 from orchestrator.diagnosis.data.signals import triangle_average
 from orchestrator.diagnosis.model.interface import LawArgument, ModelPoint
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
-from orchestrator.plants.learned import (
-    DRIVE,
-    LOAD_ANGLE,
-    LOAD_SPEED,
-    MOTOR_SPEED,
-    TWIST,
-    Argument,
-    arguments_of,
-)
+from orchestrator.plants.learned import Argument, arguments_of
+from pyfmu_sources.learned_law import DRIVE, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
 
 Array = NDArray[np.float64]
-KINDS = (MOTOR_SPEED, DRIVE, LOAD_SPEED, LOAD_ANGLE, TWIST)
 
 
 def law_arguments(models: Sequence[TorqueBalance], points: Sequence[ModelPoint], metric: bool) -> list[LawArgument]:
@@ -38,10 +30,10 @@ def law_arguments(models: Sequence[TorqueBalance], points: Sequence[ModelPoint],
     found = []
     for argument in arguments_of(plant):
         values = [_signal(model, argument, model.values_at(point)) for model, point in zip(models, points, strict=True)]
-        if argument.with_speed or any(value is None for value in values):
+        if any(value is None for value in values):
             continue
         responses = tuple(
-            partial(_respond, model, model.residual_scale(point)[:, None] * _gains(model, argument)[:, None])
+            partial(_respond, model.residual_scale(point)[:, None] * _gains(model, argument)[:, None])
             for model, point in zip(models, points, strict=True)
         )
         unit = argument.unit.replace("rad", "m").replace("N.m", "N") if metric else argument.unit
@@ -65,12 +57,12 @@ def _signal(model: TorqueBalance, argument: Argument, p: Array) -> Array | None:
         TWIST: lambda: scales.twist,
         DRIVE: lambda: model.drive_torque(p),
     }
-    return signals[argument.kind]() if argument.kind in signals else None
+    return signals[argument.code]()
 
 
 def _gains(model: TorqueBalance, argument: Argument) -> Array:
     """Return (channels,) the change of each balance by a unit of a torque against the motion."""
-    if argument.kind == TWIST:
+    if argument.code == TWIST:
         return np.array([-1.0 / model.plant.ratio(model.nominal), 1.0])
     at = model.channels.index(argument.site) if argument.site in model.channels else 0
     gains = np.zeros(len(model.channels))
@@ -78,6 +70,5 @@ def _gains(model: TorqueBalance, argument: Argument) -> Array:
     return gains
 
 
-def _respond(model: TorqueBalance, gains: Array, torque: Array) -> Array:
-    del model
+def _respond(gains: Array, torque: Array) -> Array:
     return np.asarray(gains * triangle_average(torque))

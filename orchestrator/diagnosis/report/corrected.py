@@ -108,7 +108,7 @@ def start_values(plant: Plant, p: Array) -> dict[str, float]:
 
     Args:
         plant: that the record is of.
-        p: (parameters,) of the predictor.
+        p: (parameters,) of the analysis.
 
     Returns:
         Value by name, in SI units.

@@ -2,8 +2,8 @@
 
 Without effects the plant is linear, and each sample's motion is a matrix. Two bodies that rub vibrate against stiction
 at every oscillation of their shaft: to locate each of these events, and to follow other nonlinear effects to twelve
-digits, costs up to a hundred times what the predictor does, which runs in the exact plant's place there. Where teeth
-meet, and whatever else there is, the exact, event-located plant itself runs.
+digits, costs up to a hundred times what steps without events do, which run in the exact plant's place there. Where
+teeth meet, and whatever else there is, the exact, event-located plant itself runs.
 """
 
 from collections.abc import Callable
@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.report.run_signals import RunSignals
+from orchestrator.plants.coarse_run import FINER, coarse_runner_of, coarse_steps, runs_coarsely
 from orchestrator.plants.description import Plant
 from orchestrator.plants.linear_run import is_linear, linear_run_of
-from orchestrator.plants.predictor import FINER, coarse_runner_of, coarse_steps, runs_coarsely
 from pyfmu_sources.drive_request import UNASKED
 
 Array = NDArray[np.float64]

@@ -28,7 +28,7 @@ SELDOM = (
 
 
 def refused(values: Mapping[str, float]) -> str:
-    """Return why a drivetrain's backlash model cannot be diagnosed: the one-step predictor is elastic.
+    """Return why a drivetrain's backlash model cannot be diagnosed: the analysis is elastic.
 
     Args:
         values: of the plant's parameters, by name.
@@ -47,7 +47,7 @@ def refused(values: Mapping[str, float]) -> str:
 def _whole() -> Any:
     """Return ``whole(x, u)``, compiled: the state of the FMU's equations.
 
-    The predictor bends its own bristles, gets a filtered request, and its last state is the shaft's memory.
+    The analysis bends its own bristles, gets a filtered request, and its last state is the shaft's memory.
     """
     from numba import njit
 
@@ -185,7 +185,7 @@ def realised(p: Array) -> Array:
     """Return the FMU's own parameters of a model (n,): fitted distances of friction and contact included.
 
     Args:
-        p: the predictor's parameters, (n,).
+        p: the parameters of the analysis, (n,).
 
     Returns:
         The parameters, in the order of the FMU's table.
@@ -225,7 +225,6 @@ PLANT = Plant(
     starts={0: "theta_m_start", 1: "omega_m_start", 2: "theta_l_start", 3: "omega_l_start", 4: "T_m_start"},
     offsets=("effects.sensor_offset.motor.offset", "effects.sensor_offset.load.offset"),
     nuisances=(*(PRESLIDING._replace(name=name) for name in NUISANCES), LEAD, SHIFT),
-    events=("contact of the teeth", "stick and slip of the motor", "stick and slip of the load"),
     enumerations=("backlash_model",),
     bank=(*DRIVETRAIN_BANK, EARLY_TORQUE, LATE_LOAD),
     stage=_stage,

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, built_up
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant
 from orchestrator.plants.measurement import EARLY_TORQUE, LEAD
-from pyfmu_sources import servo_axis as sa
 from pyfmu_sources import servo_axis_parameters as ap
 
 Array = NDArray[np.float64]
@@ -94,28 +93,6 @@ def runner() -> Any:
     return run
 
 
-def inverse(position: Array, speed: Array, acceleration: Array, p: Array) -> Array:
-    """Return the torque (n,) [N.m] that a motion (n,) needs, without the drive's lag.
-
-    Args:
-        position: (n,) [rad].
-        speed: (n,) [rad/s].
-        acceleration: (n,) [rad/s^2].
-        p: the plant's parameters.
-
-    Returns:
-        The torque.
-    """
-    flat = tuple(p[: ap.COUNT].tolist())
-    return np.array(
-        [
-            sa.inertia((x, v, 0.0, 0.0, 0.0), flat) * rate - sa.sliding_torque((x, v, 0.0, 0.0, 0.0), flat, 0.0, 0.0)
-            + np.sign(v) * sa.friction((x, v, 0.0, 0.0, 0.0), flat)
-            for x, v, rate in zip(position.tolist(), speed.tolist(), acceleration.tolist(), strict=True)
-        ]
-    )  # fmt: skip
-
-
 def _realised(p: Array) -> Array:
     """Return the FMU's own parameters of a model (n,): the fitted distance of friction included."""
     own = np.array(p[: ap.COUNT], dtype=float)
@@ -141,10 +118,8 @@ PLANT = Plant(
     starts={0: "theta_m_start", 1: "omega_m_start", 4: "T_m_start"},
     offsets=("effects.sensor_offset.motor.offset",),
     nuisances=(PRESLIDING._replace(name="presliding.motor"), LEAD),
-    events=("stick and slip",),
     bank=(*SERVO_AXIS_BANK, EARLY_TORQUE),
     stage=stage,
     runner=runner,
     realised=_realised,
-    inverse=inverse,
 )

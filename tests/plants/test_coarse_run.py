@@ -1,4 +1,4 @@
-"""The predictor of a plant whose equations others have written."""
+"""Coarse runs: of equations that others have written, and beside the exact plant."""
 
 from dataclasses import replace
 from typing import Any
@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numba import njit
 
+from orchestrator.plants.coarse_run import _coarse_runner, coarse_runner_of
 from orchestrator.plants.known.drivetrain import PLANT as DRIVETRAIN
 from orchestrator.plants.known.servo_axis import PLANT
 from orchestrator.plants.learned import with_law
-from orchestrator.plants.predictor import _coarse_runner, _predictor, coarse_runner_of, follower_of
 from orchestrator.plants.sample import is_usual
 from orchestrator.shared.code_digest import digest_of
 
@@ -34,11 +34,9 @@ def test_equations_of_a_plant_may_make_arrays() -> None:
 
 
 @pytest.mark.parametrize("plant", [DRIVETRAIN, PLANT, with_law(DRIVETRAIN), with_law(PLANT)], ids=lambda p: p.name)
-def test_machine_code_of_a_predictor_is_kept(plant) -> None:
+def test_machine_code_of_a_run_is_kept(plant) -> None:
     for usual in (True, False):
-        assert digest_of(_predictor(plant, usual)) is not None
         assert digest_of(_coarse_runner(plant, usual)) is not None
-    assert digest_of(follower_of(plant)) is not None
     assert digest_of(plant.runner()) is not None
 
 
@@ -49,7 +47,7 @@ def drivetrain(**changed: float) -> np.ndarray:
     return p
 
 
-# What is not smooth -> how far the predictor's own run may be from the exact one [rad].
+# What is not smooth -> how far a coarse run may be from the exact one [rad].
 SHARP = {
     "friction of the shaft's torque alone": (
         {"effects.load_dependent_friction.motor.coefficient": 0.05, "c": 0.0}, 2e-5),
@@ -59,7 +57,7 @@ SHARP = {
 
 
 @pytest.mark.parametrize("law", SHARP)
-def test_the_predictor_follows_what_is_not_smooth(law: str) -> None:
+def test_a_coarse_run_follows_what_is_not_smooth(law: str) -> None:
     changed, near = SHARP[law]
     p, n = drivetrain(**{"effects.coulomb_friction.motor.torque": 0.0, **changed}), 400
     u = 20.0 * np.sin(0.05 * np.arange(n))

@@ -1,0 +1,124 @@
+"""Free runs of a plant in steps of its own: the equations that run inside the FMU, one sample after the other.
+
+They are compiled once per plant (:mod:`orchestrator.plants.compiled`, :mod:`orchestrator.plants.sample`). No event is
+located: a sample in which friction may turn round or teeth meet is run in shorter steps.
+"""
+
+import math
+from functools import cache, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.plants.description import Plant
+from orchestrator.plants.sample import is_usual, parameters_of, sample_of
+from orchestrator.shared.numba_cache import ALGEBRA, kept
+
+Array = NDArray[np.float64]
+
+FINER = 8  # times more steps of a free run in a sample in which friction may turn round or teeth meet, as in fits
+MOST_STEPS = 1000  # of a free run in a sample: with values that ask for more a model is lost, and not waited for
+WAVE = 0.05  # of a wave's period: the farthest that a Runge-Kutta step of a free run goes
+
+
+def coarse_runner_of(plant: Plant, p: Any) -> Any:
+    """Return ``run(start, p, early, late, first, h, substeps, out)``, compiled.
+
+    In each sample the torque ``early`` acts for ``first`` [s], then ``late`` (a dead time is no multiple of ``h``).
+    ``substeps`` are the Runge-Kutta steps of a sample, and of one in which friction may turn round or teeth meet.
+    ``p`` is the plant's tuple followed by its nuisance parameters.
+
+    Args:
+        plant: whose equations it has.
+        p: parameters that it is to be called with.
+
+    Returns:
+        The function, of machine code; start (8,), early and late (n,), out (n, 2): the angles.
+    """
+    return _coarse_runner(plant, is_usual(plant, p))
+
+
+@cache
+def _coarse_runner(plant: Plant, usual: bool) -> Any:
+    prepared, sample = sample_of(plant)
+    parameters = parameters_of(plant, usual)
+
+    @kept(error_model="numpy", nogil=True, **ALGEBRA)
+    def run(start: Any, p: Any, early: Array, late: Array, first: float, h: float, substeps: Any, out: Array) -> None:
+        x = (start[0], start[1], start[2], start[3], start[4], start[5], start[6], start[7])
+        values = parameters(p)
+        common = prepared(values, first, h, substeps)
+        memory = (0.0, 0.0, 0.0, 0.0)
+        for n in range(late.size):
+            out[n, 0], out[n, 1] = x[0], x[2]
+            x, memory = sample(x, memory, values, common, (early[n], late[n]))
+
+    return run
+
+
+def runs_coarsely(plant: Plant, p: Array) -> bool:
+    """Tell whether such steps follow a model closely, at far less than its exact runs cost.
+
+    So it is for two bodies with nonlinear effects of the bank, but none that makes impacts or a resonance of its own.
+
+    Args:
+        plant: the plant.
+        p: the parameters.
+
+    Returns:
+        True when they do.
+    """
+    shaft, added, drive = plant.shaft, plant.resonance, plant.drive
+    if shaft is None or (shaft.gap and plant.value(p, shaft.gap) > 0.0):
+        return False
+    if added is not None and plant.value(p, added.inertia) > 0.0:
+        return False
+    quick = {*plant.linear, *plant.offsets, *plant.enumerations, drive.delay, drive.limit}
+    on = {entry.name for n, entry in enumerate(plant.table) if p[n] != entry.default} - quick
+    known = {name for effect in plant.bank for name in effect.parameters.values()}
+    return bool(on) and on <= known
+
+
+def waves_of(plant: Plant, p: Array) -> dict[int, float]:
+    """Return the periods, in the motor's angle [rad], of what repeats in a model with position.
+
+    Args:
+        plant: the plant.
+        p: the parameters.
+
+    Returns:
+        Place of each amplitude -> period.
+    """
+    found = {}
+    for effect in plant.bank:
+        place = effect.places(plant)[effect.size]
+        if effect.phase and p[place] != 0.0:
+            cycles = effect.parameters.get("cycles_per_rev")
+            turns = abs(plant.value(p, cycles)) if cycles else 1.0 / plant.ratio(p)
+            if turns > 0.0:  # else it is one torque everywhere
+                found[place] = 2.0 * math.pi / turns
+    return found
+
+
+def coarse_steps(plant: Plant, p: Array, h: float, turn: float) -> int:
+    """Return the steps in a sample with which a free run follows a model's modes and its waves.
+
+    Args:
+        plant: the plant.
+        p: the parameters.
+        h: a sample [s].
+        turn: the farthest that the motor turns in it [rad].
+
+    Returns:
+        At least 1, and ``MOST_STEPS`` at most.
+    """
+    return _coarse_steps(plant, p.tobytes(), h, turn)
+
+
+@lru_cache(maxsize=256)
+def _coarse_steps(plant: Plant, values: bytes, h: float, turn: float) -> int:
+    """Return what :func:`coarse_steps` does; a model is run many times from one start after the other."""
+    p = np.frombuffer(values)
+    shortest = min(waves_of(plant, p).values(), default=math.inf)
+    return min(max(plant.substeps(p, h), math.ceil(min(turn / (WAVE * shortest), MOST_STEPS))), MOST_STEPS)
