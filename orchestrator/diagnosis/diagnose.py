@@ -19,12 +19,8 @@ from orchestrator.diagnosis.model.plant_effects import effect_parameters
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.model.units import in_metres, unit_in
 from orchestrator.diagnosis.report.drive_gain import find_drive_gain
-from orchestrator.diagnosis.report.estimates import (
-    block_values,
-    effect_estimates,
-    interval_width,
-    parameter_estimates,
-)
+from orchestrator.diagnosis.report.estimates import interval_width, parameter_estimates
+from orchestrator.diagnosis.report.graded_effect import report_effect
 from orchestrator.diagnosis.report.hidden_gap import report_hidden_gap
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.test_report import misfit_on_test_data, motion_shares
@@ -32,8 +28,6 @@ from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, Par
 from orchestrator.diagnosis.selection.grading import (
     Grade,
     RecordEvidence,
-    effect_evidence,
-    grade_effect,
     record_evidence,
     torque_shares,
 )
@@ -137,13 +131,7 @@ def _graded(
         return {short: full[name] for short, name in row.parameters.items()}
 
     units = {short: unit_in(plant.entry(place).unit, model, short) for short, place in row.places(plant).items()}
-    evidence = effect_evidence(found, label)
-    grade, lowered = grade_effect(evidence, record, settings)
-    return GradedEffect(
-        row.name, row.site, grade, lowered,
-        effect_estimates(found.problem, found.final, label, named, units, settings.report.level), evidence,
-        block_values(found.problem, found.final, label, named), of_log=row.measurement,
-    )  # fmt: skip
+    return replace(report_effect(found, label, named, units, record, settings), of_log=row.measurement)
 
 
 def _nuisances(

@@ -156,41 +156,33 @@ class Workings:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
-    """The outcome of a diagnosis; docs/diagnosis.md says what each word means.
+class DiagnosisOutcome:
+    """What a diagnosis of a plant of ours and of any FMU have in common.
 
     Attributes:
         verdict: "none" (the model explains the record), "parameters" (re-fitted, it does), "effects" (one at least is
             likely) or "unknown" (something is missing, and nothing is likely).
         effects: of the machine, surest first.
-        nuisances: of the log.
         parameters: estimates by name.
-        left: share of the torque that no law explains, by body.
+        left: share of each residual's power that no law explains, by body or output.
         remaining: what that follows, strongest first.
-        law: the strongest, as a curve, where it may be used; None: there is none.
         test: misfits on test data.
-        record: evidence of the whole record.
+        record: evidence of the records as a whole.
         trust: how far the corrected model can be trusted.
         notes: what to bear in mind, a sentence each.
         settings: that were used.
-        model: that the record was compared with.
-        workings: how it was made.
     """
 
     verdict: str
     effects: tuple[GradedEffect, ...]
-    nuisances: tuple[Nuisance, ...]
     parameters: Mapping[str, ParameterEstimate]
     left: Mapping[str, float]
     remaining: tuple[Dependence, ...]
-    law: Dependence | None
     test: tuple[TestMisfit, ...]
     record: RecordEvidence
     trust: Trust
     notes: tuple[str, ...]
     settings: DiagnosisSettings
-    model: Model
-    workings: Workings = field(repr=False)
 
     def graded(self, least: Grade) -> tuple[GradedEffect, ...]:
         """Return the effects of the machine that are at least so sure.
@@ -202,3 +194,20 @@ class Diagnosis:
             The effects.
         """
         return tuple(effect for effect in self.effects if effect.grade >= least)
+
+
+@dataclass(frozen=True)
+class Diagnosis(DiagnosisOutcome):
+    """The outcome of a diagnosis of a plant of ours; docs/diagnosis.md says what each word means.
+
+    Attributes:
+        nuisances: of the log.
+        law: the strongest dependence of what is left, as a curve, where it may be used; None: there is none.
+        model: that the record was compared with.
+        workings: how it was made.
+    """
+
+    nuisances: tuple[Nuisance, ...]
+    law: Dependence | None
+    model: Model
+    workings: Workings = field(repr=False)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.diagnosis.data.signals import prepare_signals, smooth
+from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.plant_effects import effect_parameters
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
 from orchestrator.diagnosis.report.run_signals import RunSignals
@@ -69,7 +70,7 @@ def exact_record(values):
 def left_at(balance, p):
     """Rms of what is missing over that of what drives, at each body, within the band and away from the ends."""
     missing, inner = balance.balance(p), slice(6 * balance.size // 10, -balance.size // 20)  # the start is forgotten
-    driving = balance.driving(balance.nominal_point())
+    driving = balance.driving(ModelPoint.nominal(balance.parameters))
     shares = []
     for n, cutoff in enumerate(balance.cutoffs):
         rows = balance.active[n][inner] > 0.0
@@ -110,9 +111,9 @@ def test_values_of_effects_reach_the_plants_table():
     named = effect_parameters(DRIVETRAIN, ripple, (0.3, 0.4, 6.0))
     assert named["effects.torque_ripple.amplitude"] == pytest.approx(0.5)
     assert named["effects.torque_ripple.phase"] == pytest.approx(np.arctan2(0.4, 0.3))
-    point = balance.nominal_point().with_effect("torque_ripple@motor", (0.3, 0.4, 6.0))
+    point = ModelPoint.nominal(balance.parameters).with_effect("torque_ripple@motor", (0.3, 0.4, 6.0))
     assert balance.values_at(point)[DRIVETRAIN.index("effects.torque_ripple.cycles_per_rev")] == 6.0
-    friction = balance.nominal_point().with_effect("coulomb_friction@motor", (1.0, -5.0))
+    friction = ModelPoint.nominal(balance.parameters).with_effect("coulomb_friction@motor", (1.0, -5.0))
     place = DRIVETRAIN.index("presliding.motor")
     assert balance.values_at(friction)[place] == -5.0
     assert balance.physical_values(friction)[place] == balance.nominal[place]

@@ -5,6 +5,7 @@ import pytest
 
 from orchestrator.diagnosis.data.signals import prepare_signals
 from orchestrator.diagnosis.inference.whitening import estimate_whitening
+from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.torque_balance import TorqueBalance
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import default_model, read_model
@@ -27,7 +28,7 @@ def exact_balance(seed=1, duration=20.0, **options):
 @pytest.mark.parametrize("torque_noise", [0.0, 0.5])
 def test_noise_of_encoders_and_torque_comes_out_white(torque_noise):
     balance = exact_balance(torque_noise=torque_noise)
-    start = balance.nominal_point()
+    start = ModelPoint.nominal(balance.parameters)
     (residuals,) = balance.residuals([start])
     whitening = estimate_whitening(balance, residuals, SETTINGS.fit)
     white = whitening.apply(residuals).reshape(2, -1)
@@ -39,7 +40,7 @@ def test_noise_of_encoders_and_torque_comes_out_white(torque_noise):
 
 def test_back_filter_is_the_adjoint_of_the_filter():
     balance = exact_balance()
-    (residuals,) = balance.residuals([balance.nominal_point()])
+    (residuals,) = balance.residuals([ModelPoint.nominal(balance.parameters)])
     whitening = estimate_whitening(balance, residuals, SETTINGS.fit)
     rng = np.random.default_rng(3)
     given, weights = rng.standard_normal(residuals.shape), rng.standard_normal(whitening.size)

@@ -66,7 +66,7 @@ def calibrate_fmu(
         raise ScenarioError(f"{given.source}: $.parameters must give an uncertainty to at least one, but gives none")
     found = diagnose_fmu(subject, given, records, settings, search=False, progress=progress)
     problem, fitted = found.workings.search.problem, found.workings.search.final
-    covariance = value_covariance(problem, fitted)
+    covariance = value_covariance(fitted)
     errors = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     names = [entry.name for entry in problem.shared]
     learned = {

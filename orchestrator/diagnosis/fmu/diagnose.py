@@ -8,7 +8,6 @@ import msgspec
 import numpy as np
 
 from orchestrator.diagnosis.data.test_data import split_records
-from orchestrator.diagnosis.fmu.bank import BoxEffect
 from orchestrator.diagnosis.fmu.growing import grow_fit
 from orchestrator.diagnosis.fmu.mapping import Map
 from orchestrator.diagnosis.fmu.misfit import misfit_on_test_data, motion_shares
@@ -23,13 +22,12 @@ from orchestrator.diagnosis.fmu.units import effect_units, named_values
 from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.model.interface import Values
-from orchestrator.diagnosis.report.estimates import block_values, effect_estimates, parameter_estimates
+from orchestrator.diagnosis.report.estimates import parameter_estimates
+from orchestrator.diagnosis.report.graded_effect import report_effect
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.result import GradedEffect
 from orchestrator.diagnosis.selection.grading import (
     RecordEvidence,
-    effect_evidence,
-    grade_effect,
     record_evidence,
     torque_shares,
 )
@@ -144,14 +142,4 @@ def _graded(workings: FmuWorkings, label: str, record: RecordEvidence, settings:
         return named_values(effect, values)
 
     units = effect_units(workings.problem, effect)
-    evidence = effect_evidence(found, label)
-    grade, lowered = grade_effect(evidence, record, settings)
-    return GradedEffect(
-        effect.kind.name, _site(effect), grade, lowered,
-        effect_estimates(found.problem, found.final, label, named, units, settings.report.level),
-        evidence, block_values(found.problem, found.final, label, named),
-    )  # fmt: skip
-
-
-def _site(effect: BoxEffect) -> str:
-    return effect.label.partition("@")[2]
+    return report_effect(found, label, named, units, record, settings)

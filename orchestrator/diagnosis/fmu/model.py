@@ -87,26 +87,6 @@ class BoxModel:
         effects = tuple((e.label, e.at_rest, tuple(v.tolist())) for e, v in zip(self.effects, self.values, strict=True))
         return tuple(self.p.tolist()), effects
 
-    @property
-    def vector(self) -> Array:
-        """Return all values in one row."""
-        return np.concatenate([self.p, *self.values])
-
-    def moved(self, vector: Array) -> "BoxModel":
-        """Return the same structure with other values, kept within what the laws allow.
-
-        Args:
-            vector: (values,) parameters first.
-
-        Returns:
-            The model.
-        """
-        values, at = [], len(self.p)
-        for effect, old in zip(self.effects, self.values, strict=True):
-            values.append(effect.bounded(vector[at : at + len(old)]))
-            at += len(old)
-        return BoxModel(vector[: len(self.p)], self.effects, tuple(values))
-
     def extended(self, effect: BoxEffect, values: Array) -> "BoxModel":
         """Return this model with one more effect.
 
@@ -118,15 +98,3 @@ class BoxModel:
             The model.
         """
         return BoxModel(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))
-
-    def without(self, label: str) -> "BoxModel":
-        """Return this model with one effect less.
-
-        Args:
-            label: of the effect that goes.
-
-        Returns:
-            The model.
-        """
-        kept = [k for k, effect in enumerate(self.effects) if effect.label != label]
-        return BoxModel(self.p, tuple(self.effects[k] for k in kept), tuple(self.values[k] for k in kept))

@@ -146,10 +146,7 @@ class BoxProblem:
         Raises:
             SlaveError: the FMU does not run over the record.
         """
-        y = self.simulate([model])[0]
-        if y is None:
-            raise self.does_not_run()
-        return y
+        return self._required(self.simulate([model])[0])
 
     def must_read(self, model: BoxModel) -> Array:
         """Return all that is read (rows, reads) of a model, before effects at outputs.
@@ -163,10 +160,12 @@ class BoxProblem:
         Raises:
             SlaveError: the FMU does not run over the record.
         """
-        y = self.read([model])[0]
-        if y is None:
+        return self._required(self.read([model])[0])
+
+    def _required(self, run: Array | None) -> Array:
+        if run is None:
             raise self.does_not_run()
-        return y
+        return run
 
     def does_not_run(self) -> SlaveError:
         """Return the error that says why the last run failed.

@@ -59,7 +59,7 @@ class FmuResiduals(ResidualModel):
         self.is_linear = responses.is_linear(problem.settings.response.linear)
         self._start = start_responses(problem, problem.nominal, self._places if self.is_linear else ())
         self.parameters = _parameters(problem, len(self._start))
-        self._nominal = self._nominal_point()
+        self._nominal = ModelPoint.nominal(self.parameters)
         self._responses[self._nominal.parameters, ()] = reads, responses
         self.motions = port_motions(problem, reads)
         self._placed = place_effects(
@@ -155,7 +155,7 @@ class FmuResiduals(ResidualModel):
         other = copy(self)
         other._start = self._start[:0]
         other.parameters = self.parameters[: len(self._order)]
-        other._nominal = other._nominal_point()
+        other._nominal = ModelPoint.nominal(other.parameters)
         other._responses = {(other._nominal.parameters, ()): self._measured_responses(self._nominal)}
         return other
 
@@ -272,9 +272,6 @@ class FmuResiduals(ResidualModel):
         acting = [*problem.inputs, *(port.input for port in problem.map.ports.values())]
         acting += [cut.input for cut in problem.map.cuts.values()]
         return [names.index(name) for name in dict.fromkeys(acting)]
-
-    def _nominal_point(self) -> ModelPoint:
-        return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in self.parameters))
 
 
 def _order(problem: BoxProblem) -> list[int]:

@@ -1,6 +1,5 @@
 """What a diagnosis of any FMU says: plain immutable values."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from orchestrator.diagnosis.data.test_data import TestData
@@ -9,12 +8,8 @@ from orchestrator.diagnosis.fmu.model import BoxModel, Data
 from orchestrator.diagnosis.fmu.probing import Probe
 from orchestrator.diagnosis.fmu.problem import BoxProblem
 from orchestrator.diagnosis.fmu.residual_model import FmuResiduals
-from orchestrator.diagnosis.result import GradedEffect, ParameterEstimate, TestMisfit
-from orchestrator.diagnosis.selection.grading import Grade, RecordEvidence
-from orchestrator.diagnosis.selection.remaining import Dependence
+from orchestrator.diagnosis.result import DiagnosisOutcome
 from orchestrator.diagnosis.selection.search import SearchResult
-from orchestrator.diagnosis.settings import DiagnosisSettings
-from orchestrator.shared.trust import Trust
 
 
 @dataclass(frozen=True)
@@ -48,44 +43,13 @@ class FmuWorkings:
 
 
 @dataclass(frozen=True)
-class FmuDiagnosis:
+class FmuDiagnosis(DiagnosisOutcome):
     """The outcome of a diagnosis of any FMU; docs/any-fmu.md says what each word means.
 
     Attributes:
-        verdict: "none", "parameters", "effects" or "unknown".
-        effects: around the FMU, surest first.
-        parameters: estimates by name.
-        left: share of each output's power that no model explains, its noise included.
-        remaining: what that follows, strongest first.
-        test: misfits on test data.
-        record: evidence of the records as a whole.
-        trust: how far the corrected model can be trusted.
-        notes: what to bear in mind, a sentence each.
-        settings: that were used.
         map: that the records were read by.
         workings: how it was made.
     """
 
-    verdict: str
-    effects: tuple[GradedEffect, ...]
-    parameters: Mapping[str, ParameterEstimate]
-    left: Mapping[str, float]
-    remaining: tuple[Dependence, ...]
-    test: tuple[TestMisfit, ...]
-    record: RecordEvidence
-    trust: Trust
-    notes: tuple[str, ...]
-    settings: DiagnosisSettings
     map: Map
     workings: FmuWorkings = field(repr=False)
-
-    def graded(self, least: Grade) -> tuple[GradedEffect, ...]:
-        """Return the effects that are at least so sure.
-
-        Args:
-            least: grade.
-
-        Returns:
-            The effects.
-        """
-        return tuple(effect for effect in self.effects if effect.grade >= least)

@@ -62,7 +62,7 @@ class FitProblem:
     @property
     def start(self) -> ModelPoint:
         """Return the nominal point: no effect, local parameters zero."""
-        return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in self.parameters))
+        return ModelPoint.nominal(self.parameters)
 
     @cached_property
     def blocks(self) -> NDArray[np.int64]:

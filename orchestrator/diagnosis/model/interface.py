@@ -131,6 +131,18 @@ class ModelPoint:
     parameters: Values
     effects: Mapping[str, Values] = field(default_factory=dict)
 
+    @staticmethod
+    def nominal(parameters: Sequence["UncertainParameter"]) -> "ModelPoint":
+        """Return the nominal values of parameters, those of a record alone at zero, without effects.
+
+        Args:
+            parameters: of the model.
+
+        Returns:
+            The point.
+        """
+        return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in parameters))
+
     def with_effect(self, label: str, values: Values) -> "ModelPoint":
         """Return the point with an effect added or moved.
 

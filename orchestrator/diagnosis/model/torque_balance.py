@@ -136,14 +136,6 @@ class TorqueBalance(ResidualModel):
             twist=twist, twist_is_measured=not self.hides_load, angular=self.angular,
         )  # fmt: skip
 
-    def nominal_point(self) -> ModelPoint:
-        """Return the nominal values, without effects and with the drive at rest.
-
-        Returns:
-            The point.
-        """
-        return ModelPoint(tuple(0.0 if entry.local else entry.nominal for entry in self.parameters))
-
     # --- residuals -----------------------------------------------------------------------------------------
 
     def values_at(self, point: ModelPoint) -> Array:

@@ -28,7 +28,7 @@ def parameter_estimates(problem: FitProblem, fitted: FittedModel, level: float) 
     Returns:
         Estimates by name.
     """
-    covariance, width = value_covariance(problem, fitted), interval_width(problem, level)
+    covariance, width = value_covariance(fitted), interval_width(problem, level)
     found = {}
     for n, entry in enumerate(problem.shared):
         value = fitted.point.parameters[n]
@@ -56,7 +56,7 @@ def effect_estimates(
         Estimates by short name.
     """
     values, effect = fitted.point.effects[label], problem.effects[label]
-    covariance, width = value_covariance(problem, fitted), interval_width(problem, level)
+    covariance, width = value_covariance(fitted), interval_width(problem, level)
     centre = names(values)
     slopes = np.zeros((len(centre), len(fitted.coordinates)))
     for n, coordinate in enumerate(fitted.coordinates):
@@ -98,11 +98,10 @@ def block_values(
     return {name: tuple(row[name] for row in rows) for name in rows[0]}
 
 
-def value_covariance(problem: FitProblem, fitted: FittedModel) -> Array:
+def value_covariance(fitted: FittedModel) -> Array:
     """Return the covariance (coordinates, coordinates) of fitted values.
 
     Args:
-        problem: of the fit.
         fitted: the model.
 
     Returns:
@@ -110,7 +109,6 @@ def value_covariance(problem: FitProblem, fitted: FittedModel) -> Array:
     """
     white, blocks = fitted.covariance, fitted.jackknife
     wider = np.sqrt(np.maximum(np.diag(blocks) / np.maximum(np.diag(white), 1e-300), 1.0))
-    del problem
     return np.asarray(white * np.outer(wider, wider))
 
 

@@ -1,7 +1,7 @@
 """Free runs of a model over a part of a record, from the initial state that lies closest, and what they miss.
 
-The initial state of the simulation is not measured. It starts from the predictor's estimate at the first sample
-(which has seen earlier samples only) and is then chosen so that the simulation lies closest to the measurement:
+The initial state of the simulation is not measured. It starts from the measured motion at the first sample
+and is then chosen so that the simulation lies closest to the measurement:
 five numbers against thousands of samples, for the nominal and the corrected model alike. Parameters stay as they are.
 """
 
@@ -123,7 +123,7 @@ def _closest(model: Simulation, guess: Array, part: slice, settings: ReportSetti
 
     first = _followed(plant, np.array(guess, dtype=float))
     foretold: list[float] = []  # squared errors over what derivatives foretold, of each step
-    steps = _steps(plant, first, signals, free, settings)
+    steps = _steps(plant, first, signals, free)
 
     def linearise(point: tuple[Array, Array]) -> Linearised[tuple[Array, Array]] | None:
         start, out = point
@@ -176,13 +176,10 @@ def _followed(plant: Plant, start: Array) -> Array:
     return moved
 
 
-def _steps(
-    plant: Plant, start: Array, signals: RunSignals, free: tuple[int, ...], settings: ReportSettings
-) -> list[float]:  # fmt: skip
+def _steps(plant: Plant, start: Array, signals: RunSignals, free: tuple[int, ...]) -> list[float]:
     """Return the steps of the derivatives by the free places of the state."""
-    share = RELATIVE_SIZE
-    sizes = {plant.drive.torque: share * signals.torque}
+    sizes = {plant.drive.torque: RELATIVE_SIZE * signals.torque}
     for channel, body in enumerate(plant.bodies):
         sizes[body.angle] = float(signals.noise[min(channel, signals.channels - 1)])
-        sizes[body.speed] = share * abs(start[body.speed]) + LEAST_SPEED
+        sizes[body.speed] = RELATIVE_SIZE * abs(start[body.speed]) + LEAST_SPEED
     return [NUDGE * float(sizes[place]) for place in free]
