@@ -20,10 +20,10 @@ from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.model.units import in_metres, unit_in
 from orchestrator.diagnosis.report.drive_gain import find_drive_gain
 from orchestrator.diagnosis.report.estimates import interval_width, parameter_estimates
-from orchestrator.diagnosis.report.graded_effect import report_effect
+from orchestrator.diagnosis.report.graded_effect import motion_shares, report_effect
 from orchestrator.diagnosis.report.hidden_gap import report_hidden_gap
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
-from orchestrator.diagnosis.report.test_report import misfit_on_test_data, motion_shares
+from orchestrator.diagnosis.report.test_report import misfit_on_test_data, misses_of
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
 from orchestrator.diagnosis.selection.grading import (
     Grade,
@@ -99,7 +99,7 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     record = record_evidence(found)
     graded = tuple(_graded(workings, label, record, model, settings) for label in found.final.labels)
     test = misfit_on_test_data(workings, model, settings)
-    shares = motion_shares(workings, model, test, [effect.label for effect in graded], settings)
+    shares = motion_shares(found, test, misses_of(workings, model, settings))
     graded = tuple(replace(effect, motion_share=shares[effect.label]) for effect in graded)
     effects = tuple(sorted((one for one in graded if not one.of_log), key=lambda one: -one.grade))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)

@@ -10,7 +10,7 @@ import numpy as np
 from orchestrator.diagnosis.data.test_data import split_records
 from orchestrator.diagnosis.fmu.growing import grow_fit
 from orchestrator.diagnosis.fmu.mapping import Map
-from orchestrator.diagnosis.fmu.misfit import misfit_on_test_data, motion_shares
+from orchestrator.diagnosis.fmu.misfit import misfit_on_test_data, misses_of
 from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.prepare import prepare_problems
 from orchestrator.diagnosis.fmu.problem import BoxProblem
@@ -23,7 +23,7 @@ from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.inference.problem import FitProblem, fit_problem
 from orchestrator.diagnosis.model.interface import Values
 from orchestrator.diagnosis.report.estimates import parameter_estimates
-from orchestrator.diagnosis.report.graded_effect import report_effect
+from orchestrator.diagnosis.report.graded_effect import motion_shares, report_effect
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.result import GradedEffect
 from orchestrator.diagnosis.selection.grading import (
@@ -117,7 +117,7 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     record = record_evidence(found)
     graded = tuple(_graded(workings, label, record, settings) for label in found.final.labels)
     test = misfit_on_test_data(workings)
-    shares = motion_shares(workings, test, [effect.label for effect in graded])
+    shares = motion_shares(found, test, misses_of(workings))
     graded = tuple(replace(effect, motion_share=shares[effect.label]) for effect in graded)
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection.least_t)

@@ -1,6 +1,6 @@
 """How models of an FMU do on test data: free runs over whole records, and what they miss of their test parts."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,6 @@ from orchestrator.diagnosis.fmu.clock import compared_later
 from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.problem import BoxProblem
 from orchestrator.diagnosis.fmu.result import FmuWorkings
-from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.report.open_test_data import open_test_data
 from orchestrator.diagnosis.result import SignalMisfit, TestMisfit
@@ -91,27 +90,25 @@ def stage_runs(workings: FmuWorkings) -> tuple[BoxProblem, dict[str, Array], int
     return problem, {name: empty if y is None else y for name, y in zip(models, runs, strict=True)}, row
 
 
-def motion_shares(workings: FmuWorkings, test: Sequence[TestMisfit], labels: Sequence[str]) -> dict[str, float]:
-    """Return the share of the misfit on test data that comes back when one effect is left out and the rest re-fitted.
+def misses_of(workings: FmuWorkings) -> Callable[[ModelPoint], float]:
+    """Return what says how much runs of a model miss of the test data.
 
     Args:
         workings: of the diagnosis.
-        test: misfits of the final model.
-        labels: of the effects.
 
     Returns:
-        Label -> one minus final over without, in squares and in units of the noise; nan where runs fail.
+        A model's values -> the sum of squares over the outputs, in units of their noise.
     """
-    search, shares = workings.search, {}
-    final = sum((one.final / one.noise) ** 2 for record in test for one in record.signals)
-    for label in labels:
-        without = fit_model(search.problem, search.final.point.without_effects([label]), 3)
-        left_out = sum(
-            float(np.sum((_misses(workings, without.point, problem, first, number) / problem.noise) ** 2))
-            for number, (problem, first) in enumerate(test_problems(workings))
+    problems = test_problems(workings)
+
+    def missed(point: ModelPoint) -> float:
+        misses = (
+            _misses(workings, point, problem, first, number) / problem.noise
+            for number, (problem, first) in enumerate(problems)
         )
-        shares[label] = 1.0 - final / left_out if np.isfinite(left_out) and left_out > 0.0 else float("nan")
-    return shares
+        return sum(float(np.sum(one**2)) for one in misses)
+
+    return missed
 
 
 def _misses(workings: FmuWorkings, point: ModelPoint, problem: BoxProblem, first: int, number: int) -> Array:

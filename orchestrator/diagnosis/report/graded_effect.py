@@ -1,10 +1,12 @@
 """An effect of the final model as it is reported: its grade, its sizes with errors, and what blocks say of them."""
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 
-from orchestrator.diagnosis.model.interface import Values
+from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.model.interface import ModelPoint, Values
 from orchestrator.diagnosis.report.estimates import block_values, effect_estimates
-from orchestrator.diagnosis.result import GradedEffect
+from orchestrator.diagnosis.result import GradedEffect, TestMisfit
 from orchestrator.diagnosis.selection.grading import RecordEvidence, effect_evidence, grade_effect
 from orchestrator.diagnosis.selection.search import SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
@@ -33,3 +35,23 @@ def report_effect(
     estimates = effect_estimates(found.problem, found.final, label, names, units, settings.report.level)
     blocks = block_values(found.problem, found.final, label, names)
     return GradedEffect(name, site, grade, lowered, estimates, evidence, blocks)
+
+
+def motion_shares(
+    found: SearchResult, test: Sequence[TestMisfit], missed: Callable[[ModelPoint], float]
+) -> dict[str, float]:
+    """Return the share of the misfit on test data that comes back when one effect is left out and the rest re-fitted.
+
+    Args:
+        found: by the search.
+        test: misfits of the final model.
+        missed: a model -> what its runs miss of the test data, in squares and in units of the noise.
+
+    Returns:
+        Label of each effect -> one minus final over without; nan where runs go astray.
+    """
+    final, shares = sum((one.final / one.noise) ** 2 for record in test for one in record.signals), {}
+    for label in found.final.labels:
+        left_out = missed(fit_model(found.problem, found.final.point.without_effects([label]), 3).point)
+        shares[label] = 1.0 - final / left_out if math.isfinite(left_out) and left_out > 0.0 else math.nan
+    return shares

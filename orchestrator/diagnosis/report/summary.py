@@ -5,7 +5,7 @@ next.
 import math
 from collections.abc import Iterator, Sequence
 
-from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance
+from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, Nuisance
 from orchestrator.diagnosis.selection.grading import GRADE_RULES, Grade
 from orchestrator.plants.description import Plant
 from orchestrator.shared.play import Play
@@ -108,24 +108,31 @@ def listed(labels: Sequence[str]) -> str:
     return " and ".join(filter(None, [", ".join(words[:-1]), *words[-1:]]))
 
 
-def headline(found: Diagnosis) -> str:
+def headline(found: DiagnosisOutcome, subject: str = "model") -> str:
     """Return the verdict in one sentence.
 
     Args:
         found: the diagnosis.
+        subject: what the record was compared with, in words.
 
     Returns:
         The sentence.
     """
     if found.verdict == "none":
-        return "Verdict: none. Nothing is missing: the model explains the record."
+        return f"Verdict: none. Nothing is missing: the {subject} explains the record."
     if found.verdict == "parameters":
-        return "Verdict: parameters. Nothing is missing: the model explains the record once its values are re-fitted."
+        return (
+            f"Verdict: parameters. Nothing is missing: the {subject} explains the record once its values are re-fitted."
+        )
     if found.verdict == "effects":
         named = [effect.label for effect in found.graded(Grade.LIKELY)]
-        return f"Verdict: effects. The model lacks {listed(named)}." if named else "Verdict: effects, in the log alone."
+        return (
+            f"Verdict: effects. The {subject} lacks {listed(named)}."
+            if named
+            else "Verdict: effects, in the log alone."
+        )
     near = [effect.label for effect in found.effects]
-    text = "Verdict: unknown. The model misses something, and no effect of the library is likely."
+    text = f"Verdict: unknown. The {subject} misses something, and no effect of the library is likely."
     return text + (f" Possible: {listed(near)}." if near else "")
 
 
@@ -146,12 +153,7 @@ def play_of(found: Diagnosis) -> Play | None:
 
 
 def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
-    values = ", ".join(
-        f"{name.replace('_', ' ')} {e.value:.5g} +- {e.standard_error:.2g} {'' if e.unit == '1' else e.unit}".rstrip()
-        for name, e in effect.parameters.items()
-    )
-    words = effect_words(effect.label)
-    yield f"  {words[:1].upper()}{words[1:]}: {values}"
+    yield sizes_line(effect)
     play = play_of(found)
     if effect.name == "backlash" and play is not None:
         yield f"    {play}"
@@ -165,6 +167,23 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
         yield f"    It explains {' and '.join(shares)}."
     if effect.name in MOTION:
         yield f"    In the motion: {MOTION[effect.name]}"
+
+
+def sizes_line(effect: GradedEffect) -> str:
+    """Return an effect and its sizes as a line.
+
+    Args:
+        effect: that was found.
+
+    Returns:
+        The line.
+    """
+    sizes = ", ".join(
+        f"{name.replace('_', ' ')} {e.value:.5g} +- {e.standard_error:.2g} {'' if e.unit == '1' else e.unit}".rstrip()
+        for name, e in effect.parameters.items()
+    )
+    words = effect_words(effect.label)
+    return f"  {words[:1].upper()}{words[1:]}: {sizes}"
 
 
 def percent(share: float) -> str:

@@ -1,13 +1,13 @@
 """How the models do on test data: the motion of free runs, and the torque that they leave."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.diagnosis.data.signals import smooth
-from orchestrator.diagnosis.inference.fitting import fit_model
+from orchestrator.diagnosis.model.interface import ModelPoint
 from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.model.units import in_metres
 from orchestrator.diagnosis.report.motion_misfit import motion_misfit, run_misfit
@@ -104,29 +104,24 @@ def misfit_on_record(diagnosis: Diagnosis, record: Record) -> TestMisfit:
     return _misfit(w, model, record, 0, settings)
 
 
-def motion_shares(
-    workings: Workings, model: Model, test: Sequence[TestMisfit], labels: Sequence[str], settings: DiagnosisSettings
-) -> dict[str, float]:
-    """Return the share of the misfit on test data that comes back when one effect is left out and the rest re-fitted.
+def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> Callable[[ModelPoint], float]:
+    """Return what says how much free runs of a model miss of the test data.
 
     Args:
         workings: of the diagnosis.
         model: nominal.
-        test: misfits of the final model.
-        labels: of the effects.
         settings: of the report.
 
     Returns:
-        Label -> one minus final over without, in squares and in units of the noise; nan where runs go astray.
+        A model's values -> the sum of squares over the encoders, in units of their noise.
     """
-    found, shares = workings.search, {}
-    final = sum((one.final / one.noise) ** 2 for record in test for one in record.signals)
-    for label in labels:
-        without = fit_model(found.problem, found.final.point.without_effects([label]), 3)
-        p = workings.balances[0].physical_values(found.problem.record_points(without.point)[0])
-        left_out = sum(
-            float(np.sum((run_misfit(model.plant, p, signals, first, settings.report) / signals.noise) ** 2))
-            for _, signals, first in test_signals(workings)
+    parts = test_signals(workings)
+
+    def missed(point: ModelPoint) -> float:
+        p = workings.balances[0].physical_values(workings.search.problem.record_points(point)[0])
+        misfits = (
+            run_misfit(model.plant, p, signals, first, settings.report) / signals.noise for _, signals, first in parts
         )
-        shares[label] = 1.0 - final / left_out if np.isfinite(left_out) and left_out > 0.0 else float("nan")
-    return shares
+        return sum(float(np.sum(one**2)) for one in misfits)
+
+    return missed
