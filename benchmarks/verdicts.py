@@ -12,6 +12,7 @@ from typing import Any
 
 import orchestrator as oc
 from orchestrator.api.any_fmu import diagnose_fmu
+from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome
 from orchestrator.errors import OrchestratorError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -123,36 +124,20 @@ def outcome_of(result: Any) -> Outcome:
     Returns:
         The outcome.
     """
-    diagnosis = result.diagnosis
-    names = {}
-    for effect in (*diagnosis.effects, *getattr(diagnosis, "nuisances", ())):
-        if effect.name == "drive_gain":  # never more than a remark: values that carry a torque take its place
-            continue
-        site = getattr(effect, "site", "")
-        label = f"{effect.name}@{site}" if site else effect.name
-        names[label] = NamedEffect(_grade(effect, diagnosis), _values(effect.parameters), _family(effect))
-    parameters = _values({name: one for name, one in diagnosis.parameters.items() if one.value is not None})
-    return Outcome(names, parameters, _misfit(diagnosis), verdict=diagnosis.verdict)
-
-
-def _grade(effect: Any, diagnosis: Any) -> str:
-    if hasattr(effect, "grade"):
-        return str(effect.grade.word)
-    return {"green": "certain", "amber": "likely"}.get(diagnosis.trust.level.word, "possible")
-
-
-def _family(effect: Any) -> tuple[str, ...]:
-    return tuple(effect.evidence.family if hasattr(effect, "evidence") else getattr(effect, "family", ()))
-
-
-def _misfit(diagnosis: Any) -> dict[str, tuple[float, float]]:
-    if hasattr(diagnosis, "test"):
-        return {
-            f"{n}:{one.signal}": (one.parameters, one.final)
-            for n, part in enumerate(diagnosis.test)
-            for one in part.signals
-        }
-    return {one.signal: (one.best_before, one.after) for one in diagnosis.misfit}
+    diagnosis: DiagnosisOutcome = result.diagnosis
+    names = {
+        effect.label: NamedEffect(effect.grade.word, _values(effect.parameters), effect.evidence.family)
+        for effect in diagnosis.effects
+    }
+    for nuisance in diagnosis.nuisances if isinstance(diagnosis, Diagnosis) else ():
+        if nuisance.name != "drive_gain":  # never more than a remark: values that carry a torque take its place
+            names[nuisance.name] = NamedEffect(nuisance.grade.word, _values(nuisance.parameters))
+    misfit = {
+        f"{n}:{one.signal}": (one.parameters, one.final)
+        for n, part in enumerate(diagnosis.test)
+        for one in part.signals
+    }
+    return Outcome(names, _values(diagnosis.parameters), misfit, verdict=diagnosis.verdict)
 
 
 def _values(estimates: Mapping[str, Any]) -> dict[str, Estimate]:
