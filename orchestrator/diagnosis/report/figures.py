@@ -39,7 +39,7 @@ def draw_signals(path: Path, runs: BeforeAfter, diagnosis: Diagnosis) -> None:
         upper.plot(runs.time, runs.measured[:, n], color="black", linewidth=1.6, label="measured")
         upper.plot(runs.time, runs.before[:, n], color=ORANGE, linewidth=1.0, label="nominal FMU")
         upper.plot(runs.time, runs.after[:, n], color=BLUE, linewidth=1.0, linestyle="--", label="corrected FMU")
-        upper.set_ylabel(f"{('motor', 'load')[n]} angle [{signal.unit}]")
+        upper.set_ylabel(f"{('motor', 'load')[n]} {'position' if signal.unit == 'm' else 'angle'} [{signal.unit}]")
         for axis, run, colour, label in (
             (before, runs.before, ORANGE, "nominal minus measured"),
             (after, runs.after, BLUE, "corrected minus measured"),
