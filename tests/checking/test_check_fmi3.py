@@ -41,6 +41,11 @@ def test_the_good_fmu_has_no_finding(interface: str, tmp_path: Path) -> None:
     assert report.version == "3.0"
 
 
+def test_an_update_of_a_trial_step_may_lie_after_the_next_one(tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "update_trial"), QUICK)
+    assert report.findings == ()
+
+
 def _named(mutant: Mutant, folder: Path) -> set[str]:
     path = folder / "broken.fmu"
     mutant.make(path)
