@@ -66,6 +66,16 @@ def test_behaviour_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:
     assert mutant.rule in _named(mutant, tmp_path)
 
 
+@pytest.mark.parametrize(
+    "name", ["CoSimulation early_always", "CoSimulation event_without_cause", "CoSimulation update_beyond"]
+)
+def test_what_recurs_over_time_is_one_finding(name: str, tmp_path: Path) -> None:
+    (mutant,) = (m for m in BEHAVIOURAL if m.name == name)
+    path = tmp_path / "broken.fmu"
+    mutant.make(path)
+    assert [f.rule for f in check_fmu(path, mutant.options).findings].count(mutant.rule) == 1
+
+
 def test_there_are_many_and_each_has_a_name() -> None:
     assert len({m.name for m in (*STATIC, *BEHAVIOURAL)}) == len(STATIC) + len(BEHAVIOURAL)
     assert len(STATIC) >= 150

@@ -24,7 +24,7 @@ class Driver(FmuInstance):
 
     Attributes:
         job: what is run.
-        report: called with rule, message and path.
+        report: called with rule, message, path and the time of the first one in words (``when``).
     """
 
     maker = ""

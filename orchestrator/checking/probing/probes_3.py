@@ -76,11 +76,11 @@ def _judge(context: Context, rows: list[list[Any]], begin: float, end: float) ->
                 "intermediate.unexpected", f"intermediateUpdate must be called in steps only, not in {function}"
             )
         elif not begin - slack <= time <= end + slack:
-            message = f"an intermediate update must lie in the step from {begin:g} to {end:g}, but is at {time:g}"
-            context.report("intermediate.time", message)
+            message = "an intermediate update must lie in its step, but one does not:"
+            context.report("intermediate.time", message, when=f"it is at {time:g}, the step from {begin:g} to {end:g}")
         elif time < finished - slack:
-            message = f"no intermediate update must lie before a finished one, but {time:g} follows {finished:g}"
-            context.report("intermediate.time", message)
+            message = "no intermediate update must lie before a finished one, but one does:"
+            context.report("intermediate.time", message, when=f"{time:g} follows {finished:g}")
         if got not in (OK, WARNING, None):
             message = "variables with intermediateUpdate must be readable in an update, but are refused"
             context.report("intermediate.access", message)
