@@ -76,6 +76,11 @@ def test_what_recurs_over_time_is_one_finding(name: str, tmp_path: Path) -> None
     assert [f.rule for f in check_fmu(path, mutant.options).findings].count(mutant.rule) == 1
 
 
+def test_a_state_that_is_not_nulled_is_that_of_the_function_of_fmi3(tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "state_not_nulled"), QUICK)
+    assert [f.message.split()[0] for f in report.findings] == ["fmi3FreeFMUState"]
+
+
 def test_there_are_many_and_each_has_a_name() -> None:
     assert len({m.name for m in (*STATIC, *BEHAVIOURAL)}) == len(STATIC) + len(BEHAVIOURAL)
     assert len(STATIC) >= 150
