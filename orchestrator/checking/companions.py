@@ -7,7 +7,7 @@ from lxml import etree
 
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
-from orchestrator.checking.description import Description
+from orchestrator.checking.description import Description, number
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.xml_reading import xpath
@@ -15,6 +15,7 @@ from orchestrator.checking.xml_reading import xpath
 TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 BUILD = "sources/buildDescription.xml"
 _PNG = b"\x89PNG\r\n\x1a\n"
+_LARGEST_ICON = 1 << 26
 _MATCHED_BY_NAME = ("plug", "bus")
 
 
@@ -92,7 +93,7 @@ def _terminals(d: Description, root: etree._Element, names: set[str]) -> Iterato
             message = f"the icon of a terminal must be in terminalsAndIcons/, but {icon}.png is not"
             yield Finding("terminals.icon", xpath(element, "iconBaseName", TERMINALS), message)
     for element in root.iter("CoordinateSystem"):
-        corners = [_number(element.get(a)) for a in ("x1", "x2", "y1", "y2")]
+        corners = [number(element.get(a), "Real") for a in ("x1", "x2", "y1", "y2")]
         if None not in corners and not (corners[0] < corners[1] and corners[2] < corners[3]):  # type: ignore[operator]
             message = "the first corner must be below and left of the second, but is not"
             yield Finding("terminals.coordinates", xpath(element, name=TERMINALS), message)
@@ -122,8 +123,22 @@ def _icons(files: FmuFiles, names: set[str]) -> Iterator[Finding]:
         if path.endswith(".svg") and path[:-3] + "png" not in names:
             message = "an icon in SVG must be there as PNG, too, but is not"
             yield Finding("terminals.icon", path, message)
-        elif path.endswith(".png") and files.read(path, 1 << 26)[:8] != _PNG:
-            yield Finding("file.icon", path, "the icon must be a PNG image, but is not")
+        elif path.endswith(".png"):
+            yield from check_icon(files, path)
+
+
+def check_icon(files: FmuFiles, path: str) -> Iterator[Finding]:
+    """Findings about an icon.
+
+    Args:
+        files: of the FMU.
+        path: of the icon in it.
+
+    Yields:
+        A finding where it is no PNG image.
+    """
+    if files.read(path, _LARGEST_ICON)[: len(_PNG)] != _PNG:
+        yield Finding("file.icon", path, "the icon must be a PNG image, but is not")
 
 
 def _build(d: Description, root: etree._Element, names: set[str]) -> Iterator[Finding]:
@@ -143,10 +158,3 @@ def _build(d: Description, root: etree._Element, names: set[str]) -> Iterator[Fi
         if not any(n.startswith(f"{folder}/") for n in names):
             message = f"a folder of headers must be in sources/, but `{element.get('name')}` is not"
             yield Finding("build.include", xpath(element, "name", BUILD), message)
-
-
-def _number(text: str | None) -> float | None:
-    try:
-        return None if text is None else float(text)
-    except ValueError:
-        return None

@@ -175,10 +175,11 @@ class _Watcher:
                 return
             self.stages[self.probe] = ""
 
-    def _add(self, rule: str, message: str, path: str = "") -> None:
+    def _add(self, rule: str, message: str, path: str = "", when: str = "") -> None:
+        """Take a finding, unless the same was found before; ``when`` is the first time that it was."""
         if (rule, message) not in self._said and len(self.findings) < _MOST_FINDINGS:
             self._said.add((rule, message))
-            self.findings.append(Finding(rule, path or f"({self.interface}{self.probe})", message))
+            self.findings.append(Finding(rule, path or f"({self.interface}{self.probe})", f"{message} {when}".rstrip()))
 
     def _ended_early(self, error: ChildError, function: str) -> None:
         where = f"during {function}" if function else f"in the probe `{self.probe}`"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
-from orchestrator.checking.companions import check_companions
+from orchestrator.checking.companions import check_companions, check_icon
 from orchestrator.checking.description import DescribedVariable, Description
 from orchestrator.checking.findings import Finding
 
@@ -60,8 +60,8 @@ def check_files(d: Description, files: FmuFiles) -> Iterator[Finding]:
         yield Finding(
             "file.documentation", "documentation", f"documentation/ must have the entry {entries[0]}, but has not"
         )
-    if "model.png" in names and files.read("model.png", 1 << 26)[:8] != b"\x89PNG\r\n\x1a\n":
-        yield Finding("file.icon", "model.png", "the icon must be a PNG image, but is not")
+    if "model.png" in names:
+        yield from check_icon(files, "model.png")
 
 
 def _documents(d: Description, names: set[str]) -> Iterator[Finding]:

@@ -41,6 +41,11 @@ def test_the_good_fmu_has_no_finding(interface: str, tmp_path: Path) -> None:
     assert report.version == "3.0"
 
 
+def test_an_update_of_a_trial_step_may_lie_after_the_next_one(tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "update_trial"), QUICK)
+    assert report.findings == ()
+
+
 def _named(mutant: Mutant, folder: Path) -> set[str]:
     path = folder / "broken.fmu"
     mutant.make(path)
@@ -59,6 +64,21 @@ def test_what_is_read_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> No
 )
 def test_behaviour_is_named_by_its_rule(mutant: Mutant, tmp_path: Path) -> None:
     assert mutant.rule in _named(mutant, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "name", ["CoSimulation early_always", "CoSimulation event_without_cause", "CoSimulation update_beyond"]
+)
+def test_what_recurs_over_time_is_one_finding(name: str, tmp_path: Path) -> None:
+    (mutant,) = (m for m in BEHAVIOURAL if m.name == name)
+    path = tmp_path / "broken.fmu"
+    mutant.make(path)
+    assert [f.rule for f in check_fmu(path, mutant.options).findings].count(mutant.rule) == 1
+
+
+def test_a_state_that_is_not_nulled_is_that_of_the_function_of_fmi3(tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "state_not_nulled"), QUICK)
+    assert [f.message.split()[0] for f in report.findings] == ["fmi3FreeFMUState"]
 
 
 def test_there_are_many_and_each_has_a_name() -> None:

@@ -130,20 +130,21 @@ static void move(State *s, double h) {
 
 /* Announce that the time `t` has been reached; whether the importer wants to return. */
 static bool announce(Ball *b, double t, bool more) {
-    bool early = false;
+    bool early = false, finished = false;
     double when = t;
     if (!b->update) return false;
 #ifdef FAULT_update_missing
     return false;
 #endif
 #ifdef FAULT_update_backwards
+    finished = true;
     if (!more) t -= 0.9 * 0.02;
 #endif
 #ifdef FAULT_update_beyond
     t += 5.0;
 #endif
     b->updating = 1;
-    b->update(b->environment, t, true, true, false, more, &early, &when);
+    b->update(b->environment, t, true, true, finished, more, &early, &when);
     b->updating = 0;
 #ifdef FAULT_update_no_return
     return false;
@@ -232,6 +233,9 @@ FMI3_Export fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 t, fmi3Float64 h, 
         double first = free_flight(s, 0.5 * h, &hit);
         if (!hit) {
             move(s, first);
+#ifdef FAULT_update_trial
+            announce(b, end, false);  /* no fault: a trial step to the end, which is not accepted */
+#endif
             if (announce(b, s->time, true)) { *early = true; *last = s->time; return fmi3OK; }
         }
     }

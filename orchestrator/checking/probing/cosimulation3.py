@@ -71,9 +71,10 @@ class CoSimulation3(EventDriver):
             raise StatusError("fmi3DoStep", 0, text, "step.last-time")
         if early and not (self.early and self._may_return_early()):
             why = "mightReturnEarlyFromDoStep is not set" if self.early else "earlyReturnAllowed was false"
-            self.report("step.early-return", f"fmi3DoStep must not return early, because {why}, but does {when}")
+            self.report("step.early-return", f"fmi3DoStep must not return early, because {why}, but does", when=when)
         if event and not self.events:
-            self.report("event.not-used", f"no event must be announced where event mode is not used, but one is {when}")
+            message = "no event must be announced where event mode is not used, but one is"
+            self.report("event.not-used", message, when=when)
         if terminate:
             raise TerminatedError
         return bool(event), float(last) if early else goal
@@ -92,10 +93,9 @@ class CoSimulation3(EventDriver):
         outcomes = self.settle(t, when)
         idle = not any(o.again or o.nominals_changed or o.states_changed for o in outcomes)
         same_next = announced == self.memory["next"]
-        if watched and idle and same_next and before == self.read(watched, when) and not self.memory.get("idle"):
-            self.memory["idle"] = True
-            text = f"an event must have a cause, but the one at t = {t:g} changes no output and no local variable"
-            self.report("event.without-cause", text)
+        if watched and idle and same_next and before == self.read(watched, when):
+            text = "an event must have a cause, but one changes no output and no local variable"
+            self.report("event.without-cause", text, when=f"at t = {t:g}")
         self.call("EnterStepMode", when=when)
 
 

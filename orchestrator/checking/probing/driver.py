@@ -3,7 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from orchestrator.checking.probing.binding import FmuInstance, Library, ProbedVariable, odd
+from orchestrator.checking.probing.binding import Library, ProbedVariable, odd
+from orchestrator.checking.probing.instance import FmuInstance
 from orchestrator.checking.probing.job import ProbeJob, references
 
 Report = Callable[..., None]
@@ -24,7 +25,7 @@ class Driver(FmuInstance):
 
     Attributes:
         job: what is run.
-        report: called with rule, message and path.
+        report: called with rule, message, path and the time of the first one in words (``when``).
     """
 
     maker = ""

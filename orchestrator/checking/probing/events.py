@@ -156,8 +156,8 @@ class EventDriver(Driver):
         still = self._triggered(when)
         if still:
             names = ", ".join(c.name for c in self.job.clocks if c.reference in still)
-            text = f"a clock must be inactive after the update of the discrete states, but {names} is not {when}"
-            self.report("clock.deactivation", text)
+            text = f"a clock must be inactive after the update of the discrete states, but {names} is not"
+            self.report("clock.deactivation", text, when=when)
         self.memory["next"] = outcomes[-1].next_time
         return outcomes
 

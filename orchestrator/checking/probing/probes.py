@@ -25,7 +25,7 @@ class Context:
     """What the probes share.
 
     Attributes:
-        report: called with rule, message and path.
+        report: called with rule, message, path and the time of the first one in words (``when``).
         trace: outputs of the undisturbed run, [step][output], once there is one; None again when the run
             cannot be repeated, so that nothing can be compared with it.
         single: whether a second instance is known not to work.

@@ -28,7 +28,7 @@ def early_return(context: Context) -> None:
 
 
 def intermediate(context: Context) -> None:
-    """Intermediate updates: only in steps, in the order of time, with values that can be read and then set.
+    """Intermediate updates: only in steps, none before a finished one, with values that can be read and then set.
 
     Args:
         context: the FMU, its job and where findings go.
@@ -67,26 +67,28 @@ def intermediate(context: Context) -> None:
 
 
 def _judge(context: Context, rows: list[list[Any]], begin: float, end: float) -> None:
+    """Judge the updates of one step; only below the time of a finished internal step must none of them lie."""
     slack = _SMALL * max(abs(end), end - begin)
-    last = begin
-    for function, time, _, _, _, _, got, was_set in rows:
+    finished = begin
+    for function, time, _, _, done, _, got, was_set in rows:
         if function != "fmi3DoStep":
             context.report(
                 "intermediate.unexpected", f"intermediateUpdate must be called in steps only, not in {function}"
             )
         elif not begin - slack <= time <= end + slack:
-            message = f"an intermediate update must lie in the step from {begin:g} to {end:g}, but is at {time:g}"
-            context.report("intermediate.time", message)
-        elif time < last - slack:
-            message = f"intermediate updates must go forward in time, but one at {time:g} follows one at {last:g}"
-            context.report("intermediate.time", message)
+            message = "an intermediate update must lie in its step, but one does not:"
+            context.report("intermediate.time", message, when=f"it is at {time:g}, the step from {begin:g} to {end:g}")
+        elif time < finished - slack:
+            message = "no intermediate update must lie before a finished one, but one does:"
+            context.report("intermediate.time", message, when=f"{time:g} follows {finished:g}")
         if got not in (OK, WARNING, None):
             message = "variables with intermediateUpdate must be readable in an update, but are refused"
             context.report("intermediate.access", message)
         if was_set not in (OK, WARNING, None):
             message = "continuous inputs with intermediateUpdate must be settable in an update, but are refused"
             context.report("intermediate.access", message)
-        last = max(last, time)
+        if done:
+            finished = max(finished, time)
 
 
 def _asked_to_return(context: Context) -> None:

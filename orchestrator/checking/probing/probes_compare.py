@@ -113,7 +113,9 @@ def state(context: Context) -> None:
             finally:
                 nulled = driver.free_state(saved)
             if not nulled:
-                context.report("state.free", "fmi2FreeFMUstate must set the state to null, but does not")
+                names = bench.library.names
+                function = names.prefix + names.free_state
+                context.report("state.free", f"{function} must set the state to null, but does not")
         except StatusError as error:
             context.report("state.status", str(error))
 

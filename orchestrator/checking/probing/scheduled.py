@@ -29,8 +29,6 @@ class ScheduledExecution(EventDriver):
                 self._hold({clock.reference}, at)
                 self._advance_clocks([clock], now)
         _, locks = self.library.updates()
-        if locks and not self.memory.get("locked"):
-            self.memory["locked"] = True
-            self.report(
-                "partition.preemption", f"preemption must be unlocked as often as it is locked, but is not {when}"
-            )
+        if locks:
+            message = "preemption must be unlocked as often as it is locked, but is not"
+            self.report("partition.preemption", message, when=when)

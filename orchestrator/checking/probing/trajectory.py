@@ -27,7 +27,7 @@ class Bench:
     """One loaded FMU and the job: makes instances that are freed whatever happens.
 
     Attributes:
-        report: called with rule, message and path.
+        report: called with rule, message, path and the time of the first one in words (``when``).
         excited: whether inputs are moved in runs that are compared.
     """
 

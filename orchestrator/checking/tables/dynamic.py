@@ -72,7 +72,7 @@ steps.variable | W | 4.3.1 | 4.4 | results hardly depend on the communication st
 [intermediate update]
 intermediate.unexpected | E | - | 4.2.2 | intermediateUpdate is called in fmi3DoStep, by FMUs that say so | set providesIntermediateUpdate, or do not call it
 intermediate.missing | W | - | 4.4 | an FMU that provides intermediate updates calls them | call intermediateUpdate, or clear the flag
-intermediate.time | E | - | 4.2.2 | intermediate updates lie in the step and go forward in time | call intermediateUpdate for accepted times in their order
+intermediate.time | E | - | 4.2.2 | intermediate updates lie in the step, and none before a finished one | call intermediateUpdate with intermediateStepFinished for accepted times only
 intermediate.access | E | - | 4.2.2 | variables with intermediateUpdate can be read, then set, in an update | accept the calls that the arguments of the callback allow
 intermediate.early-return | E | - | 4.1.3 | a step ends early when an update asks for it | return early, or clear canReturnEarlyAfterIntermediateUpdate
 
