@@ -25,6 +25,7 @@ from orchestrator.records.columns import (
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, choose
+from orchestrator.records.stamps import seconds_of
 from orchestrator.records.timing import interpolated, interpolation_cost, resampled_grid
 from orchestrator.records.units import parse_unit
 
@@ -188,12 +189,7 @@ def _time(
     if column.rate is not None and not _are_sample_numbers(raw):
         return np.arange(raw.size) / column.rate, f"time from the row and {column.rate:g} Hz, `{label}` not used"
     if raw.dtype.kind == "M":
-        stamps = raw.astype("datetime64[ns]")
-        good = ~np.isnat(stamps)
-        if not good.any():
-            raise RecordError(f"{path}: column `{label}` must hold times, but is empty")
-        away = (stamps - stamps[good][0]).astype(np.int64).astype(float) * 1e-9
-        return np.where(good, away, np.nan), f"{label} as date and time"
+        return seconds_of(raw, label, path), f"{label} as date and time"
     numbers = raw.astype(float)
     if whole or column.modulo is not None:
         numbers = unwrapped_time(numbers, column, label, str(path))
