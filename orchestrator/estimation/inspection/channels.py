@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.records.arrays import runs_of
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import robust_noise
 
@@ -92,8 +93,8 @@ def _saturated(values: Array) -> float:
         return 0.0
     share = 0
     for end in (values.min(), values.max()):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], (values == end).astype(np.int8), [0]])))
-        lengths = edges[1::2] - edges[::2]
+        starts, stops = runs_of(values == end)
+        lengths = stops - starts
         share += int(lengths[lengths >= 3].sum())
     return share / values.size
 

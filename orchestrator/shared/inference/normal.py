@@ -17,19 +17,3 @@ def interval_95(value: float, deviation: float, least: float = float("-inf")) ->
         Its lower and its upper end.
     """
     return max(value - NORMAL_95 * deviation, least), value + NORMAL_95 * deviation
-
-
-def of_many(deviations: float, count: int) -> float:
-    """Return the standard deviations that one of ``count`` values exceeds as rarely as a single one ``deviations``.
-
-    Bonferroni's bound: whatever their correlation, chance is no more frequent.
-
-    Args:
-        deviations: of a single value, in either direction.
-        count: of the values.
-
-    Returns:
-        The standard deviations.
-    """
-    normal = NormalDist()
-    return -normal.inv_cdf(normal.cdf(-deviations) / max(count, 1))
