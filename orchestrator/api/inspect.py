@@ -17,7 +17,6 @@ from orchestrator.estimation.inspection.channels import (
     channels_of,
     delay_between,
     excitation_of,
-    hints_of,
     reversals_of,
 )
 from orchestrator.estimation.inspection.machine import as_model, is_of, rough_machine, visible_effects
@@ -98,8 +97,7 @@ class InspectResult(Result):
         Returns:
             A sentence each.
         """
-        said = verdict_of(self.record, self.sufficiency, self.reversals, self.two_angles)
-        return [*said, *hints_of(self.record)]
+        return verdict_of(self.sufficiency, self.reversals, self.two_angles)
 
     def blocks(self) -> Sequence[Block]:
         """Return what was read, the tables and the verdict."""

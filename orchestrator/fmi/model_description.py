@@ -107,12 +107,12 @@ def parse_description(content: bytes, origin: str, python: bool = False) -> FmuD
     if cosimulation is None:
         raise FmuError(f"{origin}: must be an FMU for co-simulation, but has no CoSimulation element")
     try:
-        return _description(root, cosimulation, origin, python)
+        return _description(root, cosimulation, python)
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise FmuError(f"{origin}: modelDescription.xml must follow FMI 2.0, but does not: {error}") from None
 
 
-def _description(root: etree._Element, cosimulation: etree._Element, origin: str, python: bool) -> FmuDescription:
+def _description(root: etree._Element, cosimulation: etree._Element, python: bool) -> FmuDescription:
     variables = _variables(root)
     names = [v.name for v in variables]
     if len(set(names)) < len(names):

@@ -97,20 +97,25 @@ class Session:
             raise FmuError(f"$.instances.{instance.name}: {error}") from None
 
     def run(
-        self, start: Mapping[str, Value | Quantity] | None = None, signals: Mapping[int, Signal] | None = None
+        self,
+        start: Mapping[str, Value | Quantity] | None = None,
+        signals: Mapping[int, Signal] | None = None,
+        allow_early_end: bool = False,
     ) -> Recording:
         """Run once.
 
         Args:
             start: parameters and start values by ``instance.variable``, over those of the system.
             signals: signals in place of those of ``System.sources``, by index.
+            allow_early_end: where a slave ends the run, return what there is up to then, with a remark: for callers
+                that show remarks, and can do with fewer values than a run has points.
 
         Returns:
             Times [s], recorded signals and statistics.
 
         Raises:
             ScenarioError: a start value is wrong.
-            SlaveError: a slave refused or failed a call.
+            SlaveError: a slave refused or failed a call, or ended the run.
             ConvergenceError: a loop did not settle.
         """
         values = self._start_values(start or {})
@@ -118,7 +123,7 @@ class Session:
         table = self._signal_table(signals or {})
         rows = np.empty((self.steps + 1, len(self.record)))
         try:
-            statistics, ended = self._run(wiring, values, table, rows, signals or {})
+            statistics, ended = self._run(wiring, values, table, rows, signals or {}, allow_early_end)
             for stage in wiring.stages:
                 stage.slave.terminate()
         except SimulationError:
@@ -136,6 +141,7 @@ class Session:
         table: Array,
         rows: Array,
         signals: Mapping[int, Signal],
+        allow_early_end: bool,
     ) -> tuple[Statistics, list[RunRemark]]:
         """Initialise and run, once more with shorter steps where a slave discards one; also say who ended the run."""
         while True:
@@ -146,6 +152,8 @@ class Session:
             except RunEndedError as error:
                 if isinstance(self.algorithm, Adaptive):  # which has no values on the grid up to there
                     raise SlaveError(f"{error}: it wants the run to end, which `adaptive` does not do") from None
+                if not allow_early_end:
+                    raise SlaveError(f"{error}: it wants the run to end, but the whole run is needed") from None
                 steps = math.floor((error.time - self.start) / self.algorithm.step + 1e-6)
                 text = f"ended the run at t = {self._times[steps]:g} s of {self.stop:g} s (fmi2Discard, terminated)"
                 calls = dict.fromkeys((block.name for block in self.layout.blocks), steps)

@@ -139,3 +139,16 @@ def lined(values: Array) -> Array:
         return values
     places = np.arange(values.size)
     return np.interp(places, places[good], values[good])
+
+
+def runs_of(flags: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the runs in which flags hold.
+
+    Args:
+        flags: (n,).
+
+    Returns:
+        First row of each run, and the row after its last.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return edges[::2], edges[1::2]

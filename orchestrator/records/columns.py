@@ -223,12 +223,12 @@ def unwrapped_time(values: Array, column: Column, label: str, source: str) -> Ar
     steps = np.diff(good)
     if column.modulo is not None:
         out = values.copy()
-        out[rows[1:]] = good[0] + np.cumsum(np.mod(steps, column.modulo))
+        out[rows[1:]] = good[:1] + np.cumsum(np.mod(steps, column.modulo))
         return out
     fallen = np.flatnonzero(steps < 0.0)
     if not fallen.size or fallen.size > 0.1 * steps.size:
         return values
-    usual = float(np.median(steps[steps > 0.0], axis=0)) if np.any(steps > 0.0) else 0.0
+    usual = float(np.median(steps[steps > 0.0])) if np.any(steps > 0.0) else 0.0
     high, low = float(good.max()), float(good.min())
     for size in COUNTERS:
         if abs(high + usual - size) <= 1.5 * usual and low < 2.0 * usual and np.all(good[fallen] > high - 2.0 * usual):

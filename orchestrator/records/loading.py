@@ -25,6 +25,7 @@ from orchestrator.records.columns import (
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, choose
+from orchestrator.records.stamps import seconds_of
 from orchestrator.records.timing import interpolated, interpolation_cost, resampled_grid
 from orchestrator.records.units import parse_unit
 
@@ -93,7 +94,7 @@ def load(
             table[name], said = _converted(name, raw, columns.get(name, Column()), written, labels[name], path, time)
             units.append(said)
     table |= {name: values[place].astype(float) for name, place in extra.items() if name not in table}
-    table, more = _same_rows(table, source, chosen, extra, values, path, reading)
+    table, more = _same_rows(table, source, chosen, extra, path, reading)
     notes += [", ".join(units), *more]
     drive = columns.get("u", Column())
     unit = None
@@ -188,12 +189,7 @@ def _time(
     if column.rate is not None and not _are_sample_numbers(raw):
         return np.arange(raw.size) / column.rate, f"time from the row and {column.rate:g} Hz, `{label}` not used"
     if raw.dtype.kind == "M":
-        stamps = raw.astype("datetime64[ns]")
-        good = ~np.isnat(stamps)
-        if not good.any():
-            raise RecordError(f"{path}: column `{label}` must hold times, but is empty")
-        away = (stamps - stamps[good][0]).astype(np.int64).astype(float) * 1e-9
-        return np.where(good, away, np.nan), f"{label} as date and time"
+        return seconds_of(raw, label, path), f"{label} as date and time"
     numbers = raw.astype(float)
     if whole or column.modulo is not None:
         numbers = unwrapped_time(numbers, column, label, str(path))
@@ -262,7 +258,6 @@ def _same_rows(
     source: RecordSource,
     chosen: Mapping[str, Choice],
     extra: Mapping[str, int],
-    values: Mapping[int, NDArray[Any]],
     path: Path,
     reading: Reading,
 ) -> tuple[dict[str, Array], list[str]]:
@@ -292,7 +287,7 @@ def _same_rows(
                 f"{path}: column `{head.full}` has time stamps of its own: say how to bring it to those of "
                 f"`{source.heads[places['theta_m']].full}`: `resample` linear or cubic"
             )
-        cost = interpolation_cost(table["time"], own, table[name], reading.resample)
+        cost = interpolation_cost(own, table[name], reading.resample)
         table[name] = interpolated(table["time"], own, table[name], reading.resample)
         notes.append(f"{head.full} resampled ({reading.resample}), error about {cost:.2g} (rms)")
     return table, notes
@@ -329,9 +324,7 @@ def _resampled(table: dict[str, Array], reading: Reading) -> tuple[dict[str, Arr
         return table, []
     if grid.size > 2 * time.size:
         return table, []
-    cost = {
-        name: interpolation_cost(grid, time, table[name], reading.resample) for name in COLUMNS[1:] if name in table
-    }
+    cost = {name: interpolation_cost(time, table[name], reading.resample) for name in COLUMNS[1:] if name in table}
     out = {name: interpolated(grid, time, values, reading.resample) for name, values in table.items() if name != "time"}
     spoken = ", ".join(f"{name} {error:.2g} {'N.m' if name == 'u' else 'rad'}" for name, error in cost.items())
     low, high = np.quantile(1e3 * np.diff(time), (0.05, 0.95))

@@ -15,6 +15,8 @@ from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 
+Array = NDArray[np.float64]
+
 DEGREES = 180.0 / math.pi
 LARGE_TRAVEL = 0.5  # rad of the load, beyond which twist no longer disturbs the slope
 LONGEST_STEP = 1.5  # rad of the shaft's oscillation
@@ -110,40 +112,65 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> 
         )
 
 
-def moved_inertia(record: Record, p: Mapping[str, float]) -> float | None:
-    """Return the inertia at the motor [kg.m2] that the torque seems to move, or None where the record does not tell.
-
-    The momentum balance ``integral of T = J omega + b theta + constant + slope t`` is fitted to smoothed data.
+def smoothed(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
+    """Return impulse, speed and angle of the motor, smoothed over a short time.
 
     Args:
-        record: of the machine, without missing samples.
-        p: parameters of the model by name, of which ``tau`` counts.
+        record: without missing samples.
+        tau: lag of the drive [s].
 
     Returns:
-        The inertia; negative where the motion goes against the torque.
+        Impulse of the torque [N.m.s], speed [rad/s] and angle [rad], and how many rows each is a mean of.
     """
-    width = max(5, round(SMOOTHING_TIME / record.step))
-    if record.size < 20 * width:
-        return None
+    width = _smoothing_width(record)
     kernel = np.ones(width) / width
-    torque = lagged(record.u, p["tau"], record.step)
-    impulse = np.cumsum(torque) * record.step
+    impulse = np.cumsum(lagged(record.u, tau, record.step)) * record.step
     speed = np.gradient(record.theta_m, record.step)
-    speed, angle, impulse = (np.convolve(v, kernel, "valid") for v in (speed, record.theta_m, impulse))
+    impulse, speed, angle = (np.convolve(v, kernel, "valid") for v in (impulse, speed, record.theta_m))
+    return impulse, speed, angle, width
+
+
+def _smoothing_width(record: Record) -> int:
+    return max(5, round(SMOOTHING_TIME / record.step))
+
+
+def momentum_balance(impulse: Array, speed: Array, angle: Array) -> tuple[float, float, float]:
+    """Return what a torque's impulse moves, a constant torque apart.
+
+    Args:
+        impulse: (n,) of the torque [N.m.s].
+        speed: (n,) of the motor [rad/s].
+        angle: (n,) of the motor [rad].
+
+    Returns:
+        Inertia [kg.m2] and viscous friction [N.m.s/rad] at the motor, and the share of the impulse they explain.
+    """
+    time = np.linspace(-1.0, 1.0, speed.size)
+    trend = np.column_stack([np.ones_like(time), time])
+    table = np.column_stack([speed, angle, trend])
+    solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
+    plain, *_ = np.linalg.lstsq(trend, impulse, rcond=None)
+    share = 1.0 - float(np.var(impulse - table @ solution)) / max(float(np.var(impulse - trend @ plain)), 1e-300)
+    return float(solution[0]), float(solution[1]), share
+
+
+def _moved_inertia(record: Record, tau: float) -> float | None:
+    """Return the inertia at the motor [kg.m2] that the torque seems to move; negative where they go opposite ways.
+
+    None where the record does not tell.
+    """
+    if record.size < 20 * _smoothing_width(record):
+        return None
+    impulse, speed, angle, _ = smoothed(record, tau)
     if np.ptp(angle) < 0.2:
         return None
-    time = np.linspace(-1.0, 1.0, speed.size)
-    table = np.column_stack([speed, angle, np.ones_like(time), time])
-    solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
-    left = impulse - table @ solution
-    trend, *_ = np.linalg.lstsq(table[:, 2:], impulse, rcond=None)
-    explained = 1.0 - float(np.var(left)) / max(float(np.var(impulse - table[:, 2:] @ trend)), 1e-300)
-    return float(solution[0]) if explained >= NEEDED_FIT else None
+    inertia, _, share = momentum_balance(impulse, speed, angle)
+    return inertia if share >= NEEDED_FIT else None
 
 
 def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
     """Compare the inertia that the torque moves with the model's; both may be what is wrong."""
-    moved = moved_inertia(record, p)
+    moved = _moved_inertia(record, p["tau"])
     if moved is None:
         return
     own = p["J_m"] + p["J_l"] / p["i"] ** 2

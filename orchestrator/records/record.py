@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from orchestrator.errors import RecordError
-from orchestrator.records.arrays import MINIMUM_ROWS, Record, lined
+from orchestrator.records.arrays import MINIMUM_ROWS, Record, lined, runs_of
 from orchestrator.records.checks import (
     check_driven,
     check_finite,
@@ -160,9 +160,8 @@ def _interpolated(u: Array) -> tuple[Array, Array | None]:
         return u, None
     filled = lined(u)
     deviation = np.zeros(u.size)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], lost.astype(np.int8), [0]])))
     known: dict[int, float] = {}
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in zip(*runs_of(lost), strict=True):
         length = int(stop - start)
         if length not in known:
             span = min(length + 1, u.size - 2)

@@ -70,6 +70,28 @@ def parse_stamps(cells: Sequence[str], label: str, path: Path, before: int = 0) 
     return out.view("datetime64[ns]")
 
 
+def seconds_of(stamps: NDArray[Any], label: str, path: Path) -> NDArray[np.float64]:
+    """Return stamps as seconds from the first one on.
+
+    Args:
+        stamps: (n,) datetime64.
+        label: name of the column, for messages.
+        path: of the file, for messages.
+
+    Returns:
+        Shape (n,); NaN where there is no stamp.
+
+    Raises:
+        RecordError: there is none at all.
+    """
+    stamps = stamps.astype("datetime64[ns]")
+    good = ~np.isnat(stamps)
+    if not good.any():
+        raise RecordError(f"{path}: column `{label}` must hold times, but is empty")
+    away = (stamps - stamps[good][0]).astype(np.int64).astype(float) * 1e-9
+    return np.where(good, away, np.nan)
+
+
 def _nanoseconds(
     found: re.Match[str],
     pattern: re.Pattern[str],

@@ -12,6 +12,7 @@ from orchestrator.errors import RecordError
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
 from orchestrator.records.names import find_named, listed, near, recognised_time
+from orchestrator.records.stamps import seconds_of
 from orchestrator.records.units import parse_unit
 from orchestrator.shared.units import KnownUnit
 from orchestrator.shared.units import parse_unit as parse_any_unit
@@ -154,12 +155,7 @@ def _seconds(raw: NDArray[Any], head: Head, wanted: Wanted, factor: float, path:
     """Return times in seconds, and in which form they were."""
     label = head.full or head.name
     if raw.dtype.kind == "M":
-        stamps = raw.astype("datetime64[ns]")
-        good = ~np.isnat(stamps)
-        if not good.any():
-            raise RecordError(f"{path}: column `{label}` must hold times, but is empty")
-        away = (stamps - stamps[good][0]).astype(np.int64).astype(float) * 1e-9
-        return np.where(good, away, np.nan), "as date and time"
+        return seconds_of(raw, label, path), "as date and time"
     numbers = raw.astype(float)
     if factor != 1.0:
         return factor * numbers, f"in {factor:g} s"

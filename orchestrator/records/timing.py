@@ -238,14 +238,13 @@ def interpolated(grid: Array, time: Array, values: Array, how: str) -> Array:
     return out
 
 
-def interpolation_cost(grid: Array, time: Array, values: Array, how: str) -> float:
+def interpolation_cost(time: Array, values: Array, how: str) -> float:
     """Return the root mean square error that resampling makes, measured on every second row of the file itself.
 
     Every other row is left out and interpolated from its neighbours; at half the distance the error is a quarter
     (linear) or a sixteenth (cubic) of that.
 
     Args:
-        grid: (m,) [s].
         time: (n,) stamps [s].
         values: (n,); NaN: missing.
         how: "linear" or "cubic".

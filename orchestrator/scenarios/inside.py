@@ -32,7 +32,7 @@ def opened(job: UnpackedRun) -> Callable[[Any], list[Any]]:
     session = Session(job.system, job.record, job.algorithm, job.stop, job.start)
 
     def run(start: Any) -> list[Any]:
-        result = session.run(start)
+        result = session.run(start, allow_early_end=True)
         s = result.statistics
         remarks = [[remark.instance, remark.text, remark.count] for remark in result.remarks]
         return [result.values, s.steps, s.rejected, dict(s.do_steps), s.sweeps, s.loop, remarks]

@@ -110,7 +110,7 @@ def run_safely(scenario: Scenario, safety: Safety) -> Recording:
         result = _in_child(scenario, safety, foreign)
     else:
         with scenario.session() as session:
-            result = session.run()
+            result = session.run(allow_early_end=True)
     if not safety.allow_nonfinite:
         _require_finite(result)
     return result
@@ -183,7 +183,7 @@ def _in_processes(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Re
             instances.append(replace(instance, create=made))
         try:
             with replace(scenario, system=replace(system, instances=tuple(instances))).session() as session:
-                return session.run()
+                return session.run(allow_early_end=True)
         except OrchestratorError as error:
             text = str(error)
             for folder, origin in origins.items():

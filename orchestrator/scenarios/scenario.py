@@ -292,21 +292,17 @@ class _Reader:
                 found.append(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit))
         return tuple(found)
 
-    @staticmethod
-    def _variable(instances: tuple[Instance, ...], target: str) -> Variable | None:
-        """The variable that a source feeds, if there is one."""
-        return System(instances).variable(target)
-
     def sources(
         self, tables: list[Any], instances: tuple[Instance, ...], step: float, start: float
     ) -> tuple[SignalSource, ...]:
         found = []
+        system = System(instances)
         for k, table in enumerate(tables):
             path = f"$.sources[{k}]"
             source = _converted(table, _AnySource, path, self.problems)
             if source is None:
                 continue
-            variable = self._variable(instances, source.target)
+            variable = system.variable(source.target)
             before = len(self.problems)
             for name in ("value", "after", "time", "before", "amplitude", "frequency", "phase", "offset", "delay"):
                 self._bounded(source, name, path, math.isfinite, "finite")

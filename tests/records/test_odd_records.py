@@ -67,6 +67,13 @@ def test_a_motor_that_stands_still_in_most_of_a_record_is_said(table: Table, tmp
     assert not [note for note in read_record(_write(tmp_path / "all.csv", table)).notes if "stands still" in note]
 
 
+def test_an_empty_time_is_refused_in_words_where_its_counter_is_said_to_overflow(table: Table, tmp_path: Path) -> None:
+    path = _write(tmp_path / "log.csv", table | {"time": np.full(table["time"].size, np.nan)})
+    for column in (Column(), Column(modulo=65536.0)):
+        with pytest.raises(RecordError, match="column `time` must be a finite number"):
+            read_record(path, {"time": column})
+
+
 def _servo(torque: np.ndarray) -> Record:
     time = 0.01 * np.arange(1500)
     speed = np.sin(2.0 * time)

@@ -11,6 +11,7 @@ from orchestrator.api.scenario_sweep import sweep_scenario
 from orchestrator.api.simulate import simulate
 from orchestrator.cli import main
 from orchestrator.errors import SlaveError
+from orchestrator.scenarios.scenario import load_scenario
 from tests.support.answers_fmu import build_answers_fmu
 from tests.support.c_fmu import have_compiler
 
@@ -68,6 +69,19 @@ def test_a_run_that_an_fmu_ends_keeps_what_it_has(tmp_path: Path, algorithm: str
     assert result.time[-1] == pytest.approx(0.7)
     assert np.allclose(result["a.x"], 2.0 * result.time)
     assert "a: ended the run at t = 0.7 s of 1 s" in str(result.run.remarks[0])
+
+
+@ALGORITHMS
+@pytest.mark.parametrize("step", [0.01, 0.0004])
+def test_a_session_takes_a_run_that_ended_early_only_where_it_is_asked_to(
+    tmp_path: Path, algorithm: str, step: float
+) -> None:
+    asked = load_scenario(scenario(tmp_path, "ENDS_AT=0.7", algorithm=algorithm, step=step))
+    with asked.session() as session:
+        for _ in range(2):  # a session goes on after it
+            with pytest.raises(SlaveError, match=r"Discard.* wants the run to end, but the whole run is needed"):
+                session.run()
+            assert session.run(allow_early_end=True).time[-1] == pytest.approx(0.7)
 
 
 def test_the_adaptive_master_says_that_it_does_not_end_runs(tmp_path: Path) -> None:

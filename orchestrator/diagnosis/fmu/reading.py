@@ -13,7 +13,7 @@ from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu_settings import DEFAULT, ReadSettings
 from orchestrator.errors import RecordError
 from orchestrator.master.units import conversion, resolve
-from orchestrator.records.arrays import lined
+from orchestrator.records.arrays import lined, runs_of
 from orchestrator.records.tables import NamedColumns, Wanted, column_names, known_unit, read_columns
 from orchestrator.records.timing import interpolated
 
@@ -149,8 +149,8 @@ def _filled(values: Array, time: Array, column: _Column, path: Path) -> tuple[Ar
     lost = np.isnan(values)
     if not lost.any():
         return values, []
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], lost.astype(np.int8), [0]])))
-    longest = int(np.max(edges[1::2] - edges[::2]))
+    starts, stops = runs_of(lost)
+    longest = int(np.max(stops - starts))
     count = int(np.count_nonzero(lost))
     if count > MOST_MISSING * values.size or longest > LONGEST_GAP or lost[0]:
         raise RecordError(

@@ -167,10 +167,7 @@ class FlankProblem:
         before = -math.inf
         for _ in range(self.settings.rounds if rounds is None else rounds):
             values = fit.values.copy()
-            if values[ALPHA] < 0.0:
-                values[ALPHA] = -values[ALPHA]
-            least = 0.1 * math.sqrt(fit.variance)
-            values[ALPHA] = max(values[ALPHA], least)
+            values[ALPHA] = max(fit.alpha, 0.1 * math.sqrt(fit.variance))
             twist = self._table(fit.base) @ values - self.points.load
             variance = fit.variance + self.points.variance
             densities(twist, variance, float(values[ALPHA]), mask, density)
@@ -250,7 +247,7 @@ def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Deviations, float]:
         mask = np.ones(n, dtype=np.bool_)
         mask[rows] = False
         without = problem.refined(fit, mask, problem.settings.block_rounds)
-        found.append((abs(without.alpha), without.late, without.ratio))
+        found.append((without.alpha, without.late, without.ratio))
     values = np.array(found)
     errors = np.sqrt((blocks - 1.0) / blocks * np.sum((values - values.mean(axis=0)) ** 2, axis=0))
     return Deviations(*(float(error) for error in errors)), float(t.ppf(0.975, blocks - 1))

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from orchestrator.estimation.innovations import Array
+from orchestrator.records.arrays import runs_of
 from orchestrator.records.record import Record, quantisation_step
 
 REST_ROWS = 5  # in which neither encoder moves by more than a count: the machine rests
@@ -118,15 +118,9 @@ def _rests(record: Record, motor_count: float, load_count: float) -> tuple[Array
     if load_count <= 0.0:
         return np.empty(0), np.empty(0)
     still = (np.diff(record.theta_l) == 0.0) & (np.abs(np.diff(record.theta_m)) <= 1.5 * motor_count)
-    starts, stops = _runs(still)
+    starts, stops = runs_of(still)  # of steps: from the first row of a rest to its last
     long = stops - starts >= REST_ROWS
     middle = (starts[long] + stops[long]) // 2
     within = np.abs(record.theta_m[stops[long]] - record.theta_m[starts[long]]) <= 1.5 * motor_count
     middle = middle[within]
     return record.time[middle], record.theta_l[middle]
-
-
-def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return first and last row of each run in which ``flags`` hold from row to row."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return edges[::2], edges[1::2]

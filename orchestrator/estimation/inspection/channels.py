@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from orchestrator.records.arrays import runs_of
 from orchestrator.records.record import Record, quantisation_step
 from orchestrator.shared.inference.noise import robust_noise
 
@@ -14,7 +15,6 @@ Array = NDArray[np.float64]
 
 BANDS = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)  # Hz, edges of the bands of the excitation
 LONGEST_LAG = 0.1  # s, of one encoder behind the other
-LEAST_REVERSALS = 4  # of the speed, for which a torque of one sign is odd
 PARTS = 4  # of a record, whose spread tells a standard error
 
 
@@ -93,8 +93,8 @@ def _saturated(values: Array) -> float:
         return 0.0
     share = 0
     for end in (values.min(), values.max()):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], (values == end).astype(np.int8), [0]])))
-        lengths = edges[1::2] - edges[::2]
+        starts, stops = runs_of(values == end)
+        lengths = stops - starts
         share += int(lengths[lengths >= 3].sum())
     return share / values.size
 
@@ -177,28 +177,6 @@ def reversals_of(record: Record) -> tuple[int | None, int]:
     width = max(1, round(0.02 / record.step))
     speed = np.convolve(np.gradient(filled.theta_m, filled.step), np.ones(width) / width, "same")
     return _sign_changes(filled.u) if record.has_torque else None, _sign_changes(speed)
-
-
-def hints_of(record: Record) -> list[str]:
-    """Return what looks as if the log held something else than its names say.
-
-    Args:
-        record: the record.
-
-    Returns:
-        A sentence each.
-    """
-    if not record.has_torque:
-        return []
-    _, speed = reversals_of(record)
-    one_way = bool(np.all(record.u >= 0.0) or np.all(record.u <= 0.0))
-    if not one_way or speed < LEAST_REVERSALS:
-        return []
-    return [
-        f"The torque never changes its sign, the motor's speed does so {speed} times: the log may hold the torque's "
-        "size alone, or a sign bit (servos whose load counts from 0 to 2047 mean the other direction from 1024 on). "
-        "Write signed values into the log."
-    ]
 
 
 def _sign_changes(values: Array) -> int:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model, ModelParameter
-from orchestrator.records.plausibility import SMOOTHING_TIME, check_plausible, lagged
+from orchestrator.records.plausibility import check_plausible, momentum_balance, smoothed
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.inverse import pseudo_inverse
 
@@ -50,7 +50,7 @@ def is_of(record: Record, model: Model) -> bool:
     p = {name: entry.value for name, entry in model.parameters.items()}
     record = record.filled()
     same = record.theta_l is None or abs(_ratio(record)[0] / p["i"] - 1.0) < SAME_RATIO
-    _, inertia, _, _ = _balance_at(record, p["tau"])
+    inertia, _, _ = momentum_balance(*smoothed(record, p["tau"])[:3])
     relative = inertia / (p["J_m"] + p["J_l"] / p["i"] ** 2)
     return same and 1.0 / SAME_INERTIA < relative < SAME_INERTIA
 
@@ -120,40 +120,11 @@ def as_model(rough: RoughMachine, base: Model) -> Model:
     return replace(base, parameters=parameters, source="rough machine")
 
 
-def smoothed(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
-    """Return impulse, speed and angle of the motor, smoothed over a short time.
-
-    Args:
-        record: without missing samples.
-        tau: lag of the drive [s].
-
-    Returns:
-        Impulse of the torque [N.m.s], speed [rad/s] and angle [rad], and how many rows each is a mean of.
-    """
-    width = max(5, round(SMOOTHING_TIME / record.step))
-    kernel = np.ones(width) / width
-    impulse = np.cumsum(lagged(record.u, tau, record.step)) * record.step
-    speed = np.gradient(record.theta_m, record.step)
-    impulse, speed, angle = (np.convolve(v, kernel, "valid") for v in (impulse, speed, record.theta_m))
-    return impulse, speed, angle, width
-
-
 def _balance(record: Record) -> tuple[float, float, float, float]:
     """Return lag [s], inertia [kg.m2] and viscous friction at the motor, and the share of the impulse they explain."""
-    tau, inertia, friction, share = max((_balance_at(record, tau) for tau in LAGS), key=lambda found: found[3])
+    tried = ((tau, *momentum_balance(*smoothed(record, tau)[:3])) for tau in LAGS)
+    tau, inertia, friction, share = max(tried, key=lambda found: found[3])
     return tau, abs(inertia) or 1.0, abs(friction), share
-
-
-def _balance_at(record: Record, tau: float) -> tuple[float, float, float, float]:
-    """Return the lag [s] that is given, and what goes with it, as ``_balance`` does."""
-    impulse, speed, angle, _ = smoothed(record, tau)
-    time = np.linspace(-1.0, 1.0, speed.size)
-    trend = np.column_stack([np.ones_like(time), time])
-    table = np.column_stack([speed, angle, trend])
-    solution, *_ = np.linalg.lstsq(table, impulse, rcond=None)
-    plain, *_ = np.linalg.lstsq(trend, impulse, rcond=None)
-    share = 1.0 - float(np.var(impulse - table @ solution)) / max(float(np.var(impulse - trend @ plain)), 1e-300)
-    return tau, float(solution[0]), float(solution[1]), share
 
 
 def _shaft_frequency(record: Record, ratio: float) -> float:

@@ -9,11 +9,10 @@ import numpy as np
 from orchestrator.errors import RecordError
 from orchestrator.estimation.design import Excitation, MachineLimits, bound_of_excitation, simple_candidates
 from orchestrator.estimation.innovations import affine_model, simulate
-from orchestrator.estimation.inspection.machine import smoothed
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.records.model_file import Model
-from orchestrator.records.plausibility import check_plausible
+from orchestrator.records.plausibility import check_plausible, smoothed
 from orchestrator.records.record import Record
 from pyfmu_sources.drivetrain_parameters import P_ALPHA, P_I
 

@@ -4,20 +4,16 @@ import math
 
 from orchestrator.estimation.inspection.sufficiency import SEEN, SIZES, Sufficiency
 from orchestrator.estimation.protocol import Estimate
-from orchestrator.records.record import Record
 
 MANY_REVERSALS = 4  # of the speed, in which a torque that drives them changes its sign too
 MUCH_BETTER = 0.9  # share of the record's bound below which another experiment is worth a word
 
 
-def verdict_of(
-    record: Record, found: Sufficiency, reversals: tuple[int | None, int], two_angles: Estimate | None
-) -> list[str]:
+def verdict_of(found: Sufficiency, reversals: tuple[int | None, int], two_angles: Estimate | None) -> list[str]:
     """Return whether a record suffices to see a gap, what it lacks, and what would do better.
 
     Args:
-        record: the record.
-        found: what it shows of gaps.
+        found: what the record shows of gaps.
         reversals: sign changes of torque, None without one, and of motor speed.
         two_angles: the half-gap from the two angles alone, where that was looked for.
 
@@ -29,7 +25,8 @@ def verdict_of(
     if torque == 0 and speed >= MANY_REVERSALS:
         said.append(
             f"The torque never changes its sign, though the motor's speed does {speed} times: either something else "
-            "drives the machine, or the log has lost the sign (a magnitude, or a sign in a bit of its own)."
+            "drives the machine, or the log has lost the sign (a magnitude, or a sign in a bit of its own: servos "
+            "whose load counts from 0 to 2047 mean the other direction from 1024 on). Write signed values into the log."
         )
     if not found.why:
         said.append(_of_experiments(found))

@@ -71,7 +71,7 @@ def build(source: ResultDocument) -> Report:
     results = read(source.results, DiagnoseFound)
     badge, label, sentence = VERDICTS[results.verdict]
     live = results.live
-    sections: list[Section] = [*_in_short(results), *trust_section(results.trust), *effect_tables(results.effects)]
+    sections: list[Section] = [*_in_short(results), *trust_section(results.trust), *_effect_tables(results.effects)]
     sections += _nuisances(results.nuisances)
     if results.notes:
         sections.append(Text("Take note", tuple(_sentence(note) for note in results.notes)))
@@ -80,12 +80,12 @@ def build(source: ResultDocument) -> Report:
     if results.validation is not None:
         sections.append(_test_table(f"Misfit on the other record, {results.validation.source}", results.validation))
     sections += _torque_left([*results.test, *([results.validation] if results.validation else [])])
-    sections += picture(source, "missing_torque", "Missing torque", MISSING)
-    sections += picture(source, "blocks", "Sizes block by block", BLOCKS)
+    sections += _figure(source, "missing_torque", "Missing torque", MISSING)
+    sections += _figure(source, "blocks", "Sizes block by block", BLOCKS)
     sections += [*_remaining(results.remaining), *_learned(source, results.learned_law)]
     sections += record_plots(source, "diagnose.csv", live.rows if live else ())
     sections += plant_section(source, "diagnose.csv", live)
-    sections += [parameter_table(results.parameters), *candidate_table(results.candidates), *_analysis(results)]
+    sections += [_parameter_table(results.parameters), *_candidate_table(results.candidates), *_analysis(results)]
     sections += sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"})
     return Report(
         title="Diagnosis",
@@ -115,22 +115,14 @@ def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
 
 
-def place_words(name: str, site: str) -> str:
-    """Return an effect at its site in words.
-
-    Args:
-        name: of the effect.
-        site: where it acts.
-
-    Returns:
-        The words.
-    """
+def _place_words(name: str, site: str) -> str:
+    """Return an effect at its site in words."""
     name = words(name).replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
     return f"{name} {SITES.get(site, site)}"
 
 
 def _named(effects: Sequence[EffectFound]) -> str:
-    named = [f"{place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
+    named = [f"{_place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
     listed = " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]]))
     return f"The model lacks {listed}." if named else ""
 
@@ -147,25 +139,18 @@ def _closed(tests: Sequence[TestFound]) -> str:
     return f"On test data the rms misfit {'; that '.join(parts)}." if parts else ""
 
 
-def effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
-    """Return what the model lacks, how sure each effect is, and why.
-
-    Args:
-        effects: of the result.
-
-    Returns:
-        Two tables; none without effects.
-    """
+def _effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
+    """Return what the model lacks, how sure each effect is, and why: two tables, none without effects."""
     if not effects:
         return []
     sizes = tuple(
-        (place_words(e.name, e.site), e.grade, words(name), quantity(p))
+        (_place_words(e.name, e.site), e.grade, words(name), _quantity(p))
         for e in effects
         for name, p in e.parameters.items()
     )
     reasons = tuple(
         (
-            place_words(e.name, e.site), e.grade, _percent(e.gain), e.t, _percent(e.explains.torque),
+            _place_words(e.name, e.site), e.grade, _percent(e.gain), e.t, _percent(e.explains.torque),
             _percent(e.explains.motion), ", ".join(_label_words(label) for label in e.family) or None,
             ", ".join(e.lowered_by) or None,
         )
@@ -185,26 +170,19 @@ def effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
 
 def _label_words(label: str) -> str:
     name, _, site = label.partition("@")
-    return place_words(name, site)
+    return _place_words(name, site)
 
 
 def _nuisances(nuisances: Sequence[NuisanceFound]) -> list[Section]:
     rows = tuple(
-        (words(n.name), n.grade, words(name), quantity(p)) for n in nuisances for name, p in n.parameters.items()
+        (words(n.name), n.grade, words(name), _quantity(p)) for n in nuisances for name, p in n.parameters.items()
     )
     columns = tuple(map(TableColumn, ("property", "grade", "quantity", "value")))
     return [ReportTable("What the log has, and the machine has not", columns, rows)] if rows else []
 
 
-def quantity(p: ValueFound) -> str:
-    """Return a value with its interval and unit.
-
-    Args:
-        p: the value.
-
-    Returns:
-        The text.
-    """
+def _quantity(p: ValueFound) -> str:
+    """Return a value with its interval and unit."""
     if p.value is None:
         return "unknown"
     unit = "" if p.unit in (None, "1") else f" {p.unit}"
@@ -245,18 +223,8 @@ def _torque_left(tests: Sequence[TestFound]) -> list[Section]:
     return [ReportTable("Torque that is left", columns, rows, note)] if rows else []
 
 
-def picture(source: ResultDocument, name: str, title: str, note: str) -> list[Section]:
-    """Return a figure of the diagnosis, where there is one.
-
-    Args:
-        source: of the result.
-        name: of the file, behind ``diagnose_``.
-        title: of the section.
-        note: below it.
-
-    Returns:
-        One section or none.
-    """
+def _figure(source: ResultDocument, name: str, title: str, note: str) -> list[Section]:
+    """Return a figure of the diagnosis, where there is one."""
     path = source.directory / f"diagnose_{name}.png"
     return [Picture(title, path, note)] if path.is_file() else []
 
@@ -277,7 +245,7 @@ def _remaining(remaining: RemainingFound) -> list[Section]:
 
 def _learned(source: ResultDocument, law: LearnedFound | None) -> list[Section]:
     """Return the law that was learned from what no effect explains: sentence, curve and knots."""
-    figure = picture(source, "learned_law", "The strongest curve of what is left", "")
+    figure = _figure(source, "learned_law", "The strongest curve of what is left", "")
     if law is None:
         return figure
     columns = (
@@ -300,15 +268,8 @@ def _in_the_fmu(law: LearnedFound) -> tuple[str, ...]:
     return (f"The corrected FMU has it, off until its parameter {fmu.parameter} is 1; then it misses {missed}.",)
 
 
-def parameter_table(parameters: Mapping[str, ParameterFound]) -> ReportTable:
-    """Return the model's own parameters beside their nominal values.
-
-    Args:
-        parameters: by name.
-
-    Returns:
-        The table.
-    """
+def _parameter_table(parameters: Mapping[str, ParameterFound]) -> ReportTable:
+    """Return the model's own parameters beside their nominal values."""
     columns = ("parameter", "nominal", "value", "standard error", "lower", "upper", "change [%]", "unit")
     rows = tuple(
         (name, p.nominal, p.value, p.standard_error, *(p.interval or (None, None)), _change(p), p.unit)
@@ -323,15 +284,8 @@ def _change(p: ParameterFound) -> float | None:
     return 100.0 * (p.value - p.nominal) / p.nominal if p.nominal and p.value is not None else None
 
 
-def candidate_table(steps: Sequence[StepFound]) -> list[Section]:
-    """Return what was tried in each step of the search.
-
-    Args:
-        steps: of the search.
-
-    Returns:
-        The table; none without steps.
-    """
+def _candidate_table(steps: Sequence[StepFound]) -> list[Section]:
+    """Return what was tried in each step of the search."""
     rows: list[tuple[Cell, ...]] = []
     for number, step in enumerate(steps, start=1):
         base = ", ".join(_label_words(label) for label in step.on_top_of) or "re-fitted parameters"

@@ -1,6 +1,7 @@
 """Names and schemas that reading and writing share."""
 
 import os
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
@@ -152,15 +153,8 @@ def solver_tolerance(system: etree._Element) -> float | None:
     Returns:
         The tolerance; None where there is none, or OMSimulator's default.
     """
-    for annotation in system.findall(f"{tag('ssd', 'Annotations')}/{tag('ssc', 'Annotation')}"):
-        for found in annotation.findall(f".//{tag('oms', 'SimulationInformation')}/*[@relativeTolerance]"):
-            try:
-                value = float(str(found.get("relativeTolerance")))
-            except ValueError:
-                continue
-            if annotation.get("type") == OMS and 0.0 < value < 1.0 and value != OMS_TOLERANCE:
-                return value
-    return None
+    stated = _stated(system, "*", "relativeTolerance")
+    return next((value for value in stated if 0.0 < value < 1.0 and value != OMS_TOLERANCE), None)
 
 
 def oms_step(system: etree._Element) -> float | None:
@@ -172,15 +166,18 @@ def oms_step(system: etree._Element) -> float | None:
     Returns:
         The step [s]; None where there is none.
     """
-    for annotation in system.findall(f"{tag('ssd', 'Annotations')}/{tag('ssc', 'Annotation')}"):
-        for found in annotation.findall(f".//{tag('oms', 'SimulationInformation')}/{tag('oms', 'FixedStepMaster')}"):
+    stated = _stated(system, tag("oms", "FixedStepMaster"), "stepSize")
+    return next((value for value in stated if 0.0 < value < float("inf")), None)
+
+
+def _stated(system: etree._Element, element: str, attribute: str) -> Iterator[float]:
+    """Yield the numbers in an attribute of elements of OMSimulator's SimulationInformation."""
+    for annotation in system.findall(f"{tag('ssd', 'Annotations')}/{tag('ssc', 'Annotation')}[@type='{OMS}']"):
+        for found in annotation.findall(f".//{tag('oms', 'SimulationInformation')}/{element}[@{attribute}]"):
             try:
-                value = float(str(found.get("stepSize")))
+                yield float(str(found.get(attribute)))
             except ValueError:
                 continue
-            if annotation.get("type") == OMS and 0.0 < value < float("inf"):
-                return value
-    return None
 
 
 def archived(folder: Path, source: str) -> Path | None:

@@ -157,7 +157,7 @@ def test_a_lost_sign_of_the_torque_gets_a_hint() -> None:
     swung = {"time": time, "u": np.abs(np.sin(6.3 * time)), "theta_m": np.sin(6.3 * time)}
     whole, lost = (record_from_columns(swung | {"u": u}, "swing") for u in (np.sin(6.3 * time), swung["u"]))
     nothing = Sufficiency((), np.inf, time.size, (), np.inf, np.nan, "of this test")
-    hints = [verdict_of(one, nothing, reversals_of(one), None)[1:] for one in (whole, lost)]
+    hints = [verdict_of(nothing, reversals_of(one), None)[1:] for one in (whole, lost)]
     assert hints[0] == []
     assert "the log has lost the sign" in hints[1][0]
 
