@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any, Protocol
 
 import numpy as np
@@ -83,6 +84,23 @@ class Variable:
     reference: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class PeriodicClock:
+    """An input clock that ticks at ``start + shift + n * interval`` of a run.
+
+    Attributes:
+        interval: [s], exact; ``None``: the master must be told it, for the model does not say.
+        shift: of the first tick [s], exact.
+        variables: names of the variables that belong to the clock: they are set and read while it is active.
+        reference: the slave's own handle.
+    """
+
+    interval: Fraction | None
+    shift: Fraction = Fraction(0)
+    variables: tuple[str, ...] = ()
+    reference: int = 0
+
+
 @dataclass(frozen=True)
 class ModelInterface:
     """The interface that all slaves made from one model share.
@@ -95,6 +113,10 @@ class ModelInterface:
             missing here depends on every input, for all that is known.
         can_save_state: ``get_state``, ``set_state`` and ``free_state`` work.
         can_vary_step: ``do_step`` takes steps of any length.
+        has_events: its slaves are ``EventSlave``.
+        output_derivatives: order up to which ``EventSlave.output_rates`` knows derivatives of outputs; 0: none.
+        takes_inputs_inside_steps: ``EventSlave.feed`` works.
+        clocks: periodic input clocks by name, which the master ticks.
     """
 
     name: str
@@ -103,6 +125,10 @@ class ModelInterface:
     feedthrough: Mapping[str, frozenset[str]] = field(default_factory=dict)
     can_save_state: bool = True
     can_vary_step: bool = True
+    has_events: bool = False
+    output_derivatives: int = 0
+    takes_inputs_inside_steps: bool = False
+    clocks: Mapping[str, "PeriodicClock"] = field(default_factory=dict)
 
     def named(self, causality: str) -> tuple[str, ...]:
         """Return the names of the variables with this causality, in the order of declaration.
@@ -271,3 +297,100 @@ class Slave(Protocol):
 
     def close(self) -> None:
         """Release everything. May be called at any time and more than once; never raises."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepOutcome:
+    """Where a step of an ``EventSlave`` ended.
+
+    Attributes:
+        reached: [s]; before the end of the step where an event came first.
+        event: an event is due at ``reached``: the slave must enter event mode.
+    """
+
+    reached: float
+    event: bool
+
+
+@dataclass(frozen=True, slots=True)
+class EventUpdate:
+    """What a slave says at an instant in event mode.
+
+    Attributes:
+        again: it needs another instant at the same time, after all slaves have exchanged their values.
+        next_event: time of its next event [s], which steps must not pass; ``None``: it knows of none.
+        ends_run: it wants the run to end.
+    """
+
+    again: bool = False
+    next_event: float | None = None
+    ends_run: bool = False
+
+
+class EventSlave(Slave, Protocol):
+    """A slave with events, whose steps may end early, and with clocks.
+
+    Call order, in place of ``(send* do_step receive*)*`` of ``Slave``::
+
+        start()                                 ends initialisation; the slave is in event mode
+        (send* receive* [tick] update_discrete_states)*   instants at one time, until none needs another
+        leave_event_mode()
+        (send* step receive* (enter_event_mode instants leave_event_mode)?)*
+
+    ``get_state`` and ``set_state`` work outside event mode. ``do_step`` is ``step`` for those who know no events:
+    it takes every event on its way by itself, one slave for itself.
+    """
+
+    def step(self, time: float, step: float) -> StepOutcome:
+        """Advance from ``time`` by at most ``step`` [s]; stop at the first event.
+
+        Args:
+            time: [s].
+            step: [s], positive.
+
+        Returns:
+            Where the step ended.
+
+        Raises:
+            StepDiscardedError: the step was not done; the slave is well.
+            RunEndedError: the slave wants the run to end.
+        """
+
+    def enter_event_mode(self) -> None:
+        """Take an event at the present time."""
+
+    def tick(self, clocks: Sequence[str]) -> None:
+        """Activate input clocks for this instant, in event mode.
+
+        Args:
+            clocks: their names.
+        """
+
+    def update_discrete_states(self) -> EventUpdate:
+        """End an instant in event mode.
+
+        Returns:
+            What comes next.
+        """
+
+    def leave_event_mode(self) -> None:
+        """Go on in time."""
+
+    def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
+        """Say what continuous inputs are inside steps, from now on.
+
+        Args:
+            names: of inputs.
+            values: a value per name at a time [s]; ``None``: inputs are held again.
+        """
+
+    def output_rates(self, names: Sequence[str], order: int = 1) -> list[float]:
+        """Return derivatives of outputs with respect to time at the end of the last step.
+
+        Args:
+            names: of outputs.
+            order: of the derivative, at most ``ModelInterface.output_derivatives``.
+
+        Returns:
+            A derivative per name.
+        """
