@@ -147,14 +147,7 @@ class FmuDiagnosisResult(Result):
 
 
 def parameters_found(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
-    """Return re-fitted parameters as result files have them.
-
-    Args:
-        diagnosis: of the records.
-
-    Returns:
-        The parameters by name.
-    """
+    """Return re-fitted parameters as result files have them."""
     return {
         name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
         for name, one in diagnosis.parameters.items()
@@ -186,16 +179,7 @@ def _tables(found: FmuDiagnosisResult) -> Iterator[Block]:
 
 
 def read_records(records: Sequence[Path | str], given: Map, settings: DiagnosisSettings) -> tuple[list[Data], int]:
-    """Return the columns of records that a map names, at the rate that the first one asks for.
-
-    Args:
-        records: paths of the logs.
-        given: the map.
-        settings: of reading and rate.
-
-    Returns:
-        The records, and how many rows of the files come to one.
-    """
+    """Return the columns of records that a map names, at the rate that the first one asks for."""
     found = [read_data(Path(path), given, settings.fmu.read) for path in records]
     factor = factor_of(found[0], settings.fmu.rate)
     return [decimated(data, factor) for data in found], factor
@@ -216,22 +200,8 @@ def diagnose_fmu(
     """Return what records say of an FMU, and which effects are missing around it.
 
     Args:
-        record: CSV file with the columns that the map names, or several of one machine.
         fmu: any FMI 2.0 co-simulation FMU, or a scenario file of several; they run in a child process.
-        map: TOML file: columns, uncertain parameters, ports.
-        validate: another record of the same columns, to show the misfit on; nothing is fitted to it.
-        test: a record that is test data as a whole; None: the last part of each record is.
-        settings: thresholds, or the path of a TOML file of them.
-        search: False: the FMU is re-fitted and judged as it stands.
         time_limit: seconds after which the search ends with what it has; None: the map's budget.
-        progress: called with what is being done.
-
-    Returns:
-        What is missing around the FMU, with how it was found.
-
-    Raises:
-        InputError: record, FMU, map or settings cannot be used.
-        SimulationError: the FMU fails again and again.
     """
     begun = time.monotonic()
     used = chosen_settings(settings, DiagnosisSettings)
@@ -266,7 +236,7 @@ def draft_map(record: Path | str, fmu: Path | str) -> str:
         fmu: path of the FMU.
 
     Returns:
-        The TOML text.
+        Text of the map in TOML, to be completed where it says so.
 
     Raises:
         InputError: record or FMU cannot be read.

@@ -33,7 +33,7 @@ class BenchmarkResult(Result):
 
     Attributes:
         rows: one for each tool; the first that ran is the base of the ratios.
-        job: what they ran.
+        job: FMUs, connections, steps and recorded signals that every tool ran.
         rounds: turns that every tool got.
         costs: cost of this master against FMUs and steps; empty unless asked for.
         sweeps: cost of sweeps against cases, likewise.

@@ -23,7 +23,7 @@ class BuildResult(Result):
     """FMUs that are up to date; ``result["Drivetrain"]`` is the path of one.
 
     Attributes:
-        paths: path by name.
+        paths: path of each FMU by its model's name.
         remark: what this machine cannot give an FMU, or None.
         arguments: what was asked for.
     """
@@ -47,14 +47,7 @@ class BuildResult(Result):
 
 
 def shown(path: Path) -> str:
-    """Return a path for the reader.
-
-    Args:
-        path: of an FMU or a folder.
-
-    Returns:
-        The path within the repository where it lies in it, else the path as it is.
-    """
+    """Return a path for the reader."""
     try:
         return str(path.resolve().relative_to(ROOT))
     except ValueError:

@@ -63,7 +63,7 @@ class DesignResult(Result):
         """Write the record to run: ``time`` [s] and ``u`` [N.m].
 
         Args:
-            path: the file.
+            path: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.
@@ -121,15 +121,11 @@ def check_design(
     """Refuse a design that cannot be made.
 
     Args:
-        model: of the machine.
         size: half-gap that is to be seen [rad], or None where it is not known yet.
         torque_limit: [N.m].
         speed_limit: [rad/s] of the motor.
         duration: [s].
         rate: samples per second [Hz].
-
-    Raises:
-        ScenarioError: a number is out of its range, or the rate too low for the machine's own frequency.
     """
     given = {"torque_limit": torque_limit, "speed_limit": speed_limit, "duration": duration, "rate": rate}
     for name, value in (({} if size is None else {"size": size}) | given).items():

@@ -156,19 +156,7 @@ def _of_an_fmu(
 
 
 def comparable_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
-    """Return a record that the model can be compared with.
-
-    Args:
-        given: a record or its path.
-        model: the model.
-        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
-
-    Returns:
-        The record.
-
-    Raises:
-        RecordError: it is wrong, too poor for a diagnosis, or cannot be of this machine.
-    """
+    """Return a record that the model can be compared with."""
     record = as_record(given, model, **reading)
     check_record(record)
     check_plausible(record, model)

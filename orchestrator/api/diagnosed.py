@@ -136,7 +136,7 @@ class DiagnosisResult(Result):
         """Write what ``plot`` draws as CSV.
 
         Args:
-            path: the file.
+            path: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.

@@ -48,7 +48,7 @@ class EstimateResult(Result):
     """The half-gap at the load; of several methods, that of the first that applies.
 
     Attributes:
-        record: the measured record.
+        record: the measured record, as the methods used it.
         model: what it was compared with.
         methods: what each method says.
         diagnosis: what the model misses, where it does not explain the record; else None.
@@ -80,7 +80,7 @@ class EstimateResult(Result):
         """The estimate of the first method that applies.
 
         Raises:
-            NotApplicableError: none does.
+            NotApplicableError: no method gives a gap for this record.
         """
         if not self.estimates:
             raise NotApplicableError("; ".join(f"{m.method}: {m.reason}" for m in self.methods))
@@ -205,7 +205,7 @@ class EstimateResult(Result):
         """Write data, figures, ``estimate.json``, ``report.html`` and the diagnosis into a folder that exists.
 
         Args:
-            folder: where to.
+            folder: that gets the files, made when missing.
             place: the folder that they will be moved to.
             arguments: what was asked for (default: the arguments of the call).
         """
@@ -306,14 +306,7 @@ def estimate(
 
 
 def default_method(records: Sequence[Record]) -> str:
-    """Return the method for records when none is asked for.
-
-    Args:
-        records: of one machine.
-
-    Returns:
-        A key of ``METHODS``.
-    """
+    """Return the method for records when none is asked for."""
     return DEFAULT_METHOD if all(record.has_torque for record in records) else WITHOUT_TORQUE
 
 
@@ -363,11 +356,7 @@ def _fitted(
     settings: EstimationSettings,
     report: Callable[[str, float], None],
 ) -> Estimate:
-    """Return the estimate of one method; all but the likelihood take one whole record.
-
-    Raises:
-        NotApplicableError: there are several records, or samples are missing.
-    """
+    """Return the estimate of one method; all but the likelihood take one whole record."""
     if name != WITHOUT_TORQUE and not all(one.has_torque for one in (record, *more)):
         raise NotApplicableError("needs the torque `u`, which the record does not have")
     if name == DEFAULT_METHOD:

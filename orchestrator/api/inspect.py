@@ -48,7 +48,7 @@ class InspectResult(Result):
     """What a record holds and would show.
 
     Attributes:
-        record: the record.
+        record: as it was read, with the units it was converted from.
         model: the machine that the judgement is for: the given one, or a rough one from the record.
         channels: facts of each column.
         excitation: the torque's power by frequency.
@@ -95,7 +95,7 @@ class InspectResult(Result):
         """Say whether the record suffices, what it lacks, and what would do better.
 
         Returns:
-            A sentence each.
+            One sentence for each thing that the log shows or lacks.
         """
         return verdict_of(self.sufficiency, self.reversals, self.two_angles)
 
@@ -234,14 +234,7 @@ def inspect(
 
 
 def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Model, Mapping[str, str], tuple[str, ...]]:
-    """Return the machine that the judgement is for, where each of its values is from, and what was assumed.
-
-    Args:
-        record: the record.
-        base: the model that was given, or the default one.
-        given: whether one was given.
-        sure: whether nothing was assumed of the columns.
-    """
+    """Return the machine that the judgement is for, where each of its values is from, and what was assumed."""
     if given:
         said_of = {name: OF_GIVEN if name in base.stated else OF_DEFAULT for name in base.plant.linear}
         return base, said_of, ()

@@ -85,7 +85,7 @@ class PairResult(Result):
         """Write the signals as CSV.
 
         Args:
-            path: the file.
+            path: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.
@@ -166,7 +166,7 @@ def run_pair(
     Args:
         alpha: half-gap [rad] at the load.
         noise: standard deviation of the encoder noise of the loop with a gap [rad].
-        seed: of that noise.
+        seed: of the encoder noise of both loops.
         experiment: "default", "thesis" or an ``Experiment``.
         backlash_model: "dead_zone", "nordin", "hysteresis", "rigid_impact" or "elastic_impact" (default: the
             experiment's).

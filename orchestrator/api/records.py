@@ -73,20 +73,7 @@ def read_model(path: Path | str | None = None) -> Model:
 
 
 def as_record(given: Record | Path | str, model: Model, torque_needed: bool = True, **reading: Any) -> Record:
-    """Return a record, read with the model's columns where a path is given.
-
-    Args:
-        given: a record or the path of one.
-        model: whose ``columns`` say what the file calls them.
-        torque_needed: whether two angles without a torque are refused.
-        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
-
-    Returns:
-        The record.
-
-    Raises:
-        RecordError: as ``read_record``.
-    """
+    """Return a record, read with the model's columns where a path is given."""
     if not isinstance(given, Record):
         header = reading.pop("header", None)
         header = model.header if header is None else header

@@ -20,10 +20,10 @@ class ScenarioSweepResult(AnySweepResult):
     """A sweep of a scenario; of each recorded signal the last value, the extremes, the mean and the rms.
 
     Attributes:
-        scenario: what was run.
-        cases: the cases, indexable.
-        sweep: the finished cases.
-        seed: of random parameters.
+        scenario: as read from its file, before parameters are varied.
+        cases: varied values by case, computed when asked for.
+        sweep: outcomes of the finished cases, in case order.
+        seed: from which random and Sobol parameters are drawn.
         parquet: whether ``save`` writes Parquet too.
         arguments: what was asked for.
         isolation: the walls around the FMUs that are not ours.
@@ -95,7 +95,7 @@ def sweep_scenario(
         scenario: a ``Scenario`` or a TOML scenario file.
         vary: parameters by ``instance.variable``, as in ``sweep``.
         samples: draws of what ``vary`` makes random or sobol (default: 16).
-        seed: of random parameters.
+        seed: from which random and Sobol parameters are drawn.
         options: where and how cases run.
         **more: fields of ``RunOptions`` instead of ``options``.
 

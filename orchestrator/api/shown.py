@@ -73,7 +73,7 @@ class Result:
         """Write data, figures, ``COMMAND.json`` and ``report.html`` into a folder that exists.
 
         Args:
-            folder: where to.
+            folder: that gets the files, made when missing.
             place: the folder that they will be moved to, which the JSON file names.
             arguments: what was asked for, as the JSON file says it (default: the arguments of the call).
         """
@@ -109,16 +109,7 @@ class Result:
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:
-    """Make a table from any sequences of texts.
-
-    Args:
-        title: above the table.
-        columns: headings, with units in brackets.
-        rows: one text for each column.
-
-    Returns:
-        The table.
-    """
+    """Make a table from any sequences of texts."""
     return TextTable(title, tuple(columns), tuple(tuple(row) for row in rows))
 
 
@@ -144,11 +135,7 @@ def write_columns(path: Path, columns: Mapping[str, Any]) -> None:
     """Write arrays as CSV with exact numbers.
 
     Args:
-        path: the file.
         columns: arrays of shape (n,) by heading, in their order.
-
-    Raises:
-        OutputError: the file cannot be written.
     """
     import csv
 

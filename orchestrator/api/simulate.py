@@ -29,7 +29,7 @@ class SimulationResult(Result):
 
     Attributes:
         run: times, signals, units and what the run took.
-        title: of the table.
+        title: above the printed table: the scenario's name.
         isolation: the walls around the run: which FMUs are not ours, and what the system could not enforce.
         command: whose result directory ``save`` makes.
         arguments: what was asked for.
@@ -44,14 +44,8 @@ class SimulationResult(Result):
     def __getitem__(self, name: str) -> Array:
         """Return a recorded signal.
 
-        Args:
-            name: ``instance.variable``.
-
         Returns:
             Its values at ``time``, shape (n,), in ``units[name]``.
-
-        Raises:
-            KeyError: it is not recorded.
         """
         if name not in self.run.names:
             raise KeyError(f"`name` must be one of {', '.join(self.run.names)}, but is {name!r}")
@@ -81,7 +75,7 @@ class SimulationResult(Result):
         """Write times and signals as CSV.
 
         Args:
-            path: the file.
+            path: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.
@@ -201,20 +195,8 @@ def run_ssp(
     """Run an SSP file, whatever its name; see ``simulate``.
 
     Args:
-        path: the file.
         stop: end [s].
         step: communication step [s].
-        inputs: constant values of outer inputs, by name.
-        jacobi: run all FMUs side by side.
-        safety: how far FMUs are trusted.
-        tell: as in ``simulate``.
-
-    Returns:
-        Times and recorded signals.
-
-    Raises:
-        ScenarioError: the file or an argument is wrong.
-        SimulationError: the run went wrong.
     """
     if step is not None and not 0.0 < step < float("inf"):
         raise ScenarioError(f"`step` must be finite and positive, but is {step!r}", "step")

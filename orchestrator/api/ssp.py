@@ -18,7 +18,7 @@ class ExportedSsp:
     """An SSP file that was written.
 
     Attributes:
-        path: the file.
+        path: of the SSP file that was written.
         scenario: what is in it.
     """
 

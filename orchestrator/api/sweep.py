@@ -40,9 +40,9 @@ class SweepResult(AnySweepResult):
     """A sweep of the paired loops.
 
     Attributes:
-        plan: what was varied.
-        cases: the cases, indexable.
-        sweep: the finished cases.
+        plan: sizes, noise levels, seeds and varied parameters.
+        cases: varied values by case, computed when asked for.
+        sweep: outcomes of the finished cases, in case order.
         fmus: paths of the three FMUs.
         calibrations: by noise level [rad].
         parquet: whether ``save`` writes Parquet too.

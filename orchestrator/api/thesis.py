@@ -38,7 +38,7 @@ class ThesisResult(Result):
         table: Table 4.1, recomputed with the thesis's own map.
         estimates: our estimates of the table's sizes [rad].
         errata: what the thesis prints and should.
-        arguments: none.
+        arguments: always empty, as `thesis` takes none.
     """
 
     command: ClassVar[str] = "thesis"

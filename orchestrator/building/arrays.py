@@ -17,10 +17,8 @@ class Array:
     """One variable of FMI 3.0: the variables of a table from ``first`` on, in row-major order.
 
     Attributes:
-        name: without indices.
         first: place in the table, which is the value reference.
         dimensions: sizes; none for a scalar.
-        variables: the elements.
     """
 
     name: str
@@ -34,12 +32,6 @@ def arrays(table: Sequence[FmuVariable]) -> Iterator[Array]:
 
     Variables ``name[1]``, ``name[2]`` and so on that stand in a row, and are whole and alike in causality,
     variability, type and bounds, are one array; all others are scalars.
-
-    Args:
-        table: of a slave.
-
-    Yields:
-        The variables, in order.
     """
     place = 0
     while place < len(table):

@@ -32,9 +32,6 @@ def native_directory(fmi: int = 2) -> Path:
 
     Args:
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        The folder, which may not exist yet.
     """
     return default_directory(fmi) / "native"
 
@@ -49,18 +46,8 @@ def ensure_native(
     """Return the path of each native FMU in ``names`` (default: all), after building what is missing or stale.
 
     Args:
-        names: which FMUs.
-        directory: where they are (default: :func:`native_directory`).
-        force: build also what is up to date.
         here: for this platform alone, with the local compiler where there is one: a second instead of half a minute.
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        Path by name.
-
-    Raises:
-        FmuError: a name is unknown, there is no compiler, a slave is outside the translated subset, or the
-            directory cannot be written.
     """
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = native_directory(fmi) if directory is None else directory
@@ -68,11 +55,7 @@ def ensure_native(
 
 
 def _needed_compiler(here: bool = False) -> Compiler:
-    """Return the compiler, see :func:`find_compiler`.
-
-    Raises:
-        FmuError: there is none.
-    """
+    """Return the compiler, see :func:`find_compiler`."""
     compiler = find_compiler(here)
     if compiler is None:
         raise FmuError(NO_COMPILER)
@@ -80,11 +63,7 @@ def _needed_compiler(here: bool = False) -> Compiler:
 
 
 def native_remark() -> str | None:
-    """Return one line on what is missing for all platforms, or ``None``.
-
-    Returns:
-        The line.
-    """
+    """Return one line on what is missing for all platforms, or ``None``."""
     compiler = find_compiler()
     if compiler is None or compiler.is_zig:
         return None
@@ -99,12 +78,7 @@ def native_fingerprint(recipe: Recipe, compiler: Compiler, fmi: int = 2) -> str:
     """Return what changes whenever a native build would.
 
     Args:
-        recipe: of the FMU.
-        compiler: what makes the binaries.
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        A hash.
     """
     options = {
         "fmi": fmi,
@@ -154,13 +128,7 @@ def _native_members(recipe: Recipe, compiler: Compiler, fingerprint: str, fmi: i
     """Return the members of the archive.
 
     Args:
-        recipe: of the FMU.
-        compiler: what makes the binaries.
-        fingerprint: from :func:`native_fingerprint`.
         fmi: version of FMI, 2 or 3.
-
-    Raises:
-        FmuError: the slave is outside the translated subset, or the compiler fails.
     """
     cls = slave_class(recipe, fmi)
     sources = c_sources(recipe, cls, PLACEHOLDER, fmi)

@@ -56,15 +56,7 @@ def ensure_python_fmi3(
     """Return the path of each FMU of FMI 3.0 that runs Python (default: all), after building what is missing or stale.
 
     Args:
-        names: which FMUs.
         directory: where they are (default: ``fmi3/`` beside those of FMI 2.0).
-        force: build also what is up to date.
-
-    Returns:
-        Path by name.
-
-    Raises:
-        FmuError: a name is unknown, there is no C compiler for Linux, or ``directory`` cannot be written.
     """
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = default_directory(3) if directory is None else directory

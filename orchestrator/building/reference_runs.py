@@ -27,14 +27,7 @@ Row = dict[str, float]
 
 
 def reference_run(class_name: str) -> list[Row]:
-    """Return the rows of an experiment: time, the inputs held until the next row, and the outputs.
-
-    Args:
-        class_name: of the adapter.
-
-    Returns:
-        The rows, the heading first.
-    """
+    """Return the rows of an experiment: time, the inputs held until the next row, and the outputs."""
     run = {"Drivetrain": _plant, "LqrController": _controller, "KalmanEstimator": _estimator}
     return run[class_name]()
 

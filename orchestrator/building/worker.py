@@ -42,13 +42,7 @@ keep(globals())
 
 
 def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
-    """Build ``recipe`` into ``target``.
-
-    Args:
-        recipe: of the FMU.
-        target: the FMU's path.
-        fingerprint: by which a stale FMU is recognised.
-    """
+    """Build ``recipe`` into ``target``."""
     starts = default_starts(recipe.plain) | dict(recipe.starts)
     runtime = runtime_files()
     sources = {path.name: path.read_bytes() for path in closure(recipe.module)}
@@ -133,11 +127,7 @@ def pythonfmu_license() -> bytes:
 
 
 def main() -> int:
-    """Read the recipe from standard input; return 0, or 2 with one line on standard error.
-
-    Returns:
-        The exit code.
-    """
+    """Read the recipe from standard input; return 0, or 2 with one line on standard error."""
     request = json.load(sys.stdin)
     recipe = Recipe(request["name"], request["module"], request["class_name"], request["starts"], request["law"])
     try:

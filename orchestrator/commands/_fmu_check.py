@@ -22,9 +22,6 @@ from orchestrator.shared.version import __version__
 def main(argv: Sequence[str] | None = None) -> int:
     """Check FMUs and return the exit code: 0 all are ok, 1 one fails, 2 bad input.
 
-    Args:
-        argv: words of the command line (default: those of this process).
-
     Returns:
         The exit code; 130 after Ctrl-C.
     """

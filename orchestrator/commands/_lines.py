@@ -8,15 +8,7 @@ PIPE_WIDTH = 140  # of tables in a pipe; also the widest lines of text on a term
 
 
 def folded(text: str, stream: TextIO) -> str:
-    """Return lines as ``stream`` should get them: folded between words where a person reads them.
-
-    Args:
-        text: one or more lines.
-        stream: where they go.
-
-    Returns:
-        The lines.
-    """
+    """Return lines as ``stream`` should get them: folded between words where a person reads them."""
     if not stream.isatty():
         return text
     width = min(shutil.get_terminal_size().columns, PIPE_WIDTH)

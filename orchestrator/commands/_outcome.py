@@ -14,15 +14,8 @@ from orchestrator.errors import InputError, OrchestratorError
 def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
     """Run a program's work and return its exit code: that of the work, 2 for bad input, 1 for other errors.
 
-    Args:
-        run: the work; what it prints to standard output is dropped once the reader has gone.
-        flags: what ``flags_of`` returned.
-
     Returns:
         The exit code; 130 after Ctrl-C.
-
-    Raises:
-        BrokenPipeError: the reader of the standard error stream has gone.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of any script, whatever the terminal's encoding
@@ -60,14 +53,7 @@ class ForgivingStream:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        """Write ``text``; after the reader has gone away, write nothing.
-
-        Args:
-            text: to be written.
-
-        Returns:
-            The number of characters.
-        """
+        """Write ``text``; after the reader has gone away, write nothing."""
         try:
             return int(self._stream.write(text))
         except BrokenPipeError:

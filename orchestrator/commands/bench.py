@@ -10,11 +10,7 @@ from orchestrator.shared.output import staged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what the benchmark takes.
-
-    Args:
-        parser: of the command.
-    """
+    """Add what the benchmark takes."""
     parser.add_argument("--rounds", type=int, default=3, metavar="N", help="turns that every tool gets (default: 3)")
     parser.add_argument(
         "--tools", default=",".join(TOOLS), metavar="A,B", help="which tools (default: all, installed or not)"
@@ -31,14 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, print the tables, write JSON.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Measure, print the tables, write JSON."""
     tools = [name.strip() for name in arguments.tools.split(",")]
     with staged(arguments.out) as folder:
         result = benchmark(

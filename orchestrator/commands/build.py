@@ -11,11 +11,7 @@ from orchestrator.shared.output import staged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the command's arguments."""
     parser.add_argument("names", nargs="*", metavar="FMU", help="which FMUs (default: all)")
     parser.add_argument(
         "--directory",
@@ -38,14 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Build what is missing or stale and say what this machine cannot give.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Build what is missing or stale and say what this machine cannot give."""
     with staged(args.out) as folder:
         result = build(
             args.names,

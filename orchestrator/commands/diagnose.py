@@ -18,11 +18,7 @@ from orchestrator.shared.output import staged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the arguments of the command."""
     parser.add_argument(
         "records", type=Path, nargs="+", metavar="DATA", help=f"measured records of one machine ({FORMATS})"
     )
@@ -59,17 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        ScenarioError: options that do not belong together.
-    """
+    """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU."""
     if args.fmu is not None or args.scenario is not None:
         return _any_fmu(args)
     if args.map is not None or args.draft_map:

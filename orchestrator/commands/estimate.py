@@ -69,11 +69,7 @@ LOW_RATE = 200.0  # Hz, which shows the shafts that the methods are made for
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the arguments of the command."""
     parser.add_argument(
         "records",
         type=Path,
@@ -111,14 +107,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Estimate or design, print tables, write JSON, CSV, figures and report.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Estimate or design, print tables, write JSON, CSV, figures and report."""
     options = _design_options(args)
     model = read_model(args.model)
     require_linear(model)
@@ -191,11 +180,7 @@ def _plain(value: Any) -> Any:
 
 
 def _design_options(args: argparse.Namespace) -> dict[str, float]:
-    """Return the value of each of ``DESIGN_OPTIONS``, by name; refuse options that would have no effect.
-
-    Raises:
-        ScenarioError: an option is given where nothing reads it.
-    """
+    """Return the value of each of ``DESIGN_OPTIONS``, by name; refuse options that would have no effect."""
     if args.time_limit is not None and not args.time_limit > 0.0:
         raise ScenarioError(f"`time_limit` must be positive, but is {args.time_limit:g}", "time_limit")
     if not args.records:

@@ -14,11 +14,7 @@ from orchestrator.shared.output import staged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what a run takes.
-
-    Args:
-        parser: of the command.
-    """
+    """Add what a run takes."""
     add_experiment_arguments(parser)
     parser.add_argument("--alpha", type=float, default=0.02, metavar="RAD", help="half-gap (default: %(default)s)")
     parser.add_argument("--noise", type=float, default=0.0, metavar="RAD", help="encoder noise (default: none)")
@@ -28,14 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run, print a table, write CSV, JSON and figure.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Run, print a table, write CSV, JSON and figure."""
     if arguments.scenario is not None:
         refuse_with_scenario(arguments, {"alpha": 0.02, "noise": 0.0, "seed": 0})
     with staged(arguments.out) as folder:

@@ -18,11 +18,7 @@ PAIR = {"alpha": 0.02, "reference": 0.5}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what both actions take.
-
-    Args:
-        parser: of the command.
-    """
+    """Add what both actions take."""
     parser.add_argument("action", choices=ACTIONS, help="export: write an SSP file; run: simulate one")
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE.ssp", help="run: the SSP file")
     parser.add_argument(
@@ -44,14 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write or run an SSP file.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Write or run an SSP file."""
     return _export(arguments) if arguments.action == "export" else _run(arguments)
 
 

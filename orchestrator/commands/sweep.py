@@ -24,11 +24,7 @@ PAIR_ONLY = frozenset({"experiment", "backlash_model", *PAIR_DEFAULTS})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what a sweep takes.
-
-    Args:
-        parser: of the command.
-    """
+    """Add what a sweep takes."""
     add_experiment_arguments(parser)
     parser.add_argument(
         "--sizes",
@@ -66,14 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the sweep, print the table, write the results; 1 when a case failed.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Run the sweep, print the table, write the results; 1 when a case failed."""
     if arguments.scenario is not None:
         refuse_with_scenario(arguments, PAIR_DEFAULTS)
     levels = _levels(arguments.noise)

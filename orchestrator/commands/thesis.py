@@ -8,23 +8,12 @@ from orchestrator.shared.output import staged
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Nothing to add: the thesis is what it is.
-
-    Args:
-        parser: of the command.
-    """
+    """Nothing to add: the thesis is what it is."""
     del parser
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Recompute, print and write.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Recompute, print and write."""
     with staged(arguments.out) as folder:
         result = thesis()
         result.write(folder, arguments.out)

@@ -42,11 +42,7 @@ class DaskCluster:
     tls: Tls | None = None
 
     def __call__(self, work: Work, limits: CaseLimits) -> "ClusterPool":
-        """Connect, and hand the work to every worker.
-
-        Raises:
-            ScenarioError: there is no scheduler at the address, or its workers cannot run this version.
-        """
+        """Connect, and hand the work to every worker."""
         thread = LoopThread()
         try:
             client = self._client(thread)

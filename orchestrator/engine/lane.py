@@ -73,10 +73,6 @@ class Lane:
 
         Returns:
             How some of them ended, at least one.
-
-        Raises:
-            LaneClosedError: the lane was closed.
-            OrchestratorError: no worker process can be prepared.
         """
         with self._lock:
             self._busy = True

@@ -50,11 +50,7 @@ class Sweep:
         return self._journal.failed
 
     def rows(self) -> Iterator[Row]:
-        """Yield one row per finished case, in case order.
-
-        Yields:
-            Each case with its outcome.
-        """
+        """Yield one row per finished case, in case order."""
         for outcome in self._journal.outcomes():
             yield Row(self.cases[outcome.index], outcome)
 
@@ -81,22 +77,10 @@ def run_cases(
     was stopped and resumed.
 
     Args:
-        cases: what to run.
-        work: how to run one case.
-        journal_path: the durable store, normally in the result directory.
-        open_pool: where to run; default ``LocalProcesses()``.
-        limits: time and memory per case.
-        resume: go on with the journal of an earlier run that was stopped.
         on_progress: called whenever cases have become durable, and at least about four times a second.
 
     Returns:
         The finished cases; the caller closes it.
-
-    Raises:
-        ScenarioError: bad arguments, or a journal that must not be continued (see ``Journal``).
-        JournalFullError: no room for finished cases; what was finished before is kept.
-        SimulationError: the place where cases run is gone (no worker can be prepared, the cluster is lost).
-        Interrupted: Ctrl-C.
     """
     journal = Journal(journal_path, _definition(cases, work), len(cases), resume)
     try:

@@ -17,16 +17,10 @@ class Supply:
     """Files by name in a scratch folder; to be closed.
 
     Args:
-        files: content by name.
         unpacked: the files are archives, and workers get the folders into which they are unpacked.
 
     Attributes:
-        paths: where they are.
         folder: the folder that holds them all.
-
-    Raises:
-        OutputError: there is no room for them.
-        FmuError: a file is not an archive that may be unpacked.
     """
 
     def __init__(self, files: Mapping[str, bytes], unpacked: bool) -> None:

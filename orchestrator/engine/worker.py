@@ -34,7 +34,6 @@ class Assignment:
     """What a worker process is for.
 
     Attributes:
-        work: the pickled ``Work``.
         files: local path of each of the work's files.
         time_limit: seconds that a case may take; the lane enforces it, the worker only outlives it by
             ``ORPHAN_MARGIN`` when the lane is gone.
@@ -62,14 +61,8 @@ class Answer:
 def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
     """Prepare the work and return what runs a batch of cases.
 
-    Args:
-        assignment: the work with its files and limits.
-
     Returns:
         A function from cases to the outcomes of as many of them as ``BATCH_TIME`` allows, as plain data.
-
-    Raises:
-        SimulationError: the work cannot be prepared in this process.
     """
     work: Work = pickle.loads(assignment.work)
     try:
@@ -108,9 +101,6 @@ def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
 def finished_cases(temporary: Path) -> int:
     """Return how many cases of its batch a worker process had finished, as it claims.
 
-    Args:
-        temporary: the process's temporary folder.
-
     Returns:
         The number; 0 where the process has left none.
     """
@@ -122,11 +112,6 @@ def finished_cases(temporary: Path) -> int:
 
 def read_answer(message: Any, cases: Sequence[Case], columns: int) -> Answer | None:
     """Return what a worker answered to a batch; ``None`` when it is no such answer.
-
-    Args:
-        message: what came over the wire.
-        cases: that were asked for.
-        columns: number of results of a case that is done.
 
     Returns:
         Outcomes of at least one case, and whether the process must be replaced.

@@ -13,16 +13,7 @@ PROBED_ROWS = 1000
 
 
 def expected_seconds(records: Sequence[Record], model: Model, threads: int = 2) -> float:
-    """Return about how long ``maximum_likelihood`` will take [s], from the time of one run over some rows.
-
-    Args:
-        records: of one machine.
-        model: what they are compared with.
-        threads: that share the work.
-
-    Returns:
-        The time [s].
-    """
+    """Return about how long ``maximum_likelihood`` will take [s], from the time of one run over some rows."""
     probe = records[0].part(0, min(records[0].size, PROBED_ROWS))
     problem = make_problem(probe, model)
     likelihood, start = Likelihood(problem), problem.start

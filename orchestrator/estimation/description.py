@@ -17,14 +17,7 @@ from pyfmu_sources.drivetrain_parameters import P_I
 
 
 def describe(fit: GapFit) -> Estimate:
-    """Return the estimate of a fit: interval, visibility, and what else the fit says.
-
-    Args:
-        fit: the maximum of the likelihood of a record.
-
-    Returns:
-        The estimate.
-    """
+    """Return the estimate of a fit: interval, visibility, and what else the fit says."""
     likelihood = fit.likelihood
     problem, settings = likelihood.problem, likelihood.settings.verdict
     place = problem.index("alpha")
@@ -133,11 +126,7 @@ def _lacking(diagnostics: dict[str, Any], drive: float, ratio: float, rows: int,
     """Return the warning that the model lacks something, or nothing.
 
     Args:
-        diagnostics: of the fit.
         drive: effective value of the motor's torque [N.m].
-        ratio: gear ratio.
-        rows: of the record.
-        settings: thresholds.
     """
     worst = max(abs(value) for value in diagnostics["innovation_autocorrelation"])
     motor, load = diagnostics["torque_noise"]

@@ -22,7 +22,6 @@ class Profile:
 
         Args:
             best: the estimate [rad].
-            limit: drop at which the interval ends.
 
         Returns:
             Lower and upper end [rad]; the upper one is infinite where the profile does not reach it.
@@ -35,14 +34,7 @@ class Profile:
 
 
 def profile(fit: GapFit) -> Profile:
-    """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0).
-
-    Args:
-        fit: the maximum.
-
-    Returns:
-        The profile.
-    """
+    """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0)."""
     likelihood = fit.likelihood
     place = likelihood.problem.index("alpha")
     column = list(fit.free).index(place)

@@ -18,16 +18,7 @@ FITTED = "maximum_likelihood"
 def trust_of_estimates(
     estimates: Sequence[Estimate], model: Model, settings: TrustSettings | None = None
 ) -> dict[str, Trust]:
-    """Return how far each estimate of one record can be trusted.
-
-    Args:
-        estimates: of the methods that apply, each once.
-        model: what the record was compared with.
-        settings: where green ends.
-
-    Returns:
-        Method -> trust.
-    """
+    """Return how far each estimate of one record can be trusted."""
     chosen = settings or TrustSettings()
     fit = next((e for e in estimates if e.method == FITTED), None)
     own = trust_of(_of_fit(fit, model, chosen)) if fit is not None else None

@@ -28,13 +28,6 @@ def run_pair_within(
 
     Args:
         time_limit: [s], the start of the child process included.
-        experiment, fmus, alpha, seed, start: see ``run_pair``.
-
-    Returns:
-        The run.
-
-    Raises:
-        SimulationError: it took longer, or went wrong.
     """
     limits = Limits(time_limit, _BOUNDLESS, _BOUNDLESS, math.inf, _BOUNDLESS, _BOUNDLESS, _BOUNDLESS, 1 << 16)
     argument = (experiment, {name: path.absolute() for name, path in fmus.items()}, alpha, seed, dict(start or {}))
@@ -52,12 +45,5 @@ def run_pair_within(
 
 
 def opened(argument: tuple[Any, ...]) -> Callable[[Any], bytes]:
-    """Return a handler that does the run.
-
-    Args:
-        argument: those of ``run_pair``.
-
-    Returns:
-        Called with anything, it gives the pickled result.
-    """
+    """Return a handler that does the run."""
     return lambda _: pickle.dumps(run_pair(*argument))

@@ -60,7 +60,6 @@ class Calibration(msgspec.Struct, frozen=True):
         level: what the interval claims to cover.
         runs: how many runs it was made from.
         seed_branch: the branch of the seed tree that they came from.
-        settings: of the calibration.
     """
 
     experiment: dict[str, object]
@@ -100,18 +99,11 @@ class CalibratedLoop(Protocol):
         Args:
             alpha: half-gap [rad].
             errors: errors [rad] of both encoders, each (n,).
-
-        Returns:
-            The signals.
         """
 
 
 class GapMap:
-    """A calibration, ready to be asked many times.
-
-    Args:
-        calibration: the map.
-    """
+    """A calibration, ready to be asked many times."""
 
     def __init__(self, calibration: Calibration) -> None:
         self._calibration = calibration
@@ -124,12 +116,6 @@ class GapMap:
 
         Args:
             total: the metric S [rad].
-
-        Returns:
-            The half-gap and its interval.
-
-        Raises:
-            CalibrationError: ``total`` lies outside what was calibrated; nothing is extrapolated.
         """
         calibration = self._calibration
         low, high = np.exp(calibration.log_sum[0]), np.exp(calibration.log_sum[-1])
@@ -151,17 +137,7 @@ def estimate_gap(calibration: Calibration, total: float) -> GapEstimate:
     """Return the half-gap that the metric ``total`` [rad] stands for, see ``GapMap.estimate``.
 
     Args:
-        calibration: of the experiment.
         total: S [rad].
-
-    Returns:
-        The half-gap and its interval.
-
-    Returns:
-        The half-gap and its 95 % interval [rad].
-
-    Raises:
-        CalibrationError: ``total`` lies outside what was calibrated.
     """
     return GapMap(calibration).estimate(total)
 
@@ -179,19 +155,7 @@ def load_or_calibrate(
     progress: Callable[[str], None] | None = None,
     settings: MapSettings = DEFAULT_SETTINGS,
 ) -> Calibration:
-    """Return the calibration of ``experiment``: the one that comes with these sources, or the user's, or a new one.
-
-    Args:
-        experiment: what is calibrated.
-        progress: told what is going on.
-        settings: of the calibration.
-
-    Returns:
-        The map.
-
-    Raises:
-        CalibrationError: S is not strictly monotone over the sizes claimed.
-    """
+    """Return the calibration of ``experiment``: the one that comes with these sources, or the user's, or a new one."""
     name = f"{_digest(experiment, settings)}.json"
     if (SHIPPED / name).exists():
         return msgspec.json.decode((SHIPPED / name).read_bytes(), type=Calibration)
@@ -210,14 +174,7 @@ def load_or_calibrate(
 
 
 def calibration_text(calibration: Calibration) -> str:
-    """Return a calibration as JSON, from which it is read again exactly.
-
-    Args:
-        calibration: the map.
-
-    Returns:
-        The text.
-    """
+    """Return a calibration as JSON, from which it is read again exactly."""
     return msgspec.json.format(msgspec.json.encode(calibration), indent=1).decode()
 
 
@@ -240,18 +197,7 @@ def _sources() -> tuple[Path, ...]:
 
 
 def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) -> Calibration:
-    """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds.
-
-    Args:
-        experiment: what is calibrated.
-        settings: of the calibration.
-
-    Returns:
-        The map.
-
-    Raises:
-        CalibrationError: S is not strictly monotone over the sizes claimed.
-    """
+    """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds."""
     builds = ensure_fastest(FMUS)
     if builds.kind != NATIVE:
         from orchestrator.paired.compiled_loop import compiled_loop  # numba takes its time to import
@@ -262,16 +208,7 @@ def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) 
 
 
 def calibrate_loop(loop: CalibratedLoop, settings: MapSettings, threads: int = 1) -> Calibration:
-    """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`.
-
-    Args:
-        loop: what runs it.
-        settings: of the calibration.
-        threads: in which ``loop.run`` is called; the map does not depend on their number.
-
-    Returns:
-        The map.
-    """
+    """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`."""
     with ThreadPoolExecutor(threads) as pool:
         return _calibrated(loop, settings, pool.map)
 

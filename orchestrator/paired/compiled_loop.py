@@ -33,9 +33,6 @@ class CompiledLoop:
         Args:
             alpha: half-gap [rad].
             errors: errors [rad] of both encoders, each of shape (steps + 1,).
-
-        Returns:
-            The signals.
         """
         e = self.experiment
         p = _plant_parameters(e, alpha)
@@ -76,14 +73,7 @@ def _plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]
 
 
 def compiled_loop(experiment: Experiment) -> CompiledLoop:
-    """Return the loop of ``experiment``, designed and ready to run.
-
-    Args:
-        experiment: what is run.
-
-    Returns:
-        The loop.
-    """
+    """Return the loop of ``experiment``, designed and ready to run."""
     estimator = experiment.estimator()
     S = estimator.S_inverse
     reference, speed = experiment.reference()

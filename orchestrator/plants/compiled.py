@@ -39,17 +39,7 @@ _SOURCES = Path(pyfmu_sources.__file__).parent
 
 @cache
 def compiled(name: str) -> ModuleType:
-    """Return a copy of ``pyfmu_sources.NAME`` whose functions are compiled by numba (at their first call).
-
-    Args:
-        name: of the source's module.
-
-    Returns:
-        The module; one copy per process and name.
-
-    Raises:
-        ModuleNotFoundError: there is no such source.
-    """
+    """Return a copy of ``pyfmu_sources.NAME`` whose functions are compiled by numba (at their first call)."""
     full_name = f"_compiled_{name}"
     original = f"{_PACKAGE}.{name}"
     if not (_SOURCES / f"{name}.py").exists():

@@ -83,14 +83,7 @@ class KalmanFilter:
 
 
 def six_state_model(values: DrivetrainValues) -> LinearModel:
-    """Return the model of eq. 3.5 with states ``ESTIMATOR_STATES`` and outputs ``(theta_m, theta_l)``.
-
-    Args:
-        values: the physical values, SI units.
-
-    Returns:
-        The model.
-    """
+    """Return the model of eq. 3.5 with states ``ESTIMATOR_STATES`` and outputs ``(theta_m, theta_l)``."""
     v = values
     A = np.zeros((6, 6))
     A[0, 1] = A[2, 3] = 1.0
@@ -110,14 +103,7 @@ def six_state_model(values: DrivetrainValues) -> LinearModel:
 
 
 def five_state_model(values: DrivetrainValues) -> LinearModel:
-    """Return the model without the load torque, states ``REGULATOR_STATES``: what a regulator can control.
-
-    Args:
-        values: the physical values, SI units.
-
-    Returns:
-        The model.
-    """
+    """Return the model without the load torque, states ``REGULATOR_STATES``: what a regulator can control."""
     six = six_state_model(values)
     keep = [0, 1, 2, 3, 5]
     return LinearModel(six.A[np.ix_(keep, keep)], six.B[keep], six.C[:, keep], REGULATOR_STATES)
@@ -125,9 +111,6 @@ def five_state_model(values: DrivetrainValues) -> LinearModel:
 
 def rank_report(model: LinearModel) -> RankReport:
     """Return ranks, uncontrollable modes, stabilisability and detectability of ``model``.
-
-    Args:
-        model: continuous in time.
 
     Returns:
         Ranks and the modes that are missed [1/s].
@@ -175,7 +158,6 @@ def sampled(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
     """Return (A, B) of ``model`` with its input held over ``sample_time`` [s].
 
     Args:
-        model: continuous in time.
         sample_time: [s].
 
     Returns:
@@ -195,16 +177,8 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
     """Return the sampled LQR of ``model`` for the continuous weights ``Q`` and ``R`` times the sample time.
 
     Args:
-        model: continuous in time.
         Q: (states, states) weights of the states.
-        R: weight of the torque.
         sample_time: [s].
-
-    Returns:
-        Gains and the poles of the closed loop.
-
-    Raises:
-        DesignError: ``model`` is not stabilisable, or the Riccati equation has no solution.
     """
     from scipy.linalg import eigvals, solve, solve_discrete_are
 
@@ -234,16 +208,9 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
     """Return the stationary Kalman filter of ``model``.
 
     Args:
-        model: six-state model.
         process: intensities of the white noise on each state, 6 values, unit^2/s.
         measurement: variances of both encoders [rad2].
         sample_time: [s].
-
-    Returns:
-        The filter, sampled.
-
-    Raises:
-        DesignError: ``model`` is not detectable, or the Riccati equation has no solution.
     """
     from scipy.linalg import solve_discrete_are
 

@@ -17,7 +17,6 @@ def is_linear(plant: Plant, p: Array) -> bool:
     """Tell whether a model moves as the linear plant does: what acts on it changes the request or the encoders alone.
 
     Args:
-        plant: the plant.
         p: the parameters of the analysis.
 
     Returns:
@@ -38,13 +37,8 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
     step adds up.
 
     Args:
-        plant: the plant.
-        p: the parameters of the analysis.
         first: length of the first piece [s].
         h: length of a sample [s].
-
-    Returns:
-        The function.
     """
     A, B = plant.jacobian(p), plant.request_column(p)
     places = list(moving(plant, p))
@@ -63,15 +57,7 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
 
 
 def moving(plant: Plant, p: Array) -> tuple[int, ...]:
-    """Return the places of the states that the linear plant has: without a lag the drive has none.
-
-    Args:
-        plant: the plant.
-        p: the parameters of the analysis.
-
-    Returns:
-        The places, in the order of the plant's states.
-    """
+    """Return the places of the states that the linear plant has: without a lag the drive has none."""
     lagged = plant.value(p, plant.drive.lag) > 0.0
     return tuple(place for place in plant.states if place != plant.drive.torque or lagged)
 

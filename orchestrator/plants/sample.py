@@ -56,9 +56,6 @@ def reached(speed: float, acceleration: float, h: float) -> float:
         speed: of the part [rad/s].
         acceleration: [rad/s^2].
         h: [s].
-
-    Returns:
-        The way.
     """
     return abs(speed) * h + 0.75 * h * h * abs(acceleration)
 
@@ -124,14 +121,7 @@ class Sample(NamedTuple):
 
 
 def completed(equations: CompiledEquations) -> CompiledEquations:
-    """Return a plant's equations with what it leaves out: levels of friction at rest, teeth and end stops.
-
-    Args:
-        equations: of the plant.
-
-    Returns:
-        The equations, none of them None.
-    """
+    """Return a plant's equations with what it leaves out: levels of friction at rest, teeth and end stops."""
     friction = equations.friction
 
     @njit(error_model="numpy", **ALGEBRA)
@@ -158,12 +148,6 @@ def sample_of(plant: Plant) -> Sample:
     """Return the compiled equations of one sample.
 
     References are counted in them: equations of a plant that say nothing else inherit that, and may make arrays.
-
-    Args:
-        plant: whose equations they are.
-
-    Returns:
-        What prepares a run, and what runs one sample.
     """
     friction, stage, (at_m, at_l), rest_of, flanks, meets = completed(plant.stage())
     at_lag = plant.index(plant.drive.lag)
@@ -222,13 +206,6 @@ def parameters_of(plant: Plant, usual: bool) -> Any:
     """Return ``parameters(p)``, compiled: the parameters as a tuple, which no array of results may overlap.
 
     Equations that get them so read each once in a run, and leave out what constants do not ask for.
-
-    Args:
-        plant: whose parameters they are.
-        usual: ``plant.seldom`` are their defaults, as constants.
-
-    Returns:
-        The function.
     """
     fixed = {plant.index(name) for name in plant.seldom} if usual else set()
     entries = (repr(float(plant.entry(n).default)) if n in fixed else f"p[{n}]" for n in range(len(plant.names)))
@@ -237,15 +214,7 @@ def parameters_of(plant: Plant, usual: bool) -> Any:
 
 
 def is_usual(plant: Plant, p: Any) -> bool:
-    """Tell whether what models have seldom is absent from one, so that equations without it may run.
-
-    Args:
-        plant: the plant.
-        p: the parameters of the analysis.
-
-    Returns:
-        True when each of ``plant.seldom`` is its default.
-    """
+    """Tell whether what models have seldom is absent from one, so that equations without it may run."""
     return all(p[place] == default for place, default in _seldom(plant))
 
 

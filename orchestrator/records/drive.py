@@ -19,7 +19,6 @@ def torque_of_voltage(voltage: Array, angle: Array, time: Array, column: Column)
         voltage: (n,) at the motor's terminals, held from row to row [V]; NaN: missing.
         angle: (n,) of the motor [rad]; NaN: missing, a straight line is taken.
         time: (n,) [s].
-        column: with ``resistance``, ``torque_constant``, and perhaps ``back_emf_constant`` and ``inductance``.
 
     Returns:
         (n,) torque [N.m]; NaN where the voltage is.

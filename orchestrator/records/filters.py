@@ -25,14 +25,7 @@ def decimated(record: Record, rate: float) -> Record:
     than a new sample are blurred.
 
     Args:
-        record: at its own rate.
         rate: [1/s].
-
-    Returns:
-        The slower record; the same one when the rate is not lower.
-
-    Raises:
-        RecordError: too few rows would be left.
     """
     factor = math.floor(1.0 / (record.step * rate) + 1e-6)
     if factor < 2:

@@ -63,18 +63,8 @@ def load(
 ) -> Loaded:
     """Return the columns of a record from an opened file.
 
-    Args:
-        source: the opened file.
-        path: of the file, for messages.
-        columns: what the model file says of columns.
-        further: names of other columns to keep.
-        reading: part, rate and resampling.
-
     Returns:
         Arrays (n,) in SI units by name, names in the file, and what was assumed.
-
-    Raises:
-        RecordError: a column is missing, ambiguous, in a wrong unit, or no number.
     """
     chosen = chosen_channels(source, columns, str(path), reading.torque_needed)
     extra = {name: n for n, head in enumerate(source.heads) for name in further if name in (head.name, head.full)}
@@ -137,20 +127,7 @@ def _in_part(
 def chosen_channels(
     source: RecordSource, columns: Mapping[str, Column], where: str, torque_needed: bool = True
 ) -> dict[str, Choice]:
-    """Return the channel of each column; the time is one of the motor's raster, or made from a rate.
-
-    Args:
-        source: the opened file.
-        columns: names and units in the file, where the user gave them.
-        where: file name, for messages.
-        torque_needed: whether a file of two angles without a torque is refused.
-
-    Returns:
-        The channel of each column of a record.
-
-    Raises:
-        RecordError: the file has no columns, or one is not found or not the only one.
-    """
+    """Return the channel of each column; the time is one of the motor's raster, or made from a rate."""
     heads = list(source.heads)
     if not heads:
         raise RecordError(f"{where}: a record must hold columns of numbers, but there are none")

@@ -30,22 +30,7 @@ def choose(
     rated: bool = False,
     torque_needed: bool = True,
 ) -> dict[str, Choice]:
-    """Return the channel of each column of a record: named, of the same name, or recognised without doubt.
-
-    Args:
-        heads: channels of the file.
-        columns: what the model file says of columns.
-        source: file name, for messages.
-        skip: columns that are not looked for.
-        rated: whether a time can be made of the rows, so that none is needed.
-        torque_needed: whether two angles without a torque are refused.
-
-    Returns:
-        The choice of each column that was found, by name.
-
-    Raises:
-        RecordError: a column is missing or ambiguous; the message says what to write in the model file.
-    """
+    """Return the channel of each column of a record: named, of the same name, or recognised without doubt."""
     found: dict[str, Choice] = {}
     names = [name for name in COLUMNS if name not in skip]
     for name in names:
@@ -76,15 +61,7 @@ def choose(
 
 
 def find_named(heads: Sequence[Head], name: str) -> list[int]:
-    """Return the places of channels called ``name``; ``#3`` is the third.
-
-    Args:
-        heads: channels of a file.
-        name: with or without the unit in it.
-
-    Returns:
-        The places.
-    """
+    """Return the places of channels called ``name``; ``#3`` is the third."""
     if re.fullmatch(r"#\d{1,6}", name) and not any(head.name == name for head in heads):
         place = int(name[1:]) - 1
         return [place] if 0 <= place < len(heads) else []
@@ -95,18 +72,7 @@ def find_named(heads: Sequence[Head], name: str) -> list[int]:
 
 
 def recognised_time(heads: Sequence[Head], source: str) -> int | None:
-    """Return the place of the time, recognised by name or unit; None: there is none, or only a sample number.
-
-    Args:
-        heads: channels of a file.
-        source: file name, for messages.
-
-    Returns:
-        The place.
-
-    Raises:
-        RecordError: two channels look like it.
-    """
+    """Return the place of the time, recognised by name or unit; None: there is none, or only a sample number."""
     choice = _recognised("time", heads, set(), source)
     return None if choice is None or choice.numbered else choice.place
 
@@ -186,29 +152,14 @@ def _torque_score(found: set[str], kind: str) -> int:
 
 
 def listed(heads: Sequence[Head]) -> str:
-    """Return the names of channels for a message, as far as there is room.
-
-    Args:
-        heads: channels of a file.
-
-    Returns:
-        The names in backquotes.
-    """
+    """Return the names of channels for a message, as far as there is room."""
     names = ",".join(head.full or head.name for head in heads)
     plain = "".join(c if c.isprintable() else "?" for c in names)
     return f"`{plain if len(plain) <= 100 else plain[:97] + '...'}`"
 
 
 def near(name: str, heads: Sequence[Head]) -> str:
-    """Return the question whether a name like this one was meant, or nothing.
-
-    Args:
-        name: that is not there.
-        heads: channels of a file.
-
-    Returns:
-        The end of a message.
-    """
+    """Return the question whether a name like this one was meant, or nothing."""
     close = difflib.get_close_matches(name, [head.full or head.name for head in heads], 1, 0.6)
     return f"; did you mean `{close[0]}`?" if close else ""
 

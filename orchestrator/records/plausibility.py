@@ -26,15 +26,7 @@ NEAR_DEGREES = 0.3  # of a logarithm: an inertia this near to 1/57 of the model'
 
 
 def check_plausible(record: Record, model: Model) -> None:
-    """Refuse a record of a ``Drivetrain`` whose units, signs or columns cannot be what the format demands.
-
-    Args:
-        record: of the machine.
-        model: of the machine.
-
-    Raises:
-        RecordError: the message names the column and what it seems to hold.
-    """
+    """Refuse a record of a ``Drivetrain`` whose units, signs or columns cannot be what the format demands."""
     if model.fmu != "Drivetrain":
         return
     record = record.filled()
@@ -46,14 +38,7 @@ def check_plausible(record: Record, model: Model) -> None:
 
 
 def own_frequency(model: Model) -> float:
-    """Return how fast [rad/s] the shaft of a ``Drivetrain`` oscillates, its motor free to turn.
-
-    Args:
-        model: of the machine.
-
-    Returns:
-        The frequency.
-    """
+    """Return how fast [rad/s] the shaft of a ``Drivetrain`` oscillates, its motor free to turn."""
     p = {name: entry.value for name, entry in model.parameters.items()}
     return math.sqrt(p["k"] * (1.0 / p["J_l"] + 1.0 / (p["J_m"] * p["i"] ** 2)))
 
@@ -116,7 +101,7 @@ def smoothed(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
     """Return impulse, speed and angle of the motor, smoothed over a short time.
 
     Args:
-        record: without missing samples.
+        record: with every sample of its grid, missing ones filled.
         tau: lag of the drive [s].
 
     Returns:

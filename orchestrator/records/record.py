@@ -36,20 +36,7 @@ def read_record(
     further: Sequence[str] = (),
     reading: Reading | None = None,
 ) -> Record:
-    """Read and check a record: CSV of any dialect, Parquet, MDF, MAT or NumPy.
-
-    Args:
-        path: the file.
-        columns: for some of ``COLUMNS``, their names and units in the file (default: recognised).
-        further: names of other columns to keep; those that are absent are left out.
-        reading: part, rate and resampling (default: the whole file as it is).
-
-    Returns:
-        The record, in SI units.
-
-    Raises:
-        RecordError: the file is missing or unreadable, or breaks a rule; the message names the place and the cure.
-    """
+    """Read and check a record: CSV of any dialect, Parquet, MDF, MAT or NumPy."""
     reading = reading or Reading()
     with open_source(path, reading.header) as source:
         loaded = load(source, path, columns or {}, further, reading)
@@ -75,21 +62,7 @@ def read_record(
 def record_from_columns(
     table: Mapping[str, Array], source: str, shown: Mapping[str, str] | None = None, trust_rows: bool = False
 ) -> Record:
-    """Check columns that are already numbers (any mapping of name to (n,) array) and return the record.
-
-    Args:
-        table: ``time``, ``u``, ``theta_m``, perhaps ``theta_l``, and further columns; NaN where a sample is missing.
-            With ``theta_l``, ``u`` may be absent.
-        source: name used in messages.
-        shown: how columns are called in messages, where that differs.
-        trust_rows: whether rows are uniform whatever their stamps say.
-
-    Returns:
-        The record.
-
-    Raises:
-        RecordError: a rule of the format is broken.
-    """
+    """Check columns that are already numbers (any mapping of name to (n,) array) and return the record."""
     arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in table.items()}
     label = {name: name for name in arrays} | dict(shown or {})
     arrays = _stamped(arrays, label["time"], source)
@@ -173,12 +146,7 @@ def _interpolated(u: Array) -> tuple[Array, Array | None]:
 
 
 def write_record(path: Path, record: Record) -> None:
-    """Write ``record`` as CSV with the columns of ``COLUMNS`` that it has; missing samples as empty cells.
-
-    Args:
-        path: the file.
-        record: in SI units.
-    """
+    """Write ``record`` as CSV with the columns of ``COLUMNS`` that it has; missing samples as empty cells."""
     names = [name for name in COLUMNS if getattr(record, name) is not None and (name != "u" or record.has_torque)]
     columns = [getattr(record, name).tolist() for name in names]
     lines = [",".join(names)]

@@ -49,18 +49,7 @@ _BUILDERS: dict[str, Callable[[ResultDocument], Report]] = {
 
 
 def report_from_directory(directory: Path, command: str | None = None) -> Report:
-    """Return the report of a result directory, from its ``COMMAND.json`` and the CSV files beside it.
-
-    Args:
-        directory: where a command left its results.
-        command: which command's results; needed only where there are several.
-
-    Returns:
-        The report.
-
-    Raises:
-        ScenarioError: there are no results, or several and ``command`` is not given, or they are damaged.
-    """
+    """Return the report of a result directory, from its ``COMMAND.json`` and the CSV files beside it."""
     if not directory.is_dir():
         raise ScenarioError(f"`directory` must be an existing folder, but {directory} is not", "directory")
     if command is not None and command not in COMMANDS:
@@ -78,19 +67,7 @@ def report_from_directory(directory: Path, command: str | None = None) -> Report
 
 
 def write_report(directory: Path, command: str | None = None) -> Path:
-    """Write ``report.html`` into a result directory, whole or not at all, and return its path.
-
-    Args:
-        directory: where a command left its results.
-        command: which command's results; needed only where there are several.
-
-    Returns:
-        The page's path.
-
-    Raises:
-        ScenarioError: as ``report_from_directory``.
-        OutputError: the directory cannot be written.
-    """
+    """Write ``report.html`` into a result directory, whole or not at all, and return its path."""
     page = render(report_from_directory(directory, command))
     path = directory / PAGE
     partial = directory / f".{PAGE}.partial"

@@ -14,14 +14,7 @@ from orchestrator.reporting.model import Live
 
 
 def live_data(live: Live) -> Markup:
-    """Write a live section as JSON.
-
-    Args:
-        live: the section.
-
-    Returns:
-        Text that is safe inside a script element.
-    """
+    """Write a live section as JSON. Return text that is safe inside a script element."""
     regulator = live.regulator
     return in_script(
         {
@@ -42,14 +35,7 @@ def live_data(live: Live) -> Markup:
 
 
 def in_script(data: Any) -> Markup:
-    """Write data as JSON.
-
-    Args:
-        data: anything that JSON knows.
-
-    Returns:
-        Text that is safe inside a script element.
-    """
+    """Write data as JSON. Return text that is safe inside a script element."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
     return Markup(text.replace("<", "\\u003c").replace("&", "\\u0026"))
 

@@ -48,17 +48,7 @@ _KINDS = {
 
 
 def render(report: Report) -> str:
-    """Return the page. It depends on the report and the files named in ``downloads`` only, never on the date.
-
-    Args:
-        report: what the page shows.
-
-    Returns:
-        The page as HTML, with nothing outside it.
-
-    Raises:
-        OSError: a file of ``downloads``, or a picture, cannot be read.
-    """
+    """Return the page. It depends on the report and the files named in ``downloads`` only, never on the date."""
     live = any(isinstance(section, Live) for section in report.sections)
     inside: Set[Path] = {path for path in report.downloads if path.stat().st_size <= EMBED_LIMIT}
     if live:

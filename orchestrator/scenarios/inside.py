@@ -21,14 +21,7 @@ class UnpackedRun:
 
 
 def opened(job: UnpackedRun) -> Callable[[Any], list[Any]]:
-    """Return a handler that runs the job once for each mapping of start values.
-
-    Args:
-        job: what the parent sent.
-
-    Returns:
-        Called with start values by ``instance.variable``, it gives the recorded values and the statistics.
-    """
+    """Return a handler that runs the job once for each mapping of start values."""
     session = Session(job.system, job.record, job.algorithm, job.stop, job.start)
 
     def run(start: Any) -> list[Any]:

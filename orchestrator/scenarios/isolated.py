@@ -55,28 +55,13 @@ class Safety:
 
 
 def foreign_fmus(system: System) -> list[Path]:
-    """Return the FMUs of a system that are not ours, each once.
-
-    Args:
-        system: whose FMUs are in question.
-
-    Returns:
-        Their paths.
-    """
+    """Return the FMUs of a system that are not ours, each once."""
     paths = [i.create.path for i in system.instances if isinstance(i.create, FmuFactory)]
     return [path for path in dict.fromkeys(paths) if not is_ours(path)]
 
 
 def described(system: System, safety: Safety) -> WallsFound:
-    """Return what a result file says of the walls around a run of ``system``.
-
-    Args:
-        system: whose FMUs are in question.
-        safety: how far its FMUs are trusted, and the limits.
-
-    Returns:
-        The walls.
-    """
+    """Return what a result file says of the walls around a run of ``system``."""
     foreign = foreign_fmus(system)
     walls, behind = support(), bool(foreign) and not safety.trust
     return WallsFound(
@@ -89,19 +74,7 @@ def described(system: System, safety: Safety) -> WallsFound:
 
 
 def run_safely(scenario: Scenario, safety: Safety) -> Recording:
-    """Run a scenario once, in a child process when an FMU is not ours or the time is limited.
-
-    Args:
-        scenario: what to run.
-        safety: how far its FMUs are trusted, and the limits.
-
-    Returns:
-        The recorded signals.
-
-    Raises:
-        SimulationError: the run went wrong, or the child ended or broke a limit.
-        InputError: the scenario or an FMU is wrong.
-    """
+    """Run a scenario once, in a child process when an FMU is not ours or the time is limited."""
     foreign = [] if safety.trust else foreign_fmus(scenario.system)
     movable = all(isinstance(i.create, FmuFactory) for i in scenario.system.instances)
     if movable and _one_a_process(scenario.system):
@@ -117,11 +90,7 @@ def run_safely(scenario: Scenario, safety: Safety) -> Recording:
 
 
 def _require_finite(result: Recording) -> None:
-    """Refuse a result with NaN or infinities.
-
-    Raises:
-        SimulationError: names the first one in time.
-    """
+    """Refuse a result with NaN or infinities."""
     bad = ~np.isfinite(result.values)
     if not bad.any():
         return
@@ -133,18 +102,7 @@ def _require_finite(result: Recording) -> None:
 
 @contextmanager
 def unpacked(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]:
-    """Yield ``system`` with its FMUs unpacked for a child: the system, the folder, and the FMU of each subfolder.
-
-    Args:
-        system: whose FMUs are in question.
-
-    Yields:
-        The three; they are gone when the block ends.
-
-    Raises:
-        FmuError: one cannot be unpacked.
-        OutputError: there is no room for them.
-    """
+    """Yield ``system`` with its FMUs unpacked for a child: the system, the folder, and the FMU of each subfolder."""
     with Scratch("fmus") as scratch:
         origins: dict[str, str] = {}
         instances = []

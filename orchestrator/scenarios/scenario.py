@@ -32,19 +32,7 @@ MAXIMUM_BYTES = 16 * 2**20
 
 
 def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
-    """Run a scenario once; FMUs that are not ours run in a child process.
-
-    Args:
-        scenario: what to run.
-        safety: how far its FMUs are trusted (default: not at all).
-
-    Returns:
-        The recorded signals.
-
-    Raises:
-        InputError: the scenario or an FMU is wrong.
-        SimulationError: the run went wrong, or its result is not finite.
-    """
+    """Run a scenario once; FMUs that are not ours run in a child process."""
     try:
         return scenario.with_derived(run_safely(scenario, safety or Safety()))
     except FmuError as error:  # of what only comes out when an FMU is unpacked or loaded
@@ -157,19 +145,7 @@ _SETTINGS: dict[type[Algorithm], tuple[str, ...]] = {
 
 
 def load_scenario(path: Path) -> Scenario:
-    """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be.
-
-    Args:
-        path: a TOML file.
-
-    Returns:
-        The scenario, without problems.
-
-    Raises:
-        ScenarioError: the file cannot be read or is wrong; the text names the file and every problem with its path.
-        ConnectionMismatchError: there is nothing wrong but connections.
-        FmuError: an FMU is missing or not usable.
-    """
+    """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be."""
     content = _content(path)
     problems: list[Problem] = []
     top = _converted(content, _Top, "$", problems)

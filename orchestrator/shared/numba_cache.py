@@ -44,12 +44,6 @@ def kept(**options: Any) -> Callable[[Any], Any]:
     """Return a decorator like ``numba.njit`` that keeps machine code for later processes, where there is a place.
 
     A function with a closure is kept under a digest of all that it reaches; where that is not known, not at all.
-
-    Args:
-        options: of ``njit``, but for ``cache``.
-
-    Returns:
-        The decorator.
     """
 
     def compiled(function: Any) -> Any:

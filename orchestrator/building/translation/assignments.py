@@ -14,15 +14,7 @@ _SIGNS: dict[type, str] = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*="}
 
 
 def assigned(scope: Scope, node: ast.Assign) -> list[str]:
-    """Translate an assignment.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Statements in C.
-    """
+    """Translate an assignment."""
     if len(node.targets) != 1:
         scope.refuse(node, "an assignment must have one target")
     target = node.targets[0]
@@ -32,15 +24,7 @@ def assigned(scope: Scope, node: ast.Assign) -> list[str]:
 
 
 def annotated(scope: Scope, node: ast.AnnAssign) -> list[str]:
-    """Translate an assignment to a local variable of declared type.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Statements in C.
-    """
+    """Translate an assignment to a local variable of declared type."""
     if node.value is None or not isinstance(node.target, ast.Name):
         scope.refuse(node, "a declared variable must be a name and be given a value")
     kind = scope.source.annotation(node.annotation, node)
@@ -182,15 +166,7 @@ def _part(scope: Scope, node: ast.Assign, part: ast.expr, code: Code) -> list[st
 
 
 def augmented(scope: Scope, node: ast.AugAssign) -> list[str]:
-    """``x += ...``, which rounds as ``x = x + ...``.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Statements in C.
-    """
+    """``x += ...``, which rounds as ``x = x + ...``."""
     before = scope.faults
     place = _place(scope, node.target) if not isinstance(node.target, ast.Name) else scope.expression(_load(node))
     value = scope.expression(node.value)

@@ -10,16 +10,7 @@ from orchestrator.building.translation.scope import Code, Scope, converted, memb
 
 
 def tuple_built(scope: Scope, node: ast.Call, wanted: Kind | None) -> Code:
-    """Translate ``tuple(expression for n in range(count))`` with a constant count, or a tuple of a tuple.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        wanted: kind to which the value is converted, if that is known.
-
-    Returns:
-        The tuple in C.
-    """
+    """Translate ``tuple(expression for n in range(count))`` with a constant count, or a tuple of a tuple."""
     argument = node.args[0] if len(node.args) == 1 else None
     if not isinstance(argument, ast.GeneratorExp):
         if argument is not None:
@@ -63,15 +54,7 @@ def _filled(scope: Scope, node: ast.GeneratorExp, place: str, wanted: Tuple | No
 
 
 def constant_range(scope: Scope, node: ast.GeneratorExp | ast.ListComp) -> tuple[str, int, int]:
-    """Return variable, start and stop of the one ``for ... in range(...)`` with constant ends, or refuse.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Name of the variable, first number, and the number before which it stops.
-    """
+    """Return variable, start and stop of the one ``for ... in range(...)`` with constant ends, or refuse."""
     loop = node.generators[0]
     call = loop.iter
     fits = len(node.generators) == 1 and not loop.ifs and isinstance(loop.target, ast.Name)
@@ -87,14 +70,7 @@ def constant_range(scope: Scope, node: ast.GeneratorExp | ast.ListComp) -> tuple
 
 
 def with_loop(scope: Scope, variable: str, start: int, stop: int) -> None:
-    """Make the variable of a loop known.
-
-    Args:
-        scope: the function under translation.
-        variable: its name.
-        start: first number.
-        stop: number before which the loop stops.
-    """
+    """Make the variable of a loop known."""
     if variable in scope.kinds and variable not in scope.ranges:
         scope.kinds.pop(variable)
     scope.kinds[variable] = WHOLE
@@ -102,27 +78,13 @@ def with_loop(scope: Scope, variable: str, start: int, stop: int) -> None:
 
 
 def without_loop(scope: Scope, variable: str) -> None:
-    """Forget the variable of a loop.
-
-    Args:
-        scope: the function under translation.
-        variable: its name.
-    """
+    """Forget the variable of a loop."""
     scope.kinds.pop(variable, None)
     scope.ranges.pop(variable, None)
 
 
 def list_lines(scope: Scope, node: ast.expr, place: Code) -> list[str] | None:
-    """Return the statements that fill ``place`` with a whole list, or ``None`` if ``node`` is none.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        place: the list in C.
-
-    Returns:
-        Statements in C.
-    """
+    """Return the statements that fill ``place`` with a whole list, or ``None`` if ``node`` is none."""
     kind = place.kind
     assert isinstance(kind, Items)
     base = member(place)

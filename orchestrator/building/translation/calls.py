@@ -35,16 +35,7 @@ _TESTS = ("isfinite", "isnan", "isinf")
 
 
 def call(scope: Scope, node: ast.Call, wanted: Kind | None) -> Code:
-    """Translate a call.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        wanted: kind to which the value is converted, if that is known.
-
-    Returns:
-        The call, or what stands for it, in C.
-    """
+    """Translate a call. Return the call, or what stands for it, in C."""
     if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name) and node.func.value.id == "self":
         return _method(scope, node, node.func.attr)
     target = _target(scope, node.func)
@@ -79,16 +70,7 @@ def _method(scope: Scope, node: ast.Call, name: str) -> Code:
 
 
 def invoke(scope: Scope, node: ast.Call, function: Function) -> Code:
-    """Return the call of a translated function.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        function: that is called.
-
-    Returns:
-        The call in C.
-    """
+    """Return the call of a translated function."""
     arguments = _ordered(scope, node, function)
     texts = ["self"] if function.owned else []
     for (name, kind), argument in zip(function.parameters, arguments, strict=True):
@@ -210,15 +192,7 @@ def _constructed(scope: Scope, node: ast.Call, target: Any) -> Code:
 
 
 def message(scope: Scope, node: ast.expr) -> str:
-    """Return the arguments by which the C runtime formats a text: a format, then values.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        The arguments, separated by commas.
-    """
+    """Return the arguments by which the C runtime formats a text: a format, then values."""
     parts = node.values if isinstance(node, ast.JoinedStr) else [node]
     text, values = "", []
     for part in parts:

@@ -21,18 +21,7 @@ class Directional:
 
 
 def directional(plain: Program, owner: Owner) -> Directional:
-    """Translate the response of a slave: derivatives and outputs as a function of states and inputs.
-
-    Args:
-        plain: the slave's own program, in the same file.
-        owner: the slave.
-
-    Returns:
-        The translation.
-
-    Raises:
-        FmuError: the response has a parameter that is neither hidden attribute nor input, or returns something else.
-    """
+    """Translate the response of a slave: derivatives and outputs as a function of states and inputs."""
     cls = owner.cls
     program = Program(translate, taken=frozenset({cls.__name__}), beside=plain)
     function = program.function(None, None, cls.response)

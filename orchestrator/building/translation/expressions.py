@@ -47,16 +47,7 @@ _COMPARED: dict[type, tuple[str, int]] = {
 
 
 def expression(scope: Scope, node: ast.expr, wanted: Kind | None = None) -> Code:
-    """Translate an expression; ``wanted`` is the kind to which it is converted, if that is known.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        wanted: kind to which the value is converted, if that is known.
-
-    Returns:
-        The expression in C.
-    """
+    """Translate an expression; ``wanted`` is the kind to which it is converted, if that is known."""
     handler = _HANDLERS.get(type(node))
     if handler is None:
         scope.refuse(node, f"`{ast.unparse(node)}` is outside the subset")
@@ -65,17 +56,7 @@ def expression(scope: Scope, node: ast.expr, wanted: Kind | None = None) -> Code
 
 
 def constant(scope: Scope, value: Any, node: ast.AST, name: str = "") -> Code:
-    """Return a number that Python knows already, by its name where it has one.
-
-    Args:
-        scope: the function under translation.
-        value: the number.
-        node: of the Python source.
-        name: of the constant, if it has one.
-
-    Returns:
-        The number in C.
-    """
+    """Return a number that Python knows already, by its name where it has one."""
     if isinstance(value, bool):
         return Code("true" if value else "false", TRUTH)
     if not isinstance(value, int | float) or not math.isfinite(value):

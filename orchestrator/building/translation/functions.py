@@ -22,18 +22,7 @@ LARGEST_BY_VALUE = 12
 def translate(
     program: Program, source: ModuleSource, node: ast.FunctionDef, c_name: str, owner: Owner | None = None
 ) -> Function:
-    """Return the function in C; what it calls is translated before.
-
-    Args:
-        program: what is translated so far.
-        source: the function's module.
-        node: its definition.
-        c_name: its name in C.
-        owner: the slave, for a method.
-
-    Returns:
-        The function.
-    """
+    """Return the function in C; what it calls is translated before."""
     function = _signature(source, node, c_name, owner)
     mutated: set[str] = set()
     function.by_address = _by_address(function, node)

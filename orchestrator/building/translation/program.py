@@ -64,26 +64,12 @@ class Program:
 
     @staticmethod
     def local_name(name: str) -> str:
-        """Return the C name of a local variable.
-
-        Args:
-            name: in Python.
-
-        Returns:
-            The name.
-        """
+        """Return the C name of a local variable."""
         return f"{name}_" if name in RESERVED else name
 
     @staticmethod
     def attribute_name(name: str) -> str:
-        """Return the C name of a slave's attribute.
-
-        Args:
-            name: in Python.
-
-        Returns:
-            The name.
-        """
+        """Return the C name of a slave's attribute."""
         plain = name.lstrip("_")
         return f"{plain}_" if plain in RESERVED else plain
 
@@ -93,19 +79,7 @@ class Program:
         return plain if plain not in taken else f"{module}_{plain}"
 
     def constant(self, source: ModuleSource, name: str, value: float | int) -> str:
-        """Return the name of a constant, which is defined once.
-
-        Args:
-            source: the module that defines it.
-            name: of the constant there.
-            value: of the constant.
-
-        Returns:
-            Its C name.
-
-        Raises:
-            FmuError: two modules use the name for different values.
-        """
+        """Return the name of a constant, which is defined once."""
         plain = name.lstrip("_")
         for candidate in (plain, f"{source.name}_{plain}"):
             known = self._constants.get(candidate)
@@ -119,19 +93,7 @@ class Program:
     # Functions ----------------------------------------------------------------------------------------------
 
     def function(self, user: ModuleSource | None, node: ast.AST | None, target: Callable[..., Any]) -> Function:
-        """Return the translation of a function of the sources.
-
-        Args:
-            user: the module that calls it, or None.
-            node: the call, for messages.
-            target: the function.
-
-        Returns:
-            The translated function.
-
-        Raises:
-            FmuError: it is not a function of a module that is translated.
-        """
+        """Return the translation of a function of the sources."""
         source = self._source(target.__module__)
         name = target.__name__
         definition = source.functions.get(name)
@@ -140,19 +102,7 @@ class Program:
         return self._translated(user, node, (target.__module__, name), source, definition, None)
 
     def method(self, user: ModuleSource | None, node: ast.AST | None, name: str) -> Function:
-        """Return the translation of a method of the slave.
-
-        Args:
-            user: the module that calls it, or None.
-            node: the call, for messages.
-            name: of the method.
-
-        Returns:
-            The translated method.
-
-        Raises:
-            FmuError: the slave has no such method.
-        """
+        """Return the translation of a method of the slave."""
         assert self.owner is not None
         for cls in self.owner.cls.__mro__:
             if name in vars(cls) and cls.__module__ not in BASE_MODULES:
@@ -205,38 +155,22 @@ class Program:
         self._largest_index = max(self._largest_index, index)
 
     def note_values(self, length: int) -> None:
-        """Note that a tuple of this length is handed on as one of unknown length.
-
-        Args:
-            length: of the tuple.
-        """
+        """Note that a tuple of this length is handed on as one of unknown length."""
         self._shortest = min(getattr(self, "_shortest", length), length)
 
     def check_lengths(self) -> None:
-        """Refuse a program that could read beyond a flat tuple.
-
-        Raises:
-            FmuError: the program could.
-        """
+        """Refuse a program that could read beyond a flat tuple."""
         if self._largest_index >= getattr(self, "_shortest", self._largest_index + 1):
             raise FmuError(f"item {self._largest_index} of a tuple of {self._shortest} floats must not be read, but is")
 
     # Text -----------------------------------------------------------------------------------------------------
 
     def types(self) -> str:
-        """Return the typedefs.
-
-        Returns:
-            C text.
-        """
+        """Return the typedefs."""
         return "\n\n".join(self.names.definitions())
 
     def constants(self) -> str:
-        """Return the definitions of the constants in use.
-
-        Returns:
-            C text.
-        """
+        """Return the definitions of the constants in use."""
         own = {n: v for n, v in self._constants.items() if n not in self._shared}
         wholes = {n: v for n, v in own.items() if isinstance(v, int) and abs(v) < 2**31}
         lines = [f"enum {{ {name} = {value} }};" for name, value in sorted(wholes.items(), key=_by_value)]
@@ -245,19 +179,11 @@ class Program:
         return "\n".join(lines)
 
     def prototypes(self) -> str:
-        """Return a declaration of every function.
-
-        Returns:
-            C text.
-        """
+        """Return a declaration of every function."""
         return "\n".join(f"{function.head};" for function in self._in_order())
 
     def definitions(self) -> str:
-        """Return every function, module by module.
-
-        Returns:
-            C text.
-        """
+        """Return every function, module by module."""
         parts: list[str] = []
         module = ""
         for function in self._in_order():

@@ -17,15 +17,7 @@ REFUSALS = {"StepRefusedError": "STEP_REFUSED", "ValueError": "VALUE_ERROR"}
 
 
 def block(scope: Scope, statements: list[ast.stmt]) -> list[str]:
-    """Translate a block; the lines are not indented.
-
-    Args:
-        scope: the function under translation.
-        statements: of the block.
-
-    Returns:
-        Lines of C.
-    """
+    """Translate a block; the lines are not indented."""
     lines: list[str] = []
     for node in statements:
         lines += [f"/* {text} */" for text in scope.source.comments(node)]
@@ -34,15 +26,7 @@ def block(scope: Scope, statements: list[ast.stmt]) -> list[str]:
 
 
 def statement(scope: Scope, node: ast.stmt) -> list[str]:
-    """Translate one statement, with what has to be computed before it.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Lines of C.
-    """
+    """Translate one statement, with what has to be computed before it."""
     handler = _HANDLERS.get(type(node))
     if handler is None:
         scope.refuse(node, f"the statement `{ast.unparse(node).splitlines()[0]}` is outside the subset")

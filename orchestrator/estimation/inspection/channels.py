@@ -24,9 +24,6 @@ class Channel:
 
     Attributes:
         name: of the record's columns.
-        unit: SI unit.
-        least: smallest value.
-        most: largest value.
         count: step that the values are rounded to; 0.0: none.
         noise: standard deviation of what changes from sample to sample without motion.
         saturated: share of the samples at the very ends of the range, in runs of three or more.
@@ -54,14 +51,7 @@ class Band:
 
 
 def channels_of(record: Record) -> list[Channel]:
-    """Return the facts of torque and angles.
-
-    Args:
-        record: the record.
-
-    Returns:
-        A channel per column.
-    """
+    """Return the facts of torque and angles."""
     missing_u = 0 if record.u_deviation is None else int(np.count_nonzero(record.u_deviation))
     found = [_channel("u", "N.m", record.u, missing_u)] if record.has_torque else []
     for name in ("theta_m", "theta_l"):
@@ -100,14 +90,7 @@ def _saturated(values: Array) -> float:
 
 
 def excitation_of(record: Record) -> list[Band]:
-    """Return the torque's power by frequency, and how much of the motor's motion follows it.
-
-    Args:
-        record: the record.
-
-    Returns:
-        The bands, rising; none without a torque.
-    """
+    """Return the torque's power by frequency, and how much of the motor's motion follows it."""
     from scipy.signal import coherence, welch
 
     if not record.has_torque:
@@ -133,12 +116,6 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     The lag at which a straight line explains one angle by the other best, between samples by a parabola, on four parts
     of the record, whose spread gives the standard error. The shaft's own compliance is part of the lag. None where
     there is one encoder, or no torque: `two_encoders` then tells the lag from the gap.
-
-    Args:
-        record: the record.
-
-    Returns:
-        The lag and its standard error.
     """
     if record.theta_l is None or not record.has_torque:
         return None
@@ -165,14 +142,7 @@ def _unexplained(motor: Array, load: Array) -> float:
 
 
 def reversals_of(record: Record) -> tuple[int | None, int]:
-    """Return how often the torque and the motor's speed change sign, small wiggles apart.
-
-    Args:
-        record: the record.
-
-    Returns:
-        Both numbers; None for a torque that there is not.
-    """
+    """Return how often the torque and the motor's speed change sign, small wiggles apart."""
     filled = record.filled()
     width = max(1, round(0.02 / record.step))
     speed = np.convolve(np.gradient(filled.theta_m, filled.step), np.ones(width) / width, "same")

@@ -34,15 +34,7 @@ class RoughMachine:
 
 
 def is_of(record: Record, model: Model) -> bool:
-    """Return whether a record looks like one of this machine: gear ratio and inertia are the model's.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        Whether it does.
-    """
+    """Return whether a record looks like one of this machine: gear ratio and inertia are the model's."""
     try:
         check_plausible(record, model)
     except RecordError:
@@ -56,14 +48,7 @@ def is_of(record: Record, model: Model) -> bool:
 
 
 def rough_machine(record: Record) -> RoughMachine:
-    """Return a machine that could have made the record; what the record does not show is assumed and called that.
-
-    Args:
-        record: the record.
-
-    Returns:
-        Values by parameter, and where each is from; without a torque the gear ratio alone.
-    """
+    """Return a machine that could have made the record; what the record does not show is assumed and called that."""
     record = record.filled()
     ratio, said = _ratio(record)
     values, origin = {"i": ratio}, {"i": said}
@@ -103,15 +88,7 @@ def _ratio(record: Record) -> tuple[float, str]:
 
 
 def as_model(rough: RoughMachine, base: Model) -> Model:
-    """Return ``base`` with the rough values and wide uncertainties.
-
-    Args:
-        rough: the rough values.
-        base: the model to start from.
-
-    Returns:
-        The model.
-    """
+    """Return ``base`` with the rough values and wide uncertainties."""
     parameters: dict[str, ModelParameter] = dict(base.parameters)
     for name, value in rough.values.items():
         old = parameters[name]
@@ -148,13 +125,6 @@ def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]
 
     The balance of impulses over windows of a tenth of a second is fitted with inertia, viscous friction and a constant
     torque; what it leaves is the noise that an effect must stand out of.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        Name, size and unit of each.
     """
     record = record.filled()
     if not record.has_torque:

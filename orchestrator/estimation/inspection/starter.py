@@ -33,19 +33,7 @@ MEANING = {
 def assumed_columns(
     path: Path, columns: Mapping[str, Column], header: int | None = None
 ) -> tuple[dict[str, Column], tuple[str, ...]]:
-    """Return the columns with what their units still need, and a sentence on each assumption.
-
-    Args:
-        path: of the record.
-        columns: what the model file says of columns.
-        header: line of the names in a text; None: found.
-
-    Returns:
-        Both.
-
-    Raises:
-        RecordError: the file cannot be read, or a column is missing or ambiguous.
-    """
+    """Return the columns with what their units still need, and a sentence on each assumption."""
     with open_source(path, header) as source:
         chosen = chosen_channels(source, columns, str(path), torque_needed=False)
     filled, said = dict(columns), []
@@ -85,18 +73,7 @@ def _called(head: Head, place: int) -> str:
 def starter(
     model: Model, columns: Mapping[str, Column], origin: Mapping[str, str], assumed: Sequence[str], record: str
 ) -> str:
-    """Return the text of a model file.
-
-    Args:
-        model: values and uncertainties.
-        columns: where each column comes from.
-        origin: of each parameter that is written, a sentence on where its value is from.
-        assumed: what was assumed of the columns' units.
-        record: the file's name.
-
-    Returns:
-        The text, which ``read_model`` takes.
-    """
+    """Return the text of a model file."""
     lines = [f"# A model of the machine that made {record}: look at every line that says ASSUMED or ROUGH.", ""]
     lines += [f'fmu = "{model.fmu}"']
     if model.header is not None:

@@ -47,11 +47,7 @@ class Sufficiency:
     why: str = ""
 
     def ranges(self) -> list[tuple[float, float]]:
-        """Return the smallest and the largest size of each run of sizes that are seen [rad].
-
-        Returns:
-            The runs, rising; the first begins where the bound meets its share, between two sizes.
-        """
+        """Return the smallest and the largest size of each run of sizes that are seen [rad]."""
         runs: list[list[float]] = []
         seen = False
         for size, bound in self.bounds:
@@ -66,10 +62,6 @@ class Sufficiency:
 
 def sufficiency(record: Record, model: Model) -> Sufficiency:
     """Return what a record shows of gaps if the machine is as the model says.
-
-    Args:
-        record: the record.
-        model: of the machine.
 
     Returns:
         Bounds by size, the smallest size that is seen [rad], and the torque that would do better.

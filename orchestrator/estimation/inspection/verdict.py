@@ -13,12 +13,7 @@ def verdict_of(found: Sufficiency, reversals: tuple[int | None, int], two_angles
     """Return whether a record suffices to see a gap, what it lacks, and what would do better.
 
     Args:
-        found: what the record shows of gaps.
-        reversals: sign changes of torque, None without one, and of motor speed.
         two_angles: the half-gap from the two angles alone, where that was looked for.
-
-    Returns:
-        A sentence each.
     """
     said = [_of_angles(two_angles)] if two_angles is not None else [_of_sizes(found)]
     torque, speed = reversals

@@ -39,7 +39,6 @@ class SweepCost:
     """One sweep over the paired loops of six FMUs, ``CASE_STEPS`` steps each, with one worker process.
 
     Attributes:
-        cases: number of cases.
         total: wall time of all [s], with the start of the worker and the table.
         per_case: what one more case costs [s], once the worker runs.
         peak: largest memory of the sweep's own process [MiB].
@@ -67,17 +66,7 @@ class RecordCost:
 
 
 def growth(progress: Callable[[str], None] = lambda text: None) -> tuple[list[SweepCost], list[RecordCost]]:
-    """Measure both.
-
-    Args:
-        progress: is told what runs.
-
-    Returns:
-        Cost of sweeps by number of cases, and of records by length.
-
-    Raises:
-        SimulationError: a process failed.
-    """
+    """Measure both. Return cost of sweeps by number of cases, and of records by length."""
     sweeps, records = [], []
     for cases in CASES:
         progress(f"sweep of {cases} cases")
@@ -143,14 +132,7 @@ def _record(count: int) -> dict[str, float]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Measure one point and write it as JSON.
-
-    Args:
-        arguments: "sweep" or "record", its size, and the file to write.
-
-    Returns:
-        The exit code.
-    """
+    """Measure one point and write it as JSON."""
     measure = {"sweep": _sweep, "record": _record}[arguments[0]]
     found = measure(int(arguments[1]))
     Path(arguments[2]).write_text(json.dumps(found), encoding="utf-8")

@@ -17,7 +17,6 @@ class BenchJob:
         references: value reference by instance and variable.
         watched: ``[instance, output]`` whose ends show that a tool did the work.
         step: communication step [s].
-        steps: number of steps.
     """
 
     fmus: dict[str, str]
@@ -29,21 +28,10 @@ class BenchJob:
     steps: int
 
     def write(self, path: Path) -> None:
-        """Write the job as JSON.
-
-        Args:
-            path: the file.
-        """
+        """Write the job as JSON."""
         path.write_text(json.dumps(asdict(self)), encoding="utf-8")
 
 
 def read_job(path: Path) -> BenchJob:
-    """Read what ``BenchJob.write`` wrote.
-
-    Args:
-        path: the file.
-
-    Returns:
-        The job.
-    """
+    """Read what ``BenchJob.write`` wrote."""
     return BenchJob(**json.loads(path.read_text(encoding="utf-8")))

@@ -22,13 +22,10 @@ class ToolRow:
     """What one tool took.
 
     Attributes:
-        tool: key of ``TOOLS``.
-        title: for the table.
         version: of the tool; ``None`` when it did not run.
         scheme: order in which values are exchanged.
         wall: median wall time of a run [s]; ``None`` when there was none.
         cpu: median processor time of a run [s]; ``None`` also when the tool has a clock of its own.
-        runs: number of runs.
         peak: largest memory of its process [MiB].
         deviation: largest difference between the ends of the watched outputs and those of plain FMI calls in the
             same scheme, in the outputs' unit.
@@ -66,13 +63,6 @@ def compare(
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[ToolRow]:
     """Run every tool ``rounds`` times in turn and return one row each.
-
-    Args:
-        job: what is run.
-        tools: keys of ``TOOLS``.
-        rounds: turns that every tool gets; each is a process with ``runner.RUNS`` runs.
-        pythons: interpreter by tool, for tools that live in an environment of their own.
-        progress: is told what runs.
 
     Returns:
         Times and ends of each tool, in the order of ``tools``.

@@ -11,15 +11,7 @@ from orchestrator.scenarios.scenario import Scenario
 
 
 def job_of(scenario: Scenario, watched: Sequence[str]) -> BenchJob:
-    """Return a scenario of FMUs, whose sources are constant, as a job; ``watched`` as ``instance.output``.
-
-    Args:
-        scenario: of FMUs.
-        watched: outputs.
-
-    Returns:
-        The job.
-    """
+    """Return a scenario of FMUs, whose sources are constant, as a job; ``watched`` as ``instance.output``."""
     system = scenario.system
     fmus: dict[str, str] = {}
     starts: list[list[Any]] = []

@@ -18,14 +18,7 @@ _MODELS = itertools.count()
 
 
 def ecos(job: BenchJob) -> Prepared:
-    """ecos, fixed step, side by side.
-
-    Args:
-        job: what is run.
-
-    Returns:
-        The run and the watched ends.
-    """
+    """ecos, fixed step, side by side. Return the run and the watched ends."""
     from ecospy import EcosSimulation, EcosSimulationStructure
 
     structure = EcosSimulationStructure()
@@ -46,14 +39,7 @@ def ecos(job: BenchJob) -> Prepared:
 
 
 def libcosim(job: BenchJob) -> Prepared:
-    """libcosim, fixed step, side by side.
-
-    Args:
-        job: what is run.
-
-    Returns:
-        The run and the watched ends.
-    """
+    """libcosim, fixed step, side by side. Return the run and the watched ends."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimObserver import CosimObserver
     from libcosimpy.CosimSlave import CosimLocalSlave
@@ -85,9 +71,6 @@ def libcosim(job: BenchJob) -> Prepared:
 def pyfmi(job: BenchJob) -> Prepared:
     """PyFMI's master, fixed step, without its linear correction and without results.
 
-    Args:
-        job: what is run.
-
     Returns:
         The run and the watched ends.
     """
@@ -116,9 +99,6 @@ def pyfmi(job: BenchJob) -> Prepared:
 def omsimulator(job: BenchJob) -> Prepared:
     """OMSimulator, weakly coupled system, fixed step, recording what is watched.
 
-    Args:
-        job: what is run.
-
     Returns:
         The run and the watched ends.
     """
@@ -126,14 +106,7 @@ def omsimulator(job: BenchJob) -> Prepared:
 
 
 def omsimulator_as_it_comes(job: BenchJob) -> Prepared:
-    """The same with all signals in a result file, which is its default.
-
-    Args:
-        job: what is run.
-
-    Returns:
-        The run and the watched ends.
-    """
+    """The same with all signals in a result file, which is its default."""
     return _omsimulator(job, everything=True)
 
 
@@ -183,14 +156,7 @@ def _omsimulator(job: BenchJob, everything: bool) -> Prepared:
 
 
 def cofmupy(job: BenchJob) -> Prepared:
-    """cofmupy's coordinator, Gauss-Seidel without iteration.
-
-    Args:
-        job: what is run.
-
-    Returns:
-        The run and the watched ends.
-    """
+    """cofmupy's coordinator, Gauss-Seidel without iteration. Return the run and the watched ends."""
     from cofmupy import Coordinator
     from cofmupy.wrappers import Fmu2Handler
 
@@ -230,9 +196,6 @@ def cofmupy(job: BenchJob) -> Prepared:
 
 def mastersim(job: BenchJob) -> Prepared:
     """MasterSim's program in Gauss-Seidel mode; its own clock, without the time for writing results.
-
-    Args:
-        job: what is run.
 
     Returns:
         The run and the watched ends.

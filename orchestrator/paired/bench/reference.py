@@ -39,15 +39,7 @@ SCHEMES: dict[str, Callable[[BenchJob, Mapping[str, Any]], None]] = {
 
 
 def reference_ends(job: BenchJob, scheme: str) -> dict[str, float]:
-    """Return where ``job.watched`` ends under a scheme.
-
-    Args:
-        job: what is run.
-        scheme: key of ``SCHEMES``.
-
-    Returns:
-        Value by ``instance.output``.
-    """
+    """Return where ``job.watched`` ends under a scheme."""
     slaves = slaves_of(job)
     SCHEMES[scheme](job, slaves)
     ends = ends_of(job, slaves)

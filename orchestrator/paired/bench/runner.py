@@ -20,14 +20,7 @@ RUNS = 3
 
 
 def main(arguments: list[str]) -> int:
-    """Run the tool; a tool whose job is good for one run is set up anew for each.
-
-    Args:
-        arguments: key of ``TOOLS``, the job's file, the file to write.
-
-    Returns:
-        The exit code.
-    """
+    """Run the tool; a tool whose job is good for one run is set up anew for each."""
     tool, job, result = TOOLS[arguments[0]], read_job(Path(arguments[1])), Path(arguments[2])
     if not tool.installed:
         result.write_text("{}", encoding="utf-8")

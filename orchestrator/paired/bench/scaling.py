@@ -25,8 +25,6 @@ class Cost:
     """One measurement.
 
     Attributes:
-        fmus: number of instances.
-        steps: number of steps.
         microseconds: processor time per instance and step [us], the least of some runs.
     """
 
@@ -36,15 +34,7 @@ class Cost:
 
 
 def chain(fmu: Path, count: int) -> System:
-    """Return ``count`` plants in a row: each shaft's torque drives the next motor.
-
-    Args:
-        fmu: path of the plant's FMU.
-        count: number of FMUs.
-
-    Returns:
-        The system.
-    """
+    """Return ``count`` plants in a row: each shaft's torque drives the next motor."""
     instances = tuple(fmu_instance(f"plant{k}", fmu) for k in range(count))
     links = tuple(Connection(f"plant{k}.T_shaft", f"plant{k + 1}.u") for k in range(count - 1))
     return System(instances, links, (SignalSource("plant0.u", Sine(20.0, 1.0)),))
@@ -52,12 +42,6 @@ def chain(fmu: Path, count: int) -> System:
 
 def cost(fmu: Path, count: int, steps: int, rounds: int) -> Cost:
     """Measure one size.
-
-    Args:
-        fmu: path of the plant's FMU.
-        count: number of FMUs.
-        steps: number of steps.
-        rounds: runs, of which the quickest counts.
 
     Returns:
         The time of a step of one FMU [us].
@@ -81,17 +65,7 @@ def scaling(
     steps: Sequence[int] = STEPS,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[Cost]:
-    """Measure the cost for numbers of FMUs at 2,000 steps, and for numbers of steps with two FMUs.
-
-    Args:
-        fmu: path of the plant's FMU.
-        fmus: numbers of FMUs.
-        steps: numbers of steps.
-        progress: is told what runs.
-
-    Returns:
-        A cost per size.
-    """
+    """Measure the cost for numbers of FMUs at 2,000 steps, and for numbers of steps with two FMUs."""
     found = []
     for count in fmus:
         progress(f"{count} FMUs")

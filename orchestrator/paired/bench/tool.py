@@ -37,9 +37,7 @@ class Tool:
     """A way to run a job.
 
     Attributes:
-        title: for the table.
         needs: import name of the package, or ``program:NAME``; empty for what is always there.
-        prepare: sets up.
         again: what it returns may be run more than once.
         scheme: order in which values are exchanged: a key of ``reference.SCHEMES``.
         package: under which the package is registered, when that is not its import name.
@@ -61,11 +59,7 @@ class Tool:
         return not self.needs or importlib.util.find_spec(self.needs) is not None
 
     def version(self) -> str:
-        """Return the version; to be called once the tool was used, since what is built from sources must be asked.
-
-        Returns:
-            The version; empty where there is none.
-        """
+        """Return the version; to be called once the tool was used, since what is built from sources must be asked."""
         kind, _, program = self.needs.rpartition(":")
         if kind == "program":
             words = subprocess.run([program, "--version"], capture_output=True, text=True, check=False).stdout

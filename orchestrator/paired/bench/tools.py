@@ -43,14 +43,7 @@ def _ours_compiled(job: BenchJob) -> Prepared:
 
 
 def ours_interpreted(job: BenchJob) -> Prepared:
-    """This master with its loop in Python.
-
-    Args:
-        job: what is run.
-
-    Returns:
-        The run and the watched ends.
-    """
+    """This master with its loop in Python. Return the run and the watched ends."""
     return _ours(job, compiled=False)
 
 

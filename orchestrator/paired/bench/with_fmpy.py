@@ -10,9 +10,6 @@ from orchestrator.paired.bench.tool import Prepared
 def slaves_of(job: BenchJob) -> dict[str, Any]:
     """Return initialised slaves by instance.
 
-    Args:
-        job: what is run.
-
     Returns:
         Slaves, to be freed by the caller.
     """
@@ -40,25 +37,12 @@ def slaves_of(job: BenchJob) -> dict[str, Any]:
 
 
 def ends_of(job: BenchJob, slaves: Mapping[str, Any]) -> dict[str, float]:
-    """Return the watched outputs.
-
-    Args:
-        job: what is run.
-        slaves: by instance.
-
-    Returns:
-        Value by ``instance.output``.
-    """
+    """Return the watched outputs."""
     return {f"{a}.{b}": slaves[a].getReal([job.references[a][b]])[0] for a, b in job.watched}
 
 
 def one_after_the_other(job: BenchJob, slaves: Mapping[str, Any]) -> None:
-    """One call per variable, instances in execution order.
-
-    Args:
-        job: what is run.
-        slaves: by instance.
-    """
+    """One call per variable, instances in execution order."""
     r = job.references
     inputs = {name: [(slaves[a], r[a][b], r[c][d]) for a, b, c, d in job.connections if c == name] for name in slaves}
     for n in range(job.steps):
@@ -69,27 +53,13 @@ def one_after_the_other(job: BenchJob, slaves: Mapping[str, Any]) -> None:
 
 
 def per_variable(job: BenchJob) -> Prepared:
-    """One call per variable.
-
-    Args:
-        job: what is run.
-
-    Returns:
-        The run and the watched ends.
-    """
+    """One call per variable."""
     slaves = slaves_of(job)
     return Prepared(lambda: one_after_the_other(job, slaves), lambda: ends_of(job, slaves))
 
 
 def batched(job: BenchJob) -> Prepared:
-    """One batched get and set per FMU and step, instances in execution order.
-
-    Args:
-        job: what is run.
-
-    Returns:
-        The run and the watched ends.
-    """
+    """One batched get and set per FMU and step, instances in execution order."""
     slaves, r = slaves_of(job), job.references
     outputs = {n: list(dict.fromkeys(b for a, b, _, _ in job.connections if a == n)) for n in slaves}
     inputs = {n: [(a, b, d) for a, b, c, d in job.connections if c == n] for n in slaves}

@@ -26,11 +26,7 @@ from orchestrator.shared.results.thesis import Erratum
 
 
 def errata() -> list[Erratum]:
-    """Return all errata, computed afresh.
-
-    Returns:
-        The errata, in the order of the thesis.
-    """
+    """Return all errata, computed afresh."""
     return [
         _damping_entry(),
         _controllability(),

@@ -28,14 +28,7 @@ SELDOM = (
 
 
 def refused(values: Mapping[str, float]) -> str:
-    """Return why a drivetrain's backlash model cannot be diagnosed: the analysis is elastic.
-
-    Args:
-        values: of the plant's parameters, by name.
-
-    Returns:
-        The reason; empty where it can be diagnosed.
-    """
+    """Return why a drivetrain's backlash model cannot be diagnosed: the analysis is elastic."""
     chosen = MODELS[int(values["backlash_model"])]
     if chosen.predicted:
         return ""
@@ -186,9 +179,6 @@ def realised(p: Array) -> Array:
 
     Args:
         p: the parameters of the analysis, (n,).
-
-    Returns:
-        The parameters, in the order of the FMU's table.
     """
     own = np.array(p[: dt.COUNT], dtype=float)
     motor = own[dt.P_COULOMB_M] + own[dt.P_STRIBECK_M] + own[dt.P_BREAKAWAY_M]

@@ -25,11 +25,7 @@ SERVO_AXIS_BANK = tuple(effect for effect in DRIVETRAIN_BANK if effect.label in 
 
 @cache
 def stage() -> CompiledEquations:
-    """Return the compiled equations.
-
-    Returns:
-        Friction, rates and places of friction's build-up distances.
-    """
+    """Return the compiled equations."""
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
@@ -68,11 +64,7 @@ def stage() -> CompiledEquations:
 
 @cache
 def runner() -> Any:
-    """Return the compiled, event-located simulation.
-
-    Returns:
-        A function, see ``Plant.runner``.
-    """
+    """Return the compiled, event-located simulation."""
     from orchestrator.plants.compiled import compiled
     from orchestrator.shared.numba_cache import kept
 

@@ -43,15 +43,10 @@ def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]
     """Open a file for a ``with`` statement; its first bytes decide on the reader, not its name.
 
     Args:
-        path: the file.
         header: line of the names in a text, from 1; 0: it has none; None: found.
 
     Yields:
         Its channels, read when they are asked for.
-
-    Raises:
-        RecordError: the file is missing, too large, broken, of an unknown format, or its reader is not installed; or
-            ``header`` is given for what is no text.
     """
     head = _first_bytes(path)
     if not head:

@@ -27,17 +27,7 @@ _Opened = tuple[list[tuple[str, str, str, int, str]], str, float | None]
 
 
 def reader(argument: tuple[str, str]) -> Callable[[list[int] | None], Any]:
-    """Open a file, in the child.
-
-    Args:
-        argument: module of this room that reads the format, and the file.
-
-    Returns:
-        What answers None with the channels, and places with their values.
-
-    Raises:
-        RecordError: the file cannot be read.
-    """
+    """Open a file, in the child. Return what answers None with the channels, and places with their values."""
     module, path = argument
     source: RecordSource = import_module(f"orchestrator.records.formats.{module}").open_file(Path(path))
 
@@ -51,20 +41,7 @@ def reader(argument: tuple[str, str]) -> Callable[[list[int] | None], Any]:
 
 @contextmanager
 def opened_apart(module: str, path: Path) -> Iterator[RecordSource]:
-    """Open a file in a child process, which ends with the ``with`` statement.
-
-    Args:
-        module: of this room, which reads the format.
-        path: the file.
-
-    Yields:
-        The opened file.
-
-    Raises:
-        RecordError: the file cannot be read, or its reader crashed, took too long or said what is no record.
-        SimulationError: no process can be started.
-        OutputError: the temporary directory cannot be written.
-    """
+    """Open a file in a child process, which ends with the ``with`` statement."""
     file = path.resolve()
     with Jail(f"{__name__}:reader", (module, str(file)), read=[file], limits=_LIMITS) as jail:
         yield _Apart(jail, NAMES[module], file, path)

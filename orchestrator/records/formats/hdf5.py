@@ -14,17 +14,7 @@ _NUMBERS = frozenset(b"double single logical int8 int16 int32 int64 uint8 uint16
 
 
 def open_file(path: Path) -> ArraySource:
-    """Return the opened file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its vectors.
-
-    Raises:
-        RecordError: h5py is not installed, or the file is broken, too large, or holds no vector.
-    """
+    """Return the opened file."""
     try:
         import h5py
     except ImportError:

@@ -24,17 +24,7 @@ class Heading:
     path: Path
 
     def found(self, lines: list[str]) -> Named:
-        """Return names (None: there are none), units (empty where not in a row of their own) and the lines before.
-
-        Args:
-            lines: above the table.
-
-        Returns:
-            The three.
-
-        Raises:
-            RecordError: the last line has another number of cells than the rows.
-        """
+        """Return names (None: there are none), units (empty where not in a row of their own) and the lines before."""
         filled = [n for n, line in enumerate(lines) if line.strip()]
         self._refuse_decimal_commas([lines[n] for n in filled])
         if not filled:
@@ -57,18 +47,7 @@ class Heading:
         return last, self._keyed_units(lines[: filled[-1]]), lines[: filled[-1]]
 
     def stated(self, lines: list[str], header: int) -> Named:
-        """Return names, units and the lines in between, where the first line holds the names.
-
-        Args:
-            lines: from the names on.
-            header: number of the first of them in the file.
-
-        Returns:
-            The three.
-
-        Raises:
-            RecordError: that line has another number of cells than the rows.
-        """
+        """Return names, units and the lines in between, where the first line holds the names."""
         names = self._fitting(lines[0])
         if names is None:
             raise self._misfit(lines[0], f"line {header}, which `header` names,")

@@ -27,15 +27,6 @@ def named(text: str, unit: str = "", kind: str = "number", raster: int = 0) -> H
 
     What stands in brackets or behind a line is a unit, known or not, unless it only describes the channel, as in
     ``load (7)`` and ``angle (motor)``. At the end of a name only known units are.
-
-    Args:
-        text: the written name.
-        unit: the written unit, where it stands apart.
-        kind: "number" or "stamp".
-        raster: number of the raster that it is sampled in.
-
-    Returns:
-        The channel, with name and unit apart.
     """
     name, written = (text, unit) if unit else _split(text)
     return Head(name, written, kind, raster, text)

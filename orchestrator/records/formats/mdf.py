@@ -83,17 +83,7 @@ class MdfSource(RecordSource):
 
 
 def open_file(path: Path) -> MdfSource:
-    """Return the opened file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its channels, read when they are asked for.
-
-    Raises:
-        RecordError: asammdf is not installed, or the file is broken or too large.
-    """
+    """Return the opened file."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

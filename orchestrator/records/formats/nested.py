@@ -32,14 +32,7 @@ class Vectors:
     passed_over: list[str] = field(default_factory=list)
 
     def describe(self, kind: str) -> str:
-        """Return what was read in one line.
-
-        Args:
-            kind: what the file is.
-
-        Returns:
-            The number of vectors, and the names of what was passed over.
-        """
+        """Return what was read in one line."""
         words = f"{kind}, {len(self.arrays)} vectors"
         if not self.passed_over:
             return words
@@ -54,13 +47,6 @@ def vectors_of(variables: Mapping[str, Any]) -> Vectors:
     A field that is called ``values`` or ``data`` has the name of its structure, or of the field ``label`` or ``name``
     beside it; other fields have their own names where that is unique. Of an array of structures each one counts, and
     numbers that each of them has are a vector.
-
-    Args:
-        variables: by name: arrays, texts, mappings (structures), sequences of mappings (arrays of structures), and
-            ``PassedOver``.
-
-    Returns:
-        The vectors.
     """
     found = Vectors()
     for name, value in variables.items():

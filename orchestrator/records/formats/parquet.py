@@ -40,17 +40,7 @@ class ParquetSource(RecordSource):
 
 
 def open_file(path: Path) -> ParquetSource:
-    """Return the opened file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its columns, read when they are asked for.
-
-    Raises:
-        RecordError: pyarrow is not installed, or the file is broken or too large.
-    """
+    """Return the opened file."""
     try:
         import pyarrow.parquet
     except ImportError:

@@ -138,14 +138,7 @@ def open_file(path: Path, header: int | None = None) -> TextSource:
     """Return the opened file, its dialect detected.
 
     Args:
-        path: the file.
         header: line of the names, from 1; 0: there are none; None: found.
-
-    Returns:
-        Its columns, read when they are asked for.
-
-    Raises:
-        RecordError: it is no text, or no table of numbers.
     """
     text, encoding = _decoded(path)
     return TextSource(path, text, encoding, detect(text, path, header))
@@ -204,15 +197,7 @@ def _number_hint(cell: str) -> str:
 
 
 def short(text: str, length: int = 60) -> str:
-    """Return printable text of at most ``length`` characters.
-
-    Args:
-        text: of any origin.
-        length: the most characters.
-
-    Returns:
-        The text.
-    """
+    """Return printable text of at most ``length`` characters."""
     plain = "".join(c if c.isprintable() else "?" for c in text)
     return plain if len(plain) <= length else plain[: length - 3] + "..."
 

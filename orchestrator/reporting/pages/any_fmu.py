@@ -22,17 +22,7 @@ KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `diagnose` for any FMU.
-
-    Returns:
-        The report.
-
-    Raises:
-        ValueError: the results are not those of `diagnose` for any FMU.
-    """
+    """Return the page."""
     found = read(source.results, FmuDiagnosisFound)
     badge, label = VERDICTS.get(found.verdict, ("neutral", found.verdict))
     sentence = found.summary[0].partition(". ")[2] if found.summary else f"{label[:1].upper()}{label[1:]}."

@@ -12,14 +12,7 @@ from orchestrator.shared.results import as_plain, read
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `bench`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     results = read(source.results, BenchFound)
     rows = results.rows
     measured = [row for row in rows if row.wall is not None]

@@ -8,17 +8,7 @@ from orchestrator.shared.results.any_fmu import FmuCalibrationFound
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `calibrate`.
-
-    Returns:
-        The report.
-
-    Raises:
-        ValueError: the results are not those of `calibrate`.
-    """
+    """Return the page."""
     found = read(source.results, FmuCalibrationFound)
     label = "the parameters explain the record"
     summary = "With these parameters the FMU explains the record to its noise."

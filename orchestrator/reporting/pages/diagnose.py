@@ -58,14 +58,7 @@ TEST = "Root mean square of free runs minus measured, on data that nothing was f
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `diagnose`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     if source.results.get("kind") == "fmu":
         return any_fmu.build(source)
     results = read(source.results, DiagnoseFound)

@@ -36,14 +36,7 @@ ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `estimate`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     results = read(source.results, EstimateFound)
     found = {name: e for name, e in results.estimates.items() if e.not_applicable is None}
     sections: list[Section] = trust_section(results.trust)

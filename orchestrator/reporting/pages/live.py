@@ -53,15 +53,7 @@ ANGLES = {"theta_m": "Motor angle", "theta_l": "Load angle"}
 
 
 def pair_section(source: ResultDocument, results: PairFound) -> list[Section]:
-    """Return the paired loops, live.
-
-    Args:
-        source: the result directory.
-        results: of the document.
-
-    Returns:
-        One section; none for results that do not hold what it takes.
-    """
+    """Return the paired loops, live."""
     if not results.experiment or results.alpha is None:
         return []
     known = {name: results.experiment[name] for name in Experiment.__dataclass_fields__ if name in results.experiment}
@@ -181,13 +173,7 @@ def plant_section(
     """Return a model beside its record, live.
 
     Args:
-        source: the result directory.
-        name: the CSV file of the record: ``time``, ``u`` and measured angles.
-        found: what the result says of it, or None.
         offered: effects [N.m] that get a slider although the model has none of them.
-
-    Returns:
-        One section; none where the results or the file do not hold what it takes.
     """
     if found is None:
         return []

@@ -16,14 +16,7 @@ Columns = Mapping[str, list[Cell]]
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `simulate` or `ssp`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     table = source.columns(f"{source.command}.csv")
     results = source.results
     file = Path(str((source.document.get("arguments") or {}).get("file") or results.get("file") or "")).name

@@ -38,14 +38,7 @@ STATISTICS = {
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `sweep`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     results = read(source.results, SweepFound)
     failed, total = results.failed, results.cases
     first, failures, table = _excerpts(source, total)

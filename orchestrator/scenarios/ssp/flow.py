@@ -23,7 +23,6 @@ class Structure:
     Attributes:
         folder: of the unpacked archive.
         units: that the file declares.
-        problems: what is wrong.
         components: file of each component.
         kinds: kind of each connector.
         connector_units: of those that state one.
@@ -51,14 +50,7 @@ class _Value:
 
 
 def instance_names(components: Mapping[str, Path]) -> dict[str, str]:
-    """Return what components are called in signals, where a dot ends the name of an instance.
-
-    Args:
-        components: by path.
-
-    Returns:
-        Names without dots, each once, by path.
-    """
+    """Return what components are called in signals, where a dot ends the name of an instance."""
     found: dict[str, str] = {}
     for path in sorted(components, key=lambda text: "." in text):
         name = path.replace(".", "_")
@@ -72,8 +64,6 @@ class Flow:
     """Follows values through a package.
 
     Args:
-        structure: the package.
-        models: interface of each component.
         names: of the instances that components become.
     """
 
@@ -81,14 +71,7 @@ class Flow:
         self._structure, self._models, self._names = structure, models, names
 
     def connections(self, inputs: Mapping[str, Signal]) -> tuple[list[Connection], list[SignalSource]]:
-        """Return what feeds the inputs of components.
-
-        Args:
-            inputs: signals for the input connectors of the outermost system.
-
-        Returns:
-            Connections between instances, and signals.
-        """
+        """Return what feeds the inputs of components."""
         connections, sources = [], []
         for target, root in self._ends():
             name = self._address(target)
@@ -109,14 +92,7 @@ class Flow:
         return connections, sources
 
     def starts(self, inputs: Mapping[str, Signal]) -> dict[Node, Given]:
-        """Return the values that bindings give to connectors of systems, where they reach components.
-
-        Args:
-            inputs: signals for the input connectors of the outermost system, which stand over bindings.
-
-        Returns:
-            Value by connector of a component, in its own unit.
-        """
+        """Return the values that bindings give to connectors of systems, where they reach components."""
         found = {}
         for target, root in self._ends():
             given = self._structure.given.get(root)
@@ -134,14 +110,7 @@ class Flow:
         return found
 
     def outputs(self, record: tuple[str, ...]) -> Iterator[Derived]:
-        """Yield the output connectors of the outermost system that show recorded signals.
-
-        Args:
-            record: names of the recorded signals.
-
-        Yields:
-            Each connector with its source and conversion.
-        """
+        """Yield the output connectors of the outermost system that show recorded signals."""
         for node, kind in self._structure.kinds.items():
             if node[0] == "" and kind == "output" and node in self._structure.drivers:
                 root = self._root(node)

@@ -23,11 +23,8 @@ class Given:
 
     Attributes:
         type: ``Real``, ``Integer``, ``Boolean``, ``String`` or ``Enumeration``.
-        text: the value.
         unit: its unit, if it has one.
         units: units declared beside it.
-        factor: of the mapping.
-        offset: of the mapping.
     """
 
     type: str
@@ -39,15 +36,7 @@ class Given:
 
 
 def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
-    """Return the units that a file declares.
-
-    Args:
-        root: of the file.
-        space: prefix of the namespace in which units are declared.
-
-    Returns:
-        Units by name.
-    """
+    """Return the units that a file declares."""
     found = {}
     for element in root.findall(f"{tag(space, 'Units')}/{tag('ssc', 'Unit')}"):
         name, base = str(element.get("name")), element.find(tag("ssc", "BaseUnit"))
@@ -58,17 +47,7 @@ def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
 
 
 def bound_values(element: etree._Element, place: str, folder: Path, problems: list[Problem]) -> list[tuple[str, Given]]:
-    """Return names, prefix included, and values of an element's parameter bindings, in their order.
-
-    Args:
-        element: a component or a system.
-        place: path of the element, for messages.
-        folder: of the unpacked archive.
-        problems: what is wrong is appended.
-
-    Returns:
-        Names and values.
-    """
+    """Return names, prefix included, and values of an element's parameter bindings, in their order."""
     found: list[tuple[str, Given]] = []
     bindings = element.findall(f"{tag('ssd', 'ParameterBindings')}/{tag('ssd', 'ParameterBinding')}")
     for k, binding in enumerate(bindings):
@@ -144,19 +123,7 @@ def _mapped(values: list[tuple[str, Given]], rules: etree._Element) -> list[tupl
 def own_value(
     model: ModelInterface, name: str, given: Given, declared: Mapping[str, Unit], place: str, problems: list[Problem]
 ) -> Value | None:
-    """Return a value as the model's variable takes it, or ``None`` after adding what is wrong to ``problems``.
-
-    Args:
-        model: interface of the component.
-        name: of the variable.
-        given: what the file gives, perhaps with a unit.
-        declared: units that the file declares.
-        place: path of the binding, for messages.
-        problems: what is wrong is appended.
-
-    Returns:
-        The value.
-    """
+    """Return a value as the model's variable takes it, or ``None`` after adding what is wrong to ``problems``."""
     variable = model.variables.get(name)
     path = f"{place}.{name}"
     if variable is None:

@@ -37,18 +37,7 @@ def opened_ssp(
     All outputs are recorded. Components of nested systems are called ``system/component``.
 
     Args:
-        path: the archive.
-        inputs: signals for the input connectors of the outermost system, by name.
         step: communication step [s]; default: the file's own annotation, else a thousandth of the stop time.
-        simultaneous: run side by side (Jacobi) rather than one after the other (Gauss-Seidel).
-
-    Yields:
-        The scenario.
-
-    Raises:
-        ScenarioError: the archive or its structure is wrong; all problems in one message.
-        ConnectionMismatchError: its connections are.
-        FmuError: one of its FMUs is.
     """
     if os.path.isdir(path):
         raise ScenarioError(f"`ssp` must be an archive, but {path} is a directory; zip what is in it")

@@ -17,13 +17,7 @@ def content_band(values: Array, step: float, noise: float, shows: float, most_ab
     Args:
         values: (n,) samples of a position, or of another quantity with a speed.
         step: sample time [s].
-        noise: standard deviation of its measurement.
-        shows: power over that of the noise from which motion shows.
-        most_above: share of the squared speed that may lie above the band, and below where noise is looked for.
         pane: samples of a spectrum's pane at most.
-
-    Returns:
-        The frequency; 0.0 where nothing moves.
     """
     from scipy.signal import welch
 
@@ -48,8 +42,6 @@ def sampled(values: Array, factor: int, cut_off: float) -> Array:
 
     Args:
         values: (n,) samples.
-        factor: rows for one that is kept.
-        cut_off: of the filter, as a share of half the lower rate.
 
     Returns:
         Shape ((n - 1) // factor,).
@@ -62,8 +54,6 @@ def averaged(values: Array, factor: int, cut_off: float) -> Array:
 
     Args:
         values: (n,) efforts, each held over its row.
-        factor: rows for one that is kept.
-        cut_off: of the filter, as a share of half the lower rate.
 
     Returns:
         Shape ((n - 1) // factor,).

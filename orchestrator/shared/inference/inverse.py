@@ -15,13 +15,6 @@ def pseudo_inverse(matrix: Array, **how: Any) -> Array:
 
     Args:
         matrix: (n, m).
-        how: options of ``numpy.linalg.pinv``.
-
-    Returns:
-        (m, n).
-
-    Raises:
-        numpy.linalg.LinAlgError: the matrix is not finite.
 
     Example:
         >>> pseudo_inverse(np.diag([2.0, 0.0])).tolist()

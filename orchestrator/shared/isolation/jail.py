@@ -61,10 +61,8 @@ class Jail:
 
     Args:
         entry: ``module:function`` that the child calls with ``argument``.
-        argument: anything that can be pickled.
         read: further files and folders that the child may read, such as unpacked FMUs.
         write: further folders that it may change.
-        limits: what it may use.
         walls: whether the kernel's walls are wanted; without them limits, time and cleaning up remain.
         packages: further top-level packages that the child may import.
         adopt: without a filter of system calls, find processes that leave the child's group, too: this process then
@@ -73,10 +71,6 @@ class Jail:
     Attributes:
         walls: what the kernel enforces, once the child has started; ``None`` when it was not wanted.
         scratch: the child's only writable folder.
-
-    Raises:
-        OutputError: the temporary directory cannot be written.
-        SimulationError: no process can be started.
     """
 
     def __init__(
@@ -137,9 +131,6 @@ class Jail:
 
         Args:
             time_limit: [s].
-
-        Raises:
-            As ``call`` does.
         """
         if not self.started:
             found = self._exchange(b"", time_limit, 1 << 20)
@@ -151,16 +142,7 @@ class Jail:
         """Return the handler's answer to ``request``.
 
         Args:
-            request: anything that can be pickled.
             time: seconds until the child is killed (default: the limit's).
-            most: bytes that the answer may have.
-
-        Returns:
-            The answer.
-
-        Raises:
-            ChildError: the child ended, broke a limit or said what is no answer; it is gone.
-            OrchestratorError: raised by the handler, whatever its class; the child is well.
         """
         self.start()
         return self._exchange(pickle.dumps(request), self.limits.time if time is None else time, most)
@@ -172,27 +154,15 @@ class Jail:
         return self._process.pid
 
     def resident(self) -> int:
-        """Return the child's resident memory in bytes; 0 where the system does not tell.
-
-        Returns:
-            The bytes.
-        """
+        """Return the child's resident memory in bytes; 0 where the system does not tell."""
         return resident_memory(self.pid)[0]
 
     def printed_bytes(self) -> int:
-        """Return how much the child has printed.
-
-        Returns:
-            The bytes.
-        """
+        """Return how much the child has printed."""
         return os.fstat(self._log.fileno()).st_size
 
     def finish(self) -> bool:
-        """Let the child end by itself, then kill what is left of it; return whether processes of its own were left.
-
-        Returns:
-            True when there were.
-        """
+        """Let the child end by itself, then kill what is left of it; return whether processes of its own were left."""
         process = self._process
         if process is None:
             return False

@@ -24,11 +24,7 @@ _RIGHTS = ((1, (1 << 13) - 1), (2, 1 << 13), (3, _TRUNCATE), (5, _IOCTL))
 
 
 def version() -> int:
-    """Return the version of Landlock's interface that the kernel offers; 0 for none.
-
-    Returns:
-        The version.
-    """
+    """Return the version of Landlock's interface that the kernel offers; 0 for none."""
     if not sys.platform.startswith("linux"):
         return 0
     found = int(_library().syscall(_CREATE, None, ctypes.c_size_t(0), _VERSION_FLAG))
@@ -38,15 +34,8 @@ def version() -> int:
 def restrict(read: Iterable[str], write: Iterable[str]) -> int:
     """Refuse this thread, for good, every file outside ``read`` and ``write``, TCP, and signals to other processes.
 
-    Args:
-        read: files and folders that may be read, and from which libraries may be loaded; missing ones are left out.
-        write: folders in which anything may be done with files, save for making devices.
-
     Returns:
         The version in use; 0 when there is none, and then nothing is refused.
-
-    Raises:
-        OSError: the kernel refused the rules.
     """
     found = version()
     if not found:

@@ -17,11 +17,7 @@ _swept: set[str] = set()
 
 
 class Scratch:
-    """A private folder of this process; use as a context manager, or call ``close``.
-
-    Raises:
-        OutputError: the temporary directory cannot be written.
-    """
+    """A private folder of this process; use as a context manager, or call ``close``."""
 
     def __init__(self, purpose: str = "run") -> None:
         place = tempfile.gettempdir()
@@ -43,17 +39,7 @@ class Scratch:
         self.close()
 
     def folder(self, name: str) -> Path:
-        """Return the folder ``name`` in it, made when need be.
-
-        Args:
-            name: of the folder.
-
-        Returns:
-            Its path.
-
-        Raises:
-            OutputError: it cannot be made.
-        """
+        """Return the folder ``name`` in it, made when need be."""
         path = self.path / name
         try:
             path.mkdir(parents=True, exist_ok=True)
@@ -78,11 +64,7 @@ def _remove_abandoned(place: Path) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Remove a folder whatever is in it: depth beyond what recursion takes, folders without rights, odd names.
-
-    Args:
-        folder: that may be missing.
-    """
+    """Remove a folder whatever is in it: depth beyond what recursion takes, folders without rights, odd names."""
     with contextlib.suppress(OSError, RecursionError):
         shutil.rmtree(folder)
         return
@@ -129,13 +111,6 @@ def usage(folder: Path, most_entries: int) -> tuple[int, int]:
     """Return bytes and number of the entries below ``folder``; counting stops beyond ``most_entries``.
 
     What cannot be looked at (a folder without rights, or too deep for a path) counts as too many.
-
-    Args:
-        folder: to look into.
-        most_entries: number of entries at which counting stops.
-
-    Returns:
-        Bytes and number.
     """
     total, count, waiting = 0, 0, [os.fspath(folder)]
     while waiting and count <= most_entries:

@@ -34,11 +34,7 @@ class Strays:
             self.mark = {_NAME: secrets.token_hex(16)}
 
     def kill(self) -> bool:
-        """Kill the orphans that have come to this process, once the child has ended; return whether there were any.
-
-        Returns:
-            True when there were.
-        """
+        """Kill the orphans that have come to this process, once the child has ended; return whether there were any."""
         if not self.mark:
             return False
         found, end = False, time.monotonic() + _PATIENCE

@@ -38,32 +38,12 @@ class LateError(WireError):
 
 
 def encode(value: Any) -> bytes:
-    """Return plain data as bytes; arrays of float64, int64 and bool keep their shape.
-
-    Args:
-        value: numbers, texts, bytes, lists, dictionaries, arrays.
-
-    Returns:
-        The bytes.
-
-    Raises:
-        TypeError: ``value`` holds something else.
-    """
+    """Return plain data as bytes; arrays of float64, int64 and bool keep their shape."""
     return msgspec.msgpack.encode(value, enc_hook=_packed)
 
 
 def decode(data: bytes) -> Any:
-    """Return what ``encode`` was given; tuples come back as lists.
-
-    Args:
-        data: from anybody.
-
-    Returns:
-        The data.
-
-    Raises:
-        WireError: the bytes are no such data.
-    """
+    """Return what ``encode`` was given; tuples come back as lists."""
     try:
         return msgspec.msgpack.decode(data, ext_hook=_unpacked)
     except (msgspec.DecodeError, ValueError, RecursionError, OverflowError, struct.error) as error:
@@ -102,14 +82,7 @@ def send(link: socket.socket, data: bytes, deadline: float = math.inf, tick: Tic
     """Send one frame.
 
     Args:
-        link: the socket.
-        data: the frame.
-        deadline: of ``time.monotonic``.
         tick: called every ``SLICE`` seconds while waiting.
-
-    Raises:
-        ClosedError: the other end has hung up.
-        LateError: it does not take the frame in time.
     """
     rest = memoryview(_LENGTH.pack(len(data)) + data)
     link.settimeout(None if deadline == math.inf else SLICE)
@@ -126,16 +99,7 @@ def receive(link: socket.socket, most: int, deadline: float = math.inf, tick: Ti
     """Return one frame of at most ``most`` bytes; arguments and errors as those of ``send``.
 
     Args:
-        link: a socket.
-        most: bytes that the frame may have.
         deadline: on the monotonic clock [s].
-        tick: called while nothing comes.
-
-    Returns:
-        The frame's content.
-
-    Raises:
-        WireError: the frame is larger.
     """
     (length,) = _LENGTH.unpack(_exactly(link, _LENGTH.size, deadline, tick))
     if length > most:
@@ -170,14 +134,7 @@ def _wait(deadline: float, tick: Tick) -> None:
 
 
 def pending(link: socket.socket) -> bool:
-    """Return whether bytes lie there that nobody has asked for.
-
-    Args:
-        link: a socket.
-
-    Returns:
-        True when there are.
-    """
+    """Return whether bytes lie there that nobody has asked for."""
     link.settimeout(0.0)
     try:
         return bool(link.recv(1, socket.MSG_PEEK))

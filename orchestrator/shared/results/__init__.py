@@ -18,11 +18,7 @@ Sizes = dict[str, dict[str, dict[str, float | None]]]
 
 
 def first_version() -> int:
-    """Return the first version of a result; a default that is made is never left out of a file.
-
-    Returns:
-        1.
-    """
+    """Return the first version of a result; a default that is made is never left out of a file."""
     return 1
 
 
@@ -222,14 +218,7 @@ class CheckFound(Found, frozen=True, kw_only=True):
 
 
 def as_plain(found: Any) -> Any:
-    """Turn results into what JSON knows.
-
-    Args:
-        found: a struct or a dataclass, or a mapping already.
-
-    Returns:
-        Nested dictionaries, lists, numbers and texts.
-    """
+    """Turn results into what JSON knows. Return nested dictionaries, lists, numbers and texts."""
     return found if isinstance(found, Mapping) else msgspec.to_builtins(found, enc_hook=_otherwise)
 
 
@@ -238,18 +227,7 @@ def _otherwise(value: Any) -> Any:
 
 
 def read(results: Any, kind: type[F]) -> F:
-    """Read results from a file's content.
-
-    Args:
-        results: nested dictionaries, as the file has them.
-        kind: the struct.
-
-    Returns:
-        The results.
-
-    Raises:
-        ValueError: a field is missing or of another type; the text says where.
-    """
+    """Read results from a file's content."""
     try:
         return msgspec.convert(results, kind)
     except msgspec.ValidationError as error:
