@@ -7,7 +7,6 @@ from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
 from orchestrator.reporting.pages import (
-    bench,
     calibrate,
     check,
     diagnose,
@@ -19,6 +18,7 @@ from orchestrator.reporting.pages import (
     thesis,
 )
 from orchestrator.reporting.source import ResultDocument, load
+from orchestrator.shared.source_tree import import_masters
 
 PAGE = "report.html"
 COMMANDS = (
@@ -34,8 +34,20 @@ COMMANDS = (
     "ssp",
     "bench",
 )
+
+
+def _bench_page(source: ResultDocument) -> Report:
+    """Return the benchmark's own page in a clone, the generic one where the package alone is installed."""
+    try:
+        page = import_masters("page")
+    except ScenarioError:
+        page = generic
+    report: Report = page.build(source)
+    return report
+
+
 _BUILDERS: dict[str, Callable[[ResultDocument], Report]] = {
-    "bench": bench.build,
+    "bench": _bench_page,
     "calibrate": calibrate.build,
     "check": check.build,
     "diagnose": diagnose.build,

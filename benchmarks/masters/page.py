@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from orchestrator.paired.bench.alone import RecordCost, SweepCost
-from orchestrator.paired.bench.measure import ToolRow
-from orchestrator.paired.bench.results import BenchFound
-from orchestrator.paired.bench.scaling import Cost
+from benchmarks.masters.alone import RecordCost, SweepCost
+from benchmarks.masters.measure import ToolRow
+from benchmarks.masters.results import BenchFound
+from benchmarks.masters.scaling import Cost
 from orchestrator.reporting.model import Plot, Report, ReportTable, Section, Series, TableColumn
 from orchestrator.reporting.source import ResultDocument, table_of, words
 from orchestrator.shared.results import as_plain, read

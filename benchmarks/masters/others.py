@@ -11,8 +11,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from orchestrator.paired.bench.job import BenchJob
-from orchestrator.paired.bench.tool import Prepared
+from benchmarks.masters.job import BenchJob
+from benchmarks.masters.tool import Prepared
 
 _MODELS = itertools.count()
 

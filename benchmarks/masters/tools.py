@@ -7,9 +7,9 @@ initialises and records two signals within the time; the others record as little
 from pathlib import Path
 from typing import Any
 
-from orchestrator.paired.bench import others, with_fmpy
-from orchestrator.paired.bench.job import BenchJob
-from orchestrator.paired.bench.tool import GAUSS_SEIDEL, JACOBI, JACOBI_READ_AGAIN, Prepared, Tool
+from benchmarks.masters import others, with_fmpy
+from benchmarks.masters.job import BenchJob
+from benchmarks.masters.tool import GAUSS_SEIDEL, JACOBI, JACOBI_READ_AGAIN, Prepared, Tool
 
 
 def _ours(job: BenchJob, compiled: bool) -> Prepared:

@@ -1,4 +1,4 @@
-"""``python -m orchestrator.paired.bench.runner TOOL JOB RESULT``: one tool, one process, one result file.
+"""``python -m benchmarks.masters.runner TOOL JOB RESULT``: one tool, one process, one result file.
 
 The file is ``{}`` when the tool is not installed. Else it holds ``[[wall, cpu], ...]`` in seconds, one pair per run,
 where the watched outputs were at the end of the last, and the tool's version. Results go to a file because tools
@@ -12,8 +12,8 @@ import sys
 import time
 from pathlib import Path
 
-from orchestrator.paired.bench.job import read_job
-from orchestrator.paired.bench.tools import TOOLS
+from benchmarks.masters.job import read_job
+from benchmarks.masters.tools import TOOLS
 from orchestrator.shared.operating_system import peak_memory
 
 RUNS = 3

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from orchestrator.paired.bench.job import BenchJob
+from benchmarks.masters.job import BenchJob
 
 GAUSS_SEIDEL = "Gauss-Seidel"
 JACOBI = "Jacobi"

@@ -7,9 +7,9 @@ timed for shows when it ends where plain calls in its own order end.
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from orchestrator.paired.bench.job import BenchJob
-from orchestrator.paired.bench.tool import GAUSS_SEIDEL, JACOBI, JACOBI_READ_AGAIN
-from orchestrator.paired.bench.with_fmpy import ends_of, one_after_the_other, slaves_of
+from benchmarks.masters.job import BenchJob
+from benchmarks.masters.tool import GAUSS_SEIDEL, JACOBI, JACOBI_READ_AGAIN
+from benchmarks.masters.with_fmpy import ends_of, one_after_the_other, slaves_of
 
 
 def _side_by_side(job: BenchJob, slaves: Mapping[str, Any], read_again: bool) -> None:

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.masters import alone
+from benchmarks.masters.job import BenchJob, read_job
+from benchmarks.masters.measure import compare
+from benchmarks.masters.of_scenario import job_of
+from benchmarks.masters.reference import SCHEMES, reference_ends
 from orchestrator.building.build import ensure_built
 from orchestrator.cli import main
 from orchestrator.master import session
-from orchestrator.paired.bench import alone
-from orchestrator.paired.bench.job import BenchJob, read_job
-from orchestrator.paired.bench.measure import compare
-from orchestrator.paired.bench.of_scenario import job_of
-from orchestrator.paired.bench.reference import SCHEMES, reference_ends
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.scenario import paired_scenario
 
@@ -80,3 +80,9 @@ def test_growth_is_measured(tmp_path: Path, monkeypatch) -> None:
         found.append(json.loads((tmp_path / "point.json").read_text()))
     assert alone.SweepCost(**found[0]).per_case > 0.0
     assert alone.RecordCost(**found[1]).expected == pytest.approx(4 * 8 * 2001 / 2**20)
+
+
+def test_an_installed_package_says_that_the_benchmark_needs_a_clone(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr("orchestrator.shared.source_tree.ROOT", tmp_path)
+    assert main(["bench", "--tools", "ours", "--rounds", "1", "--out", str(tmp_path / "x")]) == 2
+    assert "must run in a clone" in capsys.readouterr().err

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
+from benchmarks.masters.job import BenchJob
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.master.signals import Constant
 from orchestrator.master.system import split
-from orchestrator.paired.bench.job import BenchJob
 from orchestrator.scenarios.scenario import Scenario
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from orchestrator.paired.bench.job import BenchJob
-from orchestrator.paired.bench.tool import Prepared
+from benchmarks.masters.job import BenchJob
+from benchmarks.masters.tool import Prepared
 
 
 def slaves_of(job: BenchJob) -> dict[str, Any]:

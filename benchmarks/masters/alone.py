@@ -1,6 +1,6 @@
 """Growth of sweeps and of records, each measured in a process of its own, so that its peak memory is its own.
 
-``python -m orchestrator.paired.bench.alone sweep CASES RESULT`` and ``... record SIGNALS RESULT``.
+``python -m benchmarks.masters.alone sweep CASES RESULT`` and ``... record SIGNALS RESULT``.
 """
 
 import json
@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.masters.scaling import chain
 from orchestrator.building.build import ensure_built
 from orchestrator.engine import DesignCases, LocalProcesses, Progress, parse_design, run_cases, write_csv
 from orchestrator.errors import SimulationError
 from orchestrator.master import session as session_module
 from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
-from orchestrator.paired.bench.scaling import chain
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.scenario import paired_scenario
@@ -80,8 +80,8 @@ def growth(progress: Callable[[str], None] = lambda text: None) -> tuple[list[Sw
 def _child(what: str, count: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         result = Path(folder) / "result.json"
-        words = [sys.executable, "-m", "orchestrator.paired.bench.alone", what, str(count), str(result)]
-        root = str(Path(__file__).resolve().parents[3])
+        words = [sys.executable, "-m", "benchmarks.masters.alone", what, str(count), str(result)]
+        root = str(Path(__file__).resolve().parents[2])
         paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "TMPDIR": folder}
         run = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)

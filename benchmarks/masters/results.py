@@ -1,8 +1,8 @@
 """What ``bench.json`` holds, as types that the API fills and the page reads."""
 
-from orchestrator.paired.bench.alone import RecordCost, SweepCost
-from orchestrator.paired.bench.measure import ToolRow
-from orchestrator.paired.bench.scaling import Cost
+from benchmarks.masters.alone import RecordCost, SweepCost
+from benchmarks.masters.measure import ToolRow
+from benchmarks.masters.scaling import Cost
 from orchestrator.shared.results import Found
 
 

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from orchestrator.paired.bench.job import BenchJob
-from orchestrator.paired.bench.reference import reference_ends
-from orchestrator.paired.bench.tools import TOOLS
+from benchmarks.masters.job import BenchJob
+from benchmarks.masters.reference import reference_ends
+from benchmarks.masters.tools import TOOLS
 
 TIMEOUT = 900.0
 
@@ -76,7 +76,7 @@ def compare(
                 if found[name].note:
                     continue
                 python = (pythons or {}).get(name, sys.executable)
-                words = [python, "-m", "orchestrator.paired.bench.runner", name, str(path), str(result)]
+                words = [python, "-m", "benchmarks.masters.runner", name, str(path), str(result)]
                 progress(f"round {number + 1} of {rounds}: {TOOLS[name].title}")
                 try:
                     _one(words, result, found[name])
@@ -88,7 +88,7 @@ def compare(
 
 def _one(words: list[str], result: Path, found: _Found) -> None:
     result.unlink(missing_ok=True)
-    root = str(Path(__file__).resolve().parents[3])
+    root = str(Path(__file__).resolve().parents[2])
     paths = [root, *([os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else [])]
     # What tools extract and log goes away with the folder.
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths), "TMPDIR": str(result.parent)}
