@@ -29,10 +29,30 @@ def test_pages_are_found():
     assert {"README.md", CHANGES, "docs/method.md", "docs/api/functions.md", *GENERATED} <= set(PAGES)
 
 
+SENTENCES = """# A title
+
+One `x + y` here. Two,
+three 0.5 mm!
+
+- four
+- five $a + b$
+
+| a | b |
+|---|---|
+| c | d |
+
+```sh
+six
+```
+
+    seven
+
+![eight](a.png)
+"""
+
+
 def test_what_counts_as_a_sentence():
-    page = "# A title\n\nOne `x + y` here. Two,\nthree 0.5 mm!\n\n- four\n- five $a + b$\n\n| a | b |\n|---|---|\n| c | d |\n"
-    page += "\n```sh\nsix\n```\n\n    seven\n\n![eight](a.png)\n"
-    assert [count_words(sentence) for sentence in sentences(page)] == [3, 4, 1, 2]
+    assert [count_words(sentence) for sentence in sentences(SENTENCES)] == [3, 4, 1, 2]
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 from markdown_it import MarkdownIt
 
@@ -17,7 +18,7 @@ def sentences(text: str) -> Iterator[str]:
         text: of the page.
     """
     tokens = MarkdownIt("commonmark").enable("table").parse(text)
-    for before, token in zip(tokens, tokens[1:], strict=False):
+    for before, token in pairwise(tokens):
         if before.type == "paragraph_open":
             shown = "".join(SHOWN[child.type](child) for child in token.children if child.type in SHOWN)
             yield from (part for part in END.split(FORMULA.sub("x", shown)) if count_words(part))
