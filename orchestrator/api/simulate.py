@@ -17,7 +17,7 @@ from orchestrator.scenarios.isolated import Safety, described
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.shared.operating_system import LIMITS
-from orchestrator.shared.results import RemarkFound, SignalFound, SignalsFound, WallsFound
+from orchestrator.shared.results import EventsFound, RemarkFound, SignalFound, SignalsFound, WallsFound
 
 Array = NDArray[np.float64]
 HEAD = ("signal", "unit", "first", "last", "smallest", "largest")
@@ -96,9 +96,15 @@ class SimulationResult(Result):
     def blocks(self) -> Sequence[Block]:
         """Return the table of the signals, and what is to be known of the run."""
         return [
-            table(f"{self.title}: {self.steps} steps", HEAD, self._rows()),
+            table(f"{self.title}: {self.steps} steps{self._events()}", HEAD, self._rows()),
             *(f"Note: {remark}" for remark in self.run.remarks),
         ]
+
+    def _events(self) -> str:
+        """Return how many events there were, of a system that can have some."""
+        took = self.run.statistics.events
+        ticks = f" and {took.ticks} ticks of clocks" if took.ticks else ""
+        return f", {len(took.times)} events{ticks}" if took.instants else ""
 
     def _rows(self) -> list[list[str]]:
         rows = []
@@ -112,7 +118,9 @@ class SimulationResult(Result):
         """Return what the JSON file says of the run."""
         signals = [SignalFound(*row) for row in self._rows()]
         remarks = [RemarkFound(r.instance, r.text, r.count) for r in self.run.remarks]
-        return SignalsFound(signals=signals, steps=self.steps, remarks=remarks, isolation=self.isolation)
+        took = self.run.statistics.events
+        events = EventsFound(list(took.times), took.instants, took.ticks, list(took.late)) if took.instants else None
+        return SignalsFound(signals=signals, steps=self.steps, events=events, remarks=remarks, isolation=self.isolation)
 
     def write_files(self, folder: Path) -> None:
         """Write the signals as CSV; of ``simulate`` also the figure."""

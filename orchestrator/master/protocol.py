@@ -33,7 +33,15 @@ class StepDiscardedError(SlaveError):
 
 
 class RunEndedError(StepDiscardedError):
-    """A slave asked for the end of the run instead of a step."""
+    """A slave asked for the end of the run instead of a step, or at an event.
+
+    Attributes:
+        at_event: it did so at an event, to which the run has come; else at a step that it has not done.
+    """
+
+    def __init__(self, text: str, instance: str = "", time: float = math.nan, at_event: bool = False) -> None:
+        super().__init__(text, instance, time)
+        self.at_event = at_event
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,7 +341,7 @@ class EventSlave(Slave, Protocol):
     Call order, in place of ``(send* do_step receive*)*`` of ``Slave``::
 
         start()                                 ends initialisation; the slave is in event mode
-        (send* receive* [tick] update_discrete_states)*   instants at one time, until none needs another
+        ([tick] (send* receive*)* update_discrete_states)*   instants at one time, until none needs another
         leave_event_mode()
         (send* step receive* (enter_event_mode instants leave_event_mode)?)*
 

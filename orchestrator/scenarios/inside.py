@@ -28,6 +28,7 @@ def opened(job: UnpackedRun) -> Callable[[Any], list[Any]]:
         result = session.run(start, allow_early_end=True)
         s = result.statistics
         remarks = [[remark.instance, remark.text, remark.count] for remark in result.remarks]
-        return [result.values, s.steps, s.rejected, dict(s.do_steps), s.sweeps, s.loop, remarks]
+        events = [list(s.events.times), s.events.instants, s.events.ticks, list(s.events.late)]
+        return [result.values, s.steps, s.rejected, dict(s.do_steps), s.sweeps, s.loop, remarks, events]
 
     return run

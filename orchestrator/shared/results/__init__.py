@@ -105,11 +105,21 @@ class RemarkFound(msgspec.Struct, frozen=True):
     count: int = 1
 
 
+class EventsFound(msgspec.Struct, frozen=True):
+    """Events of slaves: their times [s], instants and ticks of clocks, and by how much late ones were late [s]."""
+
+    times: list[float] = []
+    instants: int = 0
+    ticks: int = 0
+    late: list[float] = []
+
+
 class SignalsFound(Found, frozen=True, kw_only=True):
-    """``simulate`` of a scenario and ``ssp run``: recorded signals, steps, remarks, and the walls around the run."""
+    """``simulate`` of a scenario and ``ssp run``: recorded signals, steps, events, remarks, and the walls around it."""
 
     signals: list[SignalFound] = []
     steps: int | None = None
+    events: EventsFound | None = None
     remarks: list[RemarkFound] = []
     isolation: WallsFound | None = None
 
