@@ -25,7 +25,7 @@ from orchestrator.building.native_sources import slave_class
 from orchestrator.building.sources import recipe_of
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.extraction import content_hash
-from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.instances import make_slave
 from orchestrator.shared.cache import cache_directory
 
 NATIVE, PYTHON = "native", "Python"
@@ -80,7 +80,7 @@ def _agree(name: str, cls: Any, path: Path, variant: Mapping[str, Any]) -> bool:
     of = {c: [v for v in cls.table if v.causality == c and v.type == "Real"] for c in ("input", "output", "parameter")}
     matrices = {v.name: rng.uniform(-0.4, 0.4) for v in of["parameter"] if "[" in v.name}
     starts = {**matrices, **{k: v for k, v in _PROBE_STARTS.items() if k in places}, **variant}
-    python, native = cls(), FmuSlave(name, path)
+    python, native = cls(), make_slave(name, path)
     try:
         native.set(starts)
         for key, value in starts.items():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.errors import ChildError, SlaveError
+from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.protocol import (
@@ -35,7 +36,7 @@ def opened(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, li
     Returns:
         Called with a method's name and arguments, it gives what that returns.
     """
-    host = _Host(FmuSlave(*request))
+    host = _Host(make_slave(*request))
     return lambda asked: getattr(host, asked[0])(*asked[1])
 
 

@@ -162,30 +162,52 @@ class ModelInterface:
         return frozenset(self.named("input")) if declared is None else declared
 
 
-KINDS = ("Real", "Integer", "Boolean")
-"""Types of signals as functions of FMI 2.0 name them, in the order in which an instance's signals lie."""
+@dataclass(frozen=True)
+class NativeTransfer:
+    """A C function that sets or reads neighbouring signals: ``status f(component, references, n, values)``.
+
+    Attributes:
+        function: its address.
+        name: for messages.
+        number: what a value is in C, as NumPy writes it: "f8", "i4", "b1" and so on.
+        sized: the function takes the number of values as a fifth argument.
+        references: of the variables, shape (n,).
+        count: number of values.
+    """
+
+    function: int
+    name: str
+    number: str
+    sized: bool
+    references: NDArray[np.uint32]
+    count: int
+
+
+ENDED, LEFT_EARLY = 16, 17
+"""Statuses of a native step that did not end as asked: the run is to end; the step returned early, or with an event."""
 
 
 @dataclass(frozen=True)
 class NativeCalls:
-    """What machine code needs to step a slave without the interpreter: C functions with FMI 2.0's signatures.
+    """What machine code needs to step a slave without the interpreter: C functions, which return 0, 1 or worse.
 
     Attributes:
         component: first argument of every call.
-        set: addresses of ``status f(component, references, count, values)``, one for each of ``KINDS``.
-        get: addresses, likewise.
         do_step: address of ``status f(component, time, step, no_rollback)``.
-        inputs: references of the inputs, those of each of ``KINDS``.
-        outputs: references of the outputs, likewise.
+        step_name: its name, for messages.
+        reports: the flag of ``do_step`` is a ``bool``, and four pointers follow: to three ``bool`` (event, end of the
+            run, early return) and the time reached.
+        inputs: calls that set the inputs, in their order.
+        outputs: calls that read the outputs, in their order.
         python: the functions run Python.
     """
 
     component: int
-    set: tuple[int, int, int]
-    get: tuple[int, int, int]
     do_step: int
-    inputs: tuple[NDArray[np.uint32], ...]
-    outputs: tuple[NDArray[np.uint32], ...]
+    step_name: str
+    reports: bool
+    inputs: tuple[NativeTransfer, ...]
+    outputs: tuple[NativeTransfer, ...]
     python: bool
 
 
