@@ -26,7 +26,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
     <Float64 name="y" valueReference="10" causality="output"><Dimension start="2"/></Float64>
     <Int8 name="m" valueReference="11" causality="output"/>
     <UInt64 name="k" valueReference="12" causality="output"/>
-    <Float32 name="g" valueReference="13" causality="output"/>
+    <Float32 name="g" valueReference="13" causality="output" variability="discrete"/>
     <Boolean name="c" valueReference="14" causality="output"/>
     <Enumeration name="r" valueReference="15" causality="output" declaredType="Three"/>
     <Int16 name="d" valueReference="16" causality="output"/>
