@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from tests.support.prose import count_words, sentences
+from tools import messages_page
 
 ROOT = Path(__file__).resolve().parents[1]
-GENERATED = {"docs/settings.md", "docs/rules.md", "fmus/README.md"}
+GENERATED = {"docs/settings.md", "docs/rules.md", "docs/messages.md", "fmus/README.md"}
 CHANGES = "CHANGELOG.md"
 PAGES = sorted(
     path.relative_to(ROOT).as_posix()
@@ -84,3 +85,48 @@ def test_the_glossary_has_each_term_once_and_stays_short():
     rows = text_of("docs/naming.md").partition("## Glossary")[2]
     terms = re.findall(r"^\| ([^|]+) \|", rows, re.MULTILINE)[1:]
     assert 40 <= len(set(terms)) == len(terms) <= 80
+
+
+def test_the_page_of_messages_is_what_the_source_says():
+    assert text_of("docs/messages.md") == messages_page.page(), "write it anew: python -m tools.messages_page"
+
+
+MESSAGES = """
+class RecordError(Exception):
+    pass
+
+
+def read(path, size):
+    text = f"`size` must be positive, but is {size}"
+    if size < 0:
+        raise RecordError(text if path else "`path` must be given, but is not")
+    notes = [f"the record has {size} rows" for _ in range(size)]
+    notes.append(explain(size) + ": record it again")
+
+
+def explain(size):
+    return f"only {size} rows move"
+
+
+class DerivedError(RecordError):
+    pass
+
+
+def fail():
+    raise DerivedError("the file " "is damaged")
+"""
+
+
+def test_messages_are_collected_from_errors_and_notes(tmp_path, monkeypatch):
+    monkeypatch.setattr(messages_page, "ROOT", tmp_path)
+    place = tmp_path / "orchestrator" / "records" / "reading.py"
+    place.parent.mkdir(parents=True)
+    place.write_text(MESSAGES, encoding="utf-8")
+    found = messages_page.collect([place])
+    assert {title: sorted({text for text, _ in rows}) for title, rows in found.items() if rows} == {
+        "Errors: records": [
+            "`path` must be given, but is not", "`size` must be positive, but is …", "the file is damaged"
+        ],
+        messages_page.NOTES: ["only … rows move", "the record has … rows", "…: record it again"],
+    }  # fmt: skip
+    assert {room for rows in found.values() for _, room in rows} == {"records"}

@@ -21,7 +21,7 @@ PROTOCOLS = (
     "orchestrator.estimation.protocol",
     "orchestrator.master.protocol",
 )
-SECTION = re.compile(r"^ *(Args|Attributes|Returns|Yields|Raises|Example):$")
+SECTION = re.compile(r"^ *(Args|Attributes|Returns|Yields|Raises|Examples):$")
 # A unit, a shape, a number, code or a mapping: lines with one of these say something however short they are.
 CONTENT = re.compile(r"\[[^\]]+\]|\(\w+,|\d|`|shape|\"|->")
 FEWEST_WORDS = 4

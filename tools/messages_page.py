@@ -14,9 +14,9 @@ PAGE = ROOT / "docs" / "messages.md"
 SOURCES = sorted(path for room in ("orchestrator", "pyfmu_sources") for path in (ROOT / room).rglob("*.py"))
 HEAD = """# Messages
 
-Every message that a command or the library can give, by what it is. `…` stands for names and values of the moment, and the second column
-names the part of the library. The rules behind findings are in [rules.md](rules.md), those that lower a grade in
-[settings.md](settings.md#rules). This page is written from the source by `python -m tools.messages_page`.
+Every message that a command or the library can give, by what it is. `…` stands for names and values of the moment. The
+second column names the part of the library. The rules behind findings are in [rules](rules.md), those that lower a
+grade in [settings](settings.md#rules). This page is written from the source by `python -m tools.messages_page`.
 
 """
 # Bases of the classes whose texts reach the user, and what their section is called.
@@ -41,6 +41,7 @@ FINDINGS = "Findings of check"
 # Names that hold texts for the user, and calls that take one.
 HOLDERS = {"notes", "reasons", "remarks", "warnings", "red", "amber", "remark", "warning", "message", "said"}
 TAKERS = {"Reason", "RunRemark", "warn"}
+ADDERS = {"append", "extend"}
 WORD = re.compile(r"[A-Za-z]{2,}")
 LEAST_WORDS = 3
 
@@ -63,7 +64,7 @@ def collect(paths: list[Path]) -> dict[str, list[tuple[str, str]]]:
     functions = {
         node.name: node for tree in trees.values() for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)
     }
-    found: dict[str, list[tuple[str, str]]] = defaultdict(list)
+    collected: dict[str, list[tuple[str, str]]] = defaultdict(list)
     for path, tree in trees.items():
         package, room = path.relative_to(ROOT).parts[:2]
         room = room.removesuffix(".py") if package == "orchestrator" else "FMU"
@@ -74,8 +75,10 @@ def collect(paths: list[Path]) -> dict[str, list[tuple[str, str]]]:
                     if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in functions:
                         texts += _returned(functions[call.func.id])
                 section = FINDINGS if title == NOTES and room == "checking" else title
-                found[section] += [(_escaped(text), room) for text in texts if len(WORD.findall(text)) >= LEAST_WORDS]
-    return found
+                collected[section] += [
+                    (_escaped(text), room) for text in texts if len(WORD.findall(text)) >= LEAST_WORDS
+                ]
+    return collected
 
 
 def _titles(trees: Iterable[ast.Module]) -> dict[str, str]:
@@ -93,26 +96,23 @@ def _titles(trees: Iterable[ast.Module]) -> dict[str, str]:
     return {name: found for name in bases if (found := title(name))}
 
 
-def _own_nodes(scope: ast.AST) -> Iterator[ast.AST]:
+def _scope_nodes(scope: ast.AST) -> Iterator[ast.AST]:
     """Yield what is in a module or function and in no function within it."""
     for child in ast.iter_child_nodes(scope):
         if not isinstance(child, ast.FunctionDef):
             yield child
-            yield from _own_nodes(child)
+            yield from _scope_nodes(child)
 
 
 def _messages(scope: ast.AST, titles: dict[str, str]) -> Iterator[tuple[str, ast.expr]]:
     """Yield the expressions of a scope that are messages, with the title of their section."""
-    for node in _own_nodes(scope):
+    for node in _scope_nodes(scope):
         if isinstance(node, ast.Call):
             name = _name(node.func)
             if name in titles:
                 yield from ((titles[name], argument) for argument in node.args[:1])
-            elif name in TAKERS:
+            elif name in TAKERS or (name in ADDERS and _name(getattr(node.func, "value", node.func)) in HOLDERS):
                 yield from ((NOTES, argument) for argument in node.args)
-            elif name in {"append", "extend"} and isinstance(node.func, ast.Attribute):
-                if _name(node.func.value) in HOLDERS:
-                    yield from ((NOTES, argument) for argument in node.args)
             yield from ((NOTES, word.value) for word in node.keywords if word.arg in HOLDERS)
         elif isinstance(node, (ast.Assign, ast.AugAssign, ast.AnnAssign)) and node.value is not None:
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
@@ -120,13 +120,13 @@ def _messages(scope: ast.AST, titles: dict[str, str]) -> Iterator[tuple[str, ast
                 yield NOTES, node.value
 
 
-def _name(node: ast.expr) -> str:
+def _name(node: ast.AST) -> str:
     return node.id if isinstance(node, ast.Name) else node.attr if isinstance(node, ast.Attribute) else ""
 
 
 def _returned(function: ast.FunctionDef) -> list[str]:
     """Return the texts that a function returns or yields."""
-    given = [n.value for n in _own_nodes(function) if isinstance(n, (ast.Return, ast.Yield)) and n.value is not None]
+    given = [n.value for n in _scope_nodes(function) if isinstance(n, (ast.Return, ast.Yield)) and n.value is not None]
     return [text for value in given for text in _texts(value, function)]
 
 
@@ -136,7 +136,7 @@ def _texts(node: ast.expr, scope: ast.AST) -> Iterator[str]:
         case ast.Constant(value=str(text)):
             yield text
         case ast.JoinedStr(values=parts):
-            yield "".join(str(p.value) if isinstance(p, ast.Constant) else "…" for p in parts)
+            yield "".join(str(p.value) if isinstance(p, ast.Constant) else _value(p, scope) for p in parts)
         case ast.IfExp(body=one, orelse=other):
             yield from (*_texts(one, scope), *_texts(other, scope))
         case ast.BinOp(left=left, op=ast.Add(), right=right):
@@ -148,10 +148,16 @@ def _texts(node: ast.expr, scope: ast.AST) -> Iterator[str]:
         case ast.ListComp(elt=item) | ast.GeneratorExp(elt=item) | ast.Starred(value=item):
             yield from _texts(item, scope)
         case ast.Name(id=name):
-            for other in _own_nodes(scope):
-                if isinstance(other, ast.Assign) and name in map(_name, other.targets) and other.value is not node:
-                    if not any(isinstance(n, ast.Name) and n.id == name for n in ast.walk(other.value)):
-                        yield from _texts(other.value, scope)
+            for given in (n for n in _scope_nodes(scope) if isinstance(n, ast.Assign)):
+                if name in map(_name, given.targets) and name not in map(_name, ast.walk(given.value)):
+                    yield from _texts(given.value, scope)
+
+
+def _value(part: ast.expr, scope: ast.AST) -> str:
+    """Return what stands for a value within a text: the one text that it may be, else dots."""
+    named = isinstance(part, ast.FormattedValue) and isinstance(part.value, ast.Name)
+    texts = list(_texts(part.value, scope)) if named else []  # type: ignore[attr-defined]
+    return texts[0] if len(texts) == 1 else "…"
 
 
 def _escaped(text: str) -> str:

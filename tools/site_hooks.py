@@ -35,12 +35,12 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     sources = {name: source for source, name in PAGES.items()}
     source = ROOT / sources.get(page.file.src_uri, f"docs/{page.file.src_uri}")
 
-    def moved(match: re.Match[str]) -> str:
+    def target_on_site(match: re.Match[str]) -> str:
         target = Path(source.parent, match[1]).resolve().relative_to(ROOT).as_posix()
         place = PAGES.get(target, target.removeprefix("docs/"))
         return "../" * page.file.src_uri.count("/") + place
 
-    return LINK.sub(moved, markdown)
+    return LINK.sub(target_on_site, markdown)
 
 
 def on_page_content(content: str, **_: Any) -> str:

@@ -241,7 +241,7 @@ def draft_map(record: Path | str, fmu: Path | str) -> str:
     Raises:
         InputError: record or FMU cannot be read.
 
-    Example:
+    Examples:
         >>> "[ports.port_1]" in oc.draft_map("axis.csv", "axis.fmu")
         True
     """

@@ -31,7 +31,7 @@ def benchmark(
     Raises:
         ScenarioError: a tool is unknown, an interpreter missing, or ``rounds`` out of range; or there is no clone.
 
-    Example:
+    Examples:
         >>> measured = oc.benchmark(["ours"], rounds=1)
         >>> measured.rows[0].deviation < 1e-9
         True

@@ -81,7 +81,7 @@ def build(
         FmuError: a name is unknown, a build fails, or a native one lacks a compiler.
         OutputError: ``directory`` is a file.
 
-    Example:
+    Examples:
         >>> oc.build(["Drivetrain"])["Drivetrain"].name
         'Drivetrain.fmu'
     """

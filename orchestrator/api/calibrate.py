@@ -116,7 +116,7 @@ def calibrate(
         InputError: record, FMU, map or settings cannot be used.
         SimulationError: the FMU fails again and again.
 
-    Example:
+    Examples:
         >>> fit = oc.calibrate("axis.csv", "axis.fmu", "axis_map.toml")
         >>> [*fit.calibration.diagnosis.parameters], fit.trust.level.word
         (['J', 'b'], 'red')

@@ -111,7 +111,7 @@ def check(
         FmuError: a path does not exist, or a folder has no FMU.
         InputError: the policy or its baseline is wrong.
 
-    Example:
+    Examples:
         >>> assert oc.check("other.fmu").ok
     """
     paths = find_fmus([fmus] if isinstance(fmus, (str, Path)) else list(fmus))

@@ -172,7 +172,7 @@ def design(
     Raises:
         ScenarioError: a number is out of its range, or the model has effects that estimators would not see.
 
-    Example:
+    Examples:
         >>> plan = oc.design(size=0.005, duration=4.0)
         >>> plan.shows
         True

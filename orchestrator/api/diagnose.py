@@ -96,7 +96,7 @@ def diagnose(
         InputError: the FMU or its map cannot be used.
         SimulationError: the FMU fails again and again.
 
-    Example:
+    Examples:
         >>> found = oc.diagnose("machine.csv", oc.read_model("machine.toml"))
         >>> found.verdict, sorted(effect.name for effect in found.effects)
         ('effects', ['backlash', 'coulomb_friction'])

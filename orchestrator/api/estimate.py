@@ -264,7 +264,7 @@ def estimate(
         ScenarioError: there is no such method, or the model has effects that estimators would not see.
         ConvergenceError: a method finds no solution, or not within the time limit.
 
-    Example:
+    Examples:
         >>> gap = oc.estimate("machine.csv", oc.read_model("machine.toml"))
         >>> gap.interval[0] < gap.alpha < gap.interval[1]
         True

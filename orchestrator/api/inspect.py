@@ -204,7 +204,7 @@ def inspect(
         RecordError: the record cannot be read, or a column is missing or ambiguous.
         ScenarioError: the model cannot be read.
 
-    Example:
+    Examples:
         >>> seen = oc.inspect("machine.csv")
         >>> seen.smallest_gap < 0.001
         True

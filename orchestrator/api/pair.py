@@ -180,7 +180,7 @@ def run_pair(
         ScenarioError: an argument is out of its range, or names nothing.
         SimulationError: the run went wrong.
 
-    Example:
+    Examples:
         >>> pair = oc.run_pair(alpha=0.02)
         >>> round(pair.estimate.alpha, 4)
         0.02

@@ -43,7 +43,7 @@ def read_record(
     Raises:
         RecordError: the file cannot be read or is no such record; the text names row and column.
 
-    Example:
+    Examples:
         >>> record = oc.read_record("machine.csv")
         >>> record.size, round(record.duration, 2)
         (4000, 20.0)
@@ -64,7 +64,7 @@ def read_model(path: Path | str | None = None) -> Model:
     Raises:
         ScenarioError: the file cannot be read, or a name, value or unit in it is wrong.
 
-    Example:
+    Examples:
         >>> model = oc.read_model("machine.toml")
         >>> model.fmu, model.parameters["J_l"].unit
         ('Drivetrain', 'kg.m2')

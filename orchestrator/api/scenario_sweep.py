@@ -106,7 +106,7 @@ def sweep_scenario(
         ScenarioError: the scenario or an argument is wrong.
         SimulationError: the place where cases run is gone. A case that fails is a row, not an error.
 
-    Example:
+    Examples:
         >>> result = oc.sweep_scenario("loop.toml", {"plant.J_l": "range:5.3:5.9:3"})
         >>> len(result), result.failed
         (3, 0)

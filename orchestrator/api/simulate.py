@@ -157,7 +157,7 @@ def simulate(
         InputError: the file, an FMU or an argument is wrong; the text names the file and every problem in it.
         SimulationError: the run went wrong.
 
-    Example:
+    Examples:
         >>> result = oc.simulate("loop.toml", stop=2.0)
         >>> result["plant.theta_l"].shape
         (2001,)

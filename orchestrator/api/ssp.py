@@ -66,7 +66,7 @@ def export_ssp(
         ScenarioError: the scenario has what SSP cannot express, or a number is out of its range.
         OutputError: the file cannot be written.
 
-    Example:
+    Examples:
         >>> print(oc.export_ssp("paired.ssp", alpha=0.02))
         paired.ssp: 6 FMUs, 20 connections
     """

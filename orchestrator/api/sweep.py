@@ -212,7 +212,7 @@ def sweep(
         CalibrationError: a size outside what the experiment claims.
         SimulationError: the place where cases run is gone. A case that fails is a row, not an error.
 
-    Example:
+    Examples:
         >>> result = oc.sweep(sizes=[0.01, 0.02], noise=0.0)
         >>> len(result), result.failed
         (2, 0)

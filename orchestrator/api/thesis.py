@@ -116,7 +116,7 @@ def thesis() -> ThesisResult:
     Returns:
         Gains, Table 4.1 and errata, each published value beside the recomputed one.
 
-    Example:
+    Examples:
         >>> ours = oc.thesis()
         >>> len(ours.estimates)
         8

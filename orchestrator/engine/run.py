@@ -149,7 +149,7 @@ def _run(cases: Cases, pool: Pool, journal: Journal, on_progress: Callable[[Prog
             if slots:
                 last_slot = time.monotonic()
             elif time.monotonic() - last_slot > NO_SLOT_LIMIT:
-                raise SimulationError(f"no worker has been there for {NO_SLOT_LIMIT:g} s; {_kept(journal)}", "resume")
+                raise SimulationError(f"no worker was connected for {NO_SLOT_LIMIT:g} s; {_kept(journal)}", "resume")
             while len(running) < max(1, slots) * QUEUED_PER_SLOT:
                 batch = queue.batch()
                 if not batch:
@@ -168,7 +168,7 @@ def _submit(pool: Pool, batch: Sequence[Case], journal: Journal) -> "Future[list
     try:
         return pool.submit(batch)
     except (BrokenExecutor, RuntimeError, OSError) as error:
-        raise SimulationError(f"cases can no longer be run: {error}; {_kept(journal)}", "resume") from None
+        raise SimulationError(f"no further case can be run: {error}; {_kept(journal)}", "resume") from None
 
 
 def _record(

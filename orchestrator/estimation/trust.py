@@ -45,7 +45,7 @@ def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Re
     elif fit.visible:
         traversals = int(fit.diagnostics.get("traversals", settings.least_traversals))
         if traversals < settings.least_traversals:
-            yield Reason(Level.AMBER, f"the gap is traversed {traversals} times only")
+            yield Reason(Level.AMBER, f"the gap is traversed only {traversals} times")
         if fit.standard_error > settings.widest * fit.alpha:
             yield Reason(Level.AMBER, "the standard error is more than a fifth of the half-gap")
     yield from _of_values(fit.diagnostics.get("parameters", {}), model, settings)
@@ -75,7 +75,7 @@ def _beside(estimate: Estimate, fit: Estimate | None, own: Trust | None) -> Iter
         yield Reason(
             Level.AMBER,
             f"{estimate.method} does not check whether the model explains the record, and its interval holds scatter "
-            f"alone; {FITTED} beside it would tell",
+            f"alone: run {FITTED} too",
         )
         return
     low, high = estimate.interval

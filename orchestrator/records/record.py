@@ -47,9 +47,8 @@ def read_record(
     if span is not None:
         start, end = span
         note = (
-            f"the motor moves from {start:.3g} to {end:.3g} s alone and stands still in the rest of "
-            f"{record.duration:.3g} s, where later parts of a record, which decide, show nothing: keep `part` "
-            f"{start:.3g}:{end:.3g}, or log motion throughout"
+            f"the motor moves only from {start:.3g} to {end:.3g} s of {record.duration:.3g} s, the rest shows nothing: "
+            f"keep `part` {start:.3g}:{end:.3g}, or log motion throughout"
         )
         record = replace(record, notes=(*record.notes, note))
     scale = (columns or {}).get("u", Column()).relative_uncertainty

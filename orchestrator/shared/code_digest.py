@@ -22,7 +22,7 @@ def digest_of(function: FunctionType | Dispatcher) -> str | None:
     Returns:
         64 hexadecimal digits, or None where it reaches something whose content is not known to stay.
 
-    Example:
+    Examples:
         >>> scale = 2.0
         >>> def scaled(x: float) -> float:
         ...     return scale * x

@@ -346,7 +346,7 @@ def odd(function: str) -> ChildError:
     Returns:
         The error, to be raised.
     """
-    return ChildError(f"the answer to {function} is none", "protocol")
+    return ChildError(f"the answer to {function} is not valid", "protocol")
 
 
 def finite(value: Any) -> bool:

@@ -16,7 +16,7 @@ def pseudo_inverse(matrix: Array, **how: Any) -> Array:
     Args:
         matrix: (n, m).
 
-    Example:
+    Examples:
         >>> pseudo_inverse(np.diag([2.0, 0.0])).tolist()
         [[0.5, 0.0], [0.0, 0.0]]
     """
