@@ -1,4 +1,4 @@
-"""Write ``docs/messages.md``: every message that a user can meet, as the source has it.
+"""Write ``docs/messages.md``: the messages that a user can meet, as the source has them.
 
 python -m tools.messages_page
 """
@@ -14,7 +14,7 @@ PAGE = ROOT / "docs" / "messages.md"
 SOURCES = sorted(path for room in ("orchestrator", "pyfmu_sources") for path in (ROOT / room).rglob("*.py"))
 HEAD = """# Messages
 
-Every message that a command or the library can give, by what it is. `…` stands for names and values of the moment. The
+The messages that commands and the library give, by what they are. `…` stands for names and values of the moment. The
 second column names the part of the library. The rules behind findings are in [rules](rules.md), those that lower a
 grade in [settings](settings.md#rules). This page is written from the source by `python -m tools.messages_page`.
 
@@ -40,7 +40,8 @@ NOTES = "Notes, remarks and reasons"
 FINDINGS = "Findings of check"
 # Names that hold texts for the user, and calls that take one.
 HOLDERS = {"notes", "reasons", "remarks", "warnings", "red", "amber", "remark", "warning", "message", "said"}
-TAKERS = {"Reason", "RunRemark", "warn"}
+TAKERS = {"Reason", "RunRemark", "warn", "Finding"}
+FINDING_TAKERS = {"report", "report_difference", "_add"}  # of the room of checking
 ADDERS = {"append", "extend"}
 WORD = re.compile(r"[A-Za-z]{2,}")
 LEAST_WORDS = 3
@@ -69,15 +70,13 @@ def collect(paths: list[Path]) -> dict[str, list[tuple[str, str]]]:
         package, room = path.relative_to(ROOT).parts[:2]
         room = room.removesuffix(".py") if package == "orchestrator" else "FMU"
         for scope in (node for node in ast.walk(tree) if isinstance(node, (ast.Module, ast.FunctionDef))):
-            for title, value in _messages(scope, titles):
+            for title, value in _messages(scope, titles, TAKERS | FINDING_TAKERS if room == "checking" else TAKERS):
                 texts = list(_texts(value, scope))
                 for call in ast.walk(value) if title == NOTES else ():
                     if isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id in functions:
                         texts += _returned(functions[call.func.id])
                 section = FINDINGS if title == NOTES and room == "checking" else title
-                collected[section] += [
-                    (_escaped(text), room) for text in texts if len(WORD.findall(text)) >= LEAST_WORDS
-                ]
+                collected[section] += [(_escaped(text), room) for text in texts if _is_sentence(text)]
     return collected
 
 
@@ -104,14 +103,14 @@ def _scope_nodes(scope: ast.AST) -> Iterator[ast.AST]:
             yield from _scope_nodes(child)
 
 
-def _messages(scope: ast.AST, titles: dict[str, str]) -> Iterator[tuple[str, ast.expr]]:
+def _messages(scope: ast.AST, titles: dict[str, str], takers: set[str]) -> Iterator[tuple[str, ast.expr]]:
     """Yield the expressions of a scope that are messages, with the title of their section."""
     for node in _scope_nodes(scope):
         if isinstance(node, ast.Call):
             name = _name(node.func)
             if name in titles:
                 yield from ((titles[name], argument) for argument in node.args[:1])
-            elif name in TAKERS or (name in ADDERS and _name(getattr(node.func, "value", node.func)) in HOLDERS):
+            elif name in takers or (name in ADDERS and _name(getattr(node.func, "value", node.func)) in HOLDERS):
                 yield from ((NOTES, argument) for argument in node.args)
             yield from ((NOTES, word.value) for word in node.keywords if word.arg in HOLDERS)
         elif isinstance(node, (ast.Assign, ast.AugAssign, ast.AnnAssign)) and node.value is not None:
@@ -151,6 +150,10 @@ def _texts(node: ast.expr, scope: ast.AST) -> Iterator[str]:
             for given in (n for n in _scope_nodes(scope) if isinstance(n, ast.Assign)):
                 if name in map(_name, given.targets) and name not in map(_name, ast.walk(given.value)):
                     yield from _texts(given.value, scope)
+
+
+def _is_sentence(text: str) -> bool:
+    return min(len(text.split()), len(WORD.findall(text))) >= LEAST_WORDS
 
 
 def _value(part: ast.expr, scope: ast.AST) -> str:
