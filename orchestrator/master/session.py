@@ -13,6 +13,7 @@ from orchestrator.master.adaptive import run_adaptive
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
 from orchestrator.master.clocks import clock_problems
 from orchestrator.master.event_steps import FixedSteps
+from orchestrator.master.event_windows import EventWindows
 from orchestrator.master.events import EventIteration
 from orchestrator.master.fixed_step import run_sequential, run_simultaneous
 from orchestrator.master.iterated import backward_slots, initialise, run_iterated
@@ -265,6 +266,8 @@ class Session:
                 )
             case Iterated():
                 sweeps = run_iterated(wiring, table, self.start, algorithm, steps, rows, record)
+            case Adaptive() if self._events is not None:
+                return EventWindows(self._events, signals, self.start, self.stop, algorithm).run(rows, record)
             case Adaptive():
                 return run_adaptive(wiring, signals, self.start, self.stop, algorithm, rows, record)
             case _:

@@ -1,0 +1,274 @@
+"""All slaves of a system with events through one window, again and again until what they exchange settles.
+
+A sweep restores all slaves to the begin of the window and steps them one after the other through its two cells; their
+outputs at the three nodes, with derivatives where slaves know them, are the inputs of the next sweep. A slave that
+takes inputs inside steps is fed their polynomials, any other one constant pieces with the right moments. Where a slave
+stops at an event the window becomes shorter, and the sweeps go on until the event stays where it is.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.master.events import EventIteration, EventStage, is_discrete, slack
+from orchestrator.master.pieces import piece_times, piece_weights
+from orchestrator.master.protocol import EventSlave, Variable
+from orchestrator.master.rollback import rollback
+from orchestrator.master.tracks import Track, cell_coefficients
+
+Array = NDArray[np.float64]
+Slots = NDArray[np.int64]
+
+MOST_SWEEPS = 30
+BRIEF = 100.0
+"""Windows that are shorter than so many roundings of time are taken as they are."""
+
+FAR = 40.0
+"""Length of a window as a multiple of the one before, beyond which that one's polynomials tell nothing."""
+
+SETTLED = 0.1
+"""Change of an output in the last sweep, as a multiple of the tolerance."""
+
+
+class UnsettledError(Exception):
+    """A window is too long for what its slaves exchange to settle."""
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What came of the sweeps over a window.
+
+    Attributes:
+        track: all signals, up to ``end``; of no use where that is the begin of the window.
+        end: of the window, or an event before it [s].
+        event: a slave has an event there.
+        rates: derivatives there.
+    """
+
+    track: Track
+    end: float
+    event: bool
+    rates: Array
+
+
+class _Part:
+    """One instance in a sweep: which slots it takes and shows, and how it is stepped."""
+
+    def __init__(self, stage: EventStage) -> None:
+        self.stage, block, model = stage, stage.block, stage.slave.model
+        taken = block.inputs
+        clocked = {name for clock in model.clocks.values() for name in clock.variables}
+        if stage.has_events:
+            taken = tuple(n for n in taken if n not in clocked and not is_discrete(model.variables[n]))
+        self.names = taken
+        self.feeds = [block.feeds[block.inputs.index(name)] for name in taken]
+        self.inputs = np.array([feed.slot for feed in self.feeds], dtype=np.int64)
+        self.inside = stage.has_events and model.takes_inputs_inside_steps and bool(taken)
+        rated = [n for n in block.outputs if model.output_derivatives and _is_smooth(model.variables[n])]
+        self.rated = [n for n in rated if n not in clocked] if stage.has_events else []
+        self.rate_slots = np.array([block.first_output + block.outputs.index(n) for n in self.rated], dtype=np.int64)
+        direct = [n for n in block.outputs if model.variables[n].causality == "output"]
+        self.closing = any(name in model.depends_on(output) for output in direct for name in taken)
+        self.follows = {n for n in block.outputs if n in direct and not model.depends_on(n).isdisjoint(block.inputs)}
+
+
+def _is_smooth(variable: Variable) -> bool:
+    return variable.causality == "output" and variable.type == "Real" and variable.variability == "continuous"
+
+
+class Sweeper:
+    """Sweeps the slaves of a wiring.
+
+    Args:
+        events: the slaves.
+        sources: what sources add to inputs at three nodes, shape (rows, 3), from their times [s].
+        difference: of two sets of outputs, as a multiple of the tolerance.
+
+    Attributes:
+        sweeps: passes over all slaves.
+        held: signals that do not change within a window.
+        rated: signals whose derivatives make cubics of them; of outputs that follow inputs at once they are incomplete.
+    """
+
+    def __init__(
+        self,
+        events: EventIteration,
+        sources: Callable[[Array], Array],
+        difference: Callable[[Array, Array], float],
+    ) -> None:
+        self.wiring, self._sources, self._difference = events.wiring, sources, difference
+        self._parts = [_Part(stage) for stage in events.stages]
+        self.sweeps = 0
+        system, slots = self.wiring.layout.system, self.wiring.layout.slots
+        self.held = np.array([(v := system.variable(a)) is not None and is_discrete(v) for a in slots], dtype=bool)
+        self.rated = np.zeros(len(slots), dtype=bool)
+        for part in self._parts:
+            for name, slot in zip(part.rated, part.rate_slots, strict=True):
+                self.rated[slot] = name not in part.follows
+
+    def rates(self) -> Array:
+        """Return the derivatives of the outputs where the slaves are, as far as they know them; zero for others.
+
+        Returns:
+            Shape (slots,).
+        """
+        found = np.zeros(len(self.wiring.values))
+        for part in self._parts:
+            self._read_rates(part, found)
+        return found
+
+    def _read_rates(self, part: _Part, rates: Array) -> None:
+        if part.rated:
+            rates[part.rate_slots] = cast(EventSlave, part.stage.slave).output_rates(part.rated)
+
+    def sweep(self, begin: float, end: float, rates: Array, guess: Track | None) -> Swept:
+        """Take all slaves from ``begin`` to ``end`` [s], or to the first event before it.
+
+        Args:
+            begin: where they are [s].
+            end: [s].
+            rates: derivatives at the begin.
+            guess: signals in an earlier window, or in this one.
+
+        Returns:
+            What the signals do.
+
+        Raises:
+            UnsettledError: the window is too long.
+        """
+        with rollback(self.wiring) as restore:
+            track = self._guessed(begin, end, rates, guess)
+            for sweep in range(MOST_SWEEPS):
+                if sweep:
+                    restore()
+                found, stopped = self._pass(track)
+                if stopped is not None:
+                    part, reached = stopped
+                    brief = begin + BRIEF * slack(begin)
+                    if reached - begin <= slack(begin) and track.end > brief:  # a poor guess may have brought it about
+                        restore()
+                        track = self._guessed(begin, max(brief, begin + 0.1 * (track.end - begin)), rates, None)
+                        continue
+                    if reached - begin <= slack(begin):
+                        restore()
+                        self._pass(track, only=part)
+                        return Swept(track, begin, True, rates)
+                    track = self._shortened(found.track, reached)
+                    continue
+                change = self._difference(track.values[1:], found.track.values[1:])
+                track = found.track
+                if change <= SETTLED:
+                    return found
+        raise UnsettledError
+
+    def _guessed(self, begin: float, end: float, rates: Array, guess: Track | None) -> Track:
+        """Return what the signals may do: as before, moved to where they are now."""
+        times, now = begin + 0.5 * (end - begin) * np.arange(3.0), self.wiring.values
+        if guess is None or end - begin > FAR * (guess.end - guess.start):
+            values, slopes = now + np.outer(times - begin, rates), np.tile(rates, (3, 1))
+        else:
+            values, slopes = guess.at(times), guess.rates_at(times)
+            values += now - values[0]
+            slopes[0] = rates
+        values[:, self.held] = now[self.held]
+        values[0] = now
+        return Track(begin, end, values, slopes, self.rated)
+
+    def _shortened(self, track: Track, end: float) -> Track:
+        times = track.start + 0.5 * (end - track.start) * np.arange(3.0)
+        values, rates = track.at(times), track.rates_at(times)
+        values[0], rates[0] = track.values[0], track.rates[0]
+        return Track(track.start, end, values, rates, self.rated)
+
+    def _pass(self, track: Track, only: _Part | None = None) -> tuple[Swept, tuple[_Part, float] | None]:
+        """Step all slaves once; return what they show, and the first one that stopped, with the time [s]."""
+        self.sweeps += only is None
+        begin, end = track.start, track.end
+        values, rates = track.values.copy(), track.rates.copy()
+        sources = self._sources(begin + 0.5 * (end - begin) * np.arange(3.0))
+        event = False
+        for part in self._parts if only is None else [only]:
+            kept = values.copy(), rates.copy()
+            run = self._along if part.inside else self._in_pieces
+            reached, due = run(part, begin, end, values, rates, sources)
+            if reached < end:
+                return Swept(Track(begin, end, *kept, self.rated), end, True, rates), (part, reached)
+            event = event or due
+        return Swept(Track(begin, end, values, rates, self.rated), end, event, rates[2].copy()), None
+
+    def _input_nodes(
+        self, part: _Part, values: Array, rates: Array, sources: Array
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return values and derivatives of a slave's inputs at the nodes, and which of them have derivatives."""
+        nodes, slopes = np.empty((3, len(part.feeds))), np.zeros((3, len(part.feeds)))
+        rated = np.zeros(len(part.feeds), dtype=bool)
+        for k, feed in enumerate(part.feeds):
+            nodes[:, k] = feed.offset
+            if feed.source >= 0:
+                source = values[:, feed.source]
+                nodes[:, k] += feed.factor * (source[0] if self.held[feed.source] else source)
+                slopes[:, k] = feed.factor * rates[:, feed.source]
+                rated[k] = self.rated[feed.source] and feed.signal < 0
+            if feed.signal >= 0:
+                nodes[:, k] += sources[feed.signal]
+        return nodes, slopes, rated
+
+    def _along(
+        self, part: _Part, begin: float, end: float, values: Array, rates: Array, sources: Array
+    ) -> tuple[float, bool]:
+        """Step a slave that is fed the polynomials of its inputs; return where it stopped, and whether at an event."""
+        nodes, slopes, rated = self._input_nodes(part, values, rates, sources)
+        middle, cell = 0.5 * (begin + end), 0.5 * (end - begin)
+        cubics = cell_coefficients(nodes, slopes, rated, cell)
+        times = (begin, middle, end)
+        slave, event = cast(EventSlave, part.stage.slave), False
+        rows: list[list[list[float]]] = cubics.transpose(0, 2, 1).tolist()
+        for k in range(2):
+            origin, cubic = times[k], rows[k]
+
+            def fed(time: float, origin: float = origin, cubic: Sequence[Sequence[float]] = cubic) -> Sequence[float]:
+                s = (time - origin) / cell
+                return [a + s * (b + s * (c + s * d)) for a, b, c, d in cubic]
+
+            self.wiring.values[part.inputs] = cubics[k, 0]
+            part.stage.send()
+            slave.feed(part.names, fed)
+            outcome = part.stage.step(times[k], times[k + 1])
+            event = outcome.event
+            self._show(part, k + 1, values, rates)
+            if outcome.reached < times[k + 1] or (event and k == 0):
+                return outcome.reached, event
+        self.wiring.values[part.inputs] = nodes[2]
+        return end, event
+
+    def _in_pieces(
+        self, part: _Part, begin: float, end: float, values: Array, rates: Array, sources: Array
+    ) -> tuple[float, bool]:
+        """Step a slave that holds its inputs; see ``_along``."""
+        nodes, _, _ = self._input_nodes(part, values, rates, sources)
+        constants = piece_weights(part.closing) @ nodes
+        times, at_node = piece_times(begin, end, part.closing)
+        node, event = 1, False
+        for k, ends_cell in enumerate(at_node):
+            self.wiring.values[part.inputs] = constants[k]
+            part.stage.send()
+            outcome = part.stage.step(times[k], times[k + 1])
+            event = outcome.event
+            if outcome.reached < times[k + 1] or (event and k + 1 < len(at_node)):
+                part.stage.receive()
+                return outcome.reached, event
+            if ends_cell:
+                self._show(part, node, values, rates)
+                node += 1
+        return end, event
+
+    def _show(self, part: _Part, node: int, values: Array, rates: Array) -> None:
+        """Read the outputs at a node, and their derivatives."""
+        part.stage.receive()
+        outputs = part.stage.outputs
+        values[node, outputs] = self.wiring.values[outputs]
+        values[node, part.inputs] = self.wiring.values[part.inputs]
+        self._read_rates(part, rates[node])
