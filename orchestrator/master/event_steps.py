@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import ChatteringError, ConvergenceError
 from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi
-from orchestrator.master.events import MOST_EVENTS, EventIteration, EventStage, slack
+from orchestrator.master.event_stage import EventStage, slack
+from orchestrator.master.events import MOST_EVENTS, EventIteration
 from orchestrator.master.fixed_point import fixed_point
 from orchestrator.master.iterated import loop_groups
 from orchestrator.master.protocol import RunEndedError, StepDiscardedError, StepOutcome

@@ -13,7 +13,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.master.events import EventIteration, EventStage, is_discrete, slack
+from orchestrator.master.event_stage import EventStage, is_discrete, slack
+from orchestrator.master.events import EventIteration
 from orchestrator.master.pieces import piece_times, piece_weights
 from orchestrator.master.protocol import EventSlave, Variable
 from orchestrator.master.rollback import rollback

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from orchestrator.errors import ConvergenceError, SlaveError
 from orchestrator.master.adaptive import GROW, ORDER, SAFETY, SHRINK, check_adaptive, window_end
 from orchestrator.master.algorithms import Adaptive
+from orchestrator.master.event_stage import slack
 from orchestrator.master.event_sweeps import BRIEF, Sweeper, Swept, UnsettledError
-from orchestrator.master.events import EventIteration, slack
+from orchestrator.master.events import EventIteration
 from orchestrator.master.protocol import RunEndedError, StepDiscardedError
 from orchestrator.master.result import Statistics
 from orchestrator.master.rollback import rollback
