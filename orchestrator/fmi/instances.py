@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.fmi.slave2 import Fmu2Slave
@@ -25,7 +26,8 @@ def make_slave(name: str, path: Path, description: FmuDescription | None = None)
         FmuError: the FMU cannot be read, loaded or instantiated here.
     """
     known = read_description(path) if description is None else description
-    return (Fmu2Slave if known.version == "2.0" else Fmu3Slave)(name, path, known)
+    kind = Fmu2Slave if known.version == "2.0" else EventFmuSlave if known.model.has_events else Fmu3Slave
+    return kind(name, path, known)
 
 
 @dataclass(frozen=True)

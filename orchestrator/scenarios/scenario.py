@@ -117,6 +117,7 @@ class _Master(_Strict, frozen=True, kw_only=True):
     step: float
     algorithm: str = "gauss_seidel"
     order: list[str] = []
+    events: bool = True
     compiled: bool | None = None
     tolerance: float | None = None
     iterations: int | None = None
@@ -197,11 +198,13 @@ class _Reader:
 
     def __init__(self, path: Path, problems: list[Problem]) -> None:
         self.path, self.problems = path, problems
+        self._events = True  # event mode is used where an FMU has it
 
     def master(self, top: _Top) -> tuple[Algorithm | None, tuple[str, ...]]:
         master: _Master | None = _converted(top.master, _Master, "$.master", self.problems)
         if master is None:
             return None, ()
+        self._events = master.events
         kind = ALGORITHMS.get(master.algorithm)
         if kind is None:
             text = f"must be one of {', '.join(ALGORITHMS)}, but is {master.algorithm!r}"
@@ -235,7 +238,8 @@ class _Reader:
                     start[key] = parameter
             self._bounded(instance, "solver_tolerance", path, lambda x: 0.0 < x < 1.0, "above 0 and below 1")
             try:
-                found.append(fmu_instance(name, self._fmu(instance.fmu), start, instance.solver_tolerance))
+                fmu = self._fmu(instance.fmu)
+                found.append(fmu_instance(name, fmu, start, instance.solver_tolerance, self._events))
             except FmuError as error:
                 raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
         return tuple(found)

@@ -182,7 +182,7 @@ def _descriptions(structure: Structure, path: Path) -> dict[str, FmuDescription]
     found = {}
     for name, file in structure.components.items():
         try:
-            found[name] = read_description(file, events=False)
+            found[name] = read_description(file)
         except FmuError as error:
             raise FmuError(f"{path}: {name}: {str(error).replace(str(file), file.name)}") from None
     for owner, variable in structure.kinds:
