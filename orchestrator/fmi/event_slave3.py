@@ -111,9 +111,12 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
     def _stepped(self, time: float, step: float) -> StepOutcome:
         status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
         self._reached = time
+        failure = self._updates.take_failure()
+        if failure is not None:
+            self._worst = ERROR
+            raise failure
         if status:
             self._check(status, "fmi3DoStep")
-        self._updates.check()
         event, ends, early = self._flags
         if ends:
             self._refuse_end(True, time)

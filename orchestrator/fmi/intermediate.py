@@ -19,7 +19,7 @@ CALLBACK = ctypes.CFUNCTYPE(
 
 
 class IntermediateUpdates:
-    """What one instance is told inside its steps. Nothing can be raised there: ``check`` does it after the step.
+    """What one instance is told inside its steps. Nothing can be raised there, but after the step.
 
     Args:
         name: of the instance, for messages.
@@ -50,15 +50,14 @@ class IntermediateUpdates:
         self._batches = functions.batches(accesses, "Set", self._buffer)
         self._values = values
 
-    def check(self) -> None:
-        """Raise what went wrong inside the step that has just been done.
+    def take_failure(self) -> BaseException | None:
+        """Return what went wrong inside the step that has just been done, and forget it.
 
-        Raises:
-            SlaveError: the FMU refused a value.
+        Returns:
+            An error to be raised, or None.
         """
         failure, self._failure = self._failure, None
-        if failure is not None:
-            raise failure
+        return failure
 
     def _update(
         self, _: int, time: float, wants: bool, gives: bool, done: bool, may_return: bool, early: Any, until: Any

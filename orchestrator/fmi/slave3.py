@@ -82,7 +82,8 @@ class Fmu3Slave(FmuSlave):
             update,
         )
         if not component:
-            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._said()}")
+            hint = " (`events = false` runs it without event mode)" if self.model.has_events else ""
+            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._said()}{hint}")
         return library, c_void_p(component)
 
     def _intermediate(self) -> tuple[Any, Any]:

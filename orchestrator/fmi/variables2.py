@@ -50,12 +50,18 @@ def _variable(scalar: etree._Element, kind: etree._Element, types: dict[str, etr
         unit=attribute("unit") or None,
         variability=scalar.get("variability", "continuous" if kind.tag == "Real" else "discrete"),
         start=start_value(str(kind.tag), kind.get("start"), name),
-        minimum=number(attribute("min")),
-        maximum=number(attribute("max")),
+        minimum=_limit(kind, attribute("min")),
+        maximum=_limit(kind, attribute("max")),
         items=tuple((item.attrib["name"], int(item.attrib["value"])) for item in items),
         description=scalar.get("description", ""),
         reference=int(scalar.attrib["valueReference"]),
     )
+
+
+def _limit(kind: etree._Element, text: str | None) -> float | None:
+    """Return a limit; one beyond the 32 bits of a whole number limits nothing."""
+    limit = number(text)
+    return None if kind.tag != "Real" and limit is not None and abs(limit) > 2**31 else limit
 
 
 def read_feedthrough(root: etree._Element, variables: list[Variable]) -> dict[str, frozenset[str]]:

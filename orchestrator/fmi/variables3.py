@@ -61,7 +61,7 @@ def read_variables(root: etree._Element) -> Variables3:
     elements = [e for e in root.iterfind("ModelVariables/*") if isinstance(e.tag, str)]
     types = {t.attrib["name"]: t for t in root.iterfind("TypeDefinitions/*") if isinstance(t.tag, str)}
     lengths = {
-        e.attrib["valueReference"]: int(e.attrib["start"])
+        e.attrib["valueReference"]: e.attrib["start"]
         for e in elements
         if e.get("causality") == "structuralParameter" and "start" in e.attrib
     }
@@ -81,12 +81,12 @@ def read_variables(root: etree._Element) -> Variables3:
     return found
 
 
-def _shape(element: etree._Element, lengths: Mapping[str, int]) -> tuple[int, ...]:
+def _shape(element: etree._Element, lengths: Mapping[str, str]) -> tuple[int, ...]:
     """Return the sizes of a variable's dimensions, none for a scalar."""
     shape = []
     for dimension in element.iterfind("Dimension"):
         of = dimension.get("valueReference")
-        size = int(dimension.attrib["start"]) if of is None else lengths[of]
+        size = int(dimension.attrib["start"] if of is None else lengths[of])
         if not 0 < size <= MOST_ELEMENTS:
             raise ValueError(f"the variable {element.get('name')!r} has a dimension of size {size}")
         shape.append(size)

@@ -16,7 +16,7 @@ from orchestrator.errors import ChildError, FmuError, OrchestratorError, Simulat
 from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.ours import is_ours
-from orchestrator.fmi.remote import RemoteFactory
+from orchestrator.fmi.remote import RemoteFactory, without_feed
 from orchestrator.master.algorithms import step_count
 from orchestrator.master.compiled import prepare
 from orchestrator.master.result import LOOPS, Recording, Statistics, claimed_events, claimed_remarks
@@ -137,8 +137,9 @@ def _in_processes(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Re
             factory = instance.create
             assert isinstance(factory, FmuFactory)
             walls = Path(origins[str(factory.path)]) in foreign
-            made = RemoteFactory(factory.path, factory.description, limits, walls)
-            instances.append(replace(instance, create=made))
+            description = without_feed(factory.description)
+            made = RemoteFactory(factory.path, description, limits, walls)
+            instances.append(replace(instance, model=description.model, create=made))
         try:
             with replace(scenario, system=replace(system, instances=tuple(instances))).session() as session:
                 return session.run(allow_early_end=True)

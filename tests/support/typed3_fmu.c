@@ -177,3 +177,11 @@ FMI3_Export fmi3Status fmi3FreeFMUState(fmi3Instance i, fmi3FMUState *x)
     *x = NULL;
     return fmi3OK;
 }
+
+FMI3_Export fmi3Status fmi3EnterEventMode(fmi3Instance i) { return say(i, fmi3Error, "no event mode"); }
+FMI3_Export fmi3Status fmi3EnterStepMode(fmi3Instance i) { return say(i, fmi3Error, "no event mode"); }
+FMI3_Export fmi3Status fmi3UpdateDiscreteStates(fmi3Instance i, fmi3Boolean *a, fmi3Boolean *b, fmi3Boolean *c,
+    fmi3Boolean *d, fmi3Boolean *e, fmi3Float64 *f)
+{
+    return say(i, fmi3Error, "no event mode");
+}
