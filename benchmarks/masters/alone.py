@@ -23,7 +23,7 @@ from orchestrator.master.algorithms import GaussSeidel
 from orchestrator.master.session import Session
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.scenario import paired_scenario
+from orchestrator.paired.scenario import scenario_of_pair
 from orchestrator.scenarios.sweep import scenario_work
 from orchestrator.shared.operating_system import peak_memory
 
@@ -94,7 +94,7 @@ def _child(what: str, count: int) -> dict[str, Any]:
 
 def _sweep(count: int) -> dict[str, float]:
     fmus = ensure_built(FMUS)
-    scenario = paired_scenario(Experiment(), fmus, 0.02, 0.5)
+    scenario = scenario_of_pair(Experiment(), fmus, 0.02, 0.5)
     scenario = replace(scenario, stop=CASE_STEPS * scenario.algorithm.step, record=("plant.theta_l",))
     cases = DesignCases(parse_design(["plant.alpha=random:0.002:0.1"], count, 0), 0)
     marks: list[tuple[int, float]] = []

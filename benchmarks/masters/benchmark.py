@@ -19,7 +19,7 @@ from orchestrator.building.native_build import ensure_native
 from orchestrator.errors import ScenarioError
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.scenario import paired_scenario
+from orchestrator.paired.scenario import scenario_of_pair
 from orchestrator.shared.cache import cache_directory
 
 WATCHED = ("plant.theta_l", "twin_plant.theta_l")
@@ -103,7 +103,7 @@ def benchmark(
             text = f"`python` must name an interpreter for {tool}, but there is no program {path!r}"
             raise ScenarioError(text, "python")
     fmus = ensure_native(FMUS, cache_directory("native"), here=True) if native else ensure_built(FMUS)
-    job = job_of(paired_scenario(Experiment(), fmus, 0.02, 0.5), WATCHED)
+    job = job_of(scenario_of_pair(Experiment(), fmus, 0.02, 0.5), WATCHED)
     rows = tuple(compare(job, chosen, rounds, dict(pythons or {}), progress))
     given = {"rounds": rounds, "tools": chosen, "native": native}
     if not scaling_too:

@@ -45,7 +45,7 @@ class ToolRow:
 
 
 @dataclass
-class _Found:
+class _Measured:
     """What the processes of one tool have reported so far."""
 
     note: str = ""
@@ -67,7 +67,7 @@ def compare(
     Returns:
         Times and ends of each tool, in the order of ``tools``.
     """
-    found = {name: _Found() for name in tools}
+    found = {name: _Measured() for name in tools}
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         path, result = Path(folder) / "job.json", Path(folder) / "result.json"
         job.write(path)
@@ -79,14 +79,14 @@ def compare(
                 words = [python, "-m", "benchmarks.masters.runner", name, str(path), str(result)]
                 progress(f"round {number + 1} of {rounds}: {TOOLS[name].title}")
                 try:
-                    _one(words, result, found[name])
+                    _run_tool(words, result, found[name])
                 except RuntimeError as error:
                     found[name].note = str(error)
     expected = {s: reference_ends(job, s) for s in {TOOLS[n].scheme for n in tools if found[n].ends}}
     return [_row(name, found[name], expected.get(TOOLS[name].scheme, {})) for name in tools]
 
 
-def _one(words: list[str], result: Path, found: _Found) -> None:
+def _run_tool(words: list[str], result: Path, measured: _Measured) -> None:
     result.unlink(missing_ok=True)
     root = str(Path(__file__).resolve().parents[2])
     paths = [root, *([os.environ["PYTHONPATH"]] if os.environ.get("PYTHONPATH") else [])]
@@ -103,18 +103,20 @@ def _one(words: list[str], result: Path, found: _Found) -> None:
         raise RuntimeError(f"failed: {lines[-1][:200]}")
     content = json.loads(result.read_text(encoding="utf-8"))
     if not content:
-        found.note = "not installed"
+        measured.note = "not installed"
         return
-    found.times += [(wall, cpu) for wall, cpu in content["times"]]
-    found.peak = max(content["peak_kib"] / 1024.0, found.peak or 0.0)
-    found.ends, found.version = content["ends"], content["version"]
+    measured.times += [(wall, cpu) for wall, cpu in content["times"]]
+    measured.peak = max(content["peak_kib"] / 1024.0, measured.peak or 0.0)
+    measured.ends, measured.version = content["ends"], content["version"]
 
 
-def _row(name: str, found: _Found, expected: dict[str, float]) -> ToolRow:
+def _row(name: str, measured: _Measured, expected: dict[str, float]) -> ToolRow:
     tool = TOOLS[name]
-    cpus = [cpu for _, cpu in found.times if cpu is not None]
-    wall = statistics.median(wall for wall, _ in found.times) if found.times else None
+    cpus = [cpu for _, cpu in measured.times if cpu is not None]
+    wall = statistics.median(wall for wall, _ in measured.times) if measured.times else None
     cpu = statistics.median(cpus) if cpus else None
-    deviation = max((abs(value - expected[key]) for key, value in found.ends.items()), default=None)
-    runs = len(found.times)
-    return ToolRow(name, tool.title, found.version, tool.scheme, wall, cpu, runs, found.peak, deviation, found.note)
+    deviation = max((abs(value - expected[key]) for key, value in measured.ends.items()), default=None)
+    runs = len(measured.times)
+    return ToolRow(
+        name, tool.title, measured.version, tool.scheme, wall, cpu, runs, measured.peak, deviation, measured.note
+    )

@@ -3,10 +3,10 @@
 from benchmarks.masters.alone import RecordCost, SweepCost
 from benchmarks.masters.measure import ToolRow
 from benchmarks.masters.scaling import Cost
-from orchestrator.shared.results import Found
+from orchestrator.shared.results import ResultData
 
 
-class BenchFound(Found, frozen=True, kw_only=True):
+class BenchFound(ResultData, frozen=True, kw_only=True):
     """``bench``: times of each tool; with ``scaling`` also the cost by numbers of FMUs and steps, and memory."""
 
     rows: tuple[ToolRow, ...] = ()

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.arguments import choose_settings
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.fmu.deliver import Delivered, deliver
 from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnosing
@@ -107,7 +107,7 @@ class FmuDiagnosisResult(Result):
             verdict=d.verdict,
             trust=d.trust.found(),
             effects=tuple(effect_found(effect) for effect in d.effects),
-            parameters=parameters_found(d),
+            parameters=parameter_results(d),
             test=tuple(test_found(test, report) for test in d.test),
             validation=None if self.validation is None else test_found(self.validation, report),
             remaining=FmuRemainingFound(dict(d.left), tuple(dependence_found(one) for one in d.remaining)),
@@ -146,7 +146,7 @@ class FmuDiagnosisResult(Result):
         self.diagnosis.workings.close()
 
 
-def parameters_found(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
+def parameter_results(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
     """Return re-fitted parameters as result files have them."""
     return {
         name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
@@ -154,8 +154,8 @@ def parameters_found(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
     }
 
 
-def _tables(found: FmuDiagnosisResult) -> Iterator[Block]:
-    d = found.diagnosis
+def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
+    d = diagnosis.diagnosis
     rows = [
         (name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.standard_error:.2g}", e.unit)
         for name, e in d.parameters.items()
@@ -169,7 +169,10 @@ def _tables(found: FmuDiagnosisResult) -> Iterator[Block]:
     ]  # fmt: skip
     if tried:
         yield table("What was tried", ("on top of", "effect", "gain [%]", "over its error", ""), tried)
-    for title, tests in (("Misfit on test data", found.test), ("Misfit on the other record", (found.validation,))):
+    for title, tests in (
+        ("Misfit on test data", diagnosis.test),
+        ("Misfit on the other record", (diagnosis.validation,)),
+    ):
         cells: list[tuple[str, ...]] = [
             (test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit)
             for test in tests if test is not None for one in test.signals
@@ -204,7 +207,7 @@ def diagnose_fmu(
         time_limit: seconds after which the search ends with what it has; None: the map's budget.
     """
     begun = time.monotonic()
-    used = chosen_settings(settings, DiagnosisSettings)
+    used = choose_settings(settings, DiagnosisSettings)
     subject = subject_of(Path(fmu))
     given = read_map(Path(map), subject)
     paths = [record] if isinstance(record, (Path, str)) else list(record)

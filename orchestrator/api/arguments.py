@@ -5,20 +5,20 @@ from pathlib import Path
 from typing import TypeVar
 
 from orchestrator.errors import ScenarioError
-from orchestrator.paired.experiment import BACKLASH_MODELS, EXPERIMENTS, Experiment, named_experiment
+from orchestrator.paired.experiment import BACKLASH_MODELS, EXPERIMENTS, Experiment, experiment_of
 from orchestrator.paired.pair import with_settings
 from orchestrator.shared.settings import Settings, read_settings
 
 S = TypeVar("S", bound=Settings)
 
 
-def chosen_experiment(experiment: str | Experiment, backlash_model: str | None = None) -> Experiment:
+def choose_experiment(experiment: str | Experiment, backlash_model: str | None = None) -> Experiment:
     """Return the experiment that is meant."""
     if isinstance(experiment, str):
         if experiment not in EXPERIMENTS:
             known = ", ".join(EXPERIMENTS)
             raise ScenarioError(f"`experiment` must be one of {known}, but is {experiment!r}", "experiment")
-        experiment = named_experiment(experiment)
+        experiment = experiment_of(experiment)
     if backlash_model is not None and backlash_model not in BACKLASH_MODELS:
         known = ", ".join(BACKLASH_MODELS)
         raise ScenarioError(f"`backlash_model` must be one of {known}, but is {backlash_model!r}", "backlash_model")
@@ -39,7 +39,7 @@ def within(name: str, value: float, least: float, most: float) -> float:
     return value
 
 
-def chosen_settings(given: S | Path | str | None, kind: type[S]) -> S:
+def choose_settings(given: S | Path | str | None, kind: type[S]) -> S:
     """Return the settings that are meant."""
     if given is None:
         return kind()

@@ -38,7 +38,7 @@ class BuildResult(Result):
 
     def blocks(self) -> Sequence[Block]:
         """Return a line for each FMU, and the remark."""
-        lines = [f"{n:<20}{shown(p)}  {p.stat().st_size / 1024:.0f} kB" for n, p in self.paths.items()]
+        lines = [f"{n:<20}{short_path(p)}  {p.stat().st_size / 1024:.0f} kB" for n, p in self.paths.items()]
         return lines if self.remark is None else [*lines, f"note: {self.remark}"]
 
     def results(self, place: Path) -> BuildFound:
@@ -46,7 +46,7 @@ class BuildResult(Result):
         return BuildFound(fmus={name: str(path) for name, path in self.paths.items()}, remark=self.remark)
 
 
-def shown(path: Path) -> str:
+def short_path(path: Path) -> str:
     """Return a path for the reader."""
     try:
         return str(path.resolve().relative_to(ROOT))

@@ -155,7 +155,7 @@ class AnySweepResult(Result):
             self.write_parquet(folder / "sweep.parquet")
 
 
-def varied(vary: Varied) -> tuple[str, ...]:
+def format_varied(vary: Varied) -> tuple[str, ...]:
     """Return what is varied in the engine's text form."""
     if not isinstance(vary, Mapping):
         return tuple(vary)

@@ -17,7 +17,7 @@ from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.estimation import design as designing
 from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, MachineLimits
 from orchestrator.records.model_file import Model, read_model
-from orchestrator.records.plausibility import LONGEST_STEP, own_frequency
+from orchestrator.records.plausibility import LONGEST_STEP, natural_frequency
 from orchestrator.records.record import MINIMUM_ROWS
 from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound
 
@@ -134,7 +134,7 @@ def check_design(
     if not MINIMUM_ROWS <= round(rows) <= LONGEST:
         text = f"`duration` times `rate` must be {MINIMUM_ROWS} to {LONGEST} samples, but is {rows:g}"
         raise ScenarioError(text, "duration", "rate")
-    own = own_frequency(model)
+    own = natural_frequency(model)
     if rate * LONGEST_STEP < own:
         raise ScenarioError(
             f"`rate` must be at least {own / LONGEST_STEP:.3g} to show a shaft that oscillates at {own:.3g} rad/s, "

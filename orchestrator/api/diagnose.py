@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.law import request_law
-from orchestrator.api.numerics import fitting
+from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.records import as_record
 from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.data.admission import check_record
@@ -113,7 +113,7 @@ def diagnose(
         options = {"validate": validate, "test": test, "settings": settings, "search": search, "time_limit": time_limit}
         return _of_an_fmu(record, model, map, options, progress)
     model = read_model(None) if model is None else model
-    chosen = chosen_settings(settings, DiagnosisSettings)
+    chosen = choose_settings(settings, DiagnosisSettings)
     records = [record] if isinstance(record, (Record, Path, str)) else list(record)
     if not records:
         raise ScenarioError("`record` must be at least one record, but is empty", "record")
@@ -121,7 +121,7 @@ def diagnose(
     other = None if validate is None else comparable_record(validate, model)
     tested = None if test is None else comparable_record(test, model)
     begun, fits = time.monotonic(), itertools.count(1)
-    with fitting(f"{measured.source}: no model can be fitted to this record"):
+    with numeric_errors(f"{measured.source}: no model can be fitted to this record"):
         found = diagnosing.diagnose(
             [measured, *more], model, chosen, test=tested, search=search, time_limit=time_limit,
             progress=lambda what: progress(next(fits), 0, what),

@@ -20,7 +20,7 @@ from orchestrator.estimation.inspection.channels import (
     reversals_of,
 )
 from orchestrator.estimation.inspection.machine import as_model, is_of, rough_machine, visible_effects
-from orchestrator.estimation.inspection.starter import OF_DEFAULT, assumed_columns, starter
+from orchestrator.estimation.inspection.starter import OF_DEFAULT, assume_columns, starter
 from orchestrator.estimation.inspection.sufficiency import SEEN, Sufficiency, sufficiency
 from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.estimation.methods import two_encoders
@@ -214,7 +214,7 @@ def inspect(
     assumed: tuple[str, ...] = ()
     columns = dict(base.columns)
     if not isinstance(record, Record):
-        columns, assumed = assumed_columns(Path(record), columns, base.header)
+        columns, assumed = assume_columns(Path(record), columns, base.header)
         base = replace(base, columns=columns)
     measured = as_record(record, base, torque_needed=False, part=part, resample=resample, rate=rate)
     machine, origin, more = _machine(measured, base, given=model is not None, sure=not assumed)

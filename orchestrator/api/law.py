@@ -26,7 +26,7 @@ def law_words(diagnosis: Diagnosis, run: LawRun | None) -> str:
     return f"{text}; with it on, free runs on the test part miss {missed}"
 
 
-def law_found(law: LearnedFound | None, run: LawRun | None, unit: str) -> LearnedFound | None:
+def law_result(law: LearnedFound | None, run: LawRun | None, unit: str) -> LearnedFound | None:
     """Return the law as ``diagnose.json`` has it, with what the FMU makes of it."""
     if law is None or run is None:
         return law

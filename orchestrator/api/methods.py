@@ -31,7 +31,7 @@ class MethodResult:
     trust: Trust | None = None
 
 
-def described(record: Record) -> RecordFound:
+def describe_record(record: Record) -> RecordFound:
     """Return rows, step, source of a record, and what was detected and assumed when it was read."""
     return RecordFound(record.size, record.step, record.source, record.missing, tuple(record.notes))
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.arguments import chosen_experiment, not_negative
+from orchestrator.api.arguments import choose_experiment, not_negative
 from orchestrator.api.shown import Block, Result, table, write_columns
 from orchestrator.building.build import ensure_built
 from orchestrator.errors import ScenarioError
@@ -189,7 +189,7 @@ def run_pair(
     not_negative("noise", noise)
     if seed < 0:
         raise ScenarioError(f"`seed` must not be negative, but is {seed}", "seed")
-    chosen = with_settings(chosen_experiment(experiment, backlash_model), noise=noise)
+    chosen = with_settings(choose_experiment(experiment, backlash_model), noise=noise)
     given = {"alpha": alpha, "noise": noise, "experiment": chosen.name, "backlash_model": chosen.backlash_model}
     given |= {"start": dict(start)} if start else {}
     fmus = ensure_built(FMUS)

@@ -6,10 +6,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, varied
+from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.engine import DesignCases, Row, Status, Sweep, parse_design
-from orchestrator.scenarios.isolated import Safety, described
+from orchestrator.scenarios.isolated import Safety, describe_walls
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.sweep import SUMMARIES, scenario_work
 from orchestrator.shared.results import SweepFound, SweptScenario, WallsFound
@@ -112,12 +112,12 @@ def sweep_scenario(
         (3, 0)
     """
     options = options or RunOptions(**more)
-    words = varied(vary)
+    words = format_varied(vary)
     cases = DesignCases(parse_design(words, draws_of(samples, words), seed), seed)
     chosen = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
     done = options.run(cases, scenario_work(chosen, cases, options.trust))
     given = {"scenario": chosen.origin or chosen.name, "vary": list(words), "samples": samples}
-    walls = described(chosen.system, Safety(trust=options.trust))
+    walls = describe_walls(chosen.system, Safety(trust=options.trust))
     return ScenarioSweepResult(chosen, cases, done, seed, options.parquet, given, walls)
 
 

@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestrator.shared.output import staged, write_result
+from orchestrator.shared.output import stage_output, write_result
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Result:
             OutputError: the folder cannot be written.
         """
         place = Path(out)
-        with staged(place, self.replaces) as folder:
+        with stage_output(place, self.replaces) as folder:
             self.write(folder, place)
         return place / "report.html"
 

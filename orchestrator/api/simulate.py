@@ -13,7 +13,7 @@ from orchestrator.errors import ScenarioError
 from orchestrator.master import result as master
 from orchestrator.master.signals import Constant
 from orchestrator.scenarios import scenario as scenarios
-from orchestrator.scenarios.isolated import Safety, described
+from orchestrator.scenarios.isolated import Safety, describe_walls
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.shared.operating_system import LIMITS
@@ -183,7 +183,7 @@ def _run(
     given: Mapping[str, Any],
 ) -> SimulationResult:
     safety = safety or Safety()
-    walls = described(scenario.system, safety)
+    walls = describe_walls(scenario.system, safety)
     if walls.not_enforced and tell is not None:
         tell(f"FMUs that are not ours run with {LIMITS}, but {walls.not_enforced}")
     result = scenarios.simulate(scenario if stop is None else replace(scenario, stop=stop), safety)

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.api.arguments import chosen_experiment, chosen_settings
-from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, varied
+from orchestrator.api.arguments import choose_experiment, choose_settings
+from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
 from orchestrator.engine import (
@@ -219,11 +219,11 @@ def sweep(
     """
     options = options or RunOptions(**more)
     levels = _levels(noise)
-    words = varied(vary)
-    calibrated = chosen_settings(settings, MapSettings)
+    words = format_varied(vary)
+    calibrated = choose_settings(settings, MapSettings)
     text = sizes if isinstance(sizes, str) else ",".join(repr(float(size)) for size in sizes)
     count = draws_of(samples, words, text)
-    chosen = chosen_experiment(experiment, backlash_model)
+    chosen = choose_experiment(experiment, backlash_model)
     plan = SweepPlan(chosen, text, levels, seeds, seed, words, count)
     cases = plan.cases()
     if tell is not None:

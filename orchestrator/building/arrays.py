@@ -52,14 +52,14 @@ def _dimensions(table: Sequence[FmuVariable], place: int) -> tuple[int, ...]:
     indices: list[tuple[int, ...]] = []
     for variable in table[place:]:
         element = _ELEMENT.fullmatch(variable.name)
-        if element is None or element[1] != start[1] or not _alike(variable, table[place]):
+        if element is None or element[1] != start[1] or not _is_same_kind(variable, table[place]):
             break
         indices.append(tuple(int(number) for number in element[2].split(",")))
     dimensions = indices[-1]
     return dimensions if indices == list(_row_major(dimensions)) else ()
 
 
-def _alike(a: FmuVariable, b: FmuVariable) -> bool:
+def _is_same_kind(a: FmuVariable, b: FmuVariable) -> bool:
     return (a.causality, a.variability, a.type, a.bounds) == (b.causality, b.variability, b.type, b.bounds)
 
 

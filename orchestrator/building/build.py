@@ -92,12 +92,12 @@ def _number(value: float | str) -> float:
 def _ensure(recipe: Recipe, directory: Path, force: bool = False) -> Path:
     path = directory / f"{recipe.name}.fmu"
     current = fingerprint(recipe, find_toolchain().identity)
-    if force or stamp_of(path) != current or not trusted(path):
+    if force or stamp_of(path) != current or not is_trusted(path):
         _build(recipe, path, current)
     return path
 
 
-def trusted(path: Path) -> bool:
+def is_trusted(path: Path) -> bool:
     """Tell whether the file is what we built; a stamp alone can be forged, save beside sources as open."""
     if is_ours(path):
         return True

@@ -117,11 +117,11 @@ def compile_library(compiler: Compiler, target: Target, name: str, sources: Mapp
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
-        parts = [_compiled(compiler, target, machine, name, Path(folder)) for machine in machines]
+        parts = [_compile(compiler, target, machine, name, Path(folder)) for machine in machines]
     return parts[0] if len(parts) == 1 else universal(parts)
 
 
-def _compiled(compiler: Compiler, target: Target, machine: str, name: str, folder: Path) -> bytes:
+def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder: Path) -> bytes:
     library = f"{name}{target.suffix}"
     zig = ZIG_WINDOWS_FLAGS if target.system == "win32" else ZIG_FLAGS
     speed = zig if compiler.is_zig else ("-O3",)

@@ -77,8 +77,8 @@ def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], 
             toolchain.compiler,
             *("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden", "-Wl,--build-id=none"),
             *options,
-            f"-DPYTHON_LIBRARY={_quoted(library)}",
-            f"-DPYTHON_PROGRAM=L{_quoted(toolchain.program if library else '')}",
+            f"-DPYTHON_LIBRARY={_quote(library)}",
+            f"-DPYTHON_PROGRAM=L{_quote(toolchain.program if library else '')}",
             *("-o", "launcher.so", source, "-ldl", "-lpthread", "-lm"),
         ]
         try:
@@ -91,6 +91,6 @@ def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], 
         return (Path(folder) / "launcher.so").read_bytes()
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

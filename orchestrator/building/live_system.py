@@ -89,7 +89,7 @@ class LiveSystem:
         return (number, *_variable(self.instances[number].fmu, variable))
 
 
-def held(values: Array) -> Array:
+def hold_row(values: Array) -> Array:
     """Return samples that are held over a step as the row of a signal."""
     return np.concatenate([values[:1], values[:-1]])
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import orchestrator.building.translation
 from orchestrator import __version__
 from orchestrator.building.archive import write_archive
-from orchestrator.building.build import default_directory, stamp_of, trusted
+from orchestrator.building.build import default_directory, is_trusted, stamp_of
 from orchestrator.building.compilers import FLAGS, TARGETS, Compiler, compile_library, find_compiler
 from orchestrator.building.documentation import documentation
 from orchestrator.building.fmi3_description import fmi3_description
@@ -54,7 +54,7 @@ def ensure_native(
     return {recipe.name: _ensure(recipe, folder, force, here, fmi) for recipe in recipes}
 
 
-def _needed_compiler(here: bool = False) -> Compiler:
+def _require_compiler(here: bool = False) -> Compiler:
     """Return the compiler, see :func:`find_compiler`."""
     compiler = find_compiler(here)
     if compiler is None:
@@ -115,10 +115,10 @@ def _builder_files() -> tuple[Path, ...]:
 
 
 def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int) -> Path:
-    compiler = _needed_compiler(here)
+    compiler = _require_compiler(here)
     path = directory / f"{recipe.name}.fmu"
     current = native_fingerprint(recipe, compiler, fmi)
-    if force or stamp_of(path) != current or not trusted(path):
+    if force or stamp_of(path) != current or not is_trusted(path):
         write_archive(path, _native_members(recipe, compiler, current, fmi))
         record(path)
     return path

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.building.archive import write_archive
-from orchestrator.building.build import default_directory, stamp_of, trusted
+from orchestrator.building.build import default_directory, is_trusted, stamp_of
 from orchestrator.building.documentation import documentation
 from orchestrator.building.fmi3_description import fmi3_description
 from orchestrator.building.fmi3_files import terminals_and_icons
@@ -69,7 +69,7 @@ def _ensure(recipe: Recipe, directory: Path, force: bool) -> Path:
         raise FmuError("Python FMUs of FMI 3.0 need a C compiler (cc) on Linux x86_64, but there is none")
     path = directory / f"{recipe.name}.fmu"
     current = _fingerprint(recipe, toolchain)
-    if force or stamp_of(path) != current or not trusted(path):
+    if force or stamp_of(path) != current or not is_trusted(path):
         write_archive(path, _members(recipe, toolchain, current))
         record(path)
     return path

@@ -89,11 +89,11 @@ def closure(module: str) -> tuple[Path, ...]:
         if name in found or not path.exists():
             continue
         found[name] = path
-        waiting += _imported(path)
+        waiting += _import_names(path)
     return tuple(found[name] for name in sorted(found))
 
 
-def _imported(path: Path) -> list[str]:
+def _import_names(path: Path) -> list[str]:
     names: list[str] = []
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.ImportFrom) and node.level == 1:

@@ -24,7 +24,7 @@ def default_starts(class_name: str) -> dict[str, float]:
     return stored.get(class_name, {})
 
 
-def designed_starts() -> dict[str, dict[str, float]]:
+def design_starts() -> dict[str, dict[str, float]]:
     """Return the start values as this machine designs them, by class name, to twelve digits."""
     designs = {"LqrController": _controller(), "KalmanEstimator": _estimator()}
     return {name: {key: float(f"{value:.12g}") for key, value in values.items()} for name, values in designs.items()}

@@ -58,8 +58,8 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
     sources |= {"entry.py": entry.encode(), "__init__.py": b'"""The sources of one FMU."""\n'}
     loaded = LOADED.format(package=package, name=recipe.class_name)
     with tempfile.TemporaryDirectory() as folder:
-        members = _built_by_pythonfmu(Path(folder), package, sources, loaded, recipe.name)
-    write_archive(target, _completed(members, package, runtime, fingerprint, recipe))
+        members = _build_by_pythonfmu(Path(folder), package, sources, loaded, recipe.name)
+    write_archive(target, _complete(members, package, runtime, fingerprint, recipe))
 
 
 def runtime_files() -> dict[str, bytes]:
@@ -74,7 +74,7 @@ def runtime_files() -> dict[str, bytes]:
     return {"__init__.py": b'"""PythonFMU."""\n'} | {f"{m}.py": (folder / f"{m}.py").read_bytes() for m in RUNTIME}
 
 
-def _built_by_pythonfmu(
+def _build_by_pythonfmu(
     folder: Path, package: str, sources: dict[str, bytes], loaded: str, name: str
 ) -> dict[str, bytes]:
     from pythonfmu import FmuBuilder
@@ -88,7 +88,7 @@ def _built_by_pythonfmu(
     return read_archive(Path(built))
 
 
-def _completed(
+def _complete(
     members: dict[str, bytes], package: str, runtime: dict[str, bytes], fingerprint: str, recipe: Recipe
 ) -> dict[str, bytes]:
     """Return the members with PythonFMU put into the package, the launcher, all documents and the GUID."""

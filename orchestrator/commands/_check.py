@@ -65,7 +65,7 @@ def add_check_arguments(parser: argparse.ArgumentParser) -> None:
         )
 
 
-def chosen_options(args: argparse.Namespace) -> CheckOptions:
+def check_options(args: argparse.Namespace) -> CheckOptions:
     """Return how the arguments want FMUs to be checked."""
     return CheckOptions(
         static=args.static,
@@ -105,7 +105,7 @@ def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
     found = []
     for path, target in zip(paths, targets, strict=True):
         try:
-            repair = mend_fmu(path, target, chosen_options(args).archive)
+            repair = mend_fmu(path, target, check_options(args).archive)
         except UnmendableError as error:  # the check says the same as a finding
             print(plain(f"{path}: not mended: {error}"))
             repair = Repair((), ())
@@ -133,7 +133,7 @@ def verdicts_shown(count: int) -> Iterator[Callable[[Verdict], None]]:
             sys.stderr.write("\r\x1b[K")
             sys.stderr.flush()
 
-    def shown(verdict: Verdict) -> None:
+    def show(verdict: Verdict) -> None:
         nonlocal done
         done += 1
         clear()
@@ -142,7 +142,7 @@ def verdicts_shown(count: int) -> Iterator[Callable[[Verdict], None]]:
 
     progress()
     try:
-        yield shown
+        yield show
     finally:
         clear()
 

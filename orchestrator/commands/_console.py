@@ -9,14 +9,14 @@ from rich.console import Console
 from rich.table import Table
 
 from orchestrator.api.shown import Block
-from orchestrator.commands._lines import PIPE_WIDTH, folded
+from orchestrator.commands._lines import PIPE_WIDTH, fold
 
 
 def print_blocks(blocks: Sequence[Block]) -> None:
     """Print what a result shows of itself: lines as they are, tables by ``print_table``."""
     for block in blocks:
         if isinstance(block, str):
-            sys.stdout.write(f"{folded(block, sys.stdout)}\n")
+            sys.stdout.write(f"{fold(block, sys.stdout)}\n")
         else:
             print_table(block.title, block.columns, block.rows)
 

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any, TextIO, cast
 
-from orchestrator.commands._lines import folded
-from orchestrator.commands._parser import one_line, worded
+from orchestrator.commands._lines import fold
+from orchestrator.commands._parser import one_line, word_error
 from orchestrator.errors import InputError, OrchestratorError
 
 
@@ -25,10 +25,10 @@ def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
         sys.stdout.flush()
         return code
     except OrchestratorError as error:
-        _say(f"error: {one_line(worded(error, flags))}")
+        _say(f"error: {one_line(word_error(error, flags))}")
         return 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
-        text = worded(interruption, flags)
+        text = word_error(interruption, flags)
         _say(f"interrupted: {text}" if text else "interrupted")
         return 130
     except BrokenPipeError:
@@ -40,7 +40,7 @@ def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
 
 def _say(text: str) -> None:
     """Write one line to standard error, folded between words on a terminal."""
-    sys.stderr.write(f"{folded(text, sys.stderr)}\n")
+    sys.stderr.write(f"{fold(text, sys.stderr)}\n")
 
 
 class ForgivingStream:

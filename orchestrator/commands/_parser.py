@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from orchestrator.commands._lines import folded
+from orchestrator.commands._lines import fold
 
 LARGEST_WHOLE_NUMBER = 10**18
 # What argparse says of an argument, and how that is said here.
@@ -33,7 +33,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where help is, and exit with 2."""
-        self.exit(2, folded(f"error: {one_line(_worded(message))}; see {self.prog} --help", sys.stderr) + "\n")
+        self.exit(2, fold(f"error: {one_line(_word_message(message))}; see {self.prog} --help", sys.stderr) + "\n")
 
 
 def _whole(text: str) -> int:
@@ -76,7 +76,7 @@ def flags_of(parser: argparse.ArgumentParser) -> dict[str, str]:
     return {a.dest: a.option_strings[-1] if a.option_strings else str(a.metavar or a.dest) for a in actions}
 
 
-def worded(error: BaseException, flags: Mapping[str, str]) -> str:
+def word_error(error: BaseException, flags: Mapping[str, str]) -> str:
     """Return an error's text in which the arguments that it speaks of have their names of the command line."""
     text = str(error)
     for name in getattr(error, "arguments", ()):
@@ -84,7 +84,7 @@ def worded(error: BaseException, flags: Mapping[str, str]) -> str:
     return text
 
 
-def _worded(message: str) -> str:
+def _word_message(message: str) -> str:
     named = re.fullmatch(r"argument (.+?): (.*)", message, re.DOTALL)
     if named is None:
         return re.sub(r"^the following arguments are required: (.*)", r"`\1` must be given, but is not", message)

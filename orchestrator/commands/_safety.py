@@ -21,7 +21,7 @@ def add_safety_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--allow-nonfinite", action="store_true", help="keep results with NaN or infinities")
 
 
-def chosen_safety(arguments: argparse.Namespace) -> Safety:
+def safety_of(arguments: argparse.Namespace) -> Safety:
     """Return what the arguments say."""
     memory = int(arguments.memory_limit * MEBIBYTE)
     return Safety(arguments.trust, arguments.time_limit, memory, arguments.allow_nonfinite)

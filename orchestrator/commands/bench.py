@@ -5,7 +5,7 @@ import sys
 
 from orchestrator.api.benchmark import benchmark
 from orchestrator.commands._console import print_blocks
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, print the tables, write JSON."""
-    with staged(arguments.out) as folder:
+    with stage_output(arguments.out) as folder:
         result = benchmark(
             arguments.tools and [name.strip() for name in arguments.tools.split(",")],
             rounds=arguments.rounds,

@@ -6,7 +6,7 @@ from pathlib import Path
 from orchestrator.api.calibrate import calibrate
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._trust import note_missing_walls
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit, print the parameters, write JSON and report."""
     note_missing_walls()
-    with staged(args.out) as folder:
+    with stage_output(args.out) as folder:
         found = calibrate(args.record, args.fmu, args.map, settings=args.settings, progress=say)
         found.write(folder, args.out)
         print_blocks(found.blocks())

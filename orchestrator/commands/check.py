@@ -7,7 +7,7 @@ from orchestrator.api.build import build
 from orchestrator.api.check import check, find_fmus
 from orchestrator.commands._check import add_check_arguments, mend_fmus, read_arguments, verdicts_shown, write_reports
 from orchestrator.commands._trust import note_missing_walls
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def run(args: argparse.Namespace) -> int:
     paths = mend_fmus(args, paths)
     if not (args.static or args.trust):
         note_missing_walls()
-    with staged(args.out) as folder:
+    with stage_output(args.out) as folder:
         with verdicts_shown(len(paths)) as progress:
             result = check(
                 paths,

@@ -8,7 +8,7 @@ from orchestrator.api.inspect import STARTER, inspect
 from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,7 +23,7 @@ def run(args: argparse.Namespace) -> int:
     model = None if args.model is None else read_model(args.model)
     found = inspect(args.record, model, **reading_of(args))
     given = {"record": str(args.record), "model": args.model and str(args.model)}
-    with staged(args.out) as folder:
+    with stage_output(args.out) as folder:
         found.write(
             folder,
             args.out,

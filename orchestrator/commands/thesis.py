@@ -4,7 +4,7 @@ import argparse
 
 from orchestrator.api.thesis import thesis
 from orchestrator.commands._console import print_blocks
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Recompute, print and write."""
-    with staged(arguments.out) as folder:
+    with stage_output(arguments.out) as folder:
         result = thesis()
         result.write(folder, arguments.out)
     print_blocks(result.blocks())

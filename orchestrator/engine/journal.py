@@ -48,7 +48,7 @@ class Journal:
         self._bits = bytearray((total + 7) // 8)
         self._made = _make_directories(path.parent)
         try:
-            self._descriptor = _opened(path)
+            self._descriptor = _open(path)
         except OSError as error:
             _remove_directories(self._made)
             raise OutputError(f"cannot write {path}: {error.strerror}") from None
@@ -268,7 +268,7 @@ def _is_case(entry: Any, total: int) -> bool:
     return False
 
 
-def _opened(path: Path) -> int:
+def _open(path: Path) -> int:
     """Open the file at ``path`` itself, made when missing; links are not followed, and nothing is waited for."""
     flags = os.O_RDWR | os.O_CREAT | PLAIN_FILE
     try:

@@ -80,7 +80,7 @@ class LocalProcesses:
         count = self.workers or usable_cores()
         supply = Supply(contents(work), work.unpacked)
         try:
-            return LocalPool(count, supply, assignment(work, pickled(work), supply, limits))
+            return LocalPool(count, supply, assignment(work, pickle_work(work), supply, limits))
         except BaseException:
             supply.close()
             raise
@@ -194,7 +194,7 @@ def assignment(work: Work, pickled_work: bytes, supply: Supply, limits: CaseLimi
     return Assignment(pickled_work, supply.paths, limits.time, limits.memory, len(work.columns), work.walls)
 
 
-def pickled(work: Work) -> bytes:
+def pickle_work(work: Work) -> bytes:
     """Return the work as bytes for a worker process; its files travel apart."""
     if "__main__" in (work.prepare.__module__, work.run.__module__):
         raise ScenarioError(

@@ -122,7 +122,7 @@ class _Queue:
         """Return the next cases; none when there are none left."""
         return self._returned.popleft() if self._returned else tuple(islice(self._waiting, self._size))
 
-    def answered(self, batch: Sequence[Case], outcomes: Sequence[Outcome]) -> None:
+    def take_answer(self, batch: Sequence[Case], outcomes: Sequence[Outcome]) -> None:
         """Take back what of a batch was not run, and adapt to what was."""
         done = {outcome.index for outcome in outcomes}
         left = tuple(case for case in batch if case.index not in done)
@@ -149,7 +149,9 @@ def _run(cases: Cases, pool: Pool, journal: Journal, on_progress: Callable[[Prog
             if slots:
                 last_slot = time.monotonic()
             elif time.monotonic() - last_slot > NO_SLOT_LIMIT:
-                raise SimulationError(f"no worker was connected for {NO_SLOT_LIMIT:g} s; {_kept(journal)}", "resume")
+                raise SimulationError(
+                    f"no worker was connected for {NO_SLOT_LIMIT:g} s; {_hint_of_rest(journal)}", "resume"
+                )
             while len(running) < max(1, slots) * QUEUED_PER_SLOT:
                 batch = queue.batch()
                 if not batch:
@@ -168,7 +170,7 @@ def _submit(pool: Pool, batch: Sequence[Case], journal: Journal) -> "Future[list
     try:
         return pool.submit(batch)
     except (BrokenExecutor, RuntimeError, OSError) as error:
-        raise SimulationError(f"no further case can be run: {error}; {_kept(journal)}", "resume") from None
+        raise SimulationError(f"no further case can be run: {error}; {_hint_of_rest(journal)}", "resume") from None
 
 
 def _record(
@@ -195,17 +197,17 @@ def _record(
                 queue.alone(batch)
             continue
         outcomes += found
-        queue.answered(batch, found)
+        queue.take_answer(batch, found)
     journal.append(outcomes)
     if isinstance(lost, SimulationError):
-        raise SimulationError(f"{lost}; {_kept(journal)}", "resume")
+        raise SimulationError(f"{lost}; {_hint_of_rest(journal)}", "resume")
     if isinstance(lost, CancelledError):
-        raise SimulationError(f"the connection to the workers is lost; {_kept(journal)}", "resume")
+        raise SimulationError(f"the connection to the workers is lost; {_hint_of_rest(journal)}", "resume")
     if lost is not None:
         raise lost
 
 
-def _kept(journal: Journal) -> str:
+def _hint_of_rest(journal: Journal) -> str:
     return (
         f"{journal.done} of {journal.total} cases are kept: go on with `resume`"
         if journal.done

@@ -29,12 +29,12 @@ class Supply:
         self.paths: dict[str, Path] = {}
         try:
             for name, content in files.items():
-                self.paths[name] = self._placed(content, unpacked, name)
+                self.paths[name] = self._place(content, unpacked, name)
         except BaseException:
             self.close()
             raise
 
-    def _placed(self, content: bytes, unpacked: bool, name: str) -> Path:
+    def _place(self, content: bytes, unpacked: bool, name: str) -> Path:
         target = self.folder / hashlib.sha256(content).hexdigest()[:24]
         file = target.with_suffix(".fmu")
         if target.exists() or (file.exists() and not unpacked):

@@ -65,9 +65,9 @@ def _cells(row: Row, names: Sequence[str], columns: Sequence[ResultColumn]) -> l
     return [outcome.index, *(row.case.parameters[n] for n in names), outcome.status.value, *values, outcome.message]
 
 
-def _chain(first: Row, rest: Iterator[Row]) -> Iterator[Row]:
+def _chain(first: Row, rows: Iterator[Row]) -> Iterator[Row]:
     yield first
-    yield from rest
+    yield from rows
 
 
 def _batches(rows: Iterator[Row]) -> Iterator[list[Row]]:

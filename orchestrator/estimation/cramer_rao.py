@@ -52,12 +52,12 @@ def bound(
         elif name.startswith("log_noise_"):
             theta[n] = math.log(noise[0] if name.endswith("theta_m") else noise[1])
     free = np.array([n for n, name in enumerate(problem.names) if not name.startswith(NOISE_PREFIXES)])
-    information = _refined_information(likelihood, theta, free)
+    information = _refine_information(likelihood, theta, free)
     column = list(free).index(problem.index(ALPHA))
     return math.sqrt(inverse(information)[column, column])
 
 
-def _refined_information(likelihood: Likelihood, theta: Array, free: NDArray[np.int64]) -> Array:
+def _refine_information(likelihood: Likelihood, theta: Array, free: NDArray[np.int64]) -> Array:
     """Return the Fisher information, its differences matched to the standard errors that it implies."""
     point = likelihood.at(theta)
     information = np.eye(free.size)

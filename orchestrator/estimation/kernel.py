@@ -216,7 +216,7 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
 
 
 @kept(nogil=True)
-def blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore[no-untyped-def]
+def advance_blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore[no-untyped-def]
     """Advance ``x`` over ``h`` with the dead zone averaged over the twist's distribution (Booton 1954).
 
     Args:
@@ -371,7 +371,7 @@ def run_filter(  # type: ignore[no-untyped-def]
             for r in range(5):
                 states[k, r] = x[r]
         if soft:
-            blurred(mats, b_u, b_1, normal, alpha, cov, h, u[k], x, total)
+            advance_blurred(mats, b_u, b_1, normal, alpha, cov, h, u[k], x, total)
         else:
             propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u[k], x, total, gain)
         for r in range(5):

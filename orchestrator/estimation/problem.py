@@ -8,7 +8,7 @@ import numpy as np
 from orchestrator.estimation.innovations import Array, NoiseLevels
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
-from orchestrator.shared.inference.noise import lagged_rms, robust_noise
+from orchestrator.shared.inference.noise import rms_behind_lag, robust_noise
 from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
@@ -124,7 +124,7 @@ def make_problem(record: Record, model: Model) -> GapProblem:
 
 def _torque_unit(record: Record, lag: float) -> float:
     """Return the rms of the drive's torque, ``lag`` [s] behind the request, over the nearest of usual drives."""
-    rms = lagged_rms(record.u, record.step, lag)
+    rms = rms_behind_lag(record.u, record.step, lag)
     return rms / min(max(rms, DRIVES[0]), DRIVES[1])
 
 

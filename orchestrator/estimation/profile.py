@@ -47,7 +47,7 @@ def profile(fit: GapFit) -> Profile:
         reach = 0.5 * edge * deviation
         for _ in range(14):
             alpha = max(best + side * reach, 0.0)
-            held = _constrained(likelihood, fit, place, alpha, slope)
+            held = _fit_constrained(likelihood, fit, place, alpha, slope)
             likelihood, drop = held.likelihood, held.point.objective - fit.point.objective
             entries.append((alpha, drop))
             if drop > edge**2 or alpha == 0.0:
@@ -60,7 +60,7 @@ def profile(fit: GapFit) -> Profile:
     return Profile(np.array([e[0] for e in entries]), np.array([e[1] for e in entries]))
 
 
-def _constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
+def _fit_constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
     """Return the best fit found with alpha held: the linear prediction, then some scoring steps."""
     unknowns = likelihood.problem.unknowns
     theta = fit.point.theta.copy()

@@ -29,7 +29,7 @@ def trust_of_estimates(
         elif estimate.method == "two_encoders" and own is None:
             found[estimate.method] = trust_of([Reason(Level.AMBER, estimate.message)])  # what it cannot see, it says
         else:
-            found[estimate.method] = trust_of(_beside(estimate, fit, own))
+            found[estimate.method] = trust_of(_compare_methods(estimate, fit, own))
     return found
 
 
@@ -67,11 +67,11 @@ def _of_values(
         yield Reason(level, f"{text} {stated.uncertainty:.2g}")
 
 
-def _beside(estimate: Estimate, fit: Estimate | None, own: Trust | None) -> Iterator[Reason]:
+def _compare_methods(estimate: Estimate, fit: Estimate | None, fit_trust: Trust | None) -> Iterator[Reason]:
     """Yield what keeps a method that does not check itself from green."""
     if estimate.message:
         yield Reason(Level.AMBER, estimate.message)
-    if fit is None or own is None:
+    if fit is None or fit_trust is None:
         yield Reason(
             Level.AMBER,
             f"{estimate.method} does not check whether the model explains the record, and its interval holds scatter "
@@ -81,4 +81,4 @@ def _beside(estimate: Estimate, fit: Estimate | None, own: Trust | None) -> Iter
     low, high = estimate.interval
     if not low <= fit.alpha <= high:
         yield Reason(Level.RED, f"its interval does not hold the half-gap of {FITTED}, {fit.alpha:.5g} rad")
-    yield Reason(own.level, f"{FITTED} beside it is {own.level.word}")
+    yield Reason(fit_trust.level, f"{FITTED} beside it is {fit_trust.level.word}")

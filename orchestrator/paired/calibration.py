@@ -200,9 +200,9 @@ def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) 
     """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds."""
     builds = ensure_fastest(FMUS)
     if builds.kind != NATIVE:
-        from orchestrator.paired.compiled_loop import compiled_loop  # numba takes its time to import
+        from orchestrator.paired.compiled_loop import make_loop  # numba takes its time to import
 
-        return calibrate_loop(compiled_loop(experiment), settings)
+        return calibrate_loop(make_loop(experiment), settings)
     with closing(NativeLoop(experiment, builds.paths)) as loop:
         return calibrate_loop(loop, settings, usable_cores())
 
@@ -210,10 +210,10 @@ def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) 
 def calibrate_loop(loop: CalibratedLoop, settings: MapSettings, threads: int = 1) -> Calibration:
     """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`."""
     with ThreadPoolExecutor(threads) as pool:
-        return _calibrated(loop, settings, pool.map)
+        return _calibrate(loop, settings, pool.map)
 
 
-def _calibrated(loop: CalibratedLoop, settings: MapSettings, each: Each) -> Calibration:
+def _calibrate(loop: CalibratedLoop, settings: MapSettings, each: Each) -> Calibration:
     experiment = loop.experiment
     zero = (np.zeros(experiment.steps + 1), np.zeros(experiment.steps + 1))
     twin = loop.run(0.0, zero)[:, 2]
@@ -284,20 +284,20 @@ def _noisy_map(
     clean = monotone_cubic(log_alpha, log_sum)
     count = settings.seeds_per_size
 
-    def drawn(job: int) -> float:
+    def draw(job: int) -> float:
         n, seed = divmod(job, count)
         return float(np.log(_noisy_sum(loop, twin, float(np.exp(nodes[n])), _generator(0, n, seed))))
 
-    draws = np.array(list(each(drawn, range(settings.noisy_sizes * count)))).reshape(-1, count)
+    draws = np.array(list(each(draw, range(settings.noisy_sizes * count)))).reshape(-1, count)
     shift = draws.mean(axis=1) - clean(nodes)
     variance = draws.var(axis=1, ddof=1)
-    moved = log_sum + monotone_cubic(nodes, _smoothed(shift))(log_alpha)
+    moved = log_sum + monotone_cubic(nodes, _smooth(shift))(log_alpha)
     slope = monotone_cubic(log_alpha, moved).slope(log_alpha)
-    deviation = np.exp(0.5 * monotone_cubic(nodes, np.log(_smoothed(variance)))(log_alpha))
+    deviation = np.exp(0.5 * monotone_cubic(nodes, np.log(_smooth(variance)))(log_alpha))
     return moved, deviation / np.maximum(np.abs(slope), settings.least_slope)
 
 
-def _smoothed(values: Array) -> Array:
+def _smooth(values: Array) -> Array:
     """Return ``values`` averaged with their neighbours, weights 1 2 3 2 1."""
     padded = np.pad(values, 2, mode="edge")
     return np.convolve(padded, np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0, mode="valid")

@@ -72,7 +72,7 @@ def _plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]
     )
 
 
-def compiled_loop(experiment: Experiment) -> CompiledLoop:
+def make_loop(experiment: Experiment) -> CompiledLoop:
     """Return the loop of ``experiment``, designed and ready to run."""
     estimator = experiment.estimator()
     S = estimator.S_inverse
@@ -83,13 +83,13 @@ def compiled_loop(experiment: Experiment) -> CompiledLoop:
         speed,
         experiment.regulator().gains,
         (
-            _nested(estimator.A),
+            _as_tuples(estimator.A),
             tuple(float(b) for b in estimator.B),
-            _nested(estimator.L),
+            _as_tuples(estimator.L),
             (float(S[0, 0]), float(S[0, 1]), float(S[1, 1])),
         ),
     )
 
 
-def _nested(matrix: Array) -> tuple[tuple[float, ...], ...]:
+def _as_tuples(matrix: Array) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(v) for v in row) for row in matrix)

@@ -152,7 +152,7 @@ def thesis_experiment() -> Experiment:
 EXPERIMENTS = ("default", "thesis")
 
 
-def named_experiment(name: str) -> Experiment:
+def experiment_of(name: str) -> Experiment:
     """Return the experiment ``name``."""
     if name not in EXPERIMENTS:
         raise ScenarioError(f"`experiment` must be one of {', '.join(EXPERIMENTS)}, but is {name!r}")

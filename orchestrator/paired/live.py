@@ -15,7 +15,7 @@ from orchestrator.paired.cosimulation import (
     plant_values,
 )
 from orchestrator.paired.experiment import Experiment
-from orchestrator.plants.design import five_state_model, sampled
+from orchestrator.plants.design import discretise, five_state_model
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def pair_system(experiment: Experiment, alpha: float, seed: int, start: Mapping[
 
 def regulator_design(experiment: Experiment) -> RegulatorDesign:
     """Return what the regulator of an experiment is designed from."""
-    A, B = sampled(five_state_model(experiment.values), experiment.sample_time)
+    A, B = discretise(five_state_model(experiment.values), experiment.sample_time)
     weights = (*experiment.state_weights, experiment.torque_weight)
     return RegulatorDesign(
         tuple(A.ravel().tolist()), tuple(B[:, 0].tolist()), tuple(map(float, weights)), experiment.sample_time

@@ -43,7 +43,7 @@ def run_pair(
     """
     prefixes = (MACHINE, TWIN)
     system = loop_system(experiment, fmus, prefixes)
-    record = [_prefixed(prefix, address) for prefix in prefixes for address in RECORDED.values()]
+    record = [_add_prefix(prefix, address) for prefix in prefixes for address in RECORDED.values()]
     errors = experiment.encoder_errors(seed)
     signals = {k: Samples(e, experiment.sample_time) for k, e in zip(ERROR_SOURCES, errors, strict=True)}
     with Session(system, record, GaussSeidel(experiment.sample_time), experiment.duration) as session:
@@ -59,7 +59,7 @@ def run_pair(
     return PairRun(machine, twin, total, estimate)
 
 
-def _prefixed(prefix: str, address: str) -> str:
+def _add_prefix(prefix: str, address: str) -> str:
     return f"{prefix}{address}"
 
 

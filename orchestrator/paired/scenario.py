@@ -15,7 +15,7 @@ from orchestrator.scenarios.scenario import Scenario
 RECORDED = ("plant.theta_m", "plant.theta_l", "estimator.theta_l_hat", "controller.u")
 
 
-def paired_scenario(experiment: Experiment, fmus: Mapping[str, Path], alpha: float, reference: float) -> Scenario:
+def scenario_of_pair(experiment: Experiment, fmus: Mapping[str, Path], alpha: float, reference: float) -> Scenario:
     """Return both loops with half-gap ``alpha`` [rad] in the first, led to the load angle ``reference`` [rad].
 
     Args:

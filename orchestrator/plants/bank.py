@@ -23,7 +23,7 @@ SHORTEST = 1e-7
 LEAST_CYCLES = 1.5  # of a wave within the travel: what comes round less often is told from no spring
 
 
-def built_up(stated: float, fitted: float) -> float:
+def build_up_distance(stated: float, fitted: float) -> float:
     """Return the build-up distance [rad] that the FMU gets: the fitted one, or as stated where none was fitted.
 
     Args:

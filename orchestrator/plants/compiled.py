@@ -44,7 +44,7 @@ def compiled(name: str) -> ModuleType:
     original = f"{_PACKAGE}.{name}"
     if not (_SOURCES / f"{name}.py").exists():
         raise ModuleNotFoundError(original)
-    path = _copied_source(name)
+    path = _copy_source(name)
     spec = importlib.util.spec_from_file_location(original, path)
     assert spec is not None
     assert spec.loader is not None
@@ -72,7 +72,7 @@ def _options(name: str) -> dict[str, Any]:
 
 
 @cache
-def _copied_source(name: str) -> Path:
+def _copy_source(name: str) -> Path:
     """Return the copy of a source in a folder named by a hash of it and of all that it imports."""
     digest = hashlib.sha256(numba.__version__.encode())
     for module in sorted(_closure(name)):

@@ -92,7 +92,7 @@ class Resonance:
     frequency: str
 
 
-def _nothing_refused(values: Mapping[str, float]) -> str:
+def _accept_all(values: Mapping[str, float]) -> str:
     return ""
 
 
@@ -144,7 +144,7 @@ class Plant:
     nuisances: tuple[Parameter, ...] = ()
     enumerations: tuple[str, ...] = ()
     spread: float = 0.0
-    refused: Callable[[Mapping[str, float]], str] = _nothing_refused
+    refused: Callable[[Mapping[str, float]], str] = _accept_all
     realised: Callable[[Array], Array] | None = None
     learned: bool = False
     seldom: tuple[str, ...] = ()

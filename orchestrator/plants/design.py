@@ -115,8 +115,8 @@ def rank_report(model: LinearModel) -> RankReport:
     Returns:
         Ranks and the modes that are missed [1/s].
     """
-    stuck = _missed_modes(model.A, model.B)
-    hidden = _missed_modes(model.A.T, model.C.T)
+    stuck = _uncontrollable_modes(model.A, model.B)
+    hidden = _uncontrollable_modes(model.A.T, model.C.T)
     order = model.A.shape[0]
     return RankReport(
         order=order,
@@ -144,7 +144,7 @@ def _krylov_rank(A: Array, B: Array) -> int:
     return int(basis.shape[1])
 
 
-def _missed_modes(A: Array, B: Array) -> list[complex]:
+def _uncontrollable_modes(A: Array, B: Array) -> list[complex]:
     missed = []
     for mode in np.linalg.eigvals(A):
         pencil = np.hstack([A - mode * np.eye(A.shape[0]), B])
@@ -154,7 +154,7 @@ def _missed_modes(A: Array, B: Array) -> list[complex]:
     return missed
 
 
-def sampled(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
+def discretise(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
     """Return (A, B) of ``model`` with its input held over ``sample_time`` [s].
 
     Args:
@@ -190,7 +190,7 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
             f"no input moves the mode at {modes} 1/s; leave the uncontrollable states out of the regulator and "
             "feed their estimate forward"
         )
-    A, B = map(np.ascontiguousarray, sampled(model, sample_time))
+    A, B = map(np.ascontiguousarray, discretise(model, sample_time))
     weight = np.array([[R * sample_time]])
     try:
         X = solve_discrete_are(A, B, Q * sample_time, weight)
@@ -216,8 +216,8 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
 
     if not rank_report(model).detectable:
         raise DesignError("`model` must be detectable, but a mode that does not decay reaches no output")
-    A, B = sampled(model, sample_time)
-    Q = _sampled_noise(model.A, np.diag(process), sample_time)
+    A, B = discretise(model, sample_time)
+    Q = _noise_covariance(model.A, np.diag(process), sample_time)
     R = np.diag(measurement)
     try:
         P = solve_discrete_are(A.T, model.C.T, Q, R)
@@ -228,7 +228,7 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
     return KalmanFilter(A, B[:, 0], L, np.linalg.inv(S), sample_time)
 
 
-def _sampled_noise(A: Array, intensity: Array, h: float) -> Array:
+def _noise_covariance(A: Array, intensity: Array, h: float) -> Array:
     """Return the covariance that white noise of ``intensity`` gathers in ``h`` (Van Loan, IEEE TAC 23(3), 1978)."""
     from scipy.linalg import expm
 

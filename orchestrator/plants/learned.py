@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.compiled import compiled
 from orchestrator.plants.description import CompiledEquations, Plant
-from orchestrator.plants.sample import completed, sample_of
+from orchestrator.plants.sample import complete_equations, sample_of
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 from pyfmu_sources.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
 
@@ -79,7 +79,7 @@ def with_law(plant: Plant) -> Plant:
 def _stage(plant: Plant, first: int) -> CompiledEquations:
     from orchestrator.shared.numba_cache import kept
 
-    equations = completed(plant.stage())
+    equations = complete_equations(plant.stage())
     rates = equations.rates
     motor, last = plant.bodies[0], plant.bodies[-1]
     J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)

@@ -148,7 +148,7 @@ def reference_sample(
             return x, flank
         time = float(run.t[-1])
         which = next(k for k, hits in enumerate(run.t_events) if len(hits))
-        x, flank = _crossed(plant, x, flank, which)
+        x, flank = _cross(plant, x, flank, which)
     raise SimulationError("reference solution chatters at the edge of the gap")
 
 
@@ -194,7 +194,7 @@ def _events(plant: ReferencePlant, flank: int) -> list[Callable[[float, Array], 
     return list(chosen)
 
 
-def _crossed(plant: ReferencePlant, x: Array, flank: int, which: int) -> tuple[Array, int]:
+def _cross(plant: ReferencePlant, x: Array, flank: int, which: int) -> tuple[Array, int]:
     x = x.copy()
     if flank == 0:
         x[5] = 0.0

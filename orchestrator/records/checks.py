@@ -73,7 +73,7 @@ def check_driven(u: Array, label: str, source: str) -> None:
         )
 
 
-def moving_span(theta: Array, time: Array) -> tuple[float, float] | None:
+def motion_span(theta: Array, time: Array) -> tuple[float, float] | None:
     """Return from when to when [s after the first row] the motor moves, where that is a short part of the record.
 
     Args:
@@ -108,7 +108,7 @@ def check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str
     if length < max(20, size // 100):
         return
     if other is None or name not in ("theta_m", "theta_l"):
-        missed = start > 0 and _leaving_speed(values, start, stop) * length > 30.0 * _resolution(values)
+        missed = start > 0 and _edge_speed(values, start, stop) * length > 30.0 * _resolution(values)
     else:
         # The load may rest while the motor crosses the gap, so only more than any gap counts.
         load, motor = arrays["theta_l"], arrays["theta_m"]
@@ -133,7 +133,7 @@ def _longest_constant(values: Array) -> tuple[int, int]:
     return int(bounds[longest]), int(bounds[longest + 1])
 
 
-def _leaving_speed(values: Array, start: int, stop: int) -> float:
+def _edge_speed(values: Array, start: int, stop: int) -> float:
     """Return the smaller of the mean speeds [units per row] over the rows just before and after a run.
 
     A machine that comes to rest, held by its friction, slows down first; an encoder that sticks does not. Speeds of a

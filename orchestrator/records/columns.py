@@ -126,7 +126,7 @@ def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, sou
     return unit.factor * factor
 
 
-def unwrapped(values: Array, column: Column) -> Array:
+def unwrap(values: Array, column: Column) -> Array:
     """Return values that go on where the file's start again from zero after ``column.modulo``.
 
     Args:
@@ -165,7 +165,7 @@ def check_wraps(values: Array, name: str, label: str, source: str) -> None:
         )
 
 
-def unwrapped_time(values: Array, column: Column, label: str, source: str) -> Array:
+def unwrap_time(values: Array, column: Column, label: str, source: str) -> Array:
     """Return times that go on where a counter overflows, after ``column.modulo``; refuse those that seem to.
 
     Args:

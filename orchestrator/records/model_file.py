@@ -167,7 +167,7 @@ def read_model(path: Path | None) -> Model:
     """Return the model of a TOML file, or the default model for None."""
     if path is None:
         return default_model()
-    content = _content(_decoded(path), str(path))
+    content = _content(_decode(path), str(path))
     parameters, encoders, columns = (content.entries[name] for name in _ENTRIES)
     stated = any("uncertainty" in entry or "relative_uncertainty" in entry for entry in parameters.values())
     plant = _plant(content)
@@ -187,7 +187,7 @@ def read_model(path: Path | None) -> Model:
     )
 
 
-def _decoded(path: Path) -> dict[str, Any]:
+def _decode(path: Path) -> dict[str, Any]:
     """Return the tables of a TOML file."""
     try:
         if path.stat().st_size > MAXIMUM_BYTES:

@@ -18,11 +18,11 @@ from orchestrator.records.checks import (
     check_finite,
     check_moving,
     check_range,
-    moving_span,
+    motion_span,
     quantisation_step,
 )
 from orchestrator.records.columns import COLUMNS, Array, Column
-from orchestrator.records.filters import decimated
+from orchestrator.records.filters import decimate
 from orchestrator.records.formats import open_source
 from orchestrator.records.loading import Reading, load
 from orchestrator.records.timing import RESAMPLING, Grid, grid_of
@@ -43,7 +43,7 @@ def read_record(
     if "u" in loaded.table:
         check_driven(loaded.table["u"], loaded.labels["u"], path.name)
     record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
-    span = moving_span(lined(record.theta_m), record.time)
+    span = motion_span(lined(record.theta_m), record.time)
     if span is not None:
         start, end = span
         note = (
@@ -54,7 +54,7 @@ def read_record(
     scale = (columns or {}).get("u", Column()).relative_uncertainty
     record = replace(record, u_scale_uncertainty=scale, notes=(*loaded.notes, *record.notes))
     if reading.rate is not None:
-        record = decimated(record, reading.rate)
+        record = decimate(record, reading.rate)
     return record
 
 
@@ -64,7 +64,7 @@ def record_from_columns(
     """Check columns that are already numbers (any mapping of name to (n,) array) and return the record."""
     arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in table.items()}
     label = {name: name for name in arrays} | dict(shown or {})
-    arrays = _stamped(arrays, label["time"], source)
+    arrays = _stamp(arrays, label["time"], source)
     size = arrays["time"].size
     if size < MINIMUM_ROWS:
         raise RecordError(
@@ -83,7 +83,7 @@ def record_from_columns(
     return _on_grid(arrays, grid, source, trust_rows)
 
 
-def _stamped(arrays: dict[str, Array], label: str, source: str) -> dict[str, Array]:
+def _stamp(arrays: dict[str, Array], label: str, source: str) -> dict[str, Array]:
     """Return the rows that have a time."""
     good = np.isfinite(arrays["time"])
     lost = int(np.count_nonzero(~good))
@@ -110,7 +110,7 @@ def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: b
             table[name] = spread
         table["time"] = np.asarray(grid.start + timing.step * np.arange(grid.size), dtype=np.float64)
     absent = np.full(table["time"].size, np.nan)
-    u, deviation = _interpolated(table["u"]) if "u" in table else (absent, None)
+    u, deviation = _interpolate(table["u"]) if "u" in table else (absent, None)
     rest = {name: lined(values) for name, values in table.items() if name not in COLUMNS}
     record = Record(table["time"], u, table["theta_m"], table.get("theta_l"), source, rest, deviation, 0.0, timing)
     if record.missing:
@@ -121,7 +121,7 @@ def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: b
     return replace(record, notes=tuple(notes))
 
 
-def _interpolated(u: Array) -> tuple[Array, Array | None]:
+def _interpolate(u: Array) -> tuple[Array, Array | None]:
     """Return the torque with lines over missing samples, and how far they may be off [N.m].
 
     What a line over a gap of some length misses is measured on the record itself, at the middle of spans that long.

@@ -68,14 +68,14 @@ def seconds_of(stamps: NDArray[Any], label: str, path: Path) -> NDArray[np.float
 
 
 def _nanoseconds(
-    found: re.Match[str],
+    match: re.Match[str],
     pattern: re.Pattern[str],
     days: dict[tuple[str, str, str], int],
     label: str,
     path: Path,
     row: int,
 ) -> int:
-    parts = found.groups()
+    parts = match.groups()
     date, clock, zone = 0, parts, None
     if pattern is not _CLOCK:
         key = (parts[0], parts[1], parts[2]) if pattern is _ISO else (parts[2], parts[1], parts[0])
@@ -84,7 +84,7 @@ def _nanoseconds(
                 day = np.datetime64(f"{key[0]}-{int(key[1]):02d}-{int(key[2]):02d}", "ns")
             except ValueError:
                 raise RecordError(
-                    f"{path}: row {row + 1}, column `{label}` must be a date, but is `{found[0][:40]}`"
+                    f"{path}: row {row + 1}, column `{label}` must be a date, but is `{match[0][:40]}`"
                 ) from None
             days[key] = int(day.astype(np.int64))
         date, clock = days[key], parts[3:7]

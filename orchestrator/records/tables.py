@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from orchestrator.errors import RecordError
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
-from orchestrator.records.names import find_named, listed, near, recognised_time
+from orchestrator.records.names import find_named, list_names, near, recognise_time
 from orchestrator.records.stamps import seconds_of
 from orchestrator.records.units import parse_unit
 from orchestrator.shared.units import KnownUnit
@@ -109,13 +109,13 @@ def _place(heads: Sequence[Head], wanted: Wanted, path: Path, time: Wanted) -> i
     if len(places) == 1:
         return places[0]
     if not places and wanted is time and wanted.column == "time":
-        place = recognised_time(heads, str(path))
+        place = recognise_time(heads, str(path))
         if place is not None:
             return place
     count = f"{len(places)} of them: name it by number, such as `#{places[0] + 1}`" if places else "no such column"
     raise RecordError(
         f"{path}: {wanted.where} must name a column, but there is {count}: {wanted.column!r} of "
-        f"{listed(heads)}{near(wanted.column, heads)}"
+        f"{list_names(heads)}{near(wanted.column, heads)}"
     )
 
 

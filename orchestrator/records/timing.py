@@ -179,7 +179,7 @@ def _check_grid(
     )
 
 
-def resampled_grid(time: Array) -> tuple[Array, float]:
+def resample_grid(time: Array) -> tuple[Array, float]:
     """Return the uniform grid (n,) [s] of the same mean rate that non-uniform stamps are resampled to, and its step.
 
     Args:

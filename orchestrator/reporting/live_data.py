@@ -19,14 +19,14 @@ def live_data(live: Live) -> Markup:
     return in_script(
         {
             "module": base64.b64encode(gzip.compress(live.module, mtime=0)).decode(),
-            "plan": _packed(live.plan),
+            "plan": _pack(live.plan),
             "step": live.step,
             "records": live.records,
             "runs": [
-                {"start": run.start, "steps": run.steps, "changes": run.changes, "table": _packed(run.table)}
+                {"start": run.start, "steps": run.steps, "changes": run.changes, "table": _pack(run.table)}
                 for run in live.runs
             ],
-            "recorded": [_packed(row) for row in live.recorded],
+            "recorded": [_pack(row) for row in live.recorded],
             "controls": [asdict(control) for control in live.controls],
             "plots": [[{"name": curve.name, "terms": curve.terms} for curve in plot.curves] for plot in live.plots],
             "regulator": None if regulator is None else asdict(regulator),
@@ -40,5 +40,5 @@ def in_script(data: Any) -> Markup:
     return Markup(text.replace("<", "\\u003c").replace("&", "\\u0026"))
 
 
-def _packed(values: Sequence[float]) -> str:
+def _pack(values: Sequence[float]) -> str:
     return base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode()

@@ -20,7 +20,7 @@ class UnpackedRun:
     start: float
 
 
-def opened(job: UnpackedRun) -> Callable[[Any], list[Any]]:
+def open_runs(job: UnpackedRun) -> Callable[[Any], list[Any]]:
     """Return a handler that runs the job once for each mapping of start values."""
     session = Session(job.system, job.record, job.algorithm, job.stop, job.start)
 

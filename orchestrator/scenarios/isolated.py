@@ -60,7 +60,7 @@ def foreign_fmus(system: System) -> list[Path]:
     return [path for path in dict.fromkeys(paths) if not is_ours(path)]
 
 
-def described(system: System, safety: Safety) -> WallsFound:
+def describe_walls(system: System, safety: Safety) -> WallsFound:
     """Return what a result file says of the walls around a run of ``system``."""
     foreign = foreign_fmus(system)
     walls, behind = support(), bool(foreign) and not safety.trust
@@ -77,7 +77,7 @@ def run_safely(scenario: Scenario, safety: Safety) -> Recording:
     """Run a scenario once, in a child process when an FMU is not ours or the time is limited."""
     foreign = [] if safety.trust else foreign_fmus(scenario.system)
     movable = all(isinstance(i.create, FmuFactory) for i in scenario.system.instances)
-    if movable and _one_a_process(scenario.system):
+    if movable and _needs_processes(scenario.system):
         result = _in_processes(scenario, safety, foreign)
     elif movable and (foreign or safety.time is not None):
         result = _in_child(scenario, safety, foreign)
@@ -101,7 +101,7 @@ def _require_finite(result: Recording) -> None:
 
 
 @contextmanager
-def unpacked(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]:
+def unpack_system(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]:
     """Yield ``system`` with its FMUs unpacked for a child: the system, the folder, and the FMU of each subfolder."""
     with Scratch("fmus") as scratch:
         origins: dict[str, str] = {}
@@ -120,7 +120,7 @@ def unpacked(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]
         yield replace(system, instances=tuple(instances)), scratch, origins
 
 
-def _one_a_process(system: System) -> bool:
+def _needs_processes(system: System) -> bool:
     """Whether an FMU that may be instantiated once per process has several instances."""
     once = [f.path for f in (i.create for i in system.instances) if isinstance(f, FmuFactory) and f.description.once]
     contents = [content_hash(path) for path in once]
@@ -131,7 +131,7 @@ def _in_processes(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Re
     """Run a scenario with a process for each of its instances."""
     time = DEFAULT_TIME_LIMIT if safety.time is None else safety.time
     limits = Limits(time, safety.memory, _LARGEST_FILE, time, _MOST_FILES)
-    with unpacked(scenario.system) as (system, _, origins):
+    with unpack_system(scenario.system) as (system, _, origins):
         instances = []
         for instance in system.instances:
             factory = instance.create
@@ -156,18 +156,18 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
     steps = step_count(scenario.start, scenario.stop, scenario.algorithm.step)
     shape = (len(scenario.record), steps + 1)
     limits = replace(limits, memory=limits.memory + 24 * shape[0] * shape[1])
-    with unpacked(scenario.system) as (system, scratch, origins):
+    with unpack_system(scenario.system) as (system, scratch, origins):
         job = UnpackedRun(system, scenario.record, scenario.algorithm, scenario.stop, scenario.start)
         names = ", ".join(map(str, foreign)) or "the scenario"
         prepare()
         try:
             with Jail(
-                "orchestrator.scenarios.inside:opened", job, read=[scratch.path], limits=limits, walls=bool(foreign)
+                "orchestrator.scenarios.inside:open_runs", job, read=[scratch.path], limits=limits, walls=bool(foreign)
             ) as jail:
                 jail.start(time)
                 answer = jail.call({}, most=8 * shape[0] * shape[1] + _SLACK)
         except ChildError as error:
-            raise SimulationError(f"{names}: {_worded(error, time)}", "time_limit") from None
+            raise SimulationError(f"{names}: {_word_error(error, time)}", "time_limit") from None
         except OrchestratorError as error:
             text = str(error)
             for folder, origin in origins.items():
@@ -176,7 +176,7 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
     return _result(answer, scenario, shape, names)
 
 
-def _worded(error: ChildError, time: float) -> str:
+def _word_error(error: ChildError, time: float) -> str:
     if error.reason == "time":
         return f"the run must take at most {time:g} s (`time_limit`), but takes longer"
     said = f" (it printed: {error.said})" if error.said else ""

@@ -71,7 +71,7 @@ def spread(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     return [results[place] for place in range(len(items))]
 
 
-def both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
+def run_both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
     """Return the results of two functions, called at once where a core is idle."""
     calls: tuple[Callable[[], Any], ...] = (first, second)
     one, other = spread(lambda call: call(), calls)

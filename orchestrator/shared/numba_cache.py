@@ -46,7 +46,7 @@ def kept(**options: Any) -> Callable[[Any], Any]:
     A function with a closure is kept under a digest of all that it reaches; where that is not known, not at all.
     """
 
-    def compiled(function: Any) -> Any:
+    def decorate(function: Any) -> Any:
         dispatcher = njit(**options)(function)
         # Without a folder that can be written the function is compiled in every process.
         with contextlib.suppress(RuntimeError, OSError):
@@ -56,7 +56,7 @@ def kept(**options: Any) -> Callable[[Any], Any]:
                 dispatcher._cache = _ClosureCache(function, digest)
         return dispatcher
 
-    return compiled
+    return decorate
 
 
 class _Files(IndexDataCacheFile):

@@ -61,7 +61,7 @@ def is_own(status: os.stat_result) -> bool:
     return not hasattr(os, "getuid") or status.st_uid == os.getuid()
 
 
-def occupied(status: os.stat_result) -> int:
+def disk_usage(status: os.stat_result) -> int:
     """Return the bytes that a file takes on the disk."""
     return status.st_blocks * 512 if hasattr(status, "st_blocks") else status.st_size
 
@@ -75,7 +75,7 @@ def resident_memory(pid: int) -> tuple[int, int]:
         return 0, 0
 
 
-def allocated_memory() -> int:
+def memory_usage() -> int:
     """Return the private writable memory of this process.
 
     Returns:

@@ -22,7 +22,7 @@ DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by 
 
 
 @contextmanager
-def staged(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path]:
+def stage_output(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path]:
     """Yield a staging directory whose files are moved into ``directory`` when the block ends without error."""
     made: list[Path] = []
     try:

@@ -53,7 +53,7 @@ class Trust:
         return self.level.word if not self.reasons else f"{self.level.word}: {'; '.join(self.reasons)}"
 
 
-def trust_of(found: Iterable[Reason]) -> Trust:
+def trust_of(checks: Iterable[Reason]) -> Trust:
     """Return the trust that single checks leave."""
-    reasons = sorted((r for r in found if r.level is not Level.GREEN), key=lambda r: -r.level)
+    reasons = sorted((r for r in checks if r.level is not Level.GREEN), key=lambda r: -r.level)
     return Trust(reasons[0].level if reasons else Level.GREEN, tuple(r.text for r in reasons))

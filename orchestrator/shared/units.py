@@ -179,7 +179,7 @@ def parse_unit(text: str, wanted: Collection[Dimension] = ()) -> KnownUnit | Non
 
     ``nm`` written small is a torque or a length and ``1/min`` a speed or a frequency: ``wanted`` decides.
     """
-    found = [unit for name in _readings(text) if (unit := _valued(name)) is not None]
+    found = [unit for name in _readings(text) if (unit := _unit_value(name)) is not None]
     return next((unit for unit in found if unit.dimension in wanted), found[0] if found else None)
 
 
@@ -265,7 +265,7 @@ def _number(text: str) -> float:
 
 
 @lru_cache(maxsize=4096)
-def _valued(name: str) -> KnownUnit | None:
+def _unit_value(name: str) -> KnownUnit | None:
     """Return the value of an expression of known names."""
     import pint  # a quarter of a second that few commands need
 

@@ -15,12 +15,12 @@ from orchestrator.building.build import ensure_built
 from orchestrator.cli import main
 from orchestrator.master import session
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.scenario import paired_scenario
+from orchestrator.paired.scenario import scenario_of_pair
 
 
 @pytest.fixture(scope="module")
 def job() -> BenchJob:
-    return job_of(paired_scenario(Experiment(), ensure_built(), 0.02, 0.5), ["plant.theta_l"])
+    return job_of(scenario_of_pair(Experiment(), ensure_built(), 0.02, 0.5), ["plant.theta_l"])
 
 
 def test_job_is_plain_data(job, tmp_path: Path) -> None:

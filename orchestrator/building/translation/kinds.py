@@ -152,7 +152,7 @@ class KindNames:
 
     def suggest(self, kind: Kind, name: str) -> None:
         """Let ``kind`` be called ``name`` unless it has a name or the name is taken."""
-        name = self._own(name)
+        name = self._unique_name(name)
         free = name not in self._names.values() and name not in self._taken
         if isinstance(kind, Tuple | Items) and kind not in self._names and free:
             self._names[kind] = name
@@ -171,13 +171,13 @@ class KindNames:
                 self.c(item)
             self._order.append(kind)
         if kind not in self._names:
-            self._names[kind] = self._own(self._made(kind))
+            self._names[kind] = self._unique_name(self._make(kind))
         return self._names[kind]
 
-    def _own(self, name: str) -> str:
+    def _unique_name(self, name: str) -> str:
         return f"{name}{PAIR}" if self._paired and PAIR not in name else name
 
-    def _made(self, kind: Tuple | Items) -> str:
+    def _make(self, kind: Tuple | Items) -> str:
         if isinstance(kind, Items):
             return f"List_of_{kind.capacity}_{self.c(kind.item)}"
         names = [self.c(item) for item in kind.items]

@@ -45,17 +45,17 @@ class Program:
         translate: Translator,
         owner: Owner | None = None,
         taken: frozenset[str] = frozenset(),
-        beside: Program | None = None,
+        neighbours: Program | None = None,
     ) -> None:
         self._translate = translate
         self._taken = TAKEN | taken
-        self.paired = beside is not None
+        self.paired = neighbours is not None
         self.names = KindNames(self._taken, self.paired)
         self.owner = owner
         self.owner_name = owner.cls.__name__ if owner is not None else ""
         self._functions: dict[tuple[str, str], Function] = {}
         self._underway: list[tuple[str, str]] = []
-        self._constants: dict[str, float | int] = {} if beside is None else dict(beside._constants)
+        self._constants: dict[str, float | int] = {} if neighbours is None else dict(neighbours._constants)
         self._shared = frozenset(self._constants)
         self._sources: dict[str, ModuleSource] = {}
         self._largest_index = -1
@@ -99,7 +99,7 @@ class Program:
         definition = source.functions.get(name)
         if definition is None:
             raise FmuError(f"{source.path}: `{name}` must be a function of this module, but is not")
-        return self._translated(user, node, (target.__module__, name), source, definition, None)
+        return self._translate_function(user, node, (target.__module__, name), source, definition, None)
 
     def method(self, user: ModuleSource | None, node: ast.AST | None, name: str) -> Function:
         """Return the translation of a method of the slave."""
@@ -109,13 +109,13 @@ class Program:
                 source = self._source(cls.__module__)
                 body = next(n for n in source.tree.body if isinstance(n, ast.ClassDef) and n.name == cls.__name__)
                 definition = next(n for n in body.body if isinstance(n, ast.FunctionDef) and n.name == name)
-                return self._translated(user, node, (cls.__qualname__, name), source, definition, self.owner)
+                return self._translate_function(user, node, (cls.__qualname__, name), source, definition, self.owner)
         message = f"`{self.owner_name}` must have a method `{name}` of its own, but has none"
         if user is not None and node is not None:
             user.refuse(node, message)
         raise FmuError(message)
 
-    def _translated(
+    def _translate_function(
         self,
         user: ModuleSource | None,
         node: ast.AST | None,
@@ -138,7 +138,7 @@ class Program:
         source = read_source(module)
         if source.name not in self._sources:
             self._sources[source.name] = source
-            for imported in source.imported():
+            for imported in source.imports():
                 self._source(imported)
             for name, kind in source.aliases():
                 self.names.suggest(kind, name)

@@ -95,19 +95,19 @@ class Scope:
         self.faults += 1
         return "fault"
 
-    def raised(self, before: int) -> bool:
+    def may_raise(self, before: int) -> bool:
         """Tell whether a slave's method can have raised since there were ``before`` faults; functions go on."""
         return self.owner is not None and self.faults > before
 
-    def checked(self, before: int) -> list[str]:
+    def check_faults(self, before: int) -> list[str]:
         """Return the statement that leaves a method if it can have raised since there were ``before`` faults."""
-        return [self.fault_check()] if self.raised(before) else []
+        return [self.fault_check()] if self.may_raise(before) else []
 
     def fault_check(self) -> str:
         """Return the statement that leaves a function once something was raised."""
-        return f"if (fault->kind) return{self.nothing()};"
+        return f"if (fault->kind) return{self.empty_result()};"
 
-    def nothing(self) -> str:
+    def empty_result(self) -> str:
         """Return what a function gives back when it raises, which nobody looks at."""
         if self.returns == NOTHING:
             return ""
@@ -160,7 +160,7 @@ class Scope:
                 self.changed = True
 
 
-def converted(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
+def convert(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
     """Return ``code`` as a value of ``kind``, or refuse."""
     if code.kind == kind:
         return code
@@ -172,7 +172,7 @@ def converted(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
             code = scope.hoist(node, code, "values")
         return Code(f"{member(code)}v", kind)
     if isinstance(kind, Tuple) and isinstance(code.kind, Tuple) and code.kind.items == kind.items:
-        return code if code.kind.uniform == kind.uniform else _renamed(scope, node, code, kind)
+        return code if code.kind.uniform == kind.uniform else _rename_tuple(scope, node, code, kind)
     return scope.refuse(node, f"a value must be {describe(kind)}, but is {describe(code.kind)}")
 
 
@@ -195,7 +195,7 @@ def value_of(scope: Scope, code: Code) -> Code:
     return Code(f"({code.plain})" if code.plain else f"{member(code)}v", REAL)
 
 
-def _renamed(scope: Scope, node: ast.AST, code: Code, kind: Tuple) -> Code:
+def _rename_tuple(scope: Scope, node: ast.AST, code: Code, kind: Tuple) -> Code:
     assert isinstance(code.kind, Tuple)
     if not code.place:
         code = scope.hoist(node, code, "pair")
@@ -233,13 +233,13 @@ def address_of(code: Code) -> str:
     return code.text[1:] if code.text.startswith("*") else f"&{code.within(PRIMARY)}"
 
 
-def joined(scope: Scope, node: ast.AST, one: Kind, other: Kind) -> Kind:
+def join_kinds(scope: Scope, node: ast.AST, first: Kind, other: Kind) -> Kind:
     """Return the kind of a value that is of either kind."""
-    if one == other:
-        return one
-    if {one, other} == {REAL, WHOLE}:
+    if first == other:
+        return first
+    if {first, other} == {REAL, WHOLE}:
         return REAL
-    return scope.refuse(node, f"both values must be of one type, but are {describe(one)} and {describe(other)}")
+    return scope.refuse(node, f"both values must be of one type, but are {describe(first)} and {describe(other)}")
 
 
 def truth(code: Code) -> Code:

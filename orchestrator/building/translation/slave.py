@@ -168,7 +168,7 @@ def _state_hook(program: Program, name: str, parameters: str, function: Function
 def _hook(program: Program, name: str, parameters: str, needed: bool) -> str:
     """Return the function by which the runtime calls a hook, whether it can raise or not."""
     head = f"static void slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
-    if not needed and not _defined(program, name):
+    if not needed and not _is_defined(program, name):
         return f"{head}\n{{\n    (void)self;\n    (void)fault;\n}}"
     function = program.method(None, None, name)
     _check(program, function, parameters)
@@ -177,7 +177,7 @@ def _hook(program: Program, name: str, parameters: str, needed: bool) -> str:
     return f"{head}\n{{\n{unused}    {function.c}({', '.join(arguments)});\n}}"
 
 
-def _defined(program: Program, name: str) -> bool:
+def _is_defined(program: Program, name: str) -> bool:
     assert program.owner is not None
     return any(name in vars(base) for base in program.owner.cls.__mro__ if base.__module__ not in BASE_MODULES)
 

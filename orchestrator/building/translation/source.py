@@ -69,7 +69,7 @@ class ModuleSource:
         except KindError as error:
             self.refuse(place, f"{error}")
 
-    def imported(self) -> Iterator[str]:
+    def imports(self) -> Iterator[str]:
         """Yield the full names of the modules beside this one that it imports from, base classes of slaves apart."""
         package = self.module.__name__.rpartition(".")[0]
         for node in self.tree.body:
@@ -103,7 +103,7 @@ def read_source(name: str) -> ModuleSource:
         raise FmuError(f"the source {name} cannot be read: {error}") from None
     functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
     remarks, whole = _remarks(content)
-    return ModuleSource(name.rpartition(".")[2], _shown(path), tree, module, functions, remarks, whole)
+    return ModuleSource(name.rpartition(".")[2], _relative_path(path), tree, module, functions, remarks, whole)
 
 
 def _remarks(content: bytes) -> tuple[dict[int, str], frozenset[int]]:
@@ -118,7 +118,7 @@ def _remarks(content: bytes) -> tuple[dict[int, str], frozenset[int]]:
     return found, frozenset(whole)
 
 
-def _shown(path: Path) -> Path:
+def _relative_path(path: Path) -> Path:
     try:
         return path.relative_to(Path.cwd())
     except ValueError:

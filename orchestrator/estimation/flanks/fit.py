@@ -95,7 +95,7 @@ class FlankProblem:
         fit = FlankFit(values, 1.0, change, share, -math.inf, 0.0, np.eye(values.size), False)
         for _ in range(5):
             direction = np.sign(self._table(fit.base)[:, LATE]) * -np.sign(self._slope)
-            fit = self._moved(self._regressed(fit, direction, np.ones(n)))
+            fit = self._move(self._regress(fit, direction, np.ones(n)))
         return fit
 
     def _table(self, base: float) -> Array:
@@ -110,7 +110,7 @@ class FlankProblem:
             self._base, self._rows = base, np.column_stack(columns)
         return self._rows
 
-    def _moved(self, fit: FlankFit) -> FlankFit:
+    def _move(self, fit: FlankFit) -> FlankFit:
         """Return the fit with the motor's angle taken at the lateness that was found, where that is another."""
         late = float(np.clip(fit.late, -self.settings.latest, self.settings.latest))
         if abs(late - fit.base) < self.settings.late_step:
@@ -119,7 +119,7 @@ class FlankProblem:
         values[LATE] = 0.0
         return replace(fit, values=values, base=late)
 
-    def _regressed(self, fit: FlankFit, flank: Array, weight: Array) -> FlankFit:
+    def _regress(self, fit: FlankFit, flank: Array, weight: Array) -> FlankFit:
         """Return the fit after weighted least squares with the flanks held.
 
         Args:
@@ -166,7 +166,7 @@ class FlankProblem:
             touching = share[:, 0] + share[:, 2]
             flank = np.divide(share[:, 2] - share[:, 0], touching, out=np.zeros(n), where=touching > 1e-12)
             weight = touching * mask * fit.variance / variance
-            fit = self._moved(self._regressed(fit, flank, weight))
+            fit = self._move(self._regress(fit, flank, weight))
             counts = steps + self.settings.prior_steps * (0.9 * np.eye(STATES) + 0.1 / STATES)
             fit = replace(
                 fit, change=counts / counts.sum(axis=1, keepdims=True), share=share.copy(), loglik=loglik,

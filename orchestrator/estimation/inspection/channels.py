@@ -72,12 +72,12 @@ def _channel(name: str, unit: str, values: Array, missing: int) -> Channel:
         float(good.max()),
         count,
         max(noise, count / math.sqrt(12.0)),
-        _saturated(good),
+        _saturation_share(good),
         missing,
     )
 
 
-def _saturated(values: Array) -> float:
+def _saturation_share(values: Array) -> float:
     """Return the share of samples that lie in runs of three or more at the largest or smallest value."""
     if float(np.ptp(values)) == 0.0:
         return 0.0
@@ -125,7 +125,7 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     lags = []
     for rows in np.array_split(np.arange(filled.size), PARTS):
         motor, load = filled.theta_m[rows[reach:-reach]], filled.theta_l[rows]
-        left = [_unexplained(motor, load[reach + n : reach + n + motor.size]) for n in range(-reach, reach + 1)]
+        left = [_residual_variance(motor, load[reach + n : reach + n + motor.size]) for n in range(-reach, reach + 1)]
         best = int(np.argmin(left))
         bend = 0.0
         if 0 < best < 2 * reach:
@@ -135,7 +135,7 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     return float(np.mean(lags)), float(np.std(lags, ddof=1)) / math.sqrt(PARTS)
 
 
-def _unexplained(motor: Array, load: Array) -> float:
+def _residual_variance(motor: Array, load: Array) -> float:
     """Return the variance of ``load`` that a straight line in ``motor`` leaves."""
     a, b = motor - motor.mean(), load - load.mean()
     return float(b @ b - (a @ b) ** 2 / max(float(a @ a), 1e-300))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model, ModelParameter
-from orchestrator.records.plausibility import check_plausible, momentum_balance, smoothed
+from orchestrator.records.plausibility import check_plausible, momentum_balance, smooth
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.inverse import pseudo_inverse
 
@@ -42,7 +42,7 @@ def is_of(record: Record, model: Model) -> bool:
     p = {name: entry.value for name, entry in model.parameters.items()}
     record = record.filled()
     same = record.theta_l is None or abs(_ratio(record)[0] / p["i"] - 1.0) < SAME_RATIO
-    inertia, _, _ = momentum_balance(*smoothed(record, p["tau"])[:3])
+    inertia, _, _ = momentum_balance(*smooth(record, p["tau"])[:3])
     relative = inertia / (p["J_m"] + p["J_l"] / p["i"] ** 2)
     return same and 1.0 / SAME_INERTIA < relative < SAME_INERTIA
 
@@ -99,8 +99,8 @@ def as_model(rough: RoughMachine, base: Model) -> Model:
 
 def _balance(record: Record) -> tuple[float, float, float, float]:
     """Return lag [s], inertia [kg.m2] and viscous friction at the motor, and the share of the impulse they explain."""
-    tried = ((tau, *momentum_balance(*smoothed(record, tau)[:3])) for tau in LAGS)
-    tau, inertia, friction, share = max(tried, key=lambda found: found[3])
+    tried = ((tau, *momentum_balance(*smooth(record, tau)[:3])) for tau in LAGS)
+    tau, inertia, friction, share = max(tried, key=lambda fit: fit[3])
     return tau, abs(inertia) or 1.0, abs(friction), share
 
 
@@ -130,7 +130,7 @@ def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]
     if not record.has_torque:
         return []
     p = {name: entry.value for name, entry in model.parameters.items()}
-    impulse, speed, angle, width = smoothed(record, max(p["tau"], LEAST_LAG))
+    impulse, speed, angle, width = smooth(record, max(p["tau"], LEAST_LAG))
     h = record.step
     load = angle / p.get("i", 1.0)
     shapes = {

@@ -12,7 +12,7 @@ from orchestrator.estimation.innovations import affine_model, simulate
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.records.model_file import Model
-from orchestrator.records.plausibility import check_plausible, smoothed
+from orchestrator.records.plausibility import check_plausible, smooth
 from orchestrator.records.record import Record
 from pyfmu_sources.drivetrain_parameters import P_ALPHA, P_I
 
@@ -123,7 +123,7 @@ def _other_sign(record: Record, model: Model) -> float:
     """
     record = record.filled()
     p = {name: entry.value for name, entry in model.parameters.items()}
-    impulse, speed, angle, width = smoothed(record, p["tau"])
+    impulse, speed, angle, width = smooth(record, p["tau"])
     rows = np.arange(0, speed.size, width)
     if rows.size < 8:
         return 1.0

@@ -77,7 +77,7 @@ def estimate(
         # What a long record says first of all, its beginning says too, in a fraction of the time.
         shorts = [one.part(0, min(one.size, settings.fit.short_record // len(records))) for one in records]
         report("fitting the beginning", 0.0)
-        fit = _refined(likelihood, _likelihood(shorts, model, threads, deadline, settings), report)
+        fit = _refine(likelihood, _likelihood(shorts, model, threads, deadline, settings), report)
     if fit is None:
         fit = fit_record(likelihood, report)
     report("finding the interval", BEFORE_INTERVAL)
@@ -94,7 +94,7 @@ def _likelihood(
     return Likelihood(first, threads, settings, deadline)
 
 
-def _refined(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit | None:
+def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit | None:
     """Return the fit that starts from that of the beginning; None where the beginning does not show the gap."""
     first = fit_record(short)
     short = first.likelihood

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orchestrator.errors import RecordError
 from orchestrator.records.formats import numpy_file, text
-from orchestrator.records.formats.apart import opened_apart
+from orchestrator.records.formats.apart import open_apart
 from orchestrator.records.formats.source import MAXIMUM_BYTES, RecordSource
 
 # First bytes of a file (and where they stand) and the module that reads it.
@@ -64,7 +64,7 @@ def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]
     elif module == "numpy_file":
         yield numpy_file.open_file(path)
     else:
-        with opened_apart(module, path) as source:
+        with open_apart(module, path) as source:
             yield source
 
 

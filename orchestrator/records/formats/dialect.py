@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.cells import cells_of, is_value
 from orchestrator.records.formats.heading import UNIT_KEYS, Heading
-from orchestrator.records.formats.heads import named
+from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import MAXIMUM_CHANNELS, Head
 from orchestrator.records.stamps import is_stamp
 
@@ -87,9 +87,9 @@ def detect(text: str, path: Path, header: int | None = None) -> Dialect:
     head = Heading(separator, decimal, width, path)
     if header:
         above = [text[:skipped].rstrip("\n").rsplit("\n", 1)[-1], *above]
-        names, units, preamble = head.stated(above, header)
+        names, units, preamble = head.read_stated(above, header)
     else:
-        names, units, preamble = (None, [""] * width, above) if header == 0 else head.found(above)
+        names, units, preamble = (None, [""] * width, above) if header == 0 else head.read_names(above)
     kinds = ["stamp" if _is_stamp_column(rows, place) else "number" for place in range(width)]
     if names is None:
         heads = [Head(f"#{n + 1}", "", kind) for n, kind in enumerate(kinds)]
@@ -175,7 +175,7 @@ def _head(text: str, unit: str, kind: str) -> Head:
     plain = " ".join(text.split())
     if unit:
         return Head(plain, unit, kind, 0, plain)
-    return named(plain, "", kind)
+    return head_of(plain, "", kind)
 
 
 def _no_table(text: str, path: Path) -> RecordError:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.heads import named
+from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
     MAXIMUM_CHANNELS,
@@ -43,7 +43,7 @@ class ArraySource(RecordSource):
 
 def _head(name: str, unit: str, values: NDArray[Any], raster: int) -> Head:
     kind = "stamp" if values.dtype.kind == "M" else "number"
-    head = named(name, unit)
+    head = head_of(name, unit)
     return Head(head.name, head.unit, kind, raster, head.full)
 
 

@@ -93,7 +93,7 @@ def in_a_line(error: BaseException) -> str:
     return " ".join(str(error).split())[:120]
 
 
-def missing_extra(path: Path, kind: str, package: str, extra: str) -> RecordError:
+def extra_error(path: Path, kind: str, package: str, extra: str) -> RecordError:
     """Return the error that says which extra reads a format."""
     return RecordError(
         f"{path}: is {kind}, which needs `{package}`: pip install 'backlash-cosim[{extra}]', or save the record as CSV"

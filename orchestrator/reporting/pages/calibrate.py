@@ -26,7 +26,7 @@ def build(source: ResultDocument) -> Report:
     return Report("Calibration of an FMU", summary, tuple(sections), badge, origin, source.downloads())
 
 
-def _parameters(found: FmuCalibrationFound) -> ReportTable:
+def _parameters(results: FmuCalibrationFound) -> ReportTable:
     columns = (
         TableColumn("parameter"),
         TableColumn("nominal", "", 6),
@@ -47,17 +47,17 @@ def _parameters(found: FmuCalibrationFound) -> ReportTable:
             p.unit,
             None if p.learned is None else 100.0 * p.learned,
         )
-        for name, p in found.parameters.items()
+        for name, p in results.parameters.items()
     )
     note = "Lower and upper: ends of the 95 % interval. Learned: how much of its stated uncertainty the record removes."
     return ReportTable("Parameters", columns, rows, note)
 
 
-def _misfit(found: FmuCalibrationFound) -> ReportTable:
+def _misfit(results: FmuCalibrationFound) -> ReportTable:
     columns = tuple(TableColumn(head) for head in ("record", "output", "nominal", "calibrated", "noise", "unit"))
     rows = tuple(
         (test.source, name, m.nominal, m.final, m.noise, m.unit)
-        for test in found.test
+        for test in results.test
         for name, m in test.misfit.items()
     )
     note = "Nominal and calibrated: root mean square that runs miss on test data, to which nothing was fitted."

@@ -107,7 +107,7 @@ def add_experiment(root: etree._Element, start: float, stop: float, step: float)
 
 def solver_tolerance(system: etree._Element) -> float | None:
     """Return the relative tolerance for the FMUs' own solvers that a system states where OMSimulator looks for it."""
-    stated = _stated(system, "*", "relativeTolerance")
+    stated = _numbers_of(system, "*", "relativeTolerance")
     return next((value for value in stated if 0.0 < value < 1.0 and value != OMS_TOLERANCE), None)
 
 
@@ -117,11 +117,11 @@ def oms_step(system: etree._Element) -> float | None:
     Returns:
         The step [s]; None where there is none.
     """
-    stated = _stated(system, tag("oms", "FixedStepMaster"), "stepSize")
+    stated = _numbers_of(system, tag("oms", "FixedStepMaster"), "stepSize")
     return next((value for value in stated if 0.0 < value < float("inf")), None)
 
 
-def _stated(system: etree._Element, element: str, attribute: str) -> Iterator[float]:
+def _numbers_of(system: etree._Element, element: str, attribute: str) -> Iterator[float]:
     """Yield the numbers in an attribute of elements of OMSimulator's SimulationInformation."""
     for annotation in system.findall(f"{tag('ssd', 'Annotations')}/{tag('ssc', 'Annotation')}[@type='{OMS}']"):
         for found in annotation.findall(f".//{tag('oms', 'SimulationInformation')}/{element}[@{attribute}]"):
@@ -131,7 +131,7 @@ def _stated(system: etree._Element, element: str, attribute: str) -> Iterator[fl
                 continue
 
 
-def archived(folder: Path, source: str) -> Path | None:
+def file_of_uri(folder: Path, source: str) -> Path | None:
     """Return the file of an archive that a URI names, such as ``resources/My%20Part.fmu``."""
     for text in (unquote(source), source):
         file = (folder / text).resolve()

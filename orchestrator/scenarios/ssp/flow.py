@@ -76,13 +76,13 @@ class Flow:
         for target, root in self._ends():
             name = self._address(target)
             if root[0] in self._models:
-                value = self._carried(root, target, self._starting_at(root))
+                value = self._carry(root, target, self._start_at(root))
                 source, own = self._own_unit(root), self._own_unit(target)
                 ratio = units.conversion(source, own) or (1.0, 0.0)  # what the master converts by itself
                 factor = value.factor / ratio[0]
                 connections.append(Connection(self._address(root), name, factor, value.offset - factor * ratio[1]))
             elif root[0] == "" and root[1] in inputs:
-                value = self._carried(root, target, self._starting_at(root))
+                value = self._carry(root, target, self._start_at(root))
                 # As other tools do: what is set at a communication point holds over the step from there.
                 sources.append(SignalSource(name, Scaled(inputs[root[1]], value.factor, value.offset), at="start"))
         for name in inputs:
@@ -103,7 +103,7 @@ class Flow:
                 continue
             unit = None if given.unit is None else units.resolve(given.unit, {**self._structure.units, **given.units})
             number = given.factor * float(given.text) + given.offset
-            value = self._carried(root, target, self._step(_Value(1.0, 0.0, unit), self._connector_unit(root), root))
+            value = self._carry(root, target, self._step(_Value(1.0, 0.0, unit), self._connector_unit(root), root))
             number = value.factor * number + value.offset
             text = f"{number:.0f}" if number.is_integer() and abs(number) < 1e15 else repr(number)
             found[target] = Given(given.type, text, None, {})
@@ -115,7 +115,7 @@ class Flow:
             if node[0] == "" and kind == "output" and node in self._structure.drivers:
                 root = self._root(node)
                 if root[0] in self._models and self._address(root) in record:
-                    value = self._carried(root, node, self._starting_at(root))
+                    value = self._carry(root, node, self._start_at(root))
                     unit = None if value.unit is None else value.unit.name
                     yield Derived(node[1], self._address(root), value.factor, value.offset, unit)
 
@@ -140,7 +140,7 @@ class Flow:
             seen.add(node)
         return node
 
-    def _carried(self, root: Node, target: Node, value: _Value) -> _Value:
+    def _carry(self, root: Node, target: Node, value: _Value) -> _Value:
         """Return a value that has gone from ``root`` to ``target``."""
         path: list[Node] = []
         node = target
@@ -155,7 +155,7 @@ class Flow:
                 value = _Value(factor * value.factor, factor * value.offset + offset, unit)
         return self._step(value, self._own_unit(target), target)
 
-    def _starting_at(self, root: Node) -> _Value:
+    def _start_at(self, root: Node) -> _Value:
         return self._step(_Value(1.0, 0.0, self._own_unit(root)), self._connector_unit(root), root)
 
     def _step(self, value: _Value, unit: Unit | None, node: Node) -> _Value:

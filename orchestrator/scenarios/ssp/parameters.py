@@ -12,7 +12,7 @@ from orchestrator.master import units
 from orchestrator.master.problems import Problem
 from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.master.values import nearest
-from orchestrator.scenarios.ssp.common import EXPONENTS, archived, parse, tag
+from orchestrator.scenarios.ssp.common import EXPONENTS, file_of_uri, parse, tag
 
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 
@@ -60,7 +60,7 @@ def bound_values(element: etree._Element, place: str, folder: Path, problems: li
         mapping = binding.find(tag("ssd", "ParameterMapping"))
         if mapping is not None:
             rules = _content(mapping, "ParameterMapping", "ssm", path, folder, problems)
-            named = [] if rules is None else _mapped(named, rules)
+            named = [] if rules is None else _map_values(named, rules)
         found += [(prefix + name, given) for name, given in named]
     return found
 
@@ -82,7 +82,7 @@ def _content(
     source = element.get("source")
     if source is None:
         return element.find(tag(space, name))
-    file = archived(folder, source)
+    file = file_of_uri(folder, source)
     if file is None:
         problems.append(Problem(f"{path}.source", f"must be a file of the archive, but is {source!r}"))
         return None
@@ -105,7 +105,7 @@ def _values(values: etree._Element) -> list[tuple[str, Given]]:
     return found
 
 
-def _mapped(values: list[tuple[str, Given]], rules: etree._Element) -> list[tuple[str, Given]]:
+def _map_values(values: list[tuple[str, Given]], rules: etree._Element) -> list[tuple[str, Given]]:
     by_name = dict(values)
     found = []
     for entry in rules.findall(tag("ssm", "MappingEntry")):
@@ -131,13 +131,13 @@ def own_value(
         problems.append(Problem(path, text))
         return None
     try:
-        return _typed(variable.type, given) if variable.type != "Real" else _real(model, name, given, declared)
+        return _as_type(variable.type, given) if variable.type != "Real" else _real(model, name, given, declared)
     except ValueError as error:
         problems.append(Problem(path, f"must be a {variable.type}, but is {given.text!r}{error}"))
         return None
 
 
-def _typed(kind: str, given: Given) -> Value:
+def _as_type(kind: str, given: Given) -> Value:
     text = given.text.strip()
     if kind == "String":
         return given.text

@@ -17,7 +17,16 @@ from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, System
 from orchestrator.master.units import resolve
 from orchestrator.scenarios.scenario import Scenario
-from orchestrator.scenarios.ssp.common import OSP, SPACES, STRUCTURE, archived, oms_step, parse, solver_tolerance, tag
+from orchestrator.scenarios.ssp.common import (
+    OSP,
+    SPACES,
+    STRUCTURE,
+    file_of_uri,
+    oms_step,
+    parse,
+    solver_tolerance,
+    tag,
+)
 from orchestrator.scenarios.ssp.flow import Flow, Node, Structure, instance_names
 from orchestrator.scenarios.ssp.parameters import Given, bound_values, own_value, read_units
 from orchestrator.shared.isolation.archives import unpack
@@ -111,7 +120,7 @@ def _connectors(element: etree._Element, path: str, structure: Structure) -> Non
 
 def _component(element: etree._Element, name: str, structure: Structure) -> None:
     source, kind = str(element.get("source")), element.get("type", FMU_TYPE)
-    file = archived(structure.folder, source)
+    file = file_of_uri(structure.folder, source)
     if kind != FMU_TYPE:
         structure.problems.append(Problem(f"$.{name}.type", f"must be {FMU_TYPE}, but is {kind!r}"))
     elif element.get("implementation") == "ModelExchange":

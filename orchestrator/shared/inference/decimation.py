@@ -37,7 +37,7 @@ def content_band(values: Array, step: float, noise: float, shows: float, most_ab
     return float(frequency[1:][min(int(np.searchsorted(share, 1.0 - most_above)), last)])
 
 
-def sampled(values: Array, factor: int, cut_off: float) -> Array:
+def decimate_samples(values: Array, factor: int, cut_off: float) -> Array:
     """Return every ``factor``-th sample behind the filter.
 
     Args:
@@ -49,7 +49,7 @@ def sampled(values: Array, factor: int, cut_off: float) -> Array:
     return _smooth(values, factor, _kernel(factor, cut_off))[::factor]
 
 
-def averaged(values: Array, factor: int, cut_off: float) -> Array:
+def decimate_means(values: Array, factor: int, cut_off: float) -> Array:
     """Return means over ``factor`` rows each behind the filter: what is held over a row keeps its impulse.
 
     Args:
@@ -58,7 +58,7 @@ def averaged(values: Array, factor: int, cut_off: float) -> Array:
     Returns:
         Shape ((n - 1) // factor,).
     """
-    smooth = _smooth(values, factor, _made_up_for(_kernel(factor, cut_off), factor))
+    smooth = _smooth(values, factor, _restore_gain(_kernel(factor, cut_off), factor))
     return np.asarray(smooth.reshape(-1, factor).mean(axis=1))
 
 
@@ -78,7 +78,7 @@ def _smooth(values: Array, factor: int, kernel: Array) -> Array:
     return np.asarray(fftconvolve(mirrored, kernel, "valid"))[: (values.size - 1) // factor * factor]
 
 
-def _made_up_for(kernel: Array, factor: int) -> Array:
+def _restore_gain(kernel: Array, factor: int) -> Array:
     """Return a filter's kernel with the gain that a torque loses where it is averaged over ``factor`` rows and held.
 
     Both take a sinc of the frequency from it, beside that of the hold over a row which the machine has seen.

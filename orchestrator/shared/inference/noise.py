@@ -46,7 +46,7 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def lagged_rms(u: Array, h: float, tau: float) -> float:
+def rms_behind_lag(u: Array, h: float, tau: float) -> float:
     """Return the rms [N.m] of ``u`` behind a lag of ``tau`` [s].
 
     Args:

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from orchestrator.errors import OutputError
-from orchestrator.shared.operating_system import alive, is_own, occupied
+from orchestrator.shared.operating_system import alive, disk_usage, is_own
 
 PREFIX = "backlash-cosim-"
 _swept: set[str] = set()
@@ -88,14 +88,14 @@ def _empty(top: bytes) -> None:
             os.chmod(path, 0o700)
             target = path
             if current != top:
-                target = _moved(path, top, count)
+                target = _move(path, top, count)
                 count += 1
             waiting.append(target)
         if current != top:
             os.rmdir(current)
 
 
-def _moved(path: bytes, top: bytes, count: int) -> bytes:
+def _move(path: bytes, top: bytes, count: int) -> bytes:
     while True:
         target = os.path.join(top, b"~%d" % count)
         try:
@@ -124,7 +124,7 @@ def usage(folder: Path, most_entries: int) -> tuple[int, int]:
         count += len(found)
         for entry in found:
             with contextlib.suppress(OSError):
-                total += occupied(entry.stat(follow_symlinks=False))
+                total += disk_usage(entry.stat(follow_symlinks=False))
                 if entry.is_dir(follow_symlinks=False):
                     waiting.append(entry.path)
     return total, count

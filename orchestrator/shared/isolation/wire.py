@@ -39,18 +39,18 @@ class LateError(WireError):
 
 def encode(value: Any) -> bytes:
     """Return plain data as bytes; arrays of float64, int64 and bool keep their shape."""
-    return msgspec.msgpack.encode(value, enc_hook=_packed)
+    return msgspec.msgpack.encode(value, enc_hook=_pack)
 
 
 def decode(data: bytes) -> Any:
     """Return what ``encode`` was given; tuples come back as lists."""
     try:
-        return msgspec.msgpack.decode(data, ext_hook=_unpacked)
+        return msgspec.msgpack.decode(data, ext_hook=_unpack)
     except (msgspec.DecodeError, ValueError, RecursionError, OverflowError, struct.error) as error:
         raise WireError(f"a message must be plain data, but is not: {error}") from None
 
 
-def _packed(value: Any) -> Any:
+def _pack(value: Any) -> Any:
     np = sys.modules.get("numpy")  # where it was never imported, nothing is an array
     if np is None:
         raise TypeError(f"a message must be plain data, but has a {type(value).__name__}")
@@ -63,7 +63,7 @@ def _packed(value: Any) -> Any:
     raise TypeError(f"a message must be plain data, but has a {type(value).__name__}")
 
 
-def _unpacked(code: int, data: memoryview) -> Any:
+def _unpack(code: int, data: memoryview) -> Any:
     if code != _ARRAY or len(data) < 2:
         raise ValueError("an unknown extension")
     kind, axes = struct.unpack_from(">cB", data)
@@ -133,7 +133,7 @@ def _wait(deadline: float, tick: Tick) -> None:
         raise LateError("too late")
 
 
-def pending(link: socket.socket) -> bool:
+def is_pending(link: socket.socket) -> bool:
     """Return whether bytes lie there that nobody has asked for."""
     link.settimeout(0.0)
     try:

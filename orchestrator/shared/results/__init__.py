@@ -22,7 +22,7 @@ def first_version() -> int:
     return 1
 
 
-class Found(msgspec.Struct, frozen=True, kw_only=True):
+class ResultData(msgspec.Struct, frozen=True, kw_only=True):
     """Base: what one command found."""
 
     schema_version: int = msgspec.field(default_factory=first_version)
@@ -43,14 +43,14 @@ class GapFound(msgspec.Struct, frozen=True):
     upper: float | None
 
 
-class BuildFound(Found, frozen=True, kw_only=True):
+class BuildFound(ResultData, frozen=True, kw_only=True):
     """``build``: path by name, and what this machine cannot give an FMU."""
 
     fmus: dict[str, str]
     remark: str | None = None
 
 
-class PairFound(Found, frozen=True, kw_only=True):
+class PairFound(ResultData, frozen=True, kw_only=True):
     """``simulate``: both loops. ``alpha`` and ``S`` in rad; ``experiment`` as the class of that name."""
 
     alpha: float
@@ -114,7 +114,7 @@ class EventsFound(msgspec.Struct, frozen=True):
     late: list[float] = []
 
 
-class SignalsFound(Found, frozen=True, kw_only=True):
+class SignalsFound(ResultData, frozen=True, kw_only=True):
     """``simulate`` of a scenario and ``ssp run``: recorded signals, steps, events, remarks, and the walls around it."""
 
     signals: list[SignalFound] = []
@@ -164,7 +164,7 @@ class SweptScenario(msgspec.Struct, frozen=True):
     stop: float | None = None
 
 
-class SweepFound(Found, frozen=True, kw_only=True):
+class SweepFound(ResultData, frozen=True, kw_only=True):
     """``sweep``: counts and columns always; of the pair the errors and their origin, of a scenario its name.
 
     ``remarked``: cases with a text in the column ``remarks``; ``first_remark`` is the first of them.
@@ -219,7 +219,7 @@ class CheckedFmu(msgspec.Struct, frozen=True):
     rules: list[RuleFound] = []
 
 
-class CheckFound(Found, frozen=True, kw_only=True):
+class CheckFound(ResultData, frozen=True, kw_only=True):
     """``check``: whether no FMU has an error, counts by severity, and each FMU."""
 
     ok: bool
@@ -227,9 +227,9 @@ class CheckFound(Found, frozen=True, kw_only=True):
     fmus: list[CheckedFmu] = []
 
 
-def as_plain(found: Any) -> Any:
+def as_plain(data: Any) -> Any:
     """Turn results into what JSON knows. Return nested dictionaries, lists, numbers and texts."""
-    return found if isinstance(found, Mapping) else msgspec.to_builtins(found, enc_hook=_otherwise)
+    return data if isinstance(data, Mapping) else msgspec.to_builtins(data, enc_hook=_otherwise)
 
 
 def _otherwise(value: Any) -> Any:
