@@ -32,11 +32,14 @@ class Estimate:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """A named effect: its grade, its values by short name, and the labels that the record does not tell from it."""
+    """A named effect: its grade, its values by short name, the labels that the record does not tell from it, and the
+    rules that lowered its grade.
+    """
 
     grade: str
     values: dict[str, Estimate]
     family: tuple[str, ...] = ()
+    lowered_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,12 +129,16 @@ def outcome_of(result: Any) -> Outcome:
     """
     diagnosis: DiagnosisOutcome = result.diagnosis
     names = {
-        effect.label: NamedEffect(effect.grade.word, _values(effect.parameters), effect.evidence.family)
+        effect.label: NamedEffect(
+            effect.grade.word, _values(effect.parameters), effect.evidence.family, effect.lowered_by
+        )
         for effect in diagnosis.effects
     }
     for nuisance in diagnosis.nuisances if isinstance(diagnosis, Diagnosis) else ():
         if nuisance.name != "drive_gain":  # never more than a remark: values that carry a torque take its place
-            names[nuisance.name] = NamedEffect(nuisance.grade.word, _values(nuisance.parameters))
+            names[nuisance.name] = NamedEffect(
+                nuisance.grade.word, _values(nuisance.parameters), lowered_by=nuisance.lowered_by
+            )
     misfit = {
         f"{n}:{one.signal}": (one.parameters, one.final)
         for n, part in enumerate(diagnosis.test)

@@ -97,10 +97,9 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
     found = workings.search
     record = record_evidence(found)
-    graded = tuple(_graded(workings, label, record, model, settings) for label in found.final.labels)
     test = misfit_on_test_data(workings, model, settings)
     shares = motion_shares(found, test, misses_of(workings, model, settings))
-    graded = tuple(replace(effect, motion_share=shares[effect.label]) for effect in graded)
+    graded = tuple(_graded(workings, label, record, share, model, settings) for label, share in shares.items())
     effects = tuple(sorted((one for one in graded if not one.of_log), key=lambda one: -one.grade))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}
@@ -120,8 +119,9 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
 
 
 def _graded(
-    workings: Workings, label: str, record: RecordEvidence, model: Model, settings: DiagnosisSettings
-) -> GradedEffect:
+    workings: Workings, label: str, record: RecordEvidence, motion_share: float, model: Model,
+    settings: DiagnosisSettings,
+) -> GradedEffect:  # fmt: skip
     found, plant = workings.search, model.plant
     effect = found.problem.effects[label]
     row = next(row for row in plant.bank if row.label == label)
@@ -131,14 +131,14 @@ def _graded(
         return {short: full[name] for short, name in row.parameters.items()}
 
     units = {short: unit_in(plant.entry(place).unit, model, short) for short, place in row.places(plant).items()}
-    return replace(report_effect(found, label, named, units, record, settings), of_log=row.measurement)
+    return replace(report_effect(found, label, named, units, record, motion_share, settings), of_log=row.measurement)
 
 
 def _nuisances(
     found: SearchResult, graded: Sequence[GradedEffect], parameters: Mapping[str, ParameterEstimate], model: Model,
     settings: DiagnosisSettings,
 ) -> tuple[Nuisance, ...]:  # fmt: skip
-    nuisances = [Nuisance(one.name, one.grade, one.parameters) for one in graded if one.of_log]
+    nuisances = [Nuisance(one.name, one.grade, one.parameters, one.lowered_by) for one in graded if one.of_log]
     width = interval_width(found.problem, settings.report.level)
     gain = find_drive_gain(model, {name: one.value for name, one in parameters.items()}, width)
     if gain is not None:

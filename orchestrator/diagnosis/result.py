@@ -47,7 +47,6 @@ class GradedEffect:
         parameters: estimate of each parameter, by short name.
         evidence: gain, shares and family.
         block_values: short name -> (blocks,) its value when each block in turn decides by its share.
-        motion_share: share of the motion's misfit on test data that goes with it; nan: it was not run.
         of_log: a property of the log, not of the machine.
     """
 
@@ -58,7 +57,6 @@ class GradedEffect:
     parameters: Mapping[str, ValueEstimate]
     evidence: EffectEvidence
     block_values: Mapping[str, tuple[float, ...]]
-    motion_share: float = float("nan")
     of_log: bool = False
 
     @property
@@ -69,11 +67,19 @@ class GradedEffect:
 
 @dataclass(frozen=True)
 class Nuisance:
-    """A property of the log: a late encoder, an early torque, the gain of the drive."""
+    """A property of the log: a late encoder, an early torque, the gain of the drive.
+
+    Attributes:
+        name: of the property.
+        grade: certain, likely or possible.
+        parameters: estimate of each parameter, by short name.
+        lowered_by: names of the rules that lowered the grade.
+    """
 
     name: str
     grade: Grade
     parameters: Mapping[str, ValueEstimate]
+    lowered_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -105,6 +105,12 @@ class GradeSettings(Settings, frozen=True):
     most_left: Annotated[float, share("of the torque that may be left beside a certain name")] = 0.5
     timing_left: Annotated[float, share("of the torque that may be left beside the name of a delay")] = 0.2
     limit_left: Annotated[float, share("of the misfit that a limit may leave: a loop that reacts looks like one")] = 0.2
+    confirmed_share: Annotated[
+        float, share("of the motion's misfit on test data that goes with a certain effect: chance takes less")
+    ] = 0.1
+    refuted_share: Annotated[
+        float, share("by which that misfit may grow with a likely effect: 5 % in rms are chance")
+    ] = 0.1
     inertia_error: Annotated[
         float, share("relative error of the inertia that the record must reach for a certain name")
     ] = 0.35
@@ -114,6 +120,9 @@ class ReportSettings(Settings, frozen=True):
     """What is reported: free runs over the test part, what is left, laws learned from it."""
 
     runs: Annotated[int, setting("free runs that the test part is divided into", ge=1)] = 2
+    longest_run: Annotated[
+        float, share("of the record that a free run covers: of longer ones impacts leave no best start", le=1.0)
+    ] = 0.075
     least_rows: Annotated[int, setting("rows of a free run at least", ge=10)] = 40
     worse: Annotated[float, share("by which chance may make the misfit of test data larger")] = 0.05
     of_noise: Annotated[float, share("and share of the encoder's noise")] = 0.1
@@ -127,7 +136,6 @@ class ReportSettings(Settings, frozen=True):
 class DiagnosisSettings(Settings, frozen=True):
     """All settings of a diagnosis."""
 
-    disabled: Annotated[tuple[str, ...], note("names of rules that are off, for an ablation")] = ()
     test_share: Annotated[float, share("last part of the record that only the report sees", le=0.5)] = 0.15
     band: BandSettings = BandSettings()
     balance: BalanceSettings = BalanceSettings()

@@ -11,6 +11,7 @@ from benchmarks.judging import Row, Truth, grade_table, judge, size_line
 from benchmarks.measured import truth_of
 from benchmarks.simulated import Counts, simulated_tasks
 from benchmarks.verdicts import GRADES, Estimate, NamedEffect, Outcome
+from orchestrator.diagnosis.selection.grading import highest_grade
 from tests.support.hidden_effects import MACHINES, Ways, none_case, single_case
 
 FRICTION = {"torque": Estimate(2.0, 1.5, 2.5)}
@@ -120,9 +121,18 @@ def test_the_diagnosis_gets_the_first_part_alone() -> None:
     assert (part.theta_m == case.record.theta_m[: part.size]).all()
 
 
-def test_without_a_rule_outcomes_are_compared_in_pairs() -> None:
-    truth = Truth((("gravity_load",),))
-    right, wrong = named(gravity_load__load="certain"), named(backlash__shaft="likely")
-    whole = [row_of(one, truth) for one in (right, right, wrong, Outcome())]
-    without = [row_of(one, truth) for one in (right, named(gravity_load__load="possible"), Outcome(), wrong)]
-    assert count_rule("rule", whole, without) == RuleCount("rule", changed=3, better=2, worse=1)
+def test_the_ablation_counts_the_names_whose_grade_would_rise_without_a_rule() -> None:
+    def row(label: str, *broken: str) -> Row:
+        outcome = Outcome({label: NamedEffect(highest_grade(broken).word, {}, lowered_by=broken)})
+        return replace(row_of(outcome, Truth((("gravity_load",),))), key=f"{label} {broken}")
+
+    rows = [
+        row("gravity_load@load", "sure size"),
+        row("gravity_load@load", "sure size", "explained"),
+        row("backlash@shaft", "sure size"),
+        row("backlash@shaft", "sure size", "size"),
+        row("backlash@shaft", "same machine"),
+    ]
+    assert count_rule("sure size", rows) == RuleCount("sure size", records=2, wrong=1, right=1)
+    assert count_rule("size", rows) == RuleCount("size", records=1, wrong=1, right=0)
+    assert count_rule("explained", rows) == RuleCount("explained", records=0, wrong=0, right=0)

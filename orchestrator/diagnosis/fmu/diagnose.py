@@ -115,10 +115,9 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
     found, problem = workings.search, workings.problem
     record = record_evidence(found)
-    graded = tuple(_graded(workings, label, record, settings) for label in found.final.labels)
     test = misfit_on_test_data(workings)
     shares = motion_shares(found, test, misses_of(workings))
-    graded = tuple(replace(effect, motion_share=shares[effect.label]) for effect in graded)
+    graded = tuple(_graded(workings, label, record, share, settings) for label, share in shares.items())
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection.least_t)
     verdict = form_verdict(found, graded, remaining, record, settings)
@@ -134,7 +133,9 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     )  # fmt: skip
 
 
-def _graded(workings: FmuWorkings, label: str, record: RecordEvidence, settings: DiagnosisSettings) -> GradedEffect:
+def _graded(
+    workings: FmuWorkings, label: str, record: RecordEvidence, motion_share: float, settings: DiagnosisSettings
+) -> GradedEffect:
     found = workings.search
     effect, _ = workings.residuals[0].placed_effect(label, found.final.point.effects[label])
 
@@ -142,4 +143,4 @@ def _graded(workings: FmuWorkings, label: str, record: RecordEvidence, settings:
         return named_values(effect, values)
 
     units = effect_units(workings.problem, effect)
-    return report_effect(found, label, named, units, record, settings)
+    return report_effect(found, label, named, units, record, motion_share, settings)

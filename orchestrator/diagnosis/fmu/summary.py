@@ -20,8 +20,8 @@ def summarise_fmu(found: FmuDiagnosis) -> Iterator[str]:
         yield sizes_line(effect)
         yield f"    How sure: {CERTAINTY[effect.grade]}; {grade_reasons(effect)}"
         shares = [f"{100.0 * max(effect.evidence.share, 0.0):.0f} % of the outputs' misfit"]
-        if effect.motion_share == effect.motion_share:
-            shares.append(f"{100.0 * max(effect.motion_share, 0.0):.0f} % of that on test data")
+        if effect.evidence.motion_share == effect.evidence.motion_share:
+            shares.append(f"{100.0 * max(effect.evidence.motion_share, 0.0):.0f} % of that on test data")
         yield f"    It explains {' and '.join(shares)}."
     left = " and ".join(f"{100.0 * share:.2g} % of the power of {name}" for name, share in found.left.items())
     strongest = [f"at {one.site} {one.words}" for one in found.remaining[:2]]

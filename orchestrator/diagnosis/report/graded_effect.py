@@ -14,7 +14,7 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 
 def report_effect(
     found: SearchResult, label: str, names: Callable[[Values], Mapping[str, float]], units: Mapping[str, str],
-    record: RecordEvidence, settings: DiagnosisSettings,
+    record: RecordEvidence, motion_share: float, settings: DiagnosisSettings,
 ) -> GradedEffect:  # fmt: skip
     """Return an effect of the final model.
 
@@ -24,13 +24,14 @@ def report_effect(
         names: values of the effect -> parameters by short name.
         units: of these.
         record: evidence of the whole record.
+        motion_share: of the effect, see :func:`motion_shares`.
         settings: thresholds.
 
     Returns:
         The effect, of the machine.
     """
     name, _, site = label.partition("@")
-    evidence = effect_evidence(found, label)
+    evidence = effect_evidence(found, label, motion_share)
     grade, lowered = grade_effect(evidence, record, settings)
     estimates = effect_estimates(found.problem, found.final, label, names, units, settings.report.level)
     blocks = block_values(found.problem, found.final, label, names)
@@ -48,10 +49,12 @@ def motion_shares(
         missed: a model -> what its runs miss of the test data, in squares and in units of the noise.
 
     Returns:
-        Label of each effect -> one minus final over without; nan where runs go astray.
+        Label of each effect -> one minus final over without; nan where runs of the final model go astray.
     """
     final, shares = sum((one.final / one.noise) ** 2 for record in test for one in record.signals), {}
     for label in found.final.labels:
         left_out = missed(fit_model(found.problem, found.final.point.without_effects([label]), 3).point)
-        shares[label] = 1.0 - final / left_out if math.isfinite(left_out) and left_out > 0.0 else math.nan
+        astray = not math.isfinite(left_out)  # which the final model is not: the effect explains all of it
+        share = 1.0 if astray else 1.0 - final / max(left_out, 1e-300)
+        shares[label] = share if math.isfinite(final) else math.nan
     return shares

@@ -62,6 +62,6 @@ def _gap_effect(gap: HiddenGap, final: float, before: float, settings: Diagnosis
     else:
         grade, lowered = Grade.POSSIBLE, ("size",)
     share = 1.0 - (final / before) ** 2 if before > 0.0 and np.isfinite(before) else UNSEEN
-    evidence = EffectEvidence("backlash@shaft", "gap", size, UNSEEN, UNSEEN, size, (), False, True)
+    evidence = EffectEvidence("backlash@shaft", "gap", size, UNSEEN, UNSEEN, size, (), False, True, share)
     estimate = ValueEstimate(gap.alpha, gap.standard_error, gap.interval, "rad")
-    return GradedEffect("backlash", "shaft", grade, lowered, {"alpha": estimate}, evidence, {"alpha": ()}, share)
+    return GradedEffect("backlash", "shaft", grade, lowered, {"alpha": estimate}, evidence, {"alpha": ()})

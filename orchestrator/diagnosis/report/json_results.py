@@ -111,7 +111,7 @@ def effect_found(effect: GradedEffect) -> EffectFound:
     evidence = effect.evidence
     return EffectFound(
         effect.name, effect.site, effect.grade.word, _values(effect.parameters),
-        ExplainedFound(_finite(evidence.share), _finite(effect.motion_share)), _finite(evidence.gain),
+        ExplainedFound(_finite(evidence.share), _finite(effect.evidence.motion_share)), _finite(evidence.gain),
         _finite(evidence.t), evidence.family, effect.lowered_by,
         {name: tuple(map(_finite, values)) for name, values in effect.block_values.items()},
     )  # fmt: skip

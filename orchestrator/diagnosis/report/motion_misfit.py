@@ -13,7 +13,6 @@ from orchestrator.plants.description import Plant
 from orchestrator.shared.cores import spread
 
 Array = NDArray[np.float64]
-LONGEST = 0.075  # of a record that a free run covers: of longer ones impacts leave no best start
 LEAST_TRAVEL = 20.0  # in deviations of the noise, from which a test part moves
 
 
@@ -29,7 +28,7 @@ def run_parts(first: int, size: int, settings: ReportSettings) -> list[slice]:
         The parts, in order.
     """
     rows = size - first
-    count = max(settings.runs, round(rows / (LONGEST * size)))
+    count = max(settings.runs, round(rows / (settings.longest_run * size)))
     count = max(min(count, rows // settings.least_rows), 1)
     length = rows // count
     return [slice(first + n * length, first + (n + 1) * length) for n in range(count)]

@@ -161,8 +161,8 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
     shares = []
     if math.isfinite(effect.evidence.share):
         shares.append(f"{percent(effect.evidence.share)} of the missing torque")
-    if math.isfinite(effect.motion_share):
-        shares.append(f"{percent(effect.motion_share)} of the motion's misfit on test data")
+    if math.isfinite(effect.evidence.motion_share):
+        shares.append(f"{percent(effect.evidence.motion_share)} of the motion's misfit on test data")
     if shares:
         yield f"    It explains {' and '.join(shares)}."
     if effect.name in MOTION:

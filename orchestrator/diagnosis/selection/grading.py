@@ -2,7 +2,7 @@
 possible.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -79,6 +79,7 @@ class EffectEvidence:
         family: labels that the record does not tell from it.
         foreign_family: one of them is of another kind.
         possible: a machine can have such values.
+        motion_share: share of the misfit of free runs on test data that comes back without it; nan: not run.
     """
 
     label: str
@@ -90,6 +91,7 @@ class EffectEvidence:
     family: tuple[str, ...]
     foreign_family: bool
     possible: bool
+    motion_share: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -182,6 +184,16 @@ GRADE_RULES: tuple[GradeRule, ...] = (
         "no machine has such values, or the record does not determine them",
     ),
     GradeRule(
+        "confirmed", Grade.LIKELY, lambda e, r, s: e.motion_share >= s.grades.confirmed_share,
+        "share of the motion's misfit on test data", "grades.confirmed_share",
+        "what stands for another law fits the record and predicts nothing",
+    ),
+    GradeRule(
+        "not refuted", Grade.POSSIBLE, lambda e, r, s: not e.motion_share < -s.grades.refuted_share,
+        "share of the motion's misfit on test data", "grades.refuted_share",
+        "test data are predicted better without it",
+    ),
+    GradeRule(
         "timing follows", Grade.POSSIBLE, lambda e, r, s: e.kind != "timing" or r.left < s.grades.timing_left,
         "share of the torque that is left", "grades.timing_left",
         "most of the misfit remains, and a delay then fits whatever is missing",
@@ -203,15 +215,25 @@ def grade_effect(
     Args:
         effect: evidence for it.
         record: evidence of the whole record.
-        settings: thresholds, and the rules that are off.
+        settings: thresholds.
 
     Returns:
         The grade, and the rules that do not hold.
     """
-    broken = [
-        rule for rule in GRADE_RULES if rule.name not in settings.disabled and not rule.holds(effect, record, settings)
-    ]
-    return min((rule.highest for rule in broken), default=Grade.CERTAIN), tuple(rule.name for rule in broken)
+    broken = tuple(rule.name for rule in GRADE_RULES if not rule.holds(effect, record, settings))
+    return highest_grade(broken), broken
+
+
+def highest_grade(broken: Collection[str]) -> Grade:
+    """Return the grade that an effect has at most where some rules do not hold.
+
+    Args:
+        broken: names of these rules.
+
+    Returns:
+        The grade.
+    """
+    return min((rule.highest for rule in GRADE_RULES if rule.name in broken), default=Grade.CERTAIN)
 
 
 def record_evidence(found: SearchResult) -> RecordEvidence:
@@ -231,12 +253,13 @@ def record_evidence(found: SearchResult) -> RecordEvidence:
     return RecordEvidence(float(left.max()), float(left[0] / max(before[0], 1e-300)), inertia, error, spread)
 
 
-def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
+def effect_evidence(found: SearchResult, label: str, motion_share: float) -> EffectEvidence:
     """Return what speaks for one effect of the final model.
 
     Args:
         found: by the search.
         label: of the effect.
+        motion_share: what free runs on test data say of it, see ``EffectEvidence``.
 
     Returns:
         The evidence.
@@ -255,7 +278,7 @@ def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
     return EffectEvidence(
         label, effect.kind, max(leaving.t, entry.comparison.t), max(leaving.gain, entry.comparison.gain),
         float(max(share, at_entry)), size_over_error(problem, final, label), step.family, bool(kinds - {effect.kind}),
-        problem.is_possible(label, final.point.effects[label]),
+        problem.is_possible(label, final.point.effects[label]), motion_share,
     )  # fmt: skip
 
 
