@@ -26,13 +26,16 @@ from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.test_report import misfit_on_test_data, misses_of
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, Nuisance, ParameterEstimate, TestMisfit, Workings
 from orchestrator.diagnosis.selection.grading import (
+    EffectEvidence,
     Grade,
     RecordEvidence,
+    effect_evidence,
+    possible_effects,
     record_evidence,
     torque_shares,
 )
 from orchestrator.diagnosis.selection.remaining import Dependence, find_dependences
-from orchestrator.diagnosis.selection.search import SearchResult, search_effects
+from orchestrator.diagnosis.selection.search import SearchResult, leave_out, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
@@ -95,11 +98,16 @@ def diagnose(
 
 def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Diagnosis:
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
-    found = workings.search
-    record = record_evidence(found)
+    searched = workings.search
+    record = record_evidence(searched)
+    evidence = [effect_evidence(searched, label) for label in searched.final.labels]
+    found = leave_out(searched, possible_effects(evidence, record, settings))
+    final = workings.balances[0].physical_values(found.problem.record_points(found.final.point)[0])
+    workings = replace(workings, search=found, final=final)
     test = misfit_on_test_data(workings, model, settings)
     shares = motion_shares(found, test, misses_of(workings, model, settings))
-    graded = tuple(_graded(workings, label, record, share, model, settings) for label, share in shares.items())
+    tested = [replace(one, motion_share=shares.get(one.label, np.nan)) for one in evidence]
+    graded = tuple(_graded(found if one.label in shares else searched, one, record, model, settings) for one in tested)
     effects = tuple(sorted((one for one in graded if not one.of_log), key=lambda one: -one.grade))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}
@@ -119,19 +127,18 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
 
 
 def _graded(
-    workings: Workings, label: str, record: RecordEvidence, motion_share: float, model: Model,
-    settings: DiagnosisSettings,
-) -> GradedEffect:  # fmt: skip
-    found, plant = workings.search, model.plant
-    effect = found.problem.effects[label]
-    row = next(row for row in plant.bank if row.label == label)
+    found: SearchResult, evidence: EffectEvidence, record: RecordEvidence, model: Model, settings: DiagnosisSettings
+) -> GradedEffect:
+    plant = model.plant
+    effect = found.problem.effects[evidence.label]
+    row = next(row for row in plant.bank if row.label == evidence.label)
 
     def named(values: Values) -> Mapping[str, float]:
         full = effect_parameters(plant, effect, values)
         return {short: full[name] for short, name in row.parameters.items()}
 
     units = {short: unit_in(plant.entry(place).unit, model, short) for short, place in row.places(plant).items()}
-    return replace(report_effect(found, label, named, units, record, motion_share, settings), of_log=row.measurement)
+    return replace(report_effect(found, evidence, named, units, record, settings), of_log=row.measurement)
 
 
 def _nuisances(

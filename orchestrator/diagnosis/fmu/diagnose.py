@@ -27,12 +27,15 @@ from orchestrator.diagnosis.report.graded_effect import motion_shares, report_ef
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.result import GradedEffect
 from orchestrator.diagnosis.selection.grading import (
+    EffectEvidence,
     RecordEvidence,
+    effect_evidence,
+    possible_effects,
     record_evidence,
     torque_shares,
 )
 from orchestrator.diagnosis.selection.remaining import find_dependences
-from orchestrator.diagnosis.selection.search import fit_base, search_effects
+from orchestrator.diagnosis.selection.search import SearchResult, fit_base, leave_out, search_effects
 from orchestrator.diagnosis.settings import DiagnosisSettings
 
 Progress = Callable[[str], None]
@@ -113,11 +116,18 @@ def problem_of(problems: Sequence[BoxProblem], settings: DiagnosisSettings) -> F
 
 def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     """Return what is reported of a search: grades, sizes, what is left, and how the models do on test data."""
-    found, problem = workings.search, workings.problem
-    record = record_evidence(found)
+    searched, problem = workings.search, workings.problem
+    record = record_evidence(searched)
+    evidence = [effect_evidence(searched, label) for label in searched.final.labels]
+    found = leave_out(searched, possible_effects(evidence, record, settings))
+    final = workings.residuals[0].box_model(found.problem.record_points(found.final.point)[0])
+    workings = replace(workings, search=found, final=final)
     test = misfit_on_test_data(workings)
     shares = motion_shares(found, test, misses_of(workings))
-    graded = tuple(_graded(workings, label, record, share, settings) for label, share in shares.items())
+    tested = [replace(one, motion_share=shares.get(one.label, np.nan)) for one in evidence]
+    graded = tuple(
+        _graded(workings, found if one.label in shares else searched, one, record, settings) for one in tested
+    )
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection.least_t)
     verdict = form_verdict(found, graded, remaining, record, settings)
@@ -134,13 +144,13 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
 
 
 def _graded(
-    workings: FmuWorkings, label: str, record: RecordEvidence, motion_share: float, settings: DiagnosisSettings
-) -> GradedEffect:
-    found = workings.search
-    effect, _ = workings.residuals[0].placed_effect(label, found.final.point.effects[label])
+    workings: FmuWorkings, found: SearchResult, evidence: EffectEvidence, record: RecordEvidence,
+    settings: DiagnosisSettings,
+) -> GradedEffect:  # fmt: skip
+    effect, _ = workings.residuals[0].placed_effect(evidence.label, found.final.point.effects[evidence.label])
 
     def named(values: Values) -> Mapping[str, float]:
         return named_values(effect, values)
 
     units = effect_units(workings.problem, effect)
-    return report_effect(found, label, named, units, record, motion_share, settings)
+    return report_effect(found, evidence, named, units, record, settings)

@@ -1,4 +1,4 @@
-"""An effect of the final model as it is reported: its grade, its sizes with errors, and what blocks say of them."""
+"""An effect as it is reported: its grade, its sizes with errors, and what blocks say of them."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -7,31 +7,30 @@ from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.model.interface import ModelPoint, Values
 from orchestrator.diagnosis.report.estimates import block_values, effect_estimates
 from orchestrator.diagnosis.result import GradedEffect, TestMisfit
-from orchestrator.diagnosis.selection.grading import RecordEvidence, effect_evidence, grade_effect
+from orchestrator.diagnosis.selection.grading import EffectEvidence, RecordEvidence, grade_effect
 from orchestrator.diagnosis.selection.search import SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
 
 
 def report_effect(
-    found: SearchResult, label: str, names: Callable[[Values], Mapping[str, float]], units: Mapping[str, str],
-    record: RecordEvidence, motion_share: float, settings: DiagnosisSettings,
+    found: SearchResult, evidence: EffectEvidence, names: Callable[[Values], Mapping[str, float]],
+    units: Mapping[str, str], record: RecordEvidence, settings: DiagnosisSettings,
 ) -> GradedEffect:  # fmt: skip
-    """Return an effect of the final model.
+    """Return an effect as it is reported.
 
     Args:
-        found: by the search.
-        label: of the effect, name and site.
+        found: a result whose final model has the effect.
+        evidence: for it.
         names: values of the effect -> parameters by short name.
         units: of these.
         record: evidence of the whole record.
-        motion_share: of the effect, see :func:`motion_shares`.
         settings: thresholds.
 
     Returns:
         The effect, of the machine.
     """
+    label = evidence.label
     name, _, site = label.partition("@")
-    evidence = effect_evidence(found, label, motion_share)
     grade, lowered = grade_effect(evidence, record, settings)
     estimates = effect_estimates(found.problem, found.final, label, names, units, settings.report.level)
     blocks = block_values(found.problem, found.final, label, names)

@@ -2,7 +2,7 @@
 possible.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -186,7 +186,7 @@ GRADE_RULES: tuple[GradeRule, ...] = (
     GradeRule(
         "confirmed", Grade.LIKELY, lambda e, r, s: e.motion_share >= s.grades.confirmed_share,
         "share of the motion's misfit on test data", "grades.confirmed_share",
-        "what stands for another law fits the record and predicts nothing",
+        "test data do not confirm it: what stands for another law fits a record and predicts nothing",
     ),
     GradeRule(
         "not refuted", Grade.POSSIBLE, lambda e, r, s: not e.motion_share < -s.grades.refuted_share,
@@ -236,6 +236,22 @@ def highest_grade(broken: Collection[str]) -> Grade:
     return min((rule.highest for rule in GRADE_RULES if rule.name in broken), default=Grade.CERTAIN)
 
 
+def possible_effects(
+    evidence: Sequence[EffectEvidence], record: RecordEvidence, settings: DiagnosisSettings
+) -> list[str]:
+    """Return the effects that are not even likely: a corrected model that had them might predict worse.
+
+    Args:
+        evidence: for each effect.
+        record: evidence of the whole record.
+        settings: thresholds.
+
+    Returns:
+        Their labels.
+    """
+    return [one.label for one in evidence if grade_effect(one, record, settings)[0] is Grade.POSSIBLE]
+
+
 def record_evidence(found: SearchResult) -> RecordEvidence:
     """Return what the record says of the final model as a whole.
 
@@ -253,16 +269,15 @@ def record_evidence(found: SearchResult) -> RecordEvidence:
     return RecordEvidence(float(left.max()), float(left[0] / max(before[0], 1e-300)), inertia, error, spread)
 
 
-def effect_evidence(found: SearchResult, label: str, motion_share: float) -> EffectEvidence:
+def effect_evidence(found: SearchResult, label: str) -> EffectEvidence:
     """Return what speaks for one effect of the final model.
 
     Args:
         found: by the search.
         label: of the effect.
-        motion_share: what free runs on test data say of it, see ``EffectEvidence``.
 
     Returns:
-        The evidence.
+        The evidence, without what test data say.
     """
     problem, final = found.problem, found.final
     effect = problem.effects[label]
@@ -278,7 +293,7 @@ def effect_evidence(found: SearchResult, label: str, motion_share: float) -> Eff
     return EffectEvidence(
         label, effect.kind, max(leaving.t, entry.comparison.t), max(leaving.gain, entry.comparison.gain),
         float(max(share, at_entry)), size_over_error(problem, final, label), step.family, bool(kinds - {effect.kind}),
-        problem.is_possible(label, final.point.effects[label]), motion_share,
+        problem.is_possible(label, final.point.effects[label]),
     )  # fmt: skip
 
 

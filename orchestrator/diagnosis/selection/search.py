@@ -145,6 +145,23 @@ def settle_anew(problem: FitProblem, fitted: FittedModel) -> tuple[FitProblem, F
     return settle(problem, again if again.cost < fitted.cost else fitted)
 
 
+def leave_out(found: SearchResult, labels: Sequence[str]) -> SearchResult:
+    """Return the result with a final model that lacks some effects, the rest fitted anew.
+
+    Args:
+        found: by the search.
+        labels: of the effects.
+
+    Returns:
+        The result; the same without labels.
+    """
+    if not labels:
+        return found
+    fitted = fit_model(found.problem, found.final.point.without_effects(labels))
+    problem, final = settle(found.problem, fitted)
+    return replace(found, problem=problem, final=final)
+
+
 @dataclass(frozen=True)
 class _Search:
     settings: SelectionSettings
