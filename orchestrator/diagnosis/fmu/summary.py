@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from orchestrator.diagnosis.fmu.result import FmuDiagnosis
-from orchestrator.diagnosis.report.summary import CERTAINTY, grade_reasons, headline, sizes_line
+from orchestrator.diagnosis.report.summary import grade_reasons, grade_words, headline, sizes_line
 
 
 def summarise_fmu(found: FmuDiagnosis) -> Iterator[str]:
@@ -18,7 +18,7 @@ def summarise_fmu(found: FmuDiagnosis) -> Iterator[str]:
     yield headline(found, "FMU")
     for effect in found.effects:
         yield sizes_line(effect)
-        yield f"    How sure: {CERTAINTY[effect.grade]}; {grade_reasons(effect)}"
+        yield f"    How sure: {grade_words(effect)}; {grade_reasons(effect)}"
         shares = [f"{100.0 * max(effect.evidence.share, 0.0):.0f} % of the outputs' misfit"]
         if effect.evidence.motion_share == effect.evidence.motion_share:
             shares.append(f"{100.0 * max(effect.evidence.motion_share, 0.0):.0f} % of that on test data")

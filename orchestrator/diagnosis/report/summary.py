@@ -52,11 +52,6 @@ EXPERIMENTS = {
     "resonance": "a torque that sweeps slowly through all frequencies",
 }
 REPEAT = "the same torque twice: what comes again is the machine, what does not is a disturbance"
-CERTAINTY = {
-    Grade.CERTAIN: "certain",
-    Grade.LIKELY: "likely",
-    Grade.POSSIBLE: "possible: it is not in the verdict, and the corrected model has it all the same",
-}
 
 
 def summarise(found: Diagnosis) -> Iterator[str]:
@@ -157,7 +152,7 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
     play = play_of(found)
     if effect.name == "backlash" and play is not None:
         yield f"    {play}"
-    yield f"    How sure: {CERTAINTY[effect.grade]}; {grade_reasons(effect)}"
+    yield f"    How sure: {grade_words(effect)}; {grade_reasons(effect)}"
     shares = []
     if math.isfinite(effect.evidence.share):
         shares.append(f"{percent(effect.evidence.share)} of the missing torque")
@@ -198,6 +193,21 @@ def percent(share: float) -> str:
     if share <= 0.0:
         return "none"
     return "under 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
+
+
+def grade_words(effect: GradedEffect) -> str:
+    """Return the grade of an effect, and what follows from it, in words.
+
+    Args:
+        effect: that was found.
+
+    Returns:
+        The words.
+    """
+    if effect.grade > Grade.POSSIBLE:
+        return effect.grade.word
+    tested = math.isfinite(effect.evidence.motion_share)
+    return "possible: it is not in the verdict" + ("" if tested else ", nor in the corrected model")
 
 
 def grade_reasons(effect: GradedEffect) -> str:
