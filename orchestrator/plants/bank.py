@@ -20,6 +20,8 @@ PRESLIDING = Parameter("presliding", "1", math.log(1e-5), math.log(1e-9), 0.0, "
 # Shorter distances [rad] than an encoder sees are left out of the FMU, where they would only cost time.
 SHORTEST = 1e-7
 
+DEEPEST_STOP = 0.2  # of the travel that lies beyond an end stop: what begins further in is a spring
+LEAST_COULOMB = 0.2  # of the breakaway torque that is left at speed: friction that vanishes there is no Stribeck curve
 LEAST_CYCLES = 1.5  # of a wave within the travel: what comes round less often is told from no spring
 
 
@@ -69,6 +71,7 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
         lambda s: {"stribeck_speed": speeds(s), "presliding": widths(s, 2)}, ("coulomb", "breakaway"), signed=False,
         bounds=lambda s: {"stribeck_speed": (0.005 * s.rms_speed(site), math.inf)}, scanned=scanned,
         possible=lambda v, s: 1.02 * v["coulomb"] < v["breakaway"] < 1.5 * _largest_torque(s, site)
+        and v["coulomb"] > LEAST_COULOMB * v["breakaway"]
         and v["stribeck_speed"] > 0.01 * s.rms_speed(site),
         contains="coulomb_friction", against="speed",
     )  # fmt: skip
@@ -163,8 +166,8 @@ def _end_stop(side: str) -> Effect:
 
     def is_touched(values: Mapping[str, float], scales: SignalScales) -> bool:
         x = scales.angles["load"]
-        inside = values["angle"] < x.max() if side == "upper" else values["angle"] > x.min()
-        return bool(inside) and values["stiffness"] > 0.0
+        depth = x.max() - values["angle"] if side == "upper" else values["angle"] - x.min()
+        return bool(0.0 < depth < DEEPEST_STOP * np.ptp(x)) and values["stiffness"] > 0.0
 
     return Effect(
         f"{side}_end_stop", "load", "position",
