@@ -34,7 +34,6 @@ from orchestrator.shared.trust import Trust
 
 Progress = Callable[[str], None]
 STAGES = ("nominal", "parameters", "final", "noise")
-SHOWN = 5  # effects of a step that the table shows
 
 
 @dataclass(frozen=True, repr=False)
@@ -162,13 +161,6 @@ def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
     ]
     if rows:
         yield table("Parameters", ("name", "nominal", "re-fitted", "standard error", "unit"), rows)
-    tried = [
-        (", ".join(step.before.labels) or "parameters", one.label, f"{100.0 * one.comparison.gain:.1f}",
-         f"{one.comparison.t:.1f}", "added" if one.label == step.taken else "")
-        for step in d.workings.search.steps for one in step.tried[:SHOWN]
-    ]  # fmt: skip
-    if tried:
-        yield table("What was tried", ("on top of", "effect", "gain [%]", "over its error", ""), tried)
     for title, tests in (
         ("Misfit on test data", diagnosis.test),
         ("Misfit on the other record", (diagnosis.validation,)),

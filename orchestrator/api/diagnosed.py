@@ -18,7 +18,7 @@ from orchestrator.diagnosis.report.corrected import BeforeAfter, before_and_afte
 from orchestrator.diagnosis.report.json_results import diagnosis_found, test_found
 from orchestrator.diagnosis.report.law_export import LawRun, build_with_law, run_with_law
 from orchestrator.diagnosis.report.model_file_text import corrected_model
-from orchestrator.diagnosis.report.summary import effect_words, summarise
+from orchestrator.diagnosis.report.summary import summarise
 from orchestrator.diagnosis.result import Diagnosis, GradedEffect, TestMisfit
 from orchestrator.errors import OutputError
 from orchestrator.records.record import Record
@@ -26,7 +26,6 @@ from orchestrator.shared.results.diagnose import DiagnoseFound, DifferenceFound
 from orchestrator.shared.trust import Trust
 
 STAGES = ("nominal", "parameters", "final", "noise")
-SHOWN = 5  # effects of a step that the table shows
 
 
 @dataclass(frozen=True, repr=False)
@@ -176,7 +175,7 @@ class DiagnosisResult(Result):
         yield from (f"  {reason}" for reason in self.trust.reasons)
 
     def blocks(self) -> Sequence[Block]:
-        """Return the summary, and the tables of candidates and misfits."""
+        """Return the summary, and the tables of misfits."""
         return [*self.summary(), *_tables(self)]
 
     def results(self, place: Path) -> DiagnoseFound:
@@ -211,19 +210,6 @@ class DiagnosisResult(Result):
 
 
 def _tables(diagnosis: DiagnosisResult) -> Iterator[Block]:
-    rows = [
-        [
-            ", ".join(effect_words(label) for label in step.before.labels) or "parameters",
-            effect_words(tried.label),
-            f"{100.0 * tried.comparison.gain:.1f}",
-            f"{tried.comparison.t:.1f}",
-            "added" if tried.label == step.taken else "",
-        ]
-        for step in diagnosis.diagnosis.workings.search.steps
-        for tried in step.tried[:SHOWN]
-    ]
-    if rows:
-        yield table("What was tried", ("on top of", "effect", "gain [%]", "over its error", ""), rows)
     for title, shown in (
         ("Misfit on test data", diagnosis.test),
         ("Misfit on the other record", (diagnosis.validation,)),

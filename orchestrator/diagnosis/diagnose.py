@@ -20,7 +20,7 @@ from orchestrator.diagnosis.model.torque_balance import balance_of
 from orchestrator.diagnosis.model.units import in_metres, unit_in
 from orchestrator.diagnosis.report.drive_gain import find_drive_gain
 from orchestrator.diagnosis.report.estimates import interval_width, parameter_estimates
-from orchestrator.diagnosis.report.graded_effect import motion_shares, report_effect
+from orchestrator.diagnosis.report.graded_effect import motion_shares, report_effect, share_values
 from orchestrator.diagnosis.report.hidden_gap import report_hidden_gap
 from orchestrator.diagnosis.report.judgement import form_verdict, judge_trust
 from orchestrator.diagnosis.report.test_report import misfit_on_test_data, misses_of
@@ -108,21 +108,23 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     shares = motion_shares(found, test, misses_of(workings, model, settings))
     tested = [replace(one, motion_share=shares.get(one.label, np.nan)) for one in evidence]
     graded = tuple(_graded(found if one.label in shares else searched, one, record, model, settings) for one in tested)
+    graded = share_values(graded, found.final.labels, model.plant)
     effects = tuple(sorted((one for one in graded if not one.of_log), key=lambda one: -one.grade))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     parameters = {name: replace(one, unit=unit_in(one.unit, model)) for name, one in parameters.items()}
     arguments = law_arguments(
         workings.balances, found.problem.record_points(found.final.point), metric=in_metres(model)
     )
-    remaining = find_dependences(found, arguments, settings.selection.least_t)
+    remaining = find_dependences(found, arguments, settings.selection)
     verdict = form_verdict(found, graded, remaining, record, settings)
-    trust = judge_trust(verdict, graded, record, test, parameters, model.uncertain, settings)
+    trust = judge_trust(verdict, graded, bool(searched.steps), record, test, parameters, model.uncertain, settings)
     left = torque_shares(found.problem, found.final.point)
     return Diagnosis(
         verdict=verdict, effects=effects, nuisances=_nuisances(found, graded, parameters, model, settings),
         parameters=parameters, left=dict(zip(workings.balances[0].channels, map(float, left), strict=True)),
         remaining=remaining, law=_law(verdict, remaining, settings), test=test, record=record, trust=trust,
-        notes=_notes(found, record, test), settings=settings, model=model, workings=workings,
+        notes=_notes(found, record, test), settings=settings, searched=bool(searched.steps),
+        model=model, workings=workings,
     )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from orchestrator.records.record import Record
 from orchestrator.shared.trust import Trust
 
 Array = NDArray[np.float64]
+NOTABLE = 3.0  # times the noise: a misfit of free runs that an engineer sees
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,16 @@ class SignalMisfit:
     final: float
     r_squared: float = float("nan")
 
+    @property
+    def miss(self) -> float:
+        """Misfit of the final model over the noise."""
+        return self.final / self.noise
+
+    @property
+    def is_missed(self) -> bool:
+        """Whether the final model misses the signal by more than its noise, as an engineer sees it."""
+        return self.miss > NOTABLE
+
 
 @dataclass(frozen=True)
 class TestMisfit:
@@ -177,6 +188,7 @@ class DiagnosisOutcome:
         trust: how far the corrected model can be trusted.
         notes: what to bear in mind, a sentence each.
         settings: that were used.
+        searched: effects were looked for.
     """
 
     verdict: str
@@ -189,6 +201,17 @@ class DiagnosisOutcome:
     trust: Trust
     notes: tuple[str, ...]
     settings: DiagnosisSettings
+    searched: bool
+
+    @property
+    def largest_miss(self) -> float:
+        """Largest misfit of the final model on test data, over the noise of its signal."""
+        return max((signal.miss for test in self.test for signal in test.signals), default=0.0)
+
+    @property
+    def misses_test_data(self) -> bool:
+        """Whether the final model misses a signal of the test data by more than its noise."""
+        return any(signal.is_missed for test in self.test for signal in test.signals)
 
     def graded(self, least: Grade) -> tuple[GradedEffect, ...]:
         """Return the effects of the machine that are at least so sure.

@@ -11,7 +11,6 @@ from orchestrator.diagnosis.fmu.model import Data
 from orchestrator.diagnosis.fmu.result import FmuDiagnosis
 from orchestrator.diagnosis.fmu.subject import Subject
 from orchestrator.diagnosis.report.estimates import value_covariance
-from orchestrator.diagnosis.report.judgement import is_missed
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
 
@@ -84,7 +83,7 @@ def calibrate_fmu(
         if share < LEARNED
     ]
     notes += [f"the record hardly distinguishes `{a}` and `{b}`: excite other frequencies" for a, b in pairs]
-    explained = found.verdict != "unknown" and not any(is_missed(one) for test in found.test for one in test.signals)
+    explained = found.verdict != "unknown" and not found.misses_test_data
     if not explained:
         notes.append("the parameters do not explain the record: `diagnose` looks for what is missing")
     return FmuCalibration(found, learned, pairs, explained, tuple(notes))

@@ -129,9 +129,11 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
         _graded(workings, found if one.label in shares else searched, one, record, settings) for one in tested
     )
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
-    remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection.least_t)
+    remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection)
     verdict = form_verdict(found, graded, remaining, record, settings)
-    trust = judge_trust(verdict, graded, record, test, parameters, problem.map.uncertain, settings)
+    trust = judge_trust(
+        verdict, graded, bool(searched.steps), record, test, parameters, problem.map.uncertain, settings
+    )
     left = torque_shares(found.problem, found.final.point)
     notes = [*workings.probe.notes, *problem.runner.remarks]
     if not found.complete:
@@ -139,7 +141,7 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     return FmuDiagnosis(
         verdict, tuple(sorted(graded, key=lambda one: -one.grade)), parameters,
         dict(zip(problem.outputs, map(float, left), strict=True)), remaining, test, record, trust, tuple(notes),
-        settings, problem.map, workings,
+        settings, bool(searched.steps), problem.map, workings,
     )  # fmt: skip
 
 

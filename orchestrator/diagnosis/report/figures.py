@@ -1,5 +1,6 @@
 """Figures of a diagnosis: test data, what was tried, each effect block by block, laws against the missing torque."""
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,7 +19,9 @@ from orchestrator.plants.effects import Effect
 Array = NDArray[np.float64]
 BLUE, ORANGE, GREY = "#2166ac", "#d6604d", "#777777"
 DPI = 130
+TITLE_WIDTH = 90  # characters of a line
 BINS = 40
+WIDEST_GAP = 0.2  # of what a signal takes: no line is drawn over values that it does not take
 SHOWN = 6  # effects of a step that are drawn
 
 
@@ -89,7 +92,8 @@ def _draw_candidates(path: Path, diagnosis: Diagnosis) -> None:
         axis.set_xlim(min(-5.0, *(max(gain, -20.0) for gain in gains)), 105.0)
         axis.axvline(0.0, color="black", linewidth=0.8)
         before = ", ".join(effect_words(label) for label in step.before.labels) or "re-fitted parameters"
-        axis.set_title(f"Error of blocks left out that an effect takes [%], on top of\n{before}", fontsize=9)
+        title = f"Error on blocks left out that an effect removes [%], on top of {before}"
+        axis.set_title(textwrap.fill(title, TITLE_WIDTH), fontsize=9)
         axis.grid(alpha=0.25, axis="x")
     figure.savefig(path, dpi=DPI, metadata={"Software": None})
 
@@ -127,12 +131,14 @@ def _row(effect: GradedEffect, diagnosis: Diagnosis) -> Effect:
 
 def _draw_missing(path: Path, diagnosis: Diagnosis) -> None:
     """Draw, for each effect, the torque that is missing without it and the part of it that its law accounts for."""
-    if not diagnosis.effects:
+    in_model = set(diagnosis.workings.search.final.labels)
+    effects = [effect for effect in diagnosis.effects if effect.label in in_model]
+    if not effects:
         return
-    figure = Figure(figsize=(8.0, 3.4 * len(diagnosis.effects)), layout="constrained")
+    figure = Figure(figsize=(8.0, 3.4 * len(effects)), layout="constrained")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(len(diagnosis.effects), 1, squeeze=False)[:, 0]
-    for axis, effect in zip(axes, diagnosis.effects, strict=True):
+    axes = figure.subplots(len(effects), 1, squeeze=False)[:, 0]
+    for axis, effect in zip(axes, effects, strict=True):
         _draw_effect(axis, diagnosis, effect)
         axis.set_title(f"{effect_words(effect.label)}: {effect.grade.word}")
     _finish(list(axes))
@@ -163,7 +169,9 @@ def _draw_effect(axis: Axes, diagnosis: Diagnosis, effect: GradedEffect) -> None
         counts = np.maximum(np.bincount(at, minlength=edges.size - 1), 1)
         centre, mean, fitted = (np.bincount(at, values, edges.size - 1) / counts for values in (x, missing, law))
         spread = np.sqrt(np.maximum(np.bincount(at, missing**2, edges.size - 1) / counts - mean**2, 0.0))
-        axis.plot(centre, fitted, "-", color=BLUE, linewidth=1.4, label="of it the effect, mean")
+        gaps = np.flatnonzero(np.diff(centre) > WIDEST_GAP * np.ptp(centre)) + 1
+        broken = [np.insert(values, gaps, np.nan) for values in (centre, fitted)]
+        axis.plot(*broken, "-", color=BLUE, linewidth=1.4, label="of it the effect, mean")
         axis.errorbar(centre, mean, spread, color=ORANGE, fmt="o", markersize=3.5, linewidth=0.8,
                       label="missing torque, mean and spread")  # fmt: skip
     axis.set_xlabel(label)
@@ -180,7 +188,9 @@ def _abscissa(diagnosis: Diagnosis, effect: GradedEffect, channel: int) -> tuple
         cycles = effect.parameters["cycles_per_rev"].value
         return np.mod(cycles * scales.angles[row.wave_site], 2.0 * np.pi), "phase of the cycle [rad]"
     if row.against == "angle":
-        return np.mod(scales.angles[site], 2.0 * np.pi), "load angle [rad]"
+        angle = scales.angles[site]
+        turns = np.ptp(angle) > 2.0 * np.pi
+        return np.mod(angle, 2.0 * np.pi) if turns else angle, "load angle [rad]"
     if row.against == "position":
         return scales.angles[site], f"load position [{unit}]"
     if effect.site == "shaft" and scales.twist.size:
@@ -190,8 +200,7 @@ def _abscissa(diagnosis: Diagnosis, effect: GradedEffect, channel: int) -> tuple
 
 def _draw_law(path: Path, diagnosis: Diagnosis) -> None:
     """Draw the curve of what is left over the signal that it follows best, with its 95 % band."""
-    law = diagnosis.law or next(iter(diagnosis.remaining), None)
-    if law is None:
+    if (law := diagnosis.law) is None:
         return
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")
     FigureCanvasAgg(figure)
@@ -200,7 +209,7 @@ def _draw_law(path: Path, diagnosis: Diagnosis) -> None:
     axis.fill_between(law.knots, values - 2.0 * errors, values + 2.0 * errors, color=BLUE, alpha=0.2, linewidth=0.0,
                       label="95 % band")  # fmt: skip
     axis.plot(law.knots, values, "o-", color=BLUE, markersize=3.0, linewidth=1.2, label="torque that is left")
-    axis.set_title(f"What no effect explains: {law.words}")
+    axis.set_title(textwrap.fill(f"What no effect explains: {law.words}", TITLE_WIDTH), fontsize=9)
     axis.set_xlabel(f"{law.argument} at the {law.site} [{law.argument_unit}]")
     axis.set_ylabel(f"torque [{law.unit}]")
     _finish([axis])

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from orchestrator.diagnosis.inference.fitting import fit_model
 from orchestrator.diagnosis.model.interface import ModelPoint, Values
@@ -10,6 +11,7 @@ from orchestrator.diagnosis.result import GradedEffect, TestMisfit
 from orchestrator.diagnosis.selection.grading import EffectEvidence, RecordEvidence, grade_effect
 from orchestrator.diagnosis.selection.search import SearchResult
 from orchestrator.diagnosis.settings import DiagnosisSettings
+from orchestrator.plants.description import Plant
 
 
 def report_effect(
@@ -35,6 +37,34 @@ def report_effect(
     estimates = effect_estimates(found.problem, found.final, label, names, units, settings.report.level)
     blocks = block_values(found.problem, found.final, label, names)
     return GradedEffect(name, site, grade, lowered, estimates, evidence, blocks)
+
+
+def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: Plant) -> tuple[GradedEffect, ...]:
+    """Return effects with one value of each parameter that several have: both end stops are of one stiffness.
+
+    Args:
+        effects: as each was fitted.
+        labels: of those that the model has; the last one that has a parameter sets it.
+        plant: the plant.
+
+    Returns:
+        The effects, in their order.
+    """
+    rows = {row.label: row.parameters for row in plant.bank}
+    fitted = {one.label: one for one in effects}
+    setter = {full: (fitted[label], short) for label in labels for short, full in rows[label].items()}
+
+    def shared(effect: GradedEffect) -> GradedEffect:
+        if effect.label not in labels:
+            return effect
+        by_name = {short: setter[full] for short, full in rows[effect.label].items()}
+        return replace(
+            effect,
+            parameters={short: one.parameters[name] for short, (one, name) in by_name.items()},
+            block_values={short: one.block_values[name] for short, (one, name) in by_name.items()},
+        )
+
+    return tuple(map(shared, effects))
 
 
 def motion_shares(

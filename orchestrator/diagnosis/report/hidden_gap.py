@@ -41,13 +41,13 @@ def report_hidden_gap(workings: Workings, gap: HiddenGap, model: Model, settings
         (_gap_effect(gap, test[0].signals[0].final, test[0].signals[0].parameters, settings),) if gap.alpha else ()
     )
     trust = judge_trust(
-        "effects" if effects else "parameters", effects, record, test, parameters, model.uncertain, settings
+        "effects" if effects else "parameters", effects, True, record, test, parameters, model.uncertain, settings
     )
     return Diagnosis(
         verdict="effects" if effects else "parameters", effects=effects, nuisances=(), parameters=parameters, left={},
         remaining=(), law=None, test=test, record=record, trust=trust,
         notes=("one encoder: the estimator of the gap explains the record, and no other effect was looked for",),
-        settings=settings, model=model, workings=workings,
+        settings=settings, searched=True, model=model, workings=workings,
     )  # fmt: skip
 
 

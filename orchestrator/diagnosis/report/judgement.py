@@ -13,8 +13,6 @@ from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.records.model_file import ModelParameter
 from orchestrator.shared.trust import Level, Reason, Trust, trust_of
 
-NOTABLE = 3.0  # times the noise: a misfit of free runs that an engineer sees
-
 
 def form_verdict(
     found: SearchResult, effects: Sequence[GradedEffect], dependences: Sequence[Dependence], record: RecordEvidence,
@@ -57,7 +55,7 @@ def _nominal_explains(found: SearchResult) -> bool:
 
 
 def judge_trust(
-    verdict: str, effects: Sequence[GradedEffect], record: RecordEvidence, test: Sequence[TestMisfit],
+    verdict: str, effects: Sequence[GradedEffect], searched: bool, record: RecordEvidence, test: Sequence[TestMisfit],
     parameters: dict[str, ParameterEstimate], uncertain: Sequence[ModelParameter], settings: DiagnosisSettings,
 ) -> Trust:  # fmt: skip
     """Return how far the corrected model can be trusted.
@@ -65,6 +63,7 @@ def judge_trust(
     Args:
         verdict: of the diagnosis.
         effects: graded.
+        searched: effects were looked for.
         record: evidence of the whole record.
         test: misfits on test data.
         parameters: estimates by name.
@@ -76,7 +75,8 @@ def judge_trust(
     """
     red, amber = [], []
     if verdict == "unknown":
-        red.append("something is missing in the model, and no effect of the library is likely")
+        why = "no effect of the library is likely" if searched else "no search was made"
+        red.append(f"something is missing in the model, and {why}")
     if record.inertia_is_off(settings.selection.prior_deviations):
         red.append(
             f"the record alone asks for {record.inertia:.2g} times the inertia of the model file: check the inertias, "
@@ -86,10 +86,10 @@ def judge_trust(
         if one.is_worse(settings.report.worse, settings.report.of_noise):
             red.append(f"the final model predicts the test part of {one.source} worse than re-fitted parameters do")
         for signal in one.signals:
-            if is_missed(signal):
+            if signal.is_missed:
                 amber.append(
-                    f"free runs on the test part of {one.source} miss {signal.signal} by "
-                    f"{signal.final / signal.noise:.3g} times its noise"
+                    f"free runs on the test part of {one.source} miss {signal.signal} by {signal.miss:.3g} times its "
+                    f"noise{_of_motion(signal)}"
                 )
     if any(effect.grade is Grade.LIKELY for effect in effects):
         amber.append("at least one effect is likely, not certain")
@@ -103,16 +103,10 @@ def judge_trust(
     return trust_of([*(Reason(Level.RED, text) for text in red), *(Reason(Level.AMBER, text) for text in amber)])
 
 
-def is_missed(signal: SignalMisfit) -> bool:
-    """Tell whether free runs of the final model miss a signal by more than its noise, as an engineer sees it.
-
-    Args:
-        signal: misfits on test data.
-
-    Returns:
-        Whether they do.
-    """
-    return signal.final > NOTABLE * signal.noise
+def _of_motion(signal: SignalMisfit) -> str:
+    """Return a misfit as a share of the motion, in words; nothing where that is not known."""
+    share = 1.0 - signal.r_squared
+    return f", {100.0 * np.sqrt(max(share, 0.0)):.2g} % of its motion (rms)" if np.isfinite(share) else ""
 
 
 def _is_far(estimate: ParameterEstimate, uncertainty: float) -> bool:

@@ -5,7 +5,7 @@ next.
 import math
 from collections.abc import Iterator, Sequence
 
-from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, Nuisance
+from orchestrator.diagnosis.result import Diagnosis, DiagnosisOutcome, GradedEffect, Nuisance, ValueEstimate
 from orchestrator.diagnosis.selection.grading import GRADE_RULES, Grade
 from orchestrator.plants.description import Plant
 from orchestrator.shared.play import Play
@@ -51,6 +51,7 @@ EXPERIMENTS = {
     "limit": "torque steps of several sizes in both directions",
     "resonance": "a torque that sweeps slowly through all frequencies",
 }
+NOTABLE_CHANGE = 0.005  # of a value that is worth a word
 REPEAT = "the same torque twice: what comes again is the machine, what does not is a disturbance"
 
 
@@ -68,11 +69,10 @@ def summarise(found: Diagnosis) -> Iterator[str]:
         yield from _effect(effect, found)
     for nuisance in found.nuisances:
         yield f"  In the log: {nuisance_words(nuisance)}"
+    yield from _values(found)
     yield _left(found)
     yield from _motion(found)
-    experiments = list(dict.fromkeys(_experiments(found)))
-    if experiments:
-        yield f"To settle what is open, record: {'; '.join(experiments)}."
+    yield from next_steps(found)
 
 
 def effect_words(label: str) -> str:
@@ -113,6 +113,11 @@ def headline(found: DiagnosisOutcome, subject: str = "model") -> str:
     Returns:
         The sentence.
     """
+    if found.verdict in ("none", "parameters") and found.misses_test_data:
+        return (
+            f"Verdict: {found.verdict}. No effect of the library is missing, yet the {subject} misses the test data by "
+            f"{found.largest_miss:.3g} times the noise: a disturbance, or an effect outside the library."
+        )
     if found.verdict == "none":
         return f"Verdict: none. Nothing is missing: the {subject} explains the record."
     if found.verdict == "parameters":
@@ -127,7 +132,8 @@ def headline(found: DiagnosisOutcome, subject: str = "model") -> str:
             else "Verdict: effects, in the log alone."
         )
     near = [effect.label for effect in found.effects]
-    text = f"Verdict: unknown. The {subject} misses something, and no effect of the library is likely."
+    why = "no effect of the library is likely" if found.searched else "no search was made"
+    text = f"Verdict: unknown. The {subject} misses something, and {why}."
     return text + (f" Possible: {listed(near)}." if near else "")
 
 
@@ -152,20 +158,15 @@ def _effect(effect: GradedEffect, found: Diagnosis) -> Iterator[str]:
     play = play_of(found)
     if effect.name == "backlash" and play is not None:
         yield f"    {play}"
-    yield f"    How sure: {grade_words(effect)}; {grade_reasons(effect)}"
-    shares = []
+    yield f"    {sureness(effect)}"
     if math.isfinite(effect.evidence.share):
-        shares.append(f"{percent(effect.evidence.share)} of the missing torque")
-    if math.isfinite(effect.evidence.motion_share):
-        shares.append(f"{percent(effect.evidence.motion_share)} of the motion's misfit on test data")
-    if shares:
-        yield f"    It explains {' and '.join(shares)}."
+        yield f"    It explains {percent(effect.evidence.share)} of the missing torque{tested(effect)}."
     if effect.name in MOTION:
         yield f"    In the motion: {MOTION[effect.name]}"
 
 
 def sizes_line(effect: GradedEffect) -> str:
-    """Return an effect and its sizes as a line.
+    """Return an effect and its sizes, with their 95 % intervals, as a line.
 
     Args:
         effect: that was found.
@@ -173,12 +174,42 @@ def sizes_line(effect: GradedEffect) -> str:
     Returns:
         The line.
     """
-    sizes = ", ".join(
-        f"{name.replace('_', ' ')} {e.value:.5g} +- {e.standard_error:.2g} {'' if e.unit == '1' else e.unit}".rstrip()
-        for name, e in effect.parameters.items()
-    )
+    sizes = ", ".join(f"{name.replace('_', ' ')} {value_words(e)}" for name, e in effect.parameters.items())
     words = effect_words(effect.label)
     return f"  {words[:1].upper()}{words[1:]}: {sizes}"
+
+
+def value_words(estimate: ValueEstimate) -> str:
+    """Return a value with its unit and 95 % interval in words.
+
+    Args:
+        estimate: of the value.
+
+    Returns:
+        The words.
+    """
+    low, high = estimate.interval
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    return f"{estimate.value:.5g}{unit} (95 %: {low:.5g} to {high:.5g})"
+
+
+def tested(effect: GradedEffect) -> str:
+    """Return what test data say of an effect, as the end of a sentence; nothing where it was not tested.
+
+    Args:
+        effect: that was found.
+
+    Returns:
+        The words.
+    """
+    share = effect.evidence.motion_share
+    if not math.isfinite(share):
+        return ""
+    if share < 0.0:
+        return "; without it the test data are predicted better"
+    if share == 1.0:
+        return "; without it no run follows the test data"
+    return f"; without it the misfit on test data is {1.0 / math.sqrt(1.0 - share):.3g} times as large"
 
 
 def percent(share: float) -> str:
@@ -195,40 +226,30 @@ def percent(share: float) -> str:
     return "under 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
 
 
-def grade_words(effect: GradedEffect) -> str:
-    """Return the grade of an effect, and what follows from it, in words.
+def sureness(effect: GradedEffect) -> str:
+    """Return the grade of an effect, the evidence for it, and the rule that speaks most against it, in words.
 
     Args:
         effect: that was found.
 
     Returns:
-        The words.
-    """
-    if effect.grade > Grade.POSSIBLE:
-        return effect.grade.word
-    tested = math.isfinite(effect.evidence.motion_share)
-    return "possible: it is not in the verdict" + ("" if tested else ", nor in the corrected model")
-
-
-def grade_reasons(effect: GradedEffect) -> str:
-    """Return why an effect is as sure as it is, as part of a sentence.
-
-    Args:
-        effect: that was found.
-
-    Returns:
-        The words.
+        A sentence or two.
     """
     evidence = effect.evidence
-    text = f"its size is {evidence.size_t:.1f} times its error"
+    text = f"{effect.grade.word.capitalize()}: its size is {evidence.size_t:.3g} times its error"
     if math.isfinite(evidence.gain):
-        text = f"on data left out it takes {percent(evidence.gain)} of the error, "
-        text += f"{evidence.t:.1f} times its uncertainty"
-    rules = {rule.name: rule.reason for rule in GRADE_RULES}
-    lowered = [rules[name] for name in effect.lowered_by]
+        text = (
+            f"{effect.grade.word.capitalize()}: it removes {percent(evidence.gain)} of the error on blocks left out, "
+        )
+        text += f"{evidence.t:.3g} times its uncertainty"
+    reasons = [rule.reason for rule in GRADE_RULES if rule.name in effect.lowered_by and rule.highest == effect.grade]
+    if reasons:
+        text += f"; not surer, for {reasons[0]}"
     if evidence.family:
         text += f"; the record does not tell it from {listed(evidence.family)}"
-    return text + (f"; not surer: {'; '.join(dict.fromkeys(lowered))}" if lowered else "")
+    if effect.grade is Grade.POSSIBLE and not math.isfinite(evidence.motion_share):
+        text += "; it is not in the corrected model"
+    return f"{text}."
 
 
 def nuisance_words(nuisance: Nuisance) -> str:
@@ -243,25 +264,48 @@ def nuisance_words(nuisance: Nuisance) -> str:
     ((name, e),) = nuisance.parameters.items()
     if name == "gain":
         return (
-            f"the drive delivers {e.value:.3f} +- {e.standard_error:.2g} times `u`, or all values that carry a torque "
-            "are off by as much; sizes are in units of `u`"
+            f"the drive delivers {e.value:.3f} (95 %: {e.interval[0]:.3f} to {e.interval[1]:.3f}) times `u`, or all "
+            "values that carry a torque are off by as much; sizes are in units of `u`"
         )
-    size = f"{1e3 * abs(e.value):.3g} +- {1e3 * e.standard_error:.2g} ms"
+    width = 0.5 * (e.interval[1] - e.interval[0])
+    size = f"{1e3 * abs(e.value):.3g} ms (95 %: within {1e3 * width:.2g} ms)"
     sure = "" if nuisance.grade is Grade.CERTAIN else f" ({nuisance.grade.word})"
     if name == "lead":
         return f"`u` acts {size} before its time stamp{sure}"
     return f"`theta_l` is stamped {size} {'later' if e.value > 0.0 else 'earlier'} than `theta_m`{sure}"
 
 
+def _values(found: Diagnosis) -> Iterator[str]:
+    changed = []
+    for name, e in found.parameters.items():
+        if e.nominal and abs(e.value / e.nominal - 1.0) >= NOTABLE_CHANGE:
+            stated = found.model.parameters[name].uncertainty
+            unit = "" if e.unit == "1" else f" {e.unit}"
+            outside = f", stated within {100.0 * stated / abs(e.nominal):.3g} %" if stated else ""
+            changed.append(f"{name} {e.value:.4g}{unit} ({100.0 * (e.value / e.nominal - 1.0):+.3g} %{outside})")
+    if changed:
+        yield f"Values of the model that were re-fitted: {', '.join(changed)}."
+
+
 def _left(found: Diagnosis) -> str:
     if not found.left:
         return "What is left is noise."
-    parts = [
-        f"{100.0 * share:.2g} % of the torque's power at {BODIES.get(name, name)}" for name, share in found.left.items()
-    ]
-    text = f"What is left: {' and '.join(parts)}"
+    parts = [f"{left_percent(share)} of the torque at {BODIES.get(name, name)}" for name, share in found.left.items()]
+    text = f"What is left (rms, where the model was fitted): {' and '.join(parts)}"
     strongest = [f"at {BODIES.get(one.site, one.site)} {one.words}" for one in found.remaining[:2]]
     return f"{text}; {'; '.join(strongest)}." if strongest else f"{text}; it follows no signal."
+
+
+def left_percent(power: float) -> str:
+    """Return what is left of a signal in words.
+
+    Args:
+        power: share of its power.
+
+    Returns:
+        The share of its rms.
+    """
+    return f"{100.0 * math.sqrt(power):.2g} %"
 
 
 def _motion(found: Diagnosis) -> Iterator[str]:
@@ -275,9 +319,23 @@ def _motion(found: Diagnosis) -> Iterator[str]:
         yield f"Test data of {test.source} ({rows}), rms of free runs: {'; '.join(parts)}."
 
 
-def _experiments(found: Diagnosis) -> Iterator[str]:
-    if found.verdict == "unknown" and not found.effects:
-        yield REPEAT
+def next_steps(found: DiagnosisOutcome) -> Iterator[str]:
+    """Yield which record would settle what is open.
+
+    Args:
+        found: the diagnosis.
+
+    Yields:
+        A sentence each; one at least.
+    """
+    open_questions: dict[str, list[str]] = {}
     for effect in found.effects:
-        if effect.grade is not Grade.CERTAIN:
-            yield EXPERIMENTS.get(effect.evidence.kind, REPEAT)
+        if effect.grade is not Grade.CERTAIN or effect.evidence.family:
+            experiment = EXPERIMENTS.get(effect.evidence.kind, REPEAT)
+            open_questions.setdefault(experiment, []).append(effect.label)
+    if found.misses_test_data or found.verdict == "unknown":
+        yield f"Next: record {REPEAT}."
+    for experiment, labels in open_questions.items():
+        yield f"Next, to settle {listed(labels)}: record {experiment}."
+    if not open_questions and found.verdict == "effects":
+        yield "Next: judge the corrected model on another record of the machine, with `--no-search`."

@@ -16,6 +16,7 @@ from orchestrator.diagnosis.inference.fitting import ScoreComparison
 from orchestrator.diagnosis.inference.problem import FitProblem
 from orchestrator.diagnosis.model.interface import LawArgument
 from orchestrator.diagnosis.selection.search import SearchResult
+from orchestrator.diagnosis.settings import SelectionSettings
 
 Array = NDArray[np.float64]
 KNOTS = 11
@@ -60,19 +61,24 @@ class Dependence:
         return text + (f", like {self.formula} with s in {self.argument_unit}" if self.formula else "")
 
 
-def find_dependences(found: SearchResult, arguments: Sequence[LawArgument], least_t: float) -> tuple[Dependence, ...]:
+def find_dependences(
+    found: SearchResult, arguments: Sequence[LawArgument], settings: SelectionSettings
+) -> tuple[Dependence, ...]:
     """Return what the final model leaves and which signals it follows, strongest first.
 
     Args:
         found: by the search.
         arguments: signals to look at.
-        least_t: paired errors by which a gain must differ from zero.
+        settings: least gain of an effect, and least paired errors by which it must differ from zero.
 
     Returns:
         Those that predict blocks left out surely better.
     """
     tried = [_fit_curve(found, argument) for argument in arguments]
-    kept = [one for one in tried if one is not None and one.comparison.t >= least_t and one.comparison.gain > 0.0]
+    kept = [
+        one for one in tried
+        if one is not None and one.comparison.t >= settings.least_t and one.comparison.gain >= settings.least_gain
+    ]  # fmt: skip
     return tuple(sorted(kept, key=lambda one: -one.comparison.gain))
 
 
@@ -213,5 +219,6 @@ def formula_of(knots: Array, values: Array, errors: Array, most: float = 1.5) ->
             fits.append((left, chosen, size))
         left, chosen, size = min(fits, key=lambda entry: entry[0])
         if left < most:
-            return " ".join(f"{value:+.4g} {name}" for value, name in zip(size, chosen, strict=True)).lstrip("+")
+            shown = zip(size, chosen, strict=True)
+            return " ".join(f"{value:+.4g}" + (f" {name}" if name != "1" else "") for value, name in shown).lstrip("+")
     return ""

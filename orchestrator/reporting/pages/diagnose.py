@@ -2,6 +2,7 @@
 left.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 
 from orchestrator.reporting.model import (
@@ -39,21 +40,17 @@ from orchestrator.shared.results.diagnose import (
 
 KNOWN = frozenset(DiagnoseFound.__struct_fields__)
 SIGNALS = {"theta_m": "motor angle", "theta_l": "load angle"}
-SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the actuator"}
+SITES = {"shaft": "in the shaft", "motor": "at the motor", "load": "at the load", "actuator": "in the drive"}
 MODELS = {"nominal": "model as given", "parameters": "with re-fitted parameters", "final": "with the effects"}
 VERDICTS: Mapping[str, tuple[Badge, str, str]] = {
     "none": ("good", "nothing is missing", "The model explains the record."),
-    "parameters": (
-        "good",
-        "nothing is missing; some values are off",
-        "The model explains the record once its parameters are re-fitted.",
-    ),
+    "parameters": ("good", "some values are off", "The model explains the record once its parameters are re-fitted."),
     "effects": ("neutral", "effects are missing", ""),
     "unknown": ("bad", "unexplained", "Something is missing in the model, and no effect of the library is likely."),
 }
 MISSING = "For each effect: the torque that the model misses without it, and how much of that its law accounts for."
 BLOCKS = "The size of each effect as every block of the record by itself says it. Where blocks agree, a size is sure."
-TAKES = "error of left out data that it takes [%]"
+TAKES = "error on blocks left out that it removes [%]"
 TEST = "Root mean square of free runs minus measured, on data that nothing was fitted to and nothing was chosen by."
 
 
@@ -76,8 +73,9 @@ def build(source: ResultDocument) -> Report:
     sections += _figure(source, "missing_torque", "Missing torque", MISSING)
     sections += _figure(source, "blocks", "Sizes block by block", BLOCKS)
     sections += [*_remaining_sections(results.remaining), *_law_sections(source, results.learned_law)]
-    sections += record_plots(source, "diagnose.csv", live.rows if live else ())
-    sections += plant_section(source, "diagnose.csv", live)
+    metric = any(signal.unit == "m" for test in results.test for signal in test.misfit.values())
+    sections += record_plots(source, "diagnose.csv", live.rows if live else (), metric)
+    sections += plant_section(source, "diagnose.csv", live, metric=metric)
     sections += [_parameter_table(results.parameters), *_candidate_table(results.candidates), *_analysis(results)]
     sections += sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"})
     return Report(
@@ -144,17 +142,17 @@ def _effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
     reasons = tuple(
         (
             _place_words(e.name, e.site), e.grade, _percent(e.gain), e.t, _percent(e.explains.torque),
-            _percent(e.explains.motion), ", ".join(_label_words(label) for label in e.family) or None,
-            ", ".join(e.lowered_by) or None,
+            _percent(e.explains.motion), "no" if e.explains.motion is None else "yes",
+            ", ".join(_label_words(label) for label in e.family) or None, ", ".join(e.lowered_by) or None,
         )
         for e in effects
     )  # fmt: skip
     titles = (
         "effect", "grade", TAKES, "over its uncertainty", "explains of the missing torque [%]",
-        "of the motion's misfit [%]", "not told from", "rules that lower the grade",
+        "of the misfit on test data [%]", "in the corrected model", "not told from", "rules that lower the grade",
     )  # fmt: skip
     columns = tuple(map(TableColumn, ("effect", "grade", "quantity", "value")))
-    note = "Certain, likely or possible. A possible effect is no answer, yet it is part of the corrected model."
+    note = "The corrected model has the effects that test data were asked about, and no others."
     return [
         ReportTable("What the model lacks", columns, sizes, note),
         ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons),
@@ -224,7 +222,10 @@ def _figure(source: ResultDocument, name: str, title: str, note: str) -> list[Se
 
 def _remaining_sections(remaining: RemainingFound) -> list[Section]:
     """Return what no effect explains, and which signals it follows."""
-    facts = tuple((f"torque's power at the {site} [%]", _percent(share)) for site, share in remaining.torque.items())
+    facts = tuple(
+        (f"torque at the {site}, rms, where the model was fitted [%]", share and 100.0 * math.sqrt(share))
+        for site, share in remaining.torque.items()
+    )
     made: list[Section] = [Facts("What is left", facts)] if facts else []
     if remaining.follows:
         columns = ("at", "follows", "share [%]", TAKES, "over its uncertainty", "like")

@@ -26,6 +26,7 @@ from orchestrator.reporting.model import (
     Section,
     Text,
 )
+from orchestrator.reporting.pages.record import metric_words
 from orchestrator.reporting.source import ResultDocument, numbers
 from orchestrator.shared.results import LiveFound, PairFound
 from pyfmu_sources.drivetrain_parameters import BIG
@@ -168,12 +169,13 @@ def _pair_plots(names: Sequence[str]) -> Sequence[LivePlot]:
 
 
 def plant_section(
-    source: ResultDocument, name: str, data: LiveFound | None, offered: Sequence[str] = ()
+    source: ResultDocument, name: str, data: LiveFound | None, offered: Sequence[str] = (), metric: bool = False
 ) -> list[Section]:
     """Return a model beside its record, live.
 
     Args:
         offered: effects [N.m] that get a slider although the model has none of them.
+        metric: the axis moves in metres.
     """
     if data is None:
         return []
@@ -219,7 +221,7 @@ def plant_section(
             made,
             recorded,
             tuple(_plant_controls(data, places, largest)),
-            tuple(_plant_plots(signals)),
+            tuple(_plant_plots(signals, metric)),
         )
     ]
 
@@ -260,13 +262,14 @@ def _reach(name: str, value: float, default: float) -> tuple[float, float, bool]
     return value - abs(value), value + abs(value), False
 
 
-def _plant_plots(signals: Sequence[str]) -> Sequence[LivePlot]:
-    plots = []
+def _plant_plots(signals: Sequence[str], metric: bool) -> Sequence[LivePlot]:
+    plots, unit = [], metric_words("rad", metric)
     for n, signal in enumerate(signals):
+        title = metric_words(ANGLES[signal], metric)
         gap = LiveCurve("live", ((n, 1.0), (-1 - n, -1.0)))
-        plots.append(LivePlot(f"{ANGLES[signal]}: live minus measured", "difference [rad]", (gap,)))
+        plots.append(LivePlot(f"{title}: live minus measured", f"difference [{unit}]", (gap,)))
         both = (LiveCurve("measured", ((-1 - n, 1.0),)), LiveCurve("live", ((n, 1.0),)))
-        plots.append(LivePlot(f"{ANGLES[signal]}, live", f"{signal} [rad]", both))
+        plots.append(LivePlot(f"{title}, live", f"{signal} [{unit}]", both))
     return plots
 
 

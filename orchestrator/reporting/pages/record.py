@@ -14,28 +14,38 @@ SIGNALS = {
     "u": ("Requested torque", "N.m"),
     "T_m": ("Motor torque", "N.m"),
 }
+# The same of an axis that moves in metres.
+METRIC = {"rad": "m", "rad/s": "m/s", "N.m": "N", "angle": "position", "torque": "force", "Twist": "Stretch"}
 GIVEN = {"u": "requested"}  # what is not measured
 MOST_SPANS = 1000
 Table = Mapping[str, list[Cell]]
 Numbers = Sequence[float | None]
 
 
-def record_plots(source: ResultDocument, name: str, restarts: Sequence[int] = ()) -> list[Section]:
+def metric_words(text: str, metric: bool) -> str:
+    """Return a title or a unit as it is for an axis that moves in metres, where it does."""
+    return " ".join(METRIC.get(word, word) for word in text.split()) if metric else text
+
+
+def record_plots(
+    source: ResultDocument, name: str, restarts: Sequence[int] = (), metric: bool = False
+) -> list[Section]:
     """Return plots against ``time`` of a file with measured columns (``theta_m``) and simulated (``theta_m_after``).
 
     For each signal with simulated columns a plot of simulated minus measured comes first. Empty where there is no
-    such file, or no column ``time``.
+    such file, or no column ``time``. ``metric``: the axis moves in metres.
     """
     table = source.columns(name)
-    return list(_plots(table, restarts)) if "time" in table else []
+    return list(_plots(table, restarts, metric)) if "time" in table else []
 
 
-def _plots(table: Table, restarts: Sequence[int]) -> Iterator[Plot]:
+def _plots(table: Table, restarts: Sequence[int], metric: bool) -> Iterator[Plot]:
     time = numbers(table["time"])
     moments = tuple(Span(t, t, "free run starts anew") for t in (time[row] for row in restarts) if t is not None)
     spans = out_of_contact(time, numbers(table["contact"])) if "contact" in table else ()
     note = "Shaded: the teeth are not in contact." if spans else ""
-    for signal, (title, unit) in SIGNALS.items():
+    for signal, shown in SIGNALS.items():
+        title, unit = (metric_words(text, metric) for text in shown)
         simulated = {_words(c, signal): numbers(v) for c, v in table.items() if c.startswith(f"{signal}_")}
         measured = numbers(table[signal]) if signal in table else None
         found = ({GIVEN.get(signal, "measured"): measured} if measured is not None else {}) | simulated
