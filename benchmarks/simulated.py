@@ -139,8 +139,10 @@ def truth_of(case: Case) -> Truth:
     allowed: tuple[str, ...] = ("input_delay", "drive_filter", "early_torque") if motor else ()
     allowed += ("late_load",) if load != motor else ()
     sizes: dict[str, dict[str, tuple[float, float]]] = {}
-    for short, value in case.truth["effects"].items():
-        if short in RECOVERED:
+    hidden = case.truth["effects"]
+    for short, value in hidden.items():
+        # Coulomb friction that stands for Stribeck friction has the size of neither of its torques.
+        if short in RECOVERED and short.replace("Fc", "Fs") not in hidden.keys() - {short}:
             label, parameter, carries = RECOVERED[short]
             sizes.setdefault(label, {})[parameter] = (value / (case.truth["gain"] if carries else 1.0), 0.0)
     return Truth(case.right, allowed, sizes)

@@ -22,6 +22,8 @@ SHORTEST = 1e-7
 
 DEEPEST_STOP = 0.2  # of the travel that lies beyond an end stop: what begins further in is a spring
 LEAST_COULOMB = 0.2  # of the breakaway torque that is left at speed: friction that vanishes there is no Stribeck curve
+ANY_DISTANCE = 3.0  # deviation of the logarithm of a build-up distance about the encoder's resolution: twenty times
+SMALL_LOGARITHM = 0.05  # step of its derivative
 LEAST_CYCLES = 1.5  # of a wave within the travel: what comes round less often is told from no spring
 
 
@@ -52,24 +54,30 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
     def small(scales: SignalScales) -> float:
         return 0.01 * scales.torque_at(site)
 
-    def widths(scales: SignalScales, count: int) -> tuple[float, ...]:
-        return tuple(math.log(scales.resolutions[site] * 4.0**n) for n in range(count))
+    def distance(scales: SignalScales) -> float:
+        return math.log(scales.resolutions[site])
+
+    def build_up(scales: SignalScales) -> dict[str, tuple[float, float]]:
+        return {"presliding": (distance(scales), ANY_DISTANCE)}
 
     def speeds(scales: SignalScales) -> tuple[float, ...]:
         return tuple(share * scales.rms_speed(site) for share in (0.05, 0.15, 0.4))
 
-    scanned = {"presliding": f"presliding.{site}"}
+    unreported = {"presliding": f"presliding.{site}"}
     coulomb = Effect(
         "coulomb_friction", site, "friction", group("coulomb_friction", f"{site}.torque"), "torque",
-        lambda s: {"torque": small(s)}, lambda s: {"presliding": widths(s, 3)}, ("torque",), signed=False,
-        scanned=scanned, possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed",
+        lambda s: {"torque": small(s), "presliding": SMALL_LOGARITHM}, lambda s: {"presliding": (distance(s),)},
+        ("torque",), signed=False, priors=build_up, unreported=unreported,
+        possible=lambda v, s: v["torque"] < _largest_torque(s, site), against="speed",
     )  # fmt: skip
     stribeck = Effect(
         "stribeck_friction", site, "friction",
         group("stribeck_friction", f"{site}.coulomb", f"{site}.breakaway", f"{site}.stribeck_speed"), "breakaway",
-        lambda s: {"coulomb": small(s), "breakaway": small(s), "stribeck_speed": 0.05 * s.rms_speed(site)},
-        lambda s: {"stribeck_speed": speeds(s), "presliding": widths(s, 2)}, ("coulomb", "breakaway"), signed=False,
-        bounds=lambda s: {"stribeck_speed": (0.005 * s.rms_speed(site), math.inf)}, scanned=scanned,
+        lambda s: {"coulomb": small(s), "breakaway": small(s), "stribeck_speed": 0.05 * s.rms_speed(site),
+                   "presliding": SMALL_LOGARITHM},
+        lambda s: {"stribeck_speed": speeds(s), "presliding": (distance(s),)}, ("coulomb", "breakaway"), signed=False,
+        bounds=lambda s: {"stribeck_speed": (0.005 * s.rms_speed(site), math.inf)}, priors=build_up,
+        unreported=unreported,
         possible=lambda v, s: 1.02 * v["coulomb"] < v["breakaway"] < 1.5 * _largest_torque(s, site)
         and v["coulomb"] > LEAST_COULOMB * v["breakaway"]
         and v["stribeck_speed"] > 0.01 * s.rms_speed(site),
@@ -77,8 +85,9 @@ def _dry_friction(site: str) -> tuple[Effect, Effect, Effect]:
     )  # fmt: skip
     loaded = Effect(
         "load_dependent_friction", site, "friction", group("load_dependent_friction", f"{site}.coefficient"),
-        "coefficient", lambda s: {"coefficient": 0.01}, lambda s: {"presliding": widths(s, 3)[1:2]}, ("coefficient",),
-        signed=False, bounds=lambda s: {"coefficient": (0.0, 0.9)}, scanned=scanned,
+        "coefficient", lambda s: {"coefficient": 0.01, "presliding": SMALL_LOGARITHM},
+        lambda s: {"presliding": (distance(s),)}, ("coefficient",), signed=False,
+        bounds=lambda s: {"coefficient": (0.0, 0.9)}, priors=build_up, unreported=unreported,
         possible=lambda v, s: v["coefficient"] < 0.5, against="speed",
     )  # fmt: skip
     return coulomb, stribeck, loaded

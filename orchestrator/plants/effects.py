@@ -116,7 +116,7 @@ class Effect:
         signed: amplitudes may have either sign.
         bounds: signal scales -> short name -> (least, largest), narrower than the table's.
         priors: signal scales -> short name -> (mean, standard deviation).
-        scanned: short name -> name in the plant's table: what is tried at its starts and neither fitted nor reported.
+        unreported: short name -> name in the plant's table: what is fitted beside its parameters and not reported.
         possible: (values by short name, signal scales) -> whether a machine can have them, and the record can show it.
         contains: name of the simpler effect at the same site that it stands for.
         both_encoders: it can be seen only with an encoder on either side.
@@ -140,7 +140,7 @@ class Effect:
     signed: bool = True
     bounds: Callable[[SignalScales], Bounds] = lambda scales: {}
     priors: Callable[[SignalScales], Bounds] = lambda scales: {}
-    scanned: dict[str, str] = field(default_factory=dict)
+    unreported: dict[str, str] = field(default_factory=dict)
     possible: Callable[[Mapping[str, float], SignalScales], bool] = _any_values
     contains: str = ""
     both_encoders: bool = False
@@ -157,5 +157,5 @@ class Effect:
         return f"{self.name}@{self.site}"
 
     def places(self, plant: ParameterTable) -> dict[str, int]:
-        """Return the place of each parameter in the plant's tuple by short name, scanned ones last."""
-        return {short: plant.index(name) for short, name in (self.parameters | self.scanned).items()}
+        """Return the place of each parameter in the plant's tuple by short name, unreported ones last."""
+        return {short: plant.index(name) for short, name in (self.parameters | self.unreported).items()}

@@ -67,6 +67,7 @@ class CandidateEffect:
         starts: values to try; those at ``amplitudes`` are found by regression.
         amplitudes: places of values in which the residual is linear; empty: the effect is tried at each start as it is.
         fitted: places of the values that a fit moves.
+        unreported: how many of these are no values of the law, but of its analysis.
         sizes: places of values whose zero is no effect.
         lower, upper: bounds of each value.
         positive: places of amplitudes that must be positive.
@@ -87,6 +88,7 @@ class CandidateEffect:
     starts: tuple[Values, ...]
     amplitudes: tuple[int, ...] = ()
     fitted: tuple[int, ...] = ()
+    unreported: int = 0
     sizes: tuple[int, ...] = (0,)
     lower: Values = ()
     upper: Values = ()
@@ -98,6 +100,11 @@ class CandidateEffect:
     excludes: tuple[str, ...] = ()
     takes_drive: bool = False
     of_log: bool = False
+
+    @property
+    def law_values(self) -> int:
+        """Return the number of values that the law has."""
+        return len(self.fitted) - self.unreported
 
     @property
     def name(self) -> str:

@@ -49,7 +49,7 @@ def _candidate(plant: Plant, row: Effect, scales: SignalScales, channels: Sequen
     lists = [starts.get(name, (_default(plant, row, name),)) for name in names]
     wave = _wave_scan(row, scales, channels, names) if "cycles_per_rev" in names else None
     bounds, priors = _bounds(plant, row, scales, names), row.priors(scales)
-    fitted = tuple(n for n, name in enumerate(names) if name not in row.scanned and name in steps)
+    fitted = tuple(n for n, name in enumerate(names) if name in steps)
     at = {name: n for n, name in enumerate(names)}
     sizes = amplitudes or (row.size,)
     timing = tuple(other.label for other in plant.bank if other.kind == "timing" and other.label != row.label)
@@ -58,7 +58,8 @@ def _candidate(plant: Plant, row: Effect, scales: SignalScales, channels: Sequen
     return CandidateEffect(
         label=row.label, kind=row.kind, values=names, scales=tuple(steps.get(name, 1.0) for name in names),
         starts=tuple(itertools.product(*lists)), amplitudes=tuple(at[name] for name in amplitudes), fitted=fitted,
-        sizes=tuple(at[name] for name in sizes), lower=tuple(low for low, _ in bounds),
+        sizes=tuple(at[name] for name in sizes), unreported=len(row.unreported),
+        lower=tuple(low for low, _ in bounds),
         upper=tuple(high for _, high in bounds),
         positive=() if row.signed or row.phase else tuple(at[name] for name in amplitudes),
         prior={at[name]: prior for name, prior in priors.items()}, wave=wave, contains=(simpler,) if simpler else (),
@@ -70,7 +71,7 @@ def _candidate(plant: Plant, row: Effect, scales: SignalScales, channels: Sequen
 def _coordinates(row: Effect) -> tuple[str, ...]:
     """Return the names of an effect's values: amplitude and phase become sine and cosine."""
     names = [name for name in row.parameters if not (row.phase and name in (row.size, row.phase))]
-    return (*((SINE, COSINE) if row.phase else ()), *names, *row.scanned)
+    return (*((SINE, COSINE) if row.phase else ()), *names, *row.unreported)
 
 
 def _default(plant: Plant, row: Effect, name: str) -> float:
@@ -117,5 +118,5 @@ def effect_parameters(plant: Plant, effect: CandidateEffect, values: Values) -> 
     if row.phase:
         sine, cosine = given.pop(SINE), given.pop(COSINE)
         given |= {row.size: math.hypot(sine, cosine), row.phase: math.atan2(cosine, sine)}
-    full = row.parameters | row.scanned
+    full = row.parameters | row.unreported
     return {full[short]: value for short, value in given.items()}

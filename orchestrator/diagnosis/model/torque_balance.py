@@ -166,8 +166,8 @@ class TorqueBalance(ResidualModel):
             The parameters of a simulation.
         """
         p = self.values_at(point)
-        scanned = [self.plant.index(name) for row in self.plant.bank for name in row.scanned.values()]
-        p[scanned] = self.nominal[scanned]
+        unreported = [self.plant.index(name) for row in self.plant.bank for name in row.unreported.values()]
+        p[unreported] = self.nominal[unreported]
         return p
 
     def drive_torque(self, p: Array) -> Array:

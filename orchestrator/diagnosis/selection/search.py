@@ -291,7 +291,7 @@ class _Search:
         if first and len(fair) > 1 and best.comparison.gain < self.settings.certain_alone:
             best = self._best_with_second(problem, fair[: self.settings.look_ahead], refused) or best
         family = [one for one in fair if one is best or self._is_alike(best, one)]
-        chosen = min(family, key=lambda one: (len(problem.effects[one.label].fitted), -one.comparison.gain))
+        chosen = min(family, key=lambda one: (problem.effects[one.label].law_values, -one.comparison.gain))
         return SearchStep(model, tuple(tried), chosen.label, tuple(one.label for one in family if one is not chosen))
 
     def _tried(self, problem: FitProblem, model: FittedModel, refused: frozenset[str], count: int) -> list[TriedEffect]:
