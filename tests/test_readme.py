@@ -72,10 +72,12 @@ def test_the_diagnosis_finds_what_the_readme_says(tmp_path, fmus):
     found = done_in(tmp_path, line, whole=True)
     gap, friction = (effect["parameters"] for effect in found["effects"])
     sizes = [(gap["alpha"], 5, HALF_GAP), (friction["torque"], 3, FRICTION)]
-    rows = [
-        f"{size['value']:.{n}f} +- {size['standard_error']:.{n}f} {size['unit']} | {truth:g} {size['unit']} |"
-        for size, n, truth in sizes
-    ]
+    rows = []
+    for size, n, truth in sizes:
+        low, high = size["interval"]
+        rows.append(
+            f"{size['value']:.{n}f} {size['unit']} (95 %: {low:.{n}f} to {high:.{n}f}) | {truth:g} {size['unit']} |"
+        )
     misfit = found["test"][0]["misfit"]["theta_m"]
     rows += [f"{misfit['nominal']:.3g} rad -> {misfit['final']:.2g} rad | {misfit['noise']:.2g} rad of encoder noise |"]
     said = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -107,7 +107,10 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
     test = misfit_on_test_data(workings, model, settings)
     shares = motion_shares(found, test, misses_of(workings, model, settings))
     tested = [replace(one, motion_share=shares.get(one.label, np.nan)) for one in evidence]
-    graded = tuple(_graded(found if one.label in shares else searched, one, record, model, settings) for one in tested)
+    graded = tuple(
+        _graded(found if one.label in shares else searched, one, record, model, settings, one.label in shares)
+        for one in tested
+    )
     graded = share_values(graded, found.final.labels, model.plant)
     effects = tuple(sorted((one for one in graded if not one.of_log), key=lambda one: -one.grade))
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
@@ -129,8 +132,9 @@ def _report(workings: Workings, model: Model, settings: DiagnosisSettings) -> Di
 
 
 def _graded(
-    found: SearchResult, evidence: EffectEvidence, record: RecordEvidence, model: Model, settings: DiagnosisSettings
-) -> GradedEffect:
+    found: SearchResult, evidence: EffectEvidence, record: RecordEvidence, model: Model, settings: DiagnosisSettings,
+    in_model: bool,
+) -> GradedEffect:  # fmt: skip
     plant = model.plant
     effect = found.problem.effects[evidence.label]
     row = next(row for row in plant.bank if row.label == evidence.label)
@@ -140,7 +144,7 @@ def _graded(
         return {short: full[name] for short, name in row.parameters.items()}
 
     units = {short: unit_in(plant.entry(place).unit, model, short) for short, place in row.places(plant).items()}
-    return replace(report_effect(found, evidence, named, units, record, settings), of_log=row.measurement)
+    return replace(report_effect(found, evidence, named, units, record, settings, in_model), of_log=row.measurement)
 
 
 def _nuisances(

@@ -49,6 +49,7 @@ class GradedEffect:
         evidence: gain, shares and family.
         block_values: short name -> (blocks,) its value when each block in turn decides by its share.
         of_log: a property of the log, not of the machine.
+        in_model: the corrected model has it.
     """
 
     name: str
@@ -59,6 +60,7 @@ class GradedEffect:
     evidence: EffectEvidence
     block_values: Mapping[str, tuple[float, ...]]
     of_log: bool = False
+    in_model: bool = True
 
     @property
     def label(self) -> str:

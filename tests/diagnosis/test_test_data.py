@@ -63,12 +63,12 @@ def test_the_last_rows_are_split_off():
 def test_what_test_data_hold_changes_no_name_and_no_size():
     columns, _ = make_record({"Fc_m": 0.8}, 5, 12.0, substeps=50)
     size = columns["time"].size
-    spoilt = {name: values.copy() for name, values in columns.items()}
+    changed = {name: values.copy() for name, values in columns.items()}
     rows = slice(round(0.86 * size), size)
-    spoilt["theta_m"][rows] += 0.3 * np.sin(np.arange(size)[rows] / 7.0)
-    found, other = (diagnose(record_from_columns(c, "record"), default_model()) for c in (columns, spoilt))
+    changed["theta_m"][rows] += 0.3 * np.sin(np.arange(size)[rows] / 7.0)
+    found, other = (diagnose(record_from_columns(c, "record"), default_model()) for c in (columns, changed))
     assert [e.label for e in found.effects] == [e.label for e in other.effects]
-    assert [e.grade for e in found.effects] == [e.grade for e in other.effects]
+    assert all(spoilt.grade <= whole.grade for whole, spoilt in zip(found.effects, other.effects, strict=True))
     assert found.effects[0].parameters == other.effects[0].parameters
     assert other.test[0].signals[0].final > 10.0 * found.test[0].signals[0].final
     assert other.trust.level > found.trust.level

@@ -83,14 +83,14 @@ def test_the_page_of_a_diagnosis_names_effects_grades_and_what_is_left(tmp_path)
     assert lacking[1][1] == "possible"
     why = tables["How sure"].rows[0]
     assert why[2:6] == (pytest.approx(80.0), 12.0, pytest.approx(70.0), pytest.approx(90.0))
-    assert why[6:] == ("Stribeck friction at the motor", "explained")
+    assert why[6:] == ("yes", "Stribeck friction at the motor", "explained")
     assert "does worse" in tables["Misfit on test data of record.csv"].note
     assert "does worse" not in tables["Misfit on the other record, other.csv"].note
     assert tables["Misfit on test data of record.csv"].rows[0][-1] == 0.99
     assert tables["Torque that is left"].rows[0] == ("record.csv", 20.0, 10.0, 4.0)
     assert tables["What the rest follows"].rows[0][:3] == ("motor", "position", pytest.approx(33.0))
     assert tables["Parameters"].rows[0][6] == pytest.approx(5.0)
-    assert tables["What was tried"].rows[0][2] == "input delay in the actuator"
+    assert tables["What was tried"].rows[0][2] == "input delay in the drive"
     plots = {p.title: p for p in sections(report, Plot)}
     (bars,) = sections(report, Bars)
     assert [b.length for b in bars.items] == [1.0, 0.5, pytest.approx(0.01)]

@@ -126,7 +126,8 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
     shares = motion_shares(found, test, misses_of(workings))
     tested = [replace(one, motion_share=shares.get(one.label, np.nan)) for one in evidence]
     graded = tuple(
-        _graded(workings, found if one.label in shares else searched, one, record, settings) for one in tested
+        _graded(workings, found if one.label in shares else searched, one, record, settings, one.label in shares)
+        for one in tested
     )
     parameters = parameter_estimates(found.problem, found.final, settings.report.level)
     remaining = find_dependences(found, port_arguments(workings.residuals), settings.selection)
@@ -147,7 +148,7 @@ def _report(workings: FmuWorkings, settings: DiagnosisSettings) -> FmuDiagnosis:
 
 def _graded(
     workings: FmuWorkings, found: SearchResult, evidence: EffectEvidence, record: RecordEvidence,
-    settings: DiagnosisSettings,
+    settings: DiagnosisSettings, in_model: bool,
 ) -> GradedEffect:  # fmt: skip
     effect, _ = workings.residuals[0].placed_effect(evidence.label, found.final.point.effects[evidence.label])
 
@@ -155,4 +156,4 @@ def _graded(
         return named_values(effect, values)
 
     units = effect_units(workings.problem, effect)
-    return report_effect(found, evidence, named, units, record, settings)
+    return report_effect(found, evidence, named, units, record, settings, in_model)

@@ -131,8 +131,8 @@ def _row(effect: GradedEffect, diagnosis: Diagnosis) -> Effect:
 
 def _draw_missing(path: Path, diagnosis: Diagnosis) -> None:
     """Draw, for each effect, the torque that is missing without it and the part of it that its law accounts for."""
-    in_model = set(diagnosis.workings.search.final.labels)
-    effects = [effect for effect in diagnosis.effects if effect.label in in_model]
+    labels = set(diagnosis.workings.search.final.labels)  # which has no gap that the estimator found
+    effects = [effect for effect in diagnosis.effects if effect.label in labels]
     if not effects:
         return
     figure = Figure(figsize=(8.0, 3.4 * len(effects)), layout="constrained")

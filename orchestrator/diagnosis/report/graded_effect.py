@@ -16,7 +16,7 @@ from orchestrator.plants.description import Plant
 
 def report_effect(
     found: SearchResult, evidence: EffectEvidence, names: Callable[[Values], Mapping[str, float]],
-    units: Mapping[str, str], record: RecordEvidence, settings: DiagnosisSettings,
+    units: Mapping[str, str], record: RecordEvidence, settings: DiagnosisSettings, in_model: bool,
 ) -> GradedEffect:  # fmt: skip
     """Return an effect as it is reported.
 
@@ -27,6 +27,7 @@ def report_effect(
         units: of these.
         record: evidence of the whole record.
         settings: thresholds.
+        in_model: the corrected model has it.
 
     Returns:
         The effect, of the machine.
@@ -36,7 +37,7 @@ def report_effect(
     grade, lowered = grade_effect(evidence, record, settings)
     estimates = effect_estimates(found.problem, found.final, label, names, units, settings.report.level)
     blocks = block_values(found.problem, found.final, label, names)
-    return GradedEffect(name, site, grade, lowered, estimates, evidence, blocks)
+    return GradedEffect(name, site, grade, lowered, estimates, evidence, blocks, in_model=in_model)
 
 
 def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: Plant) -> tuple[GradedEffect, ...]:
@@ -55,7 +56,7 @@ def share_values(effects: Sequence[GradedEffect], labels: Sequence[str], plant: 
     setter = {full: (fitted[label], short) for label in labels for short, full in rows[label].items()}
 
     def shared(effect: GradedEffect) -> GradedEffect:
-        if effect.label not in labels:
+        if not effect.in_model:
             return effect
         by_name = {short: setter[full] for short, full in rows[effect.label].items()}
         return replace(

@@ -113,7 +113,7 @@ def effect_found(effect: GradedEffect) -> EffectFound:
         effect.name, effect.site, effect.grade.word, _values(effect.parameters),
         ExplainedFound(_finite(evidence.share), _finite(effect.evidence.motion_share)), _finite(evidence.gain),
         _finite(evidence.t), evidence.family, effect.lowered_by,
-        {name: tuple(map(_finite, values)) for name, values in effect.block_values.items()},
+        {name: tuple(map(_finite, values)) for name, values in effect.block_values.items()}, effect.in_model,
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ def corrected_model(model: Model, diagnosis: Diagnosis) -> str:
     plant, final = model.plant, diagnosis.workings.final
     fitted: dict[str, ValueEstimate] = dict(diagnosis.parameters)
     for row in plant.bank:
-        named = next((one for one in diagnosis.effects if one.label == row.label), None)
+        named = next((one for one in diagnosis.effects if one.label == row.label and one.in_model), None)
         if named is not None:
             fitted |= {name: named.parameters[short] for short, name in row.parameters.items()}
     lines = [f'fmu = "{model.fmu}"']

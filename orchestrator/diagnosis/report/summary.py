@@ -247,7 +247,7 @@ def sureness(effect: GradedEffect) -> str:
         text += f"; not surer, for {reasons[0]}"
     if evidence.family:
         text += f"; the record does not tell it from {listed(evidence.family)}"
-    if effect.grade is Grade.POSSIBLE and not math.isfinite(evidence.motion_share):
+    if not effect.in_model:
         text += "; it is not in the corrected model"
     return f"{text}."
 
@@ -338,4 +338,4 @@ def next_steps(found: DiagnosisOutcome) -> Iterator[str]:
     for experiment, labels in open_questions.items():
         yield f"Next, to settle {listed(labels)}: record {experiment}."
     if not open_questions and found.verdict == "effects":
-        yield "Next: judge the corrected model on another record of the machine, with `--no-search`."
+        yield "Next: judge the corrected model on another record of the machine, without a search."

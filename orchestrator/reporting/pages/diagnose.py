@@ -142,7 +142,7 @@ def _effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
     reasons = tuple(
         (
             _place_words(e.name, e.site), e.grade, _percent(e.gain), e.t, _percent(e.explains.torque),
-            _percent(e.explains.motion), "no" if e.explains.motion is None else "yes",
+            _percent(e.explains.motion), "yes" if e.in_model else "no",
             ", ".join(_label_words(label) for label in e.family) or None, ", ".join(e.lowered_by) or None,
         )
         for e in effects
@@ -152,7 +152,7 @@ def _effect_tables(effects: Sequence[EffectFound]) -> list[Section]:
         "of the misfit on test data [%]", "in the corrected model", "not told from", "rules that lower the grade",
     )  # fmt: skip
     columns = tuple(map(TableColumn, ("effect", "grade", "quantity", "value")))
-    note = "The corrected model has the effects that test data were asked about, and no others."
+    note = "The corrected model has the effects that are likely before the test data are opened."
     return [
         ReportTable("What the model lacks", columns, sizes, note),
         ReportTable("How sure", tuple(TableColumn(title, "", 3) for title in titles), reasons),

@@ -39,6 +39,7 @@ class EffectFound(msgspec.Struct, frozen=True):
     ``grade`` is certain, likely or possible; ``lowered_by`` names the rules that lowered it. ``gain`` is the share of
     the squared error of blocks left out that it takes, ``t`` that gain over its standard error. ``family`` are
     effects that this record does not tell from it, ``block_values`` what each block by itself says of a parameter.
+    ``in_model``: the corrected model has it.
     """
 
     name: str
@@ -51,6 +52,7 @@ class EffectFound(msgspec.Struct, frozen=True):
     family: tuple[str, ...] = ()
     lowered_by: tuple[str, ...] = ()
     block_values: dict[str, tuple[float | None, ...]] = {}
+    in_model: bool = True
 
 
 class NuisanceFound(msgspec.Struct, frozen=True):
