@@ -17,7 +17,7 @@ from orchestrator.checking.probing import (
     probes_reference,
     trajectory,
 )
-from orchestrator.checking.probing.binding import PENDING, Library, StatusError, TerminatedError
+from orchestrator.checking.probing.binding import PENDING, DiscardedError, Library, StatusError, TerminatedError
 from orchestrator.checking.probing.describing import make_job
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.process import Process
@@ -164,8 +164,8 @@ class _Watcher:
         context = probes.Context(trajectory.Bench(job, library, self._add), self._add, single=single)
         for self.probe in names:
             try:
-                _PROBES[self.probe](context)
-            except probes.SkippedError as reason:
+                probes.carry_out(_PROBES[self.probe], context)
+            except (probes.SkippedError, DiscardedError) as reason:
                 self.stages[self.probe] = str(reason)
                 continue
             except TerminatedError:

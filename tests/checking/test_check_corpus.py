@@ -56,6 +56,24 @@ def test_what_the_flags_do_not_promise_is_not_asked_for(behaviour: str, old: str
     assert report.executed
 
 
+def test_a_discarded_step_is_done_in_shorter_ones(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "discard_long"), QUICK)
+    assert {f.rule for f in report.findings} == {"step.discarded"}
+    assert not any(report.executions[0].stages.values())
+
+
+def test_a_run_ends_before_a_step_that_is_discarded_at_any_size(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "discard_step"), QUICK)
+    assert {f.rule for f in report.findings} == {"step.discarded"}
+    assert report.ok
+    assert {stage for stage, reason in report.executions[0].stages.items() if reason} == {"variable steps", "reference"}
+
+
+def test_an_fmu_that_discards_its_first_step_at_any_size_does_not_pass(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "discard_first"), QUICK)
+    assert {f.rule for f in report.findings if f.severity == "error"} == {"run.status"}
+
+
 def test_a_hang_after_misuse_is_a_warning_as_a_crash_is(tmp_path: Path) -> None:
     report = check_fmu(build_c_fmu(tmp_path, "hang_negative_step"), CheckOptions(limits=Limits(time=10.0)))
     assert {f.rule for f in report.findings if f.severity != "info"} == {"misuse.crash"}

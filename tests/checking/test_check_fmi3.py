@@ -46,6 +46,18 @@ def test_an_update_of_a_trial_step_may_lie_after_the_next_one(tmp_path: Path) ->
     assert report.findings == ()
 
 
+def test_a_discarded_step_is_done_in_shorter_ones(tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "discard_long"), QUICK)
+    assert {f.rule for f in report.findings} == {"step.discarded"}
+    assert not any(report.executions[0].stages.values())
+
+
+def test_a_solver_goes_on_in_shorter_steps_where_derivatives_are_discarded(tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "discard_below", "ModelExchange"), QUICK)
+    assert report.findings == ()
+    assert report.executed
+
+
 def _named(mutant: Mutant, folder: Path) -> set[str]:
     path = folder / "broken.fmu"
     mutant.make(path)

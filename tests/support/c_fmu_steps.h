@@ -57,6 +57,16 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 #ifdef FAULT_discard_step
     if (self->s.steps == 5) return fmi2Discard;
 #endif
+#ifdef FAULT_discard_first
+    if (self->s.steps == 0) return fmi2Discard;
+#endif
+#ifdef FAULT_discard_long
+    if (step > 6e-3) {
+        integrate(&self->s, 5e-3);
+        self->s.time += 5e-3;
+        return fmi2Discard;
+    }
+#endif
 #ifdef FAULT_fatal_step
     if (self->s.steps == 5) return fmi2Fatal;
 #endif

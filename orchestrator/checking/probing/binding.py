@@ -127,6 +127,18 @@ class TerminatedError(Exception):
     """The slave asks for the simulation to end, or cannot be followed further; that is no fault."""
 
 
+class DiscardedError(Exception):
+    """A step was discarded, which is allowed, and was not done in shorter ones either.
+
+    Attributes:
+        again: whether shorter ones can be tried, in a run that saves a state before each step.
+    """
+
+    def __init__(self, detail: str, again: bool = False) -> None:
+        super().__init__(detail)
+        self.again = again
+
+
 class FmiProcess(Protocol):
     """A child process that does FMI calls."""
 

@@ -2,7 +2,16 @@
 
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, StatusError, TerminatedError
+from orchestrator.checking.probing.binding import (
+    DISCARD,
+    OK,
+    WARNING,
+    DiscardedError,
+    Library,
+    StatusError,
+    TerminatedError,
+)
+from orchestrator.checking.probing.driver import MOST_PARTS
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
 
@@ -44,13 +53,19 @@ class CoSimulation3(EventDriver):
             self.call("EnterStepMode")
 
     def advance(self, t: float, size: float, when: str = "") -> None:
-        end = t + size
+        end, h = t + size, size
         slack = _SMALL * max(abs(end), size)
         for _ in range(_MOST_RETURNS):
-            goal = min(end, self.next_instant(end)) if self.events else end
+            goal = min(end, self.next_instant(end), t + h) if self.events else min(end, t + h)
             wanted = False
             if goal > t + slack:
-                wanted, reached = self._step(t, goal, slack, when)
+                found = self._step(t, goal, slack, when)
+                if found is None:
+                    h = 0.5 * (goal - t)
+                    if not self.job.varies or h * MOST_PARTS < size:
+                        raise DiscardedError(f"a step was discarded {when}")
+                    continue
+                wanted, reached = found
                 t = reached if reached < goal - slack else goal
             if self.events and (wanted or self.next_instant(end + size) <= t + slack):
                 self._event(t, wanted, when)
@@ -59,12 +74,18 @@ class CoSimulation3(EventDriver):
         text = f"fmi3DoStep must get on, but returned early {_MOST_RETURNS} times {when}"
         raise StatusError("fmi3DoStep", 0, text, "step.no-progress")
 
-    def _step(self, t: float, goal: float, slack: float, when: str) -> tuple[bool, float]:
-        """One call of fmi3DoStep: whether an event is to be handled, and the time that was reached."""
-        found = self.call(
+    def _step(self, t: float, goal: float, slack: float, when: str) -> tuple[bool, float] | None:
+        """One call of fmi3DoStep: whether an event is to be handled, and the time that was reached; None: discarded."""
+        status, found = self.raw(
             "DoStep", ("double", t), ("double", goal - t), ("bool", True), *(("out", "bool", 1),) * 3,
-            ("out", "double", 1, goal), when=when,
+            ("out", "double", 1, goal),
         )  # fmt: skip
+        if status == DISCARD:
+            self.report_discard(when)
+            return None
+        if status not in (OK, WARNING):
+            raise self.refused("DoStep", status, when)
+        self._remark("fmi3DoStep", status, self.library.messages, self.library.errors)
         event, terminate, early, last = (values[0] for values in found)
         if not t - slack <= last <= goal + slack:
             text = f"lastSuccessfulTime must lie in the step from {t:g} to {goal:g}, but is {last:g} {when}"

@@ -18,6 +18,8 @@ _CTYPES = {
 _PYTHON: dict[str, tuple[type, ...]] = {"double": (float,), "float": (float,), "bool": (bool,)}
 _TEXTS: tuple[type, ...] = (bytes, type(None))
 MOST_ITERATIONS = 100
+MOST_PARTS = 1024
+"""Into so many a communication step is divided when longer ones are discarded."""
 
 
 class Driver(FmuInstance):
@@ -180,6 +182,15 @@ class Driver(FmuInstance):
             TerminatedError: the slave ended the simulation.
         """
         raise NotImplementedError
+
+    def report_discard(self, when: str) -> None:
+        """Report that a step was discarded.
+
+        Args:
+            when: time and step in words.
+        """
+        name = f"{self.library.names.prefix}DoStep"
+        self.report("step.discarded", f"{name} must do the steps that it is asked for, but discards one", when=when)
 
     def terminate(self) -> None:
         """End the simulation."""

@@ -44,6 +44,7 @@ class ProbeJob:
         budget: seconds that a test run may take, of a :class:`Stopwatch`.
         flags: capability flags that are true.
         reference: the result to be reproduced, or None.
+        careful: whether a state is saved before each step of FMI 2.0, so that one that is discarded can be done anew.
     """
 
     version: Version
@@ -63,6 +64,12 @@ class ProbeJob:
     budget: float
     flags: frozenset[str]
     reference: ReferenceResult | None
+    careful: bool = False
+
+    @property
+    def varies(self) -> bool:
+        """Whether communication steps may be of any size."""
+        return "canHandleVariableCommunicationStepSize" in self.flags
 
     @property
     def saves(self) -> bool:

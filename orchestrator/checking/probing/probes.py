@@ -8,7 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, ProbedVariable, StatusError, TerminatedError, finite
+from orchestrator.checking.probing.binding import (
+    DISCARD,
+    DiscardedError,
+    Library,
+    ProbedVariable,
+    StatusError,
+    TerminatedError,
+    finite,
+)
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.trajectory import Bench, Difference, compare, excitation
 from orchestrator.shared.stopwatch import Stopwatch
@@ -76,6 +84,26 @@ class SkippedError(Exception):
     """A probe does not apply to this FMU; the text says why."""
 
 
+def carry_out(probe: Probe, context: Context) -> None:
+    """Carry out a probe, and again with a saved state before each step where that helps against discarded ones.
+
+    Args:
+        probe: the probe.
+        context: the FMU, its job and where findings go.
+
+    Raises:
+        SkippedError: it does not apply.
+        DiscardedError: a step could not be done.
+    """
+    try:
+        probe(context)
+    except DiscardedError as error:
+        if not error.again:
+            raise
+        context.bench.job = replace(context.bench.job, careful=True)
+        probe(context)
+
+
 NOT_COMPARABLE = "two equal runs of this FMU differ"
 
 
@@ -116,6 +144,13 @@ def life_cycle(context: Context) -> None:
             t = job.start + n * job.step
             try:
                 driver.advance(t, job.step, f"at t = {t:g} (step {n + 1})")
+            except DiscardedError as error:
+                if error.again:
+                    raise
+                if n == 0:
+                    raise StatusError("DoStep", DISCARD, "a first step must be done, but each is discarded") from None
+                bench.job = replace(job, steps=n)
+                break
             except TerminatedError:
                 bench.job = replace(job, steps=max(n, 1))
                 break
@@ -206,9 +241,16 @@ def inputs(context: Context) -> None:
     if refused is not None:
         context.report("run.input-refused", refused)
         bench.excited = False
-    with bench.instance() as driver:
-        context.trace = bench.run(driver)
-        _remarks(context, driver)
+    try:
+        with bench.instance() as driver:
+            context.trace = bench.run(driver)
+            _remarks(context, driver)
+    except DiscardedError as error:
+        if error.again or not bench.excited:
+            raise
+        bench.excited = False  # the life cycle was possible with the start values
+        with bench.instance() as driver:
+            context.trace = bench.run(driver)
 
 
 def setting(context: Context) -> None:

@@ -168,7 +168,7 @@ def variable_steps(context: Context) -> None:
         SkippedError: it does not apply.
     """
     job = context.bench.job
-    if "canHandleVariableCommunicationStepSize" not in job.flags:
+    if not job.varies:
         raise SkippedError("canHandleVariableCommunicationStepSize is false")
     if job.steps < _FEWEST_PAIRS * 2:
         raise SkippedError("the run has too few steps")

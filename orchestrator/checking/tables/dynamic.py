@@ -28,6 +28,7 @@ value.not-finite | E | 2.2.7 | 2.4.7.5 | outputs are finite | look for a divisio
 value.out-of-range | W | 2.2.7 | 2.2.7.3 | outputs stay within min and max | correct the bounds or the model
 value.start | W | 2.2.7 | 2.4.7.5 | start values of the XML are those of the binary | generate both from one source
 value.string | E | 2.1.7 | 2.2.7.2 | strings and binaries are not null | return "" instead
+step.discarded | W | 4.2.2 | 4.2.1 | steps of the size that is asked for are done | many importers end the run there: do shorter steps inside, or state a stepSize that works
 step.last-time | E | - | 4.2.1 | lastSuccessfulTime lies in the step | return the time that was reached
 step.no-progress | E | - | 4.2.1 | a step gets on | return early only after an event that is new
 step.early-return | E | - | 4.1.3 | fmi3DoStep returns early only where the flags and earlyReturnAllowed allow it | set mightReturnEarlyFromDoStep, or go on to the end of the step
