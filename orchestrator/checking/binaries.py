@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, Interface
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Finding, listed
 from orchestrator.checking.library_headers import LibraryHeader, inspect
 from orchestrator.checking.rules import Version
 from orchestrator.checking.rules_model import C_NAME
@@ -165,10 +165,10 @@ def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
     names = set(files.names())
     folders = sorted({n.split("/")[1] for n in names if n.startswith("binaries/") and n.count("/") >= 2})
     for interface in d.interfaces:
-        for element, source in interface.sources:
-            if posixpath.normpath(f"sources/{source}") not in names:
-                message = f"a source file must be in sources/, but `{source}` is not"
-                yield Finding("file.source-missing", xpath(element, "name"), message)
+        absent = [(e, s) for e, s in interface.sources if posixpath.normpath(f"sources/{s}") not in names]
+        if absent:
+            message = f"source files must be in sources/, but are not: {listed([f'`{s}`' for _, s in absent])}"
+            yield Finding("file.source-missing", xpath(absent[0][0], "name"), message)
     for folder in folders:
         other = folder in WITHOUT_NAME if version == "2.0" else _WITH_ABI.fullmatch(folder)
         if folder not in PLATFORMS[version] and not other:
@@ -206,8 +206,8 @@ def _check_library(
         return
     missing = [f for f in functions_of(d.dialect.version, interface.kind) if not _exports(library, data, f)]
     if missing:
-        few = ", ".join(missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
-        yield Finding("binary.exports", path, f"the library must export all FMI functions, but lacks {few}")
+        message = f"the library must export all FMI functions, but lacks {listed(missing)}"
+        yield Finding("binary.exports", path, message)
     python = sorted(u for u in library.undefined or () if u.startswith(("Py", "_Py")))
     if python and not any("python" in n for n in library.needed or ()):
         message = (

@@ -8,7 +8,7 @@ from lxml import etree
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, number
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Finding, listed
 from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.xml_reading import xpath
 
@@ -148,11 +148,11 @@ def _build(d: Description, root: etree._Element, names: set[str]) -> Iterator[Fi
         if own is not None and own not in identifiers:
             message = f"modelIdentifier must be that of an interface of the FMU, but is `{own}`"
             yield Finding("build.identifier", xpath(element, "modelIdentifier", BUILD), message)
-    for element in root.iter("SourceFile"):
-        name = element.get("name", "")
-        if name and posixpath.normpath(f"sources/{name}") not in names:
-            message = f"a source file must be in sources/, but `{name}` is not"
-            yield Finding("build.file", xpath(element, "name", BUILD), message)
+    files = ((e, e.get("name", "")) for e in root.iter("SourceFile"))
+    absent = [(e, name) for e, name in files if name and posixpath.normpath(f"sources/{name}") not in names]
+    if absent:
+        message = f"source files must be in sources/, but are not: {listed([f'`{name}`' for _, name in absent])}"
+        yield Finding("build.file", xpath(absent[0][0], "name", BUILD), message)
     for element in root.iter("IncludeDirectory"):
         folder = posixpath.normpath(f"sources/{element.get('name', '')}")
         if not any(n.startswith(f"{folder}/") for n in names):

@@ -370,7 +370,10 @@ def _starts(element: etree._Element, own: Mapping[str, str], dialect: FmiDialect
     if dialect is FMI2:
         return None if text is None else (text,)
     texts = [e.get("value", "") for e in element.findall("Start")]
-    return tuple(texts or ([] if text is None else text.split())) or None
+    if texts or text is None:
+        return tuple(texts) or None
+    # Texts must not have the attribute, which is a finding already: it is one value.
+    return (text,) if _tag(element) in ("String", "Binary") else tuple(text.split()) or None
 
 
 def _entries(root: etree._Element, dialect: FmiDialect, section: str) -> tuple[StructureEntry, ...]:

@@ -1,7 +1,7 @@
 """What the checks report: one flat list of findings per FMU."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -142,8 +142,22 @@ class FmuFindings:
         return self.count("error") == 0
 
 
+def listed(names: Sequence[str], most: int = 12) -> str:
+    """Names for a message, not too many of them.
+
+    Args:
+        names: in the order wanted.
+        most: number of names that are shown.
+
+    Returns:
+        The names, and how many more there are.
+    """
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
 def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Errors first, each kept in the order found, repeats removed, at most ``MOST_PER_RULE`` of one rule.
+    """Errors first, each kept in the order found, equal ones as one, at most ``MOST_PER_RULE`` of one rule.
 
     Args:
         findings: in any order.
@@ -153,7 +167,7 @@ def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """
     seen: Counter[str] = Counter()
     kept = []
-    for finding in dict.fromkeys(findings):
+    for finding in _grouped(findings):
         seen[finding.rule] += 1
         if seen[finding.rule] <= MOST_PER_RULE:
             kept.append(finding)
@@ -161,6 +175,16 @@ def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
         if count > MOST_PER_RULE:
             kept.append(Finding(rule, "", f"and {count - MOST_PER_RULE} more findings of this rule"))
     return tuple(sorted(kept, key=lambda f: SEVERITIES.index(f.severity)))
+
+
+def _grouped(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """Findings of one rule with the same message as one, at the first place."""
+    places: dict[tuple[str, str], dict[str, None]] = {}
+    for finding in findings:
+        places.setdefault((finding.rule, finding.message), {})[finding.path] = None
+    for (rule, message), paths in places.items():
+        first, *rest = paths
+        yield Finding(rule, first, f"{message} (at {len(paths)} places)" if rest else message)
 
 
 def has_errors(findings: Iterable[Finding]) -> bool:

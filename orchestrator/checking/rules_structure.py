@@ -150,7 +150,7 @@ def _kinds(u: StructureEntry, v: DescribedVariable | None, initial: bool, three:
         message = "dependenciesKind of an initial unknown must be dependent or constant, but is"
         yield Finding("structure.dependencies-kind", path, f"{message} {' '.join(u.kinds)}")
     elif three and v is not None and v.kind not in REAL and set(u.kinds) - {"dependent"}:
-        message = f"dependenciesKind of `{v.name}`, which is no floating point variable, must be dependent, but is"
+        message = "dependenciesKind of variables that are no floating point ones must be dependent, but is"
         yield Finding("structure.dependencies-kind-type", path, f"{message} {' '.join(u.kinds)}")
 
 

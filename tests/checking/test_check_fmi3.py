@@ -12,10 +12,11 @@ from lxml import etree
 from benchmarks.fuzz_check import one_case
 from orchestrator.checking.check import check_fmu
 from orchestrator.checking.grammar import check_grammar
-from tests.support.ball3 import INTERFACES, build_ball, model_description
+from tests.support.ball3 import INTERFACES, XML, ball_files, build_ball, model_description
 from tests.support.broken_ball3 import QUICK, Mutant, behavioural
+from tests.support.broken_ball3 import STATIC as STATIC_ONLY
 from tests.support.broken_ball3_xml import static
-from tests.support.c_fmu import have_compiler
+from tests.support.c_fmu import have_compiler, write_fmu
 from tests.support.c_fmu import model_description as model_description_2
 from tests.support.fuzz_fmu import damaged_tree
 
@@ -50,6 +51,29 @@ def test_a_discarded_step_is_done_in_shorter_ones(tmp_path: Path) -> None:
     report = check_fmu(build_ball(tmp_path, "discard_long"), QUICK)
     assert {f.rule for f in report.findings} == {"step.discarded"}
     assert not any(report.executions[0].stages.values())
+
+
+def test_discrete_inputs_stay_in_continuous_time_mode(tmp_path: Path) -> None:
+    files = ball_files("input_discrete", "ModelExchange")
+    changed = files[XML].replace(b'name="u"', b'name="u" variability="discrete"').replace(
+        b'\n        intermediateUpdate="true"/>', b"/>"
+    )
+    report = check_fmu(write_fmu(tmp_path / "discrete.fmu", files | {XML: changed}), QUICK)
+    assert report.findings == ()
+    assert report.executed
+
+
+def test_an_event_may_change_what_is_hidden(tmp_path: Path) -> None:
+    assert check_fmu(build_ball(tmp_path, "event_silent"), QUICK).findings == ()
+
+
+def test_a_text_with_an_attribute_start_is_one_finding(tmp_path: Path) -> None:
+    files = ball_files()
+    old = b'variability="fixed"><Start value="ball"/></String>'
+    assert files[XML].count(old) == 1
+    changed = files[XML].replace(old, b'variability="fixed" start="two words"/>')
+    report = check_fmu(write_fmu(tmp_path / "text.fmu", files | {XML: changed}), STATIC_ONLY)
+    assert [f.rule for f in report.findings] == ["schema.invalid"]
 
 
 def test_a_solver_goes_on_in_shorter_steps_where_derivatives_are_discarded(tmp_path: Path) -> None:

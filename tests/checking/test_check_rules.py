@@ -139,6 +139,11 @@ def test_errors_come_first_and_repeats_go() -> None:
         Finding("no.such-rule", "", "")
 
 
+def test_equal_findings_are_one() -> None:
+    found = ordered(Finding("model.guid", f"m.xml:/a[{i}]", "the same") for i in range(3))
+    assert found == (Finding("model.guid", "m.xml:/a[0]", "the same (at 3 places)"),)
+
+
 def test_hostile_names_reach_neither_terminal_nor_junit() -> None:
     report = FmuFindings("x.fmu", (Finding("archive.odd-name", "a\x1b[31m\nfake: no findings", "<&\"'\x00"),))
     verdict = judge(report, Policy())

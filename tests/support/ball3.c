@@ -29,7 +29,7 @@ typedef struct {
     int64_t mode;
     bool flag, tick, hit;
     char label[TEXT];
-    int steps;
+    int steps, echo;
 } State;
 
 typedef struct {

@@ -10,6 +10,7 @@ static void bounce(State *s) {
     s->x = 0.0;
     s->v *= -s->e;
     s->bounces++;
+    s->echo = s->steps;
 }
 
 FMI3_Export fmi3Status fmi3UpdateDiscreteStates(fmi3Instance i, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals,
@@ -234,7 +235,10 @@ FMI3_Export fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 t, fmi3Float64 h, 
     if (s->steps == 5 && !b->events) *event = true;
 #endif
 #ifdef FAULT_event_without_cause
-    if (s->steps == 5 && b->events) *event = true;
+    if (b->events && s->bounces > 0 && s->steps == s->echo + 1) *event = true;
+#endif
+#ifdef FAULT_event_silent
+    if (s->steps == 5 && b->events) *event = true;  /* no fault: what an event changes may be hidden */
 #endif
     double end = t + h;
     if (b->update) {

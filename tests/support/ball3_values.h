@@ -91,6 +91,9 @@ FMI3_Export fmi3Status fmi3SetFloat64(fmi3Instance i, const fmi3ValueReference r
 #ifdef FAULT_input_refused
                 if (value != 0.0) return refuse(b, "too much");
 #endif
+#ifdef FAULT_input_discrete
+                if (b->mode == CONTINUOUS) return refuse(b, "in event mode only");
+#endif
                 s->u = value; break;
             case X: case V:
                 if (!early && b->kind != 0) {

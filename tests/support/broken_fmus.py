@@ -34,6 +34,7 @@ BEHAVIOURS = {
     "ignores_step": "steps.variable",
     "illegal_status": "run.status",
     "init_error": "run.status",
+    "input_never": "value.set",
     "input_refused": "run.input-refused",
     "instance_leak": "resources.instance-leak",
     "instantiate_null": "run.instantiate",

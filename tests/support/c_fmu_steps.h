@@ -229,6 +229,9 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     Instance *self = c;
     const Saved *saved = state;
+#ifdef FAULT_crash_restore
+    volatile int *nowhere = NULL; *nowhere = 1;
+#endif
 #ifdef FAULT_state_not_restored
     double v = self->s.v;
 #endif

@@ -1,5 +1,6 @@
 """The driver of co-simulation of FMI 3.0: steps, early return, event mode and clocks."""
 
+import math
 from typing import Any
 
 from orchestrator.checking.probing.binding import (
@@ -105,7 +106,10 @@ class CoSimulation3(EventDriver):
         return bool(flags & self.job.flags)
 
     def _event(self, t: float, wanted: bool, when: str) -> None:
-        """Handle an event; say so when the FMU asked for it and it changes nothing."""
+        """Handle an event; say so when the FMU asked for it, it changes nothing, and the last one was just before.
+
+        An event may change what is hidden; one that is told twice changes nothing the second time.
+        """
         announced = self.memory.get("next")
         expected = announced is not None and announced <= t + _SMALL * max(abs(t), self.job.step)
         watched = self.job.watched() if wanted and not expected and not self.due(t) else []
@@ -115,8 +119,11 @@ class CoSimulation3(EventDriver):
         idle = not any(o.again or o.nominals_changed or o.states_changed for o in outcomes)
         same_next = announced == self.memory["next"]
         if watched and idle and same_next and before == self.read(watched, when):
-            text = "an event must have a cause, but one changes no output and no local variable"
-            self.report("event.without-cause", text, when=f"at t = {t:g}")
+            if t - self.memory.get("visible", -math.inf) <= (1.0 + _SMALL) * self.job.step:
+                text = "an event must have a cause, but one that follows another changes no output and no local variable"
+                self.report("event.without-cause", text, when=f"at t = {t:g}")
+        elif wanted:
+            self.memory["visible"] = t
         self.call("EnterStepMode", when=when)
 
 

@@ -130,6 +130,10 @@ def life_cycle(context: Context) -> None:
 
     Args:
         context: the FMU, its job and where findings go.
+
+    Raises:
+        StatusError: a call is refused, or the first step is discarded at any size.
+        DiscardedError: a step was discarded that may be possible in shorter ones.
     """
     bench, job = context.bench, context.bench.job
     outputs = job.outputs()
@@ -254,7 +258,9 @@ def inputs(context: Context) -> None:
 
 
 def setting(context: Context) -> None:
-    """Set everything that can be set to its start value before initialisation: accepted, and without effect.
+    """Set everything that can be set to its start value: accepted, and without effect.
+
+    Inputs are set in initialisation mode: before it, FMI 2.0 allows that for variables with ``initial`` only.
 
     Args:
         context: the FMU, its job and where findings go.
@@ -262,7 +268,11 @@ def setting(context: Context) -> None:
     bench, job = context.bench, context.bench.job
     settable = [v for v in job.variables if _settable(v)]
     with bench.instance(initialised=False) as driver:
-        for v in settable:
+        entered = False
+        for v in sorted(settable, key=lambda v: v.causality == "input"):
+            if v.causality == "input" and not entered:
+                driver.enter_initialisation(job.start, job.stop)
+                entered = True
             try:
                 driver.set([v], v.start or (), f"for `{v.name}`, set to its start value,")
             except StatusError as error:
@@ -271,7 +281,9 @@ def setting(context: Context) -> None:
                 return
         if context.trace is None:
             return
-        driver.initialise()
+        if not entered:
+            driver.enter_initialisation(job.start, job.stop)
+        driver.exit_initialisation()
         difference = context.compare(context.trace, bench.run(driver))
     if difference is not None:
         context.report_difference("value.set", "a run must not change when start values are set", difference)

@@ -78,8 +78,9 @@ def _simulate(context: Context, rows: Sequence[Row], parameters: Columns, inputs
     variables = list(dict.fromkeys(v for _, v in tube.columns))
     budget = Stopwatch(_PATIENCE * job.budget)
     with bench.instance(initialised=False) as driver:
-        _set(driver, parameters + inputs, rows[0])
+        _set(driver, parameters, rows[0])
         driver.enter_initialisation(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]))
+        _set(driver, inputs, rows[0])
         driver.exit_initialisation()
         tube.compare(driver.read(variables, "after initialisation"), rows[0])
         for row, following in pairwise(rows):
