@@ -66,6 +66,14 @@ def test_inputs_are_set_in_initialisation_mode_and_not_before(tmp_path: Path) ->
     assert not any(report.executions[0].stages.values())
 
 
+@pytest.mark.parametrize(("tolerance", "rule"), [(b"1e-6", "state.restore"), (b"1e-4", "run.inexact")])
+def test_a_restored_state_is_exact_to_what_the_tolerance_allows(tolerance: bytes, rule: str, tmp_path: Path) -> None:
+    files = fmu_files("state_coarse")
+    xml = files["modelDescription.xml"].replace(b'tolerance="1e-6"', b'tolerance="' + tolerance + b'"')
+    report = check_fmu(write_fmu(tmp_path / "coarse.fmu", files | {"modelDescription.xml": xml}), QUICK)
+    assert {f.rule for f in report.findings} == {rule}
+
+
 def test_a_crash_is_not_hidden_by_the_state_that_is_left(tmp_path: Path) -> None:
     report = check_fmu(build_c_fmu(tmp_path, "crash_restore"), QUICK)
     (finding,) = (f for f in report.findings if f.rule == "run.crash")

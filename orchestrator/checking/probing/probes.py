@@ -63,15 +63,16 @@ class Context:
         """
         return compare(expected, found, self.names)
 
-    def report_difference(self, rule: str, wanted: str, difference: Difference) -> None:
+    def report_difference(self, rule: str, wanted: str, difference: Difference, allowed: float = _SMALL) -> None:
         """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only.
 
         Args:
             rule: for a difference that matters.
             wanted: what the standard asks for, in words.
             difference: what was found.
+            allowed: for the milder one, relative to the range of the signal.
         """
-        if difference.relative > _SMALL:
+        if difference.relative > allowed:
             self.report(rule, f"{wanted}, but {difference}")
         else:
             self.report("run.inexact", f"{wanted} bit for bit, but {difference}")

@@ -8,6 +8,8 @@ from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, Skippe
 
 _STEP_TOLERANCE = 0.1
 _FEWEST_PAIRS = 10
+_AMPLIFIED = 100.0
+_SMALL, _MOST_INEXACT = 1e-3, 1e-2
 
 
 def determinism(context: Context) -> None:
@@ -152,7 +154,9 @@ def _continues(context: Context, driver: Driver, half: int, rule: str, wanted: s
     """Whether the rest of the run is as it was; a difference is reported."""
     difference = context.compare((context.trace or [])[half:], context.bench.run(driver, half))
     if difference is not None:
-        context.report_difference(rule, wanted, difference)
+        # A solver that starts anew errs by its tolerance, and the rest of the run multiplies that.
+        errs = _AMPLIFIED * (context.bench.job.tolerance or 0.0)
+        context.report_difference(rule, wanted, difference, min(max(errs, _SMALL), _MOST_INEXACT))
     return difference is None
 
 
