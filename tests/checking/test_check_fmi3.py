@@ -55,8 +55,10 @@ def test_a_discarded_step_is_done_in_shorter_ones(tmp_path: Path) -> None:
 
 def test_discrete_inputs_stay_in_continuous_time_mode(tmp_path: Path) -> None:
     files = ball_files("input_discrete", "ModelExchange")
-    changed = files[XML].replace(b'name="u"', b'name="u" variability="discrete"').replace(
-        b'\n        intermediateUpdate="true"/>', b"/>"
+    changed = (
+        files[XML]
+        .replace(b'name="u"', b'name="u" variability="discrete"')
+        .replace(b'\n        intermediateUpdate="true"/>', b"/>")
     )
     report = check_fmu(write_fmu(tmp_path / "discrete.fmu", files | {XML: changed}), QUICK)
     assert report.findings == ()
