@@ -17,9 +17,10 @@ from orchestrator.checking.probing import (
     probes_reference,
     trajectory,
 )
-from orchestrator.checking.probing.binding import PENDING, DiscardedError, Library, StatusError, TerminatedError
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.describing import make_job
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.statuses import PENDING, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.process import Process
 from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, OutputError

@@ -178,11 +178,12 @@ def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def _grouped(findings: Iterable[Finding]) -> Iterator[Finding]:
-    """Findings of one rule with the same message as one, at the first place."""
-    places: dict[tuple[str, str], dict[str, None]] = {}
+    """Findings of one rule with the same message as one, at the first place in a file; those of a probe stay apart."""
+    places: dict[tuple[str, str, str], dict[str, None]] = {}
     for finding in findings:
-        places.setdefault((finding.rule, finding.message), {})[finding.path] = None
-    for (rule, message), paths in places.items():
+        probe = finding.path if finding.path.startswith("(") else ""
+        places.setdefault((finding.rule, finding.message, probe), {})[finding.path] = None
+    for (rule, message, _), paths in places.items():
         first, *rest = paths
         yield Finding(rule, first, f"{message} (at {len(paths)} places)" if rest else message)
 

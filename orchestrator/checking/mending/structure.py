@@ -4,7 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from lxml import etree
 
-from orchestrator.checking.description import DescribedVariable, Description, read_description
+from orchestrator.checking.description import DescribedVariable, Description
+from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.rules_structure import required_initial_unknowns
 

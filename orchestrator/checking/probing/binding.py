@@ -4,16 +4,16 @@ The child does the calls (``checking.host``); what it says is taken for what the
 types and sizes, and nothing more.
 """
 
-import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
+from orchestrator.checking.probing.statuses import ERROR, StatusError, odd
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, SimulationError
 
-OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 _REFERENCE = re.compile(r"#([ribs])(\d+)#")
 _LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b", "String": "s"}
 
@@ -50,93 +50,6 @@ NAMES: Mapping[Version, Names] = {
         "DeserializeFMUState",
     ),
 }  # fmt: skip
-
-
-@dataclass(frozen=True)
-class ProbedVariable:
-    """A variable as the model description has it.
-
-    Attributes:
-        base: suffix of the functions that access it, such as "Real" or "Int32".
-        size: number of its values at the initial dimensions.
-        start: its values at the start, None when the description has none.
-        clocks: value references of its clocks; it is accessed while one of them ticks.
-        intermediate: whether it can be accessed in intermediate updates.
-        extents: its dimensions: a size, or minus one less the value reference of the parameter that has it.
-    """
-
-    name: str
-    reference: int
-    base: str
-    causality: str
-    variability: str
-    initial: str | None
-    start: tuple[Any, ...] | None
-    minimum: float | None
-    maximum: float | None
-    nominal: float | None
-    size: int = 1
-    clocks: tuple[int, ...] = ()
-    intermediate: bool = False
-    extents: tuple[int, ...] = ()
-
-    def resized(self, sizes: Mapping[int, int]) -> "ProbedVariable":
-        """The variable after structural parameters have changed.
-
-        Args:
-            sizes: by value reference of the structural parameter.
-
-        Returns:
-            The variable with its new size.
-        """
-        lengths = (e if e >= 0 else sizes.get(-1 - e, 1) for e in self.extents)
-        return replace(self, size=math.prod(lengths))
-
-    @property
-    def real(self) -> bool:
-        """Whether its values are floating point numbers."""
-        return self.base in ("Real", "Float32", "Float64")
-
-    @property
-    def numeric(self) -> bool:
-        """Whether its values are numbers, Boolean ones left out."""
-        return self.real or "Int" in self.base
-
-    @property
-    def labels(self) -> list[str]:
-        """A name for each of its values."""
-        return [self.name] if self.size == 1 else [f"{self.name}[{i}]" for i in range(self.size)]
-
-
-class StatusError(Exception):
-    """A call returned something else than was wanted.
-
-    Attributes:
-        function, status: what was called and what came back.
-        rule: the rule that is broken, where that is no matter of the status.
-    """
-
-    def __init__(self, function: str, status: int, detail: str, rule: str = "") -> None:
-        super().__init__(detail)
-        self.function = function
-        self.status = status
-        self.rule = rule
-
-
-class TerminatedError(Exception):
-    """The slave asks for the simulation to end, or cannot be followed further; that is no fault."""
-
-
-class DiscardedError(Exception):
-    """A step was discarded, which is allowed, and was not done in shorter ones either.
-
-    Attributes:
-        again: whether shorter ones can be tried, in a run that saves a state before each step.
-    """
-
-    def __init__(self, detail: str, again: bool = False) -> None:
-        super().__init__(detail)
-        self.again = again
 
 
 class FmiProcess(Protocol):
@@ -347,27 +260,3 @@ class Library:
         """Messages with the names of the variables that they refer to."""
         texts = [str(m)[:200] for m in messages[:4]] if isinstance(messages, list) else []
         return [_REFERENCE.sub(lambda m: self._known.get((m[1], int(m[2])), m[0]), text) for text in texts]
-
-
-def odd(function: str) -> ChildError:
-    """The error of an answer that a function cannot have.
-
-    Args:
-        function: what was called.
-
-    Returns:
-        The error, to be raised.
-    """
-    return ChildError(f"the answer to {function} is none", "protocol")
-
-
-def finite(value: Any) -> bool:
-    """Whether a value is no NaN and no infinity.
-
-    Args:
-        value: of any type.
-
-    Returns:
-        True for a finite number and for what is no float.
-    """
-    return not isinstance(value, float) or math.isfinite(value)

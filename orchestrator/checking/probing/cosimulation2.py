@@ -3,17 +3,10 @@
 import time
 from typing import Any
 
-from orchestrator.checking.probing.binding import (
-    DISCARD,
-    OK,
-    PENDING,
-    WARNING,
-    DiscardedError,
-    Library,
-    TerminatedError,
-)
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import MOST_PARTS, Driver
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.statuses import DISCARD, OK, PENDING, WARNING, DiscardedError, TerminatedError
 
 _DO_STEP_STATUS, _TERMINATED = 0, 3
 

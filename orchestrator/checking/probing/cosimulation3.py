@@ -3,18 +3,11 @@
 import math
 from typing import Any
 
-from orchestrator.checking.probing.binding import (
-    DISCARD,
-    OK,
-    WARNING,
-    DiscardedError,
-    Library,
-    StatusError,
-    TerminatedError,
-)
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import MOST_PARTS
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.statuses import DISCARD, OK, WARNING, DiscardedError, StatusError, TerminatedError
 
 _MOST_RETURNS = 1000
 _SMALL = 1e-9

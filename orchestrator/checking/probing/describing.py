@@ -6,8 +6,8 @@ from typing import Any
 
 from orchestrator.checking.description import DescribedVariable, Description, Interface, number
 from orchestrator.checking.layered import ReferenceResult
-from orchestrator.checking.probing.binding import ProbedVariable
 from orchestrator.checking.probing.job import ProbedClock, ProbeJob
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.shared.isolation.limits import Limits
 
 _STEPS = 100

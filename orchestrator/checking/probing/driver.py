@@ -3,9 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, ProbedVariable, odd
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.instance import FmuInstance
 from orchestrator.checking.probing.job import ProbeJob, references
+from orchestrator.checking.probing.statuses import odd
+from orchestrator.checking.probing.variables import ProbedVariable
 
 Report = Callable[..., None]
 _CTYPES = {

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.checking.probing.binding import OK, WARNING, StatusError, TerminatedError
 from orchestrator.checking.probing.driver import MOST_ITERATIONS, Driver
 from orchestrator.checking.probing.job import ProbedClock
+from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
 
 _NOT_YET_KNOWN, _UNCHANGED, _CHANGED = range(3)
 _SMALL = 1e-9

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from orchestrator.checking.probing.binding import FATAL, OK, PENDING, WARNING, Library, StatusError, odd
+from orchestrator.checking.probing.binding import Library
+from orchestrator.checking.probing.statuses import FATAL, OK, PENDING, WARNING, StatusError, odd
 
 _STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 _LARGEST_STATE = 64 << 20

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from orchestrator.checking.layered import ReferenceResult
-from orchestrator.checking.probing.binding import ProbedVariable
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.rules import Version
 
 

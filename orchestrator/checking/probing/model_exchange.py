@@ -7,11 +7,12 @@ Steps of an embedded pair of order 2 (Heun) with order 1 (Euler) are short enoug
 import math
 from typing import Any
 
-from orchestrator.checking.probing.binding import DISCARD, Library, StatusError, TerminatedError
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.cosimulation2 import CoSimulation2
 from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.statuses import DISCARD, StatusError, TerminatedError
 
 _TOLERANCE = 1e-3
 _MOST_STEPS = 300

@@ -8,17 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from orchestrator.checking.probing.binding import (
-    DISCARD,
-    DiscardedError,
-    Library,
-    ProbedVariable,
-    StatusError,
-    TerminatedError,
-    finite,
-)
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.statuses import DISCARD, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.trajectory import Bench, Difference, compare, excitation
+from orchestrator.checking.probing.variables import ProbedVariable, finite
 from orchestrator.shared.stopwatch import Stopwatch
 
 _LEAK_PER_INSTANCE = 256 * 1024

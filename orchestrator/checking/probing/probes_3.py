@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from orchestrator.checking.probing.binding import OK, WARNING, StatusError, TerminatedError
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
+from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
 
 _SMALL = 1e-9
 _FEW_STEPS = 20

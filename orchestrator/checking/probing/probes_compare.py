@@ -2,9 +2,10 @@
 
 from typing import Any
 
-from orchestrator.checking.probing.binding import ProbedVariable, StatusError
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
+from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.variables import ProbedVariable
 
 _STEP_TOLERANCE = 0.1
 _FEWEST_PAIRS = 10

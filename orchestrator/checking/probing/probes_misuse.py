@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from orchestrator.checking.probing.binding import OK, WARNING
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.statuses import OK, WARNING
 
 _NOT_REFUSED = (OK, WARNING)
 

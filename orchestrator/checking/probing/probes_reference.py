@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-from orchestrator.checking.probing.binding import ProbedVariable, TerminatedError
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.statuses import TerminatedError
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.shared.stopwatch import Stopwatch
 
 _RELATIVE = 0.02

@@ -6,13 +6,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, ProbedVariable, StatusError
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.cosimulation2 import CoSimulation2
 from orchestrator.checking.probing.cosimulation3 import CoSimulation3
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.scheduled import ScheduledExecution
+from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.variables import ProbedVariable
 
 _DRIVERS: dict[tuple[str, str], type[Driver]] = {
     ("2.0", "CoSimulation"): CoSimulation2,
