@@ -43,6 +43,7 @@ _HEADINGS = {
     "2.2.8.3": "clocked-variable",
     "2.2.8.4": "_clocks_specific_api",
     "2.2.9": "model-dependencies",
+    "2.2.11": "partial-derivatives",
     "2.3": "common-state-machine",
     "2.3.1": "FMUStateSettable",
     "2.3.2": "Instantiated",

@@ -199,14 +199,29 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 }
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
                                         fmi2Real value[]) {
-    (void)vr; (void)n; (void)order; (void)value;
-    return refuse(c, "output derivatives are not supported");
+    State *s = &((Instance *)c)->s;
+    double a = acceleration(s, s->x, s->v);
+    for (size_t i = 0; i < n; i++) {
+        if (order[i] != 1) return refuse(c, "output derivatives are of order 1");
+        if (vr[i] == VR_X) value[i] = s->v;
+        else if (vr[i] == VR_V) value[i] = a;
+        else if (vr[i] == VR_ENERGY) value[i] = s->v * (s->mass * a + s->stiffness * s->x);
+        else return refuse(c, "this variable has no output derivative");
+#ifdef FAULT_slope_zero
+        value[i] = 0.0;
+#endif
+    }
+    return fmi2OK;
 }
 #ifndef FAULT_missing_function
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t nu,
                                         const fmi2ValueReference known[], size_t nk, const fmi2Real dv[], fmi2Real dz[]) {
-    (void)unknown; (void)nu; (void)known; (void)nk; (void)dv; (void)dz;
+    (void)c; (void)unknown; (void)known; (void)nk; (void)dv;
+#ifdef FAULT_directional_refused
     return refuse(c, "directional derivatives are not supported");
+#endif
+    for (size_t i = 0; i < nu; i++) dz[i] = 0.0;  /* outputs follow the force after a step only */
+    return fmi2OK;
 }
 #endif
 

@@ -126,7 +126,7 @@ class Library:
             self.ended = True
             raise
         except SimulationError as error:
-            raise StatusError(doing, ERROR, f"{doing} cannot be called: {error}") from None
+            raise StatusError(doing, ERROR, f"{doing} cannot be called: {error}", "binary.exports") from None
         self.current = ""
         return answer
 

@@ -16,6 +16,7 @@ _BUDGET = 0.5  # s of a run; there are about fifteen
 _FLAGS = (
     "canGetAndSetFMUstate", "canSerializeFMUstate", "canGetAndSetFMUState", "canSerializeFMUState",
     "canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess", "canRunAsynchronuously",
+    "providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives",
     "hasEventMode", "mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate",
 )  # fmt: skip
 
@@ -61,6 +62,10 @@ def make_job(
         clocks=tuple(_clock(v) for v in known if v.kind == "Clock"),
         states=_count(d, [d.variable(u.variable) for u in d.derivatives]),
         indicators=_indicators(d),
+        rates=frozenset(
+            v.reference for u in d.derivatives if (v := d.variable(u.variable)) and v.reference is not None
+        ),
+        output_order=int(number(interface.element.get("maxOutputDerivativeOrder"), "Integer") or 0),
         start=start,
         stop=stop,
         step=step,

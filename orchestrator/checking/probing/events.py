@@ -1,6 +1,7 @@
 """Event mode: what model exchange and co-simulation share, in both versions of FMI."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,6 +41,9 @@ class EventDriver(Driver):
             qualifier = _CHANGED
             if interval is None:
                 interval, qualifier = self._interval(clock)
+            elif clock.kind in ("fixed", "tunable"):  # the description has a default, which the importer sets
+                arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("in", "double", [interval]))
+                self.call("SetIntervalDecimal", *arguments, when=f"for the clock `{clock.name}`")
             if shift is None:
                 shift = self._shift(clock) if clock.kind in ("fixed", "tunable") else 0.0
             if qualifier == _NOT_YET_KNOWN:
@@ -120,12 +124,13 @@ class EventDriver(Driver):
         chosen = [c for c in self.job.clocks if c.reference in ticks and ticks[c.reference] <= t + slack]
         return sorted(chosen, key=lambda c: c.priority)
 
-    def settle(self, t: float, when: str) -> list[EventOutcome]:
+    def settle(self, t: float, when: str, triggered: Sequence[ProbedClock] = ()) -> list[EventOutcome]:
         """In event mode: tick what is due, then update the discrete states until nothing is left to do.
 
         Args:
             t: time [s].
             when: words for the message of an error.
+            triggered: further input clocks that tick.
 
         Returns:
             What each update said.
@@ -134,7 +139,7 @@ class EventDriver(Driver):
             StatusError: a call is refused, or there is no end.
             TerminatedError: the FMU ends the simulation.
         """
-        ticking = self.due(t)
+        ticking = [*self.due(t), *triggered]
         outcomes: list[EventOutcome] = []
         for position in range(MOST_ITERATIONS):
             active = {c.reference for c in ticking} if position == 0 else set()

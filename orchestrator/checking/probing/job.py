@@ -39,6 +39,8 @@ class ProbeJob:
         resources: the folder of resources as the version hands it over; None when there is none.
         states: number of continuous states, None when the FMU has to be asked.
         indicators: number of event indicators, likewise.
+        rates: value references of the derivatives of states.
+        output_order: up to which order outputs have derivatives over time.
         start, stop, step: the experiment in s; ``stop`` is None when the FMU does not say.
         steps: number of communication steps of a test run.
         budget: seconds that a test run may take, of a :class:`Stopwatch`.
@@ -56,6 +58,8 @@ class ProbeJob:
     clocks: tuple[ProbedClock, ...]
     states: int | None
     indicators: int | None
+    rates: frozenset[int]
+    output_order: int
     start: float
     stop: float | None
     step: float

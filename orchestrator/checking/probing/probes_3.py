@@ -9,6 +9,7 @@ from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, Ter
 _SMALL = 1e-9
 _FEW_STEPS = 20
 _LARGEST = 8
+_LEAVING = {"CoSimulation": "EnterStepMode", "ModelExchange": "EnterContinuousTimeMode"}
 
 
 def early_return(context: Context) -> None:
@@ -130,6 +131,7 @@ def clocks(context: Context) -> None:
             context.report("clock.interval-value", wrong)
     if job.interface == "ScheduledExecution":
         raise SkippedError("there is no event mode")
+    _triggered(context)
     rows = []
     outputs = job.outputs()
     with bench.instance() as driver:
@@ -141,11 +143,24 @@ def clocks(context: Context) -> None:
             rows.append(driver.read(outputs))
             driver.call("EnterEventMode")
             driver.settle(t + job.step, "in event mode without a cause")
-            driver.call("EnterStepMode" if job.interface == "CoSimulation" else "EnterContinuousTimeMode")
+            driver.call(_LEAVING[job.interface])
     difference = context.compare(context.trace, rows)
     if difference is not None:
         wanted = "clocked variables must change only while their clock is active"
         context.report_difference("clock.inactive-change", wanted, difference)
+
+
+def _triggered(context: Context) -> None:
+    """Each triggered input clock can tick, and the run goes on."""
+    bench, job = context.bench, context.bench.job
+    for clock in (c for c in job.clocks if c.causality == "input" and c.kind == "triggered" and not c.clocks):
+        with bench.instance() as driver:
+            assert isinstance(driver, EventDriver)
+            bench.run(driver, 0, 1)
+            driver.call("EnterEventMode")
+            driver.settle(job.start + job.step, f"while the clock `{clock.name}` ticks", [clock])
+            driver.call(_LEAVING[job.interface])
+            bench.run(driver, 1, min(2, job.steps))
 
 
 def structure(context: Context) -> None:
@@ -180,6 +195,32 @@ def structure(context: Context) -> None:
             except (StatusError, TerminatedError) as error:
                 context.report("configuration.status", str(error))
                 return
+    _reconfigured(context)
+
+
+def _reconfigured(context: Context) -> None:
+    """Tunable structural parameters can be set in mid-run, and the run goes on."""
+    bench, job = context.bench, context.bench.job
+    chosen = [v for v in job.variables if v.causality == "structuralParameter" and v.variability == "tunable"]
+    chosen = [v for v in chosen if v.base == "UInt64"]
+    if not chosen or job.interface == "ScheduledExecution":
+        return
+    with bench.instance() as driver:
+        bench.run(driver, 0, 1)
+        leaves = job.interface == "ModelExchange"  # there, reconfiguration begins in event mode
+        try:
+            if leaves:
+                driver.call("EnterEventMode")
+            driver.call("EnterConfigurationMode", when="in mid-run")
+            for v in chosen:
+                driver.set([v], [_size(v, 1)], f"for `{v.name}` in reconfiguration mode")
+            driver.call("ExitConfigurationMode", when="in mid-run")
+            if leaves:
+                driver.call("EnterContinuousTimeMode")
+            t = job.start + job.step
+            driver.advance(t, job.step, "after reconfiguration mode")
+        except StatusError as error:
+            context.report("configuration.status", str(error))
 
 
 def _size(v: Any, change: int) -> int:

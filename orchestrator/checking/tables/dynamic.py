@@ -70,6 +70,11 @@ state.free | W | 2.1.8 | 2.2.7.4 | freeing a state sets it to null | set the poi
 [variable steps]
 steps.variable | W | 4.3.1 | 4.4 | results hardly depend on the communication step | integrate over the step given, or clear canHandleVariableCommunicationStepSize
 
+[derivatives]
+derivative.status | E | 2.1.9 | 2.2.11 | derivatives are given as the flags promise | implement the function, or clear the flag
+derivative.value | W | 2.1.9 | 2.2.11 | derivatives are those of small changes | differentiate what is computed
+derivative.adjoint | E | - | 2.2.11 | adjoint derivatives are the directional ones transposed | compute both from one matrix
+
 [intermediate update]
 intermediate.unexpected | E | - | 4.2.2 | intermediateUpdate is called in fmi3DoStep, by FMUs that say so | set providesIntermediateUpdate, or do not call it
 intermediate.missing | W | - | 4.4 | an FMU that provides intermediate updates calls them | call intermediateUpdate, or clear the flag
