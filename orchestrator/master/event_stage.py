@@ -38,6 +38,10 @@ def is_discrete(variable: Variable) -> bool:
     return variable.type != "Real" or variable.variability == "discrete"
 
 
+def _is_smooth(variable: Variable) -> bool:
+    return variable.causality == "output" and not is_discrete(variable) and variable.variability == "continuous"
+
+
 class EventStage:
     """One instance of a system with events; its slave may have none.
 
@@ -48,8 +52,15 @@ class EventStage:
     Attributes:
         steps: calls that asked the slave for a step.
         can_go_back: it can be taken back to a saved state, and step to any time from there.
-        send: moves the continuous inputs; of a slave without events all.
+        names: of the inputs that it takes at steps: the continuous ones; of a slave without events all.
+        feeds: of these.
+        inputs: their slots.
+        inside: it can be told what they do inside a step.
+        send: moves them.
         outputs: its output slots.
+        rated: outputs whose derivatives it knows.
+        rate_slots: their slots.
+        follows: outputs that depend on an input of ``names`` at once.
         next_event: [s], as the slave said last; infinity where it knows of none.
     """
 
@@ -61,6 +72,9 @@ class EventStage:
         self.outputs = slice(block.first_output, block.first_output + len(block.outputs))
         self.next_event, self.steps = math.inf, 0
         self.send, self.receive = stage.send, stage.receive
+        self._take_inputs(block.inputs)
+        self.rated: list[str] = []
+        self.rate_slots = np.empty(0, dtype=np.int64)
         self._values = values
         self._clocks: dict[str, tuple[Callable[[], None], Callable[[], None]]] = {}
         self._sent = np.empty(0)
@@ -72,7 +86,12 @@ class EventStage:
         discrete = [name for name in free if is_discrete(model.variables[name])]
         places = {name: block.first_input + k for k, name in enumerate(block.inputs)}
         self._discrete = np.array([places[name] for name in discrete], dtype=np.int64)
-        self.send = bind_send(self.slave, block, [name for name in free if name not in discrete], values)
+        self._take_inputs([name for name in free if name not in discrete])
+        self.send = bind_send(self.slave, block, self.names, values)
+        if model.output_derivatives:
+            self.rated = [n for n in block.outputs if n not in clocked and _is_smooth(model.variables[n])]
+            slots = [block.first_output + block.outputs.index(name) for name in self.rated]
+            self.rate_slots = np.array(slots, dtype=np.int64)
         self._send_discrete = bind_send(self.slave, block, discrete, values)
         for name, clock in model.clocks.items():
             inputs = [v for v in block.inputs if v in clock.variables]
@@ -81,6 +100,25 @@ class EventStage:
                 bind_send(self.slave, block, inputs, values),
                 bind_receive(self.slave, block, outputs, values),
             )
+
+    def _take_inputs(self, names: Sequence[str]) -> None:
+        """Take these inputs at steps."""
+        block, model = self.block, self.slave.model
+        self.names = tuple(names)
+        self.feeds = [block.feeds[block.inputs.index(name)] for name in names]
+        self.inputs = np.array([feed.slot for feed in self.feeds], dtype=np.int64)
+        self.inside = self.has_events and model.takes_inputs_inside_steps and bool(names)
+        outputs = [name for name in block.outputs if model.variables[name].causality == "output"]
+        self.follows = {name for name in outputs if not model.depends_on(name).isdisjoint(names)}
+
+    def read_rates(self, rates: Signals) -> None:
+        """Read the derivatives of the outputs where the slave is.
+
+        Args:
+            rates: by slot; those of ``rate_slots`` are written.
+        """
+        if self.rated:
+            rates[self.rate_slots] = self.events.output_rates(self.rated)
 
     def step(self, begin: float, end: float) -> StepOutcome:
         """Step towards ``end`` [s].

@@ -48,6 +48,7 @@ class EventIteration:
 
     Attributes:
         stages: all instances, in execution order.
+        rated: signals whose derivatives are known; those of outputs that follow inputs at once would lack the inputs'.
         late: see ``EventStatistics``.
         late_for: an instance that could not be taken back to events, for which they were late.
     """
@@ -65,6 +66,22 @@ class EventIteration:
         self._discrete = np.array([k for k in self._outputs if k in discrete], dtype=np.int64)
         sources = {feed.source for stage in self._taking for feed in stage.block.feeds if feed.source >= 0}
         self._sources = np.array(sorted(sources), dtype=np.int64)
+
+        self.rated = np.zeros(len(slots), dtype=bool)
+        for stage in self._taking:
+            for name, slot in zip(stage.rated, stage.rate_slots, strict=True):
+                self.rated[slot] = name not in stage.follows
+
+    def rates(self) -> Array:
+        """Return the derivatives of the outputs where the slaves are, as far as they know them; zero for others.
+
+        Returns:
+            Shape (slots,), in the slots' units per second.
+        """
+        found = np.zeros(len(self.wiring.values))
+        for stage in self._taking:
+            stage.read_rates(found)
+        return found
 
     def _forget(self, start: float) -> None:
         """Begin anew at ``start`` [s]."""
