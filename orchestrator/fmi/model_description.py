@@ -69,7 +69,7 @@ def read_description(path: Path, events: bool = True) -> FmuDescription:
     if clocks := [*description.model.clocks, *description.events.timed]:
         raise FmuError(f"{path}: its clocks ({clock_names(clocks)}) tick in event mode, which is not used here")
     model = replace(
-        description.model, has_events=False, output_derivatives=0, takes_inputs_inside_steps=False, clocks={}
+        description.model, has_events=False, output_derivatives=0, inputs_inside_steps=frozenset(), clocks={}
     )
     return replace(description, model=model, events=EventFeatures())
 
@@ -186,9 +186,9 @@ def _description3(root: etree._Element, cosimulation: etree._Element, python: bo
         can_vary_step=_flag(cosimulation, "canHandleVariableCommunicationStepSize"),
         has_events=has_events,
         output_derivatives=int(cosimulation.get("maxOutputDerivativeOrder", "0")) if has_events else 0,
-        takes_inputs_inside_steps=has_events
-        and _flag(cosimulation, "providesIntermediateUpdate")
-        and bool(events.inside),
+        inputs_inside_steps=events.inside
+        if has_events and _flag(cosimulation, "providesIntermediateUpdate")
+        else frozenset(),
         clocks=clocks,
     )
     return FmuDescription(

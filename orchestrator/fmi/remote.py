@@ -261,7 +261,7 @@ def without_feed(description: FmuDescription) -> FmuDescription:
     Returns:
         The same, but nothing is set inside steps.
     """
-    return replace(description, model=replace(description.model, takes_inputs_inside_steps=False))
+    return replace(description, model=replace(description.model, inputs_inside_steps=frozenset()))
 
 
 @dataclass(frozen=True)

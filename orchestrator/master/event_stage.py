@@ -55,7 +55,8 @@ class EventStage:
         names: of the inputs that it takes at steps: the continuous ones; of a slave without events all.
         feeds: of these.
         inputs: their slots.
-        inside: it can be told what they do inside a step.
+        inside: those that it can be told inside a step.
+        places: of these among ``names``.
         send: moves them.
         outputs: its output slots.
         rated: outputs whose derivatives it knows.
@@ -107,7 +108,8 @@ class EventStage:
         self.names = tuple(names)
         self.feeds = [block.feeds[block.inputs.index(name)] for name in names]
         self.inputs = np.array([feed.slot for feed in self.feeds], dtype=np.int64)
-        self.inside = self.has_events and model.takes_inputs_inside_steps and bool(names)
+        self.inside = [name for name in names if self.has_events and name in model.inputs_inside_steps]
+        self.places = [self.names.index(name) for name in self.inside]
         outputs = [name for name in block.outputs if model.variables[name].causality == "output"]
         self.follows = {name for name in outputs if not model.depends_on(name).isdisjoint(names)}
 

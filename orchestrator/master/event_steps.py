@@ -250,13 +250,16 @@ class FixedSteps:
         self.gather(stage.stage)
         first = self.values[stage.inputs]
         self.values[:] = now
+        held = np.delete(np.arange(len(first)), stage.places)
+        first[held] = last[held]
         self.values[stage.inputs] = first
-        for k, feed in enumerate(stage.feeds):
+        for k in stage.places:
+            feed = stage.feeds[k]
             if self.events.rated[feed.source] and feed.source >= 0 and newest[feed.source] == self._before[feed.source]:
                 last[k] += feed.factor * self._rates[feed.source] * (end - begin)
-        slopes = ((last - first) / (end - begin)).tolist()
-        lines = list(zip(first.tolist(), slopes, strict=True))
-        stage.events.feed(stage.names, lambda time: [value + slope * (time - begin) for value, slope in lines])
+        slopes = (last - first) / (end - begin)
+        lines = [(float(first[k]), float(slopes[k])) for k in stage.places]
+        stage.events.feed(stage.inside, lambda time: [value + slope * (time - begin) for value, slope in lines])
         return last
 
     def _solve(self, group: _Group, begin: float, end: float) -> None:

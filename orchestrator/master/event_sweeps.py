@@ -181,7 +181,9 @@ class Sweeper:
         cubics = cell_coefficients(nodes, slopes, rated, cell)
         times = (begin, middle, end)
         event = False
-        rows: list[list[list[float]]] = cubics.transpose(0, 2, 1).tolist()
+        rows: list[list[list[float]]] = cubics[:, :, stage.places].transpose(0, 2, 1).tolist()
+        begins = cubics.transpose(0, 2, 1) @ np.array([1.0, 0.5, 1.0 / 3.0, 0.25])  # means, of those that are held
+        begins[:, stage.places] = cubics[:, 0, stage.places]
         for k in range(2):
             origin, cubic = times[k], rows[k]
 
@@ -189,9 +191,9 @@ class Sweeper:
                 s = (time - origin) / cell
                 return [a + s * (b + s * (c + s * d)) for a, b, c, d in cubic]
 
-            self.wiring.values[stage.inputs] = cubics[k, 0]
+            self.wiring.values[stage.inputs] = begins[k]
             stage.send()
-            stage.events.feed(stage.names, fed)
+            stage.events.feed(stage.inside, fed)
             outcome = stage.step(times[k], times[k + 1])
             event = outcome.event
             self._show(stage, k + 1, values, rates)

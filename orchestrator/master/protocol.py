@@ -123,7 +123,7 @@ class ModelInterface:
         can_vary_step: ``do_step`` takes steps of any length.
         has_events: its slaves are ``EventSlave``.
         output_derivatives: order up to which ``EventSlave.output_rates`` knows derivatives of outputs; 0: none.
-        takes_inputs_inside_steps: ``EventSlave.feed`` works.
+        inputs_inside_steps: names of the continuous inputs that ``EventSlave.feed`` takes.
         clocks: periodic input clocks by name, which the master ticks.
     """
 
@@ -135,7 +135,7 @@ class ModelInterface:
     can_vary_step: bool = True
     has_events: bool = False
     output_derivatives: int = 0
-    takes_inputs_inside_steps: bool = False
+    inputs_inside_steps: frozenset[str] = frozenset()
     clocks: Mapping[str, "PeriodicClock"] = field(default_factory=dict)
 
     def named(self, causality: str) -> tuple[str, ...]:
@@ -410,7 +410,7 @@ class EventSlave(Slave, Protocol):
         """Say what continuous inputs are inside steps, from now on.
 
         Args:
-            names: of inputs.
+            names: of inputs, all of them among ``ModelInterface.inputs_inside_steps``.
             values: a value per name at a time [s]; ``None``: inputs are held again.
         """
 
