@@ -475,7 +475,7 @@ class Maker:
             p[k] *= 1.001
             columns.append(((self.run((), (), p)[1] - base) / self.sigma).ravel())
         J = np.column_stack(columns)
-        tolds = [self.told(given_one, J) for given_one in self.alone(names, given, base)]
+        tolds = [self.unexplained_change(given_one, J) for given_one in self.alone(names, given, base)]
         u, y = self.run(names, given, noisy=True)
         if not (np.all(np.isfinite(u)) and np.all(np.isfinite(y))):  # the loop does not bear these sizes
             return self.case(names, low, high)
@@ -499,7 +499,7 @@ class Maker:
         return found
 
     @staticmethod
-    def told(changes: np.ndarray, J: np.ndarray) -> float:
+    def unexplained_change(changes: np.ndarray, J: np.ndarray) -> float:
         """Return what an effect changes beyond what parameters and the size of the others take up, over the noise."""
         change = changes[:, :, 0] - np.sum(changes[:, :, 1:], axis=2)
         known = np.column_stack([J, *(changes[:, :, k].ravel() for k in range(1, changes.shape[2]))])

@@ -38,9 +38,9 @@ def estimated(path: Path, model: Path | None, out: Path) -> tuple[float, float]:
     return float(found["alpha"]), float(found["standard_error"])
 
 
-def largest_difference(one: Record, other: Record) -> float:
+def largest_difference(first: Record, other: Record) -> float:
     """Return the largest difference of two records' torques [N.m] and angles [rad]."""
-    pairs = ((one.u, other.u), (one.theta_m, other.theta_m), (one.theta_l, other.theta_l))
+    pairs = ((first.u, other.u), (first.theta_m, other.theta_m), (first.theta_l, other.theta_l))
     return max(float(np.abs(a - b).max()) for a, b in pairs if a is not None and b is not None)
 
 

@@ -86,7 +86,7 @@ def guided(arguments: argparse.Namespace) -> None:
     findings = Findings(arguments.target, arguments.corpus / "findings")
     end = time.process_time() + arguments.seconds
 
-    def one(data: bytes) -> None:
+    def run_input(data: bytes) -> None:
         findings.run(function, data)
         if time.process_time() > end:
             print(findings.summary(), flush=True)
@@ -94,7 +94,7 @@ def guided(arguments: argparse.Namespace) -> None:
 
     options = [sys.argv[0], str(corpus), "-max_len=60000", "-timeout=120", "-rss_limit_mb=3000", "-verbosity=0",
                f"-seed={arguments.seed}"]  # fmt: skip
-    atheris.Setup(options, one)
+    atheris.Setup(options, run_input)
     atheris.Fuzz()
 
 

@@ -192,7 +192,7 @@ class Importer:
         motor, load = self.motor, self.load
         states = [(half, half.fmu.getFMUState()) for half in (motor, load)]
         theta, omega = motor.get("theta_m", "omega_m")
-        first = (load.get("T_shaft")[0], load.rate("T_shaft") + self.pull())
+        first = (load.get("T_shaft")[0], load.rate("T_shaft") + self.torque_rate())
         last, last_rate = first[0] + (end - begin) * first[1], first[1]
         before = np.inf
         accelerations = [motor.rate("omega_m"), 0.0]
@@ -210,7 +210,7 @@ class Importer:
             load.set(theta_m=theta, omega_m=omega)
             load.feed = lambda t, a=angle, s=speed: {"theta_m": a(t), "omega_m": s(t)}  # type: ignore[misc]
             event, reached = load.step(begin, end - begin)
-            last, last_rate = load.get("T_shaft")[0], load.rate("T_shaft") + self.pull()
+            last, last_rate = load.get("T_shaft")[0], load.rate("T_shaft") + self.torque_rate()
             if reached - begin < SAME:  # the event is where the window begins: the motor stays there
                 motor.fmu.setFMUState(states[0][1])
                 end = reached
@@ -224,7 +224,7 @@ class Importer:
             half.fmu.freeFMUState(state)
         return end, event
 
-    def pull(self) -> float:
+    def torque_rate(self) -> float:
         """Return what the motor's acceleration adds to the derivative of the torque, whose half holds the speed."""
         touching = self.load.fmu.getInt32([self.load.references["contact"]])[0] != 0
         return DAMPING * self.motor.rate("omega_m") / RATIO if touching else 0.0

@@ -7,7 +7,6 @@ from orchestrator.shared.version import __version__
 
 # Public name -> the module that has it. A module is imported when the first of its names is used.
 _PUBLIC = {
-    "BenchmarkResult": "orchestrator.api.benchmark",
     "BuildResult": "orchestrator.api.build",
     "ThesisResult": "orchestrator.api.thesis",
     "CalibrationError": "orchestrator.errors",

@@ -7,14 +7,7 @@ import sys
 
 
 def run(module: str = "orchestrator.cli") -> None:
-    """Run a command line and end the process with its exit code.
-
-    Args:
-        module: whose function ``main`` is run.
-
-    Raises:
-        SystemExit: always.
-    """
+    """Run a command line and end the process with its exit code."""
     for name, number in (("stdout", 1), ("stderr", 2)):
         if getattr(sys, name) is None:  # closed by the caller: what is written then goes nowhere
             null = os.open(os.devnull, os.O_WRONLY)

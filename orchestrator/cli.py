@@ -29,14 +29,7 @@ COMMANDS = {
 
 
 def build_parser(command: str | None) -> argparse.ArgumentParser:
-    """Return the parser; only the module of ``command`` is imported, so that start-up stays quick.
-
-    Args:
-        command: whose options are needed; None: no command is given.
-
-    Returns:
-        The parser.
-    """
+    """Return the parser; only the module of ``command`` is imported, so that start-up stays quick."""
     called = Path(sys.argv[0]).name  # the module itself when run by `python -m`
     program = called if called == PROGRAM else "python -m orchestrator"
     parser = Parser(prog=program, description=importlib.import_module("orchestrator").__doc__)
@@ -62,9 +55,6 @@ def build_parser(command: str | None) -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 0 done, 1 a check or a run found problems, 2 bad input.
-
-    Args:
-        argv: words of the command line (default: those of this process).
 
     Returns:
         The exit code; 130 after Ctrl-C.

@@ -15,6 +15,7 @@
         ├── SlaveError            a slave refused or failed a call
         ├── ChildError            a child process that ran foreign code ended, or broke a limit
         └── ConvergenceError      an iteration that did not converge
+            └── ChatteringError   events that do not come to an end at one time
 """
 
 
@@ -99,3 +100,7 @@ class ChildError(SimulationError):
 
 class ConvergenceError(SimulationError):
     """An iteration did not converge within its stated limits."""
+
+
+class ChatteringError(ConvergenceError):
+    """Events at one time do not come to an end: slaves ask for another instant, or report another event, for ever."""

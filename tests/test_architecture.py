@@ -36,7 +36,7 @@ LAYERS = (
     {"scenarios"},
     {"checking"},
     {"paired", "estimation"},
-    {"estimation.inspection", "estimation.methods", "paired.bench"},
+    {"estimation.inspection", "estimation.methods"},
     {"diagnosis.fmu_probe_settings"},
     {"diagnosis.fmu_settings"},
     {"diagnosis.settings"},

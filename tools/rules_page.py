@@ -1,4 +1,4 @@
-"""Write the table of rules in ``docs/check.md``.
+"""Write ``docs/rules.md``: every rule of the checker.
 
 python -m tools.rules_page
 """
@@ -7,28 +7,25 @@ from pathlib import Path
 
 from orchestrator.checking.rules import RULES, VERSIONS, Rule, Version
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "check.md"
-HEADING = "## Rules\n"
-HEAD = """
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "rules.md"
+HEAD = """# Rules of the checker
+
+[Checking FMUs](check.md) says how rules are selected and what runs them.
 The sections are those of the texts of FMI 2.0.4 and 3.0.2; "own" is a rule that the standard does not have, "-" is one
-that does not apply. This table is written by `python -m tools.rules_page`.
+that does not apply. This page is written by `python -m tools.rules_page`.
 
 | rule | severity | FMI 2.0 | FMI 3.0 | what must hold | what to do |
 |---|---|---|---|---|---|
 """
 
 
-def page(text: str) -> str:
-    """Return the page with its table of rules made anew.
-
-    Args:
-        text: of the page; the table is all that follows the heading "Rules".
-    """
+def page() -> str:
+    """Return the page."""
     rows = [
         f"| `{name}` | {r.severity} | {_place(r, '2.0')} | {_place(r, '3.0')} | {r.expects} | {r.advice} |\n"
         for name, r in RULES.items()
     ]
-    return text[: text.index(HEADING) + len(HEADING)] + HEAD + "".join(rows)
+    return HEAD + "".join(rows)
 
 
 def _place(rule: Rule, version: Version) -> str:
@@ -42,4 +39,4 @@ def _place(rule: Rule, version: Version) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(page(), encoding="utf-8")

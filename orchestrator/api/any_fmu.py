@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.arguments import choose_settings
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.fmu.deliver import Delivered, deliver
 from orchestrator.diagnosis.fmu.diagnose import diagnose_fmu as diagnosing
@@ -107,7 +107,7 @@ class FmuDiagnosisResult(Result):
             verdict=d.verdict,
             trust=d.trust.found(),
             effects=tuple(effect_found(effect) for effect in d.effects),
-            parameters=parameters_found(d),
+            parameters=parameter_results(d),
             test=tuple(test_found(test, report) for test in d.test),
             validation=None if self.validation is None else test_found(self.validation, report),
             remaining=FmuRemainingFound(dict(d.left), tuple(dependence_found(one) for one in d.remaining)),
@@ -146,23 +146,16 @@ class FmuDiagnosisResult(Result):
         self.diagnosis.workings.close()
 
 
-def parameters_found(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
-    """Return re-fitted parameters as result files have them.
-
-    Args:
-        diagnosis: of the records.
-
-    Returns:
-        The parameters by name.
-    """
+def parameter_results(diagnosis: FmuDiagnosis) -> dict[str, ParameterFound]:
+    """Return re-fitted parameters as result files have them."""
     return {
         name: ParameterFound(one.nominal, one.value, one.standard_error, one.interval, one.unit)
         for name, one in diagnosis.parameters.items()
     }
 
 
-def _tables(found: FmuDiagnosisResult) -> Iterator[Block]:
-    d = found.diagnosis
+def _tables(diagnosis: FmuDiagnosisResult) -> Iterator[Block]:
+    d = diagnosis.diagnosis
     rows = [
         (name, f"{e.nominal:.6g}", f"{e.value:.6g}", f"{e.standard_error:.2g}", e.unit)
         for name, e in d.parameters.items()
@@ -176,7 +169,10 @@ def _tables(found: FmuDiagnosisResult) -> Iterator[Block]:
     ]  # fmt: skip
     if tried:
         yield table("What was tried", ("on top of", "effect", "gain [%]", "over its error", ""), tried)
-    for title, tests in (("Misfit on test data", found.test), ("Misfit on the other record", (found.validation,))):
+    for title, tests in (
+        ("Misfit on test data", diagnosis.test),
+        ("Misfit on the other record", (diagnosis.validation,)),
+    ):
         cells: list[tuple[str, ...]] = [
             (test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit)
             for test in tests if test is not None for one in test.signals
@@ -186,16 +182,7 @@ def _tables(found: FmuDiagnosisResult) -> Iterator[Block]:
 
 
 def read_records(records: Sequence[Path | str], given: Map, settings: DiagnosisSettings) -> tuple[list[Data], int]:
-    """Return the columns of records that a map names, at the rate that the first one asks for.
-
-    Args:
-        records: paths of the logs.
-        given: the map.
-        settings: of reading and rate.
-
-    Returns:
-        The records, and how many rows of the files come to one.
-    """
+    """Return the columns of records that a map names, at the rate that the first one asks for."""
     found = [read_data(Path(path), given, settings.fmu.read) for path in records]
     factor = factor_of(found[0], settings.fmu.rate)
     return [decimated(data, factor) for data in found], factor
@@ -216,25 +203,11 @@ def diagnose_fmu(
     """Return what records say of an FMU, and which effects are missing around it.
 
     Args:
-        record: CSV file with the columns that the map names, or several of one machine.
         fmu: any FMI 2.0 co-simulation FMU, or a scenario file of several; they run in a child process.
-        map: TOML file: columns, uncertain parameters, ports.
-        validate: another record of the same columns, to show the misfit on; nothing is fitted to it.
-        test: a record that is test data as a whole; None: the last part of each record is.
-        settings: thresholds, or the path of a TOML file of them.
-        search: False: the FMU is re-fitted and judged as it stands.
         time_limit: seconds after which the search ends with what it has; None: the map's budget.
-        progress: called with what is being done.
-
-    Returns:
-        What is missing around the FMU, with how it was found.
-
-    Raises:
-        InputError: record, FMU, map or settings cannot be used.
-        SimulationError: the FMU fails again and again.
     """
     begun = time.monotonic()
-    used = chosen_settings(settings, DiagnosisSettings)
+    used = choose_settings(settings, DiagnosisSettings)
     subject = subject_of(Path(fmu))
     given = read_map(Path(map), subject)
     paths = [record] if isinstance(record, (Path, str)) else list(record)
@@ -266,12 +239,12 @@ def draft_map(record: Path | str, fmu: Path | str) -> str:
         fmu: path of the FMU.
 
     Returns:
-        The TOML text.
+        Text of the map in TOML, to be completed where it says so.
 
     Raises:
         InputError: record or FMU cannot be read.
 
-    Example:
+    Examples:
         >>> "[ports.port_1]" in oc.draft_map("axis.csv", "axis.fmu")
         True
     """

@@ -5,31 +5,20 @@ from pathlib import Path
 from typing import TypeVar
 
 from orchestrator.errors import ScenarioError
-from orchestrator.paired.experiment import BACKLASH_MODELS, EXPERIMENTS, Experiment, named_experiment
+from orchestrator.paired.experiment import BACKLASH_MODELS, EXPERIMENTS, Experiment, experiment_of
 from orchestrator.paired.pair import with_settings
 from orchestrator.shared.settings import Settings, read_settings
 
 S = TypeVar("S", bound=Settings)
 
 
-def chosen_experiment(experiment: str | Experiment, backlash_model: str | None = None) -> Experiment:
-    """Return the experiment that is meant.
-
-    Args:
-        experiment: an experiment, or the name of one of ``EXPERIMENTS``.
-        backlash_model: of the loop with a gap (default: the experiment's own).
-
-    Returns:
-        The experiment with that backlash model.
-
-    Raises:
-        ScenarioError: a name is unknown.
-    """
+def choose_experiment(experiment: str | Experiment, backlash_model: str | None = None) -> Experiment:
+    """Return the experiment that is meant."""
     if isinstance(experiment, str):
         if experiment not in EXPERIMENTS:
             known = ", ".join(EXPERIMENTS)
             raise ScenarioError(f"`experiment` must be one of {known}, but is {experiment!r}", "experiment")
-        experiment = named_experiment(experiment)
+        experiment = experiment_of(experiment)
     if backlash_model is not None and backlash_model not in BACKLASH_MODELS:
         known = ", ".join(BACKLASH_MODELS)
         raise ScenarioError(f"`backlash_model` must be one of {known}, but is {backlash_model!r}", "backlash_model")
@@ -37,56 +26,21 @@ def chosen_experiment(experiment: str | Experiment, backlash_model: str | None =
 
 
 def not_negative(name: str, value: float) -> float:
-    """Return ``value``, a number that must be finite and not negative.
-
-    Args:
-        name: of the argument, for the message.
-        value: in any unit.
-
-    Returns:
-        The same number.
-
-    Raises:
-        ScenarioError: it is negative or not finite.
-    """
+    """Return ``value``, a number that must be finite and not negative."""
     if not (math.isfinite(value) and value >= 0.0):
         raise ScenarioError(f"`{name}` must be finite and not negative, but is {value}", name)
     return value
 
 
 def within(name: str, value: float, least: float, most: float) -> float:
-    """Return ``value``, a number that must lie between two bounds.
-
-    Args:
-        name: of the argument, for the message.
-        value: in any unit.
-        least: smallest allowed.
-        most: largest allowed.
-
-    Returns:
-        The same number.
-
-    Raises:
-        ScenarioError: it lies outside.
-    """
+    """Return ``value``, a number that must lie between two bounds."""
     if not least <= value <= most:
         raise ScenarioError(f"`{name}` must be between {least:g} and {most:g}, but is {value:g}", name)
     return value
 
 
-def chosen_settings(given: S | Path | str | None, kind: type[S]) -> S:
-    """Return the settings that are meant.
-
-    Args:
-        given: settings, the path of a TOML file with those that differ from the default, or None for the default.
-        kind: their class.
-
-    Returns:
-        All settings of that class.
-
-    Raises:
-        ScenarioError: the file cannot be read, or a name or value in it is wrong.
-    """
+def choose_settings(given: S | Path | str | None, kind: type[S]) -> S:
+    """Return the settings that are meant."""
     if given is None:
         return kind()
     return read_settings(Path(given), kind) if isinstance(given, (str, Path)) else given

@@ -1,82 +1,9 @@
-"""Speed and accuracy as ratios measured in one run."""
+"""Speed and accuracy as ratios measured in one run; the work is in ``benchmarks/masters`` of the source tree."""
 
-import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any, ClassVar
 
-from orchestrator.api.shown import Block, Result, table
-from orchestrator.building.build import ensure_built
-from orchestrator.building.native_build import ensure_native
-from orchestrator.errors import ScenarioError
-from orchestrator.paired.bench.alone import CASE_STEPS, RECORD_STEPS, RecordCost, SweepCost, growth
-from orchestrator.paired.bench.job import BenchJob
-from orchestrator.paired.bench.measure import ToolRow, compare
-from orchestrator.paired.bench.of_scenario import job_of
-from orchestrator.paired.bench.results import BenchFound
-from orchestrator.paired.bench.scaling import Cost, scaling
-from orchestrator.paired.bench.tools import TOOLS
-from orchestrator.paired.cosimulation import FMUS
-from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.scenario import paired_scenario
-from orchestrator.shared.cache import cache_directory
-
-WATCHED = ("plant.theta_l", "twin_plant.theta_l")
-NUMBERS = ("wall [ms]", "cpu [ms]", "us per step", "wall ratio", "cpu ratio", "deviation [rad]")
-MOST_ROUNDS = 1000
-
-
-@dataclass(frozen=True, repr=False)
-class BenchmarkResult(Result):
-    """Tools on the same FMUs and the same scenario.
-
-    Attributes:
-        rows: one for each tool; the first that ran is the base of the ratios.
-        job: what they ran.
-        rounds: turns that every tool got.
-        costs: cost of this master against FMUs and steps; empty unless asked for.
-        sweeps: cost of sweeps against cases, likewise.
-        records: memory against recorded signals, likewise.
-        arguments: what was asked for.
-    """
-
-    command: ClassVar[str] = "bench"
-    rows: tuple[ToolRow, ...]
-    job: BenchJob
-    rounds: int
-    costs: tuple[Cost, ...] = ()
-    sweeps: tuple[SweepCost, ...] = ()
-    records: tuple[RecordCost, ...] = ()
-    arguments: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def base(self) -> ToolRow | None:
-        """The tool to which the ratios refer, or None when none ran."""
-        return next((row for row in self.rows if row.wall is not None), None)
-
-    def blocks(self) -> Sequence[Block]:
-        """Return the tables."""
-        job = self.job
-        kind = "native FMUs" if self.arguments.get("native") else "FMUs"
-        title = f"{len(job.fmus)} {kind}, {job.steps} steps of {job.step:g} s, medians of {3 * self.rounds} runs"
-        head = ("tool", "version", "scheme", *NUMBERS, "note")
-        blocks: list[Block] = [table(title, head, [_cells(row, self.base, job.steps) for row in self.rows])]
-        if not self.costs:
-            return blocks
-        cells = [[str(c.fmus), f"{c.steps:,}", f"{c.microseconds:.2f}"] for c in self.costs]
-        blocks.append(table("cost of this master", ("FMUs", "steps", "us per FMU and step"), cells))
-        title = f"sweeps of six FMUs, {CASE_STEPS} steps a case, one worker"
-        cells = [[f"{s.cases:,}", f"{s.total:.1f}", f"{1e3 * s.per_case:.2f}", f"{s.peak:.0f}"] for s in self.sweeps]
-        blocks.append(table(title, ("cases", "in all [s]", "one more case [ms]", "peak memory [MiB]"), cells))
-        cells = [[str(r.signals), f"{r.growth:.1f}", f"{r.expected:.1f}"] for r in self.records]
-        title = f"memory of {RECORD_STEPS:,} steps"
-        blocks.append(table(title, ("recorded signals", "added [MiB]", "8 bytes each [MiB]"), cells))
-        return blocks
-
-    def results(self, place: Path | None = None) -> BenchFound:
-        """Return what ``bench.json`` says."""
-        return BenchFound(rows=self.rows, scaling=self.costs, sweeps=self.sweeps, records=self.records)
+from orchestrator.api.shown import Result
+from orchestrator.shared.source_tree import import_masters
 
 
 def benchmark(
@@ -87,8 +14,8 @@ def benchmark(
     scaling_too: bool = False,
     native: bool = False,
     progress: Callable[[str], None] = lambda text: None,
-) -> BenchmarkResult:
-    """Run the paired loops under this master and under others, turn by turn.
+) -> Result:
+    """Run the paired loops under this master and under others, turn by turn; in a clone of the project alone.
 
     Args:
         tools: which (default: all; those that are not installed say so).
@@ -99,56 +26,17 @@ def benchmark(
         progress: called with a line on what is measured.
 
     Returns:
-        Medians of wall and CPU time [s], ratios, and deviations [rad] from the reference.
+        Its ``rows`` hold medians of wall and CPU time [s], ratios, and deviations [rad] from the reference.
 
     Raises:
-        ScenarioError: a tool is unknown, an interpreter missing, or ``rounds`` out of range.
+        ScenarioError: a tool is unknown, an interpreter missing, or ``rounds`` out of range; or there is no clone.
 
-    Example:
+    Examples:
         >>> measured = oc.benchmark(["ours"], rounds=1)
         >>> measured.rows[0].deviation < 1e-9
         True
     """
-    chosen = list(TOOLS) if tools is None else list(tools)
-    unknown = [name for name in chosen if name not in TOOLS]
-    if unknown:
-        raise ScenarioError(f"`tools` must be among {', '.join(TOOLS)}, but has {unknown[0]!r}", "tools")
-    if not 1 <= rounds <= MOST_ROUNDS:
-        raise ScenarioError(f"`rounds` must lie in [1, {MOST_ROUNDS}], but is {rounds}", "rounds")
-    for tool, path in (pythons or {}).items():
-        if tool not in TOOLS or not path:
-            text = f"`python` must be TOOL=PATH with a tool among {', '.join(TOOLS)}, but is {f'{tool}={path}'!r}"
-            raise ScenarioError(text, "python")
-        if shutil.which(path) is None:
-            text = f"`python` must name an interpreter for {tool}, but there is no program {path!r}"
-            raise ScenarioError(text, "python")
-    fmus = ensure_native(FMUS, cache_directory("native"), here=True) if native else ensure_built(FMUS)
-    job = job_of(paired_scenario(Experiment(), fmus, 0.02, 0.5), WATCHED)
-    rows = tuple(compare(job, chosen, rounds, dict(pythons or {}), progress))
-    given = {"rounds": rounds, "tools": chosen, "native": native}
-    if not scaling_too:
-        return BenchmarkResult(rows, job, rounds, arguments=given)
-    costs = tuple(scaling(fmus["Drivetrain"], progress=progress))
-    sweeps, records = growth(progress)
-    return BenchmarkResult(rows, job, rounds, costs, tuple(sweeps), tuple(records), given)
-
-
-def _cells(row: ToolRow, base: ToolRow | None, steps: int) -> list[str]:
-    names = [row.title, row.version or "", row.scheme]
-    if row.wall is None or base is None or base.wall is None:
-        return [*names, *[""] * len(NUMBERS), row.note]
-    cpu, ratio = "", ""
-    if row.cpu is not None and base.cpu is not None:
-        cpu, ratio = f"{1e3 * row.cpu:.1f}", f"{base.cpu / row.cpu:.2g}"
-    step = 1e6 * (row.wall if row.cpu is None else row.cpu) / steps
-    deviation = "" if row.deviation is None else f"{row.deviation:.1g}"
-    return [
-        *names,
-        f"{1e3 * row.wall:.1f}",
-        cpu,
-        f"{step:.3g}",
-        f"{base.wall / row.wall:.2g}",
-        ratio,
-        deviation,
-        row.note,
-    ]
+    result: Result = import_masters("benchmark").benchmark(
+        tools, rounds=rounds, pythons=pythons, scaling_too=scaling_too, native=native, progress=progress
+    )
+    return result

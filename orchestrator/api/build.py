@@ -23,7 +23,7 @@ class BuildResult(Result):
     """FMUs that are up to date; ``result["Drivetrain"]`` is the path of one.
 
     Attributes:
-        paths: path by name.
+        paths: path of each FMU by its model's name.
         remark: what this machine cannot give an FMU, or None.
         arguments: what was asked for.
     """
@@ -38,7 +38,7 @@ class BuildResult(Result):
 
     def blocks(self) -> Sequence[Block]:
         """Return a line for each FMU, and the remark."""
-        lines = [f"{n:<20}{shown(p)}  {p.stat().st_size / 1024:.0f} kB" for n, p in self.paths.items()]
+        lines = [f"{n:<20}{short_path(p)}  {p.stat().st_size / 1024:.0f} kB" for n, p in self.paths.items()]
         return lines if self.remark is None else [*lines, f"note: {self.remark}"]
 
     def results(self, place: Path) -> BuildFound:
@@ -46,15 +46,8 @@ class BuildResult(Result):
         return BuildFound(fmus={name: str(path) for name, path in self.paths.items()}, remark=self.remark)
 
 
-def shown(path: Path) -> str:
-    """Return a path for the reader.
-
-    Args:
-        path: of an FMU or a folder.
-
-    Returns:
-        The path within the repository where it lies in it, else the path as it is.
-    """
+def short_path(path: Path) -> str:
+    """Return a path for the reader."""
     try:
         return str(path.resolve().relative_to(ROOT))
     except ValueError:
@@ -88,7 +81,7 @@ def build(
         FmuError: a name is unknown, a build fails, or a native one lacks a compiler.
         OutputError: ``directory`` is a file.
 
-    Example:
+    Examples:
         >>> oc.build(["Drivetrain"])["Drivetrain"].name
         'Drivetrain.fmu'
     """

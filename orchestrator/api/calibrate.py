@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestrator.api.any_fmu import Progress, parameters_found, read_records
-from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.any_fmu import Progress, parameter_results, read_records
+from orchestrator.api.arguments import choose_settings
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.fmu.calibrate import FmuCalibration, calibrate_fmu
 from orchestrator.diagnosis.fmu.mapping import read_map
@@ -77,7 +77,7 @@ class CalibrationResult(Result):
         c, d = self.calibration, self.calibration.diagnosis
         parameters = {
             name: LearnedParameterFound(p.nominal, p.value, p.standard_error, p.interval, p.unit, c.learned[name])
-            for name, p in parameters_found(d).items()
+            for name, p in parameter_results(d).items()
         }
         return FmuCalibrationFound(
             explained=c.explained,
@@ -116,13 +116,13 @@ def calibrate(
         InputError: record, FMU, map or settings cannot be used.
         SimulationError: the FMU fails again and again.
 
-    Example:
+    Examples:
         >>> fit = oc.calibrate("axis.csv", "axis.fmu", "axis_map.toml")
         >>> [*fit.calibration.diagnosis.parameters], fit.trust.level.word
         (['J', 'b'], 'red')
     """
     begun = time.monotonic()
-    used = chosen_settings(settings, DiagnosisSettings)
+    used = choose_settings(settings, DiagnosisSettings)
     subject = subject_of(Path(fmu))
     if not isinstance(map, (Path, str)):
         raise ScenarioError("`map` must be the path of a TOML file, but is not", "map")

@@ -70,7 +70,7 @@ class RunOptions:
         """Run all cases.
 
         Args:
-            cases: what to run.
+            cases: values of every case, computed when asked for.
             work: how to run one.
 
         Returns:
@@ -133,63 +133,30 @@ class AnySweepResult(Result):
         return self.sweep.failed
 
     def rows(self) -> Iterator[Row]:
-        """Read the finished cases from the journal.
-
-        Returns:
-            One row per case, in case order: ``row.case.parameters`` and ``row.outcome.values``.
-        """
+        """Read the finished cases from the journal."""
         return self.sweep.rows()
 
     def write_csv(self, path: Path | str) -> None:
-        """Write the table as CSV, with as many digits as are needed to read the numbers back exactly.
-
-        Args:
-            path: the file.
-
-        Raises:
-            OutputError: it cannot be written.
-        """
+        """Write the table as CSV, with as many digits as are needed to read the numbers back exactly."""
         write_csv(Path(path), self.cases.names, self.sweep.columns, self.rows())
 
     def write_parquet(self, path: Path | str) -> None:
-        """Write the table as Parquet.
-
-        Args:
-            path: the file.
-
-        Raises:
-            ScenarioError: the extra ``parquet`` is not installed.
-        """
+        """Write the table as Parquet."""
         write_parquet(Path(path), self.cases.names, self.sweep.columns, self.rows())
 
     def columns(self) -> list[ColumnFound]:
-        """Name the results of a case.
-
-        Returns:
-            Name and unit of each column of results.
-        """
+        """Name the results of a case. Return name and unit of each column of results."""
         return [ColumnFound(c.name, c.unit) for c in self.sweep.columns]
 
     def write_tables(self, folder: Path) -> None:
-        """Write ``sweep.csv``, and where asked for ``sweep.parquet``.
-
-        Args:
-            folder: where to; it exists.
-        """
+        """Write ``sweep.csv``, and where asked for ``sweep.parquet``."""
         self.write_csv(folder / "sweep.csv")
         if self.parquet:
             self.write_parquet(folder / "sweep.parquet")
 
 
-def varied(vary: Varied) -> tuple[str, ...]:
-    """Return what is varied in the engine's text form.
-
-    Args:
-        vary: values or a specification by name, or ``NAME=SPECIFICATION`` each.
-
-    Returns:
-        ``NAME=SPECIFICATION`` each.
-    """
+def format_varied(vary: Varied) -> tuple[str, ...]:
+    """Return what is varied in the engine's text form."""
     if not isinstance(vary, Mapping):
         return tuple(vary)
     return tuple(f"{n}={v if isinstance(v, str) else ','.join(map(str, v))}" for n, v in vary.items())
@@ -198,16 +165,8 @@ def varied(vary: Varied) -> tuple[str, ...]:
 def draws_of(samples: int | None, vary: Sequence[str], sizes: str = "") -> int:
     """Return how often random and Sobol parameters are drawn.
 
-    Args:
-        samples: as the user gave it, or None.
-        vary: what is varied, ``NAME=SPECIFICATION`` each.
-        sizes: of a paired sweep, in their text form.
-
     Returns:
         At least 1.
-
-    Raises:
-        ScenarioError: ``samples`` says nothing here, or is below 1.
     """
     if samples is None:
         return DEFAULT_SAMPLES

@@ -64,7 +64,7 @@ class CheckResult(Result):
         """Write the verdicts as SARIF 2.1.0.
 
         Returns:
-            The JSON text: one run.
+            Text in SARIF 2.1.0 with one run.
         """
         return as_sarif(self.verdicts)
 
@@ -72,7 +72,7 @@ class CheckResult(Result):
         """Write the findings as GitLab's Code Quality report.
 
         Returns:
-            The JSON text.
+            Text of a GitLab code quality report, a JSON array.
         """
         return as_code_quality(self.verdicts)
 
@@ -96,7 +96,7 @@ def check(
 
     Args:
         fmus: an FMU, an unpacked FMU or a folder with FMUs, or several of these.
-        static: execute nothing.
+        static: check the files alone, without calling the FMU.
         trust: run FMUs without the kernel's walls around them; limits remain.
         policy: which rules count, and how much: a file such as ``fmu-check.toml`` (default: all rules, as they are).
         time_limit: wall time that one call may take [s].
@@ -111,7 +111,7 @@ def check(
         FmuError: a path does not exist, or a folder has no FMU.
         InputError: the policy or its baseline is wrong.
 
-    Example:
+    Examples:
         >>> assert oc.check("other.fmu").ok
     """
     paths = find_fmus([fmus] if isinstance(fmus, (str, Path)) else list(fmus))

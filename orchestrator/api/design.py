@@ -17,7 +17,7 @@ from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.estimation import design as designing
 from orchestrator.estimation.design import LONGEST, SHORTEST, Excitation, MachineLimits
 from orchestrator.records.model_file import Model, read_model
-from orchestrator.records.plausibility import LONGEST_STEP, own_frequency
+from orchestrator.records.plausibility import LONGEST_STEP, natural_frequency
 from orchestrator.records.record import MINIMUM_ROWS
 from orchestrator.shared.results.estimate import EstimateFound, ExcitationFound
 
@@ -63,7 +63,7 @@ class DesignResult(Result):
         """Write the record to run: ``time`` [s] and ``u`` [N.m].
 
         Args:
-            path: the file.
+            path: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.
@@ -121,15 +121,11 @@ def check_design(
     """Refuse a design that cannot be made.
 
     Args:
-        model: of the machine.
         size: half-gap that is to be seen [rad], or None where it is not known yet.
         torque_limit: [N.m].
         speed_limit: [rad/s] of the motor.
         duration: [s].
         rate: samples per second [Hz].
-
-    Raises:
-        ScenarioError: a number is out of its range, or the rate too low for the machine's own frequency.
     """
     given = {"torque_limit": torque_limit, "speed_limit": speed_limit, "duration": duration, "rate": rate}
     for name, value in (({} if size is None else {"size": size}) | given).items():
@@ -138,7 +134,7 @@ def check_design(
     if not MINIMUM_ROWS <= round(rows) <= LONGEST:
         text = f"`duration` times `rate` must be {MINIMUM_ROWS} to {LONGEST} samples, but is {rows:g}"
         raise ScenarioError(text, "duration", "rate")
-    own = own_frequency(model)
+    own = natural_frequency(model)
     if rate * LONGEST_STEP < own:
         raise ScenarioError(
             f"`rate` must be at least {own / LONGEST_STEP:.3g} to show a shaft that oscillates at {own:.3g} rad/s, "
@@ -176,7 +172,7 @@ def design(
     Raises:
         ScenarioError: a number is out of its range, or the model has effects that estimators would not see.
 
-    Example:
+    Examples:
         >>> plan = oc.design(size=0.005, duration=4.0)
         >>> plan.shows
         True

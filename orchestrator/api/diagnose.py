@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
-from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.law import request_law
-from orchestrator.api.numerics import fitting
+from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.records import as_record
 from orchestrator.diagnosis import diagnose as diagnosing
 from orchestrator.diagnosis.data.admission import check_record
@@ -96,7 +96,7 @@ def diagnose(
         InputError: the FMU or its map cannot be used.
         SimulationError: the FMU fails again and again.
 
-    Example:
+    Examples:
         >>> found = oc.diagnose("machine.csv", oc.read_model("machine.toml"))
         >>> found.verdict, sorted(effect.name for effect in found.effects)
         ('effects', ['backlash', 'coulomb_friction'])
@@ -113,7 +113,7 @@ def diagnose(
         options = {"validate": validate, "test": test, "settings": settings, "search": search, "time_limit": time_limit}
         return _of_an_fmu(record, model, map, options, progress)
     model = read_model(None) if model is None else model
-    chosen = chosen_settings(settings, DiagnosisSettings)
+    chosen = choose_settings(settings, DiagnosisSettings)
     records = [record] if isinstance(record, (Record, Path, str)) else list(record)
     if not records:
         raise ScenarioError("`record` must be at least one record, but is empty", "record")
@@ -121,7 +121,7 @@ def diagnose(
     other = None if validate is None else comparable_record(validate, model)
     tested = None if test is None else comparable_record(test, model)
     begun, fits = time.monotonic(), itertools.count(1)
-    with fitting(f"{measured.source}: no model can be fitted to this record"):
+    with numeric_errors(f"{measured.source}: no model can be fitted to this record"):
         found = diagnosing.diagnose(
             [measured, *more], model, chosen, test=tested, search=search, time_limit=time_limit,
             progress=lambda what: progress(next(fits), 0, what),
@@ -156,19 +156,7 @@ def _of_an_fmu(
 
 
 def comparable_record(given: Record | Path | str, model: Model, **reading: Any) -> Record:
-    """Return a record that the model can be compared with.
-
-    Args:
-        given: a record or its path.
-        model: the model.
-        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
-
-    Returns:
-        The record.
-
-    Raises:
-        RecordError: it is wrong, too poor for a diagnosis, or cannot be of this machine.
-    """
+    """Return a record that the model can be compared with."""
     record = as_record(given, model, **reading)
     check_record(record)
     check_plausible(record, model)

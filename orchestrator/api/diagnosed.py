@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from orchestrator.api.law import law_found, law_words
-from orchestrator.api.live import corrected_live
-from orchestrator.api.numerics import fitting
+from orchestrator.api.law import law_result, law_words
+from orchestrator.api.live import live_corrected_model
+from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.report.corrected import BeforeAfter, before_and_after, build_corrected, fmu_name
 from orchestrator.diagnosis.report.json_results import diagnosis_found, test_found
@@ -96,7 +96,7 @@ class DiagnosisResult(Result):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise OutputError(f"`out` must be a folder, but {folder} is not: {error.strerror}", "out") from None
-        with fitting(f"{self.record.source}: the corrected model cannot be built"):
+        with numeric_errors(f"{self.record.source}: the corrected model cannot be built"):
             if self.with_law and self.diagnosis.law is not None:
                 return build_with_law(self.diagnosis, self.diagnosis.law, self.record.source, folder)
             return build_corrected(self.diagnosis, self.record.source, folder)
@@ -104,21 +104,21 @@ class DiagnosisResult(Result):
     @property
     def runs(self) -> BeforeAfter:
         """The test part, measured and co-simulated with the nominal and the corrected FMU, a law being off."""
-        return self._simulated[0]
+        return self._simulation[0]
 
     @property
     def law_run(self) -> LawRun | None:
         """The test part, simulated by the corrected FMU with its learned law on; None: it has none."""
-        return self._simulated[1]
+        return self._simulation[1]
 
     @cached_property
-    def _simulated(self) -> tuple[BeforeAfter, LawRun | None]:
+    def _simulation(self) -> tuple[BeforeAfter, LawRun | None]:
         with tempfile.TemporaryDirectory(prefix="diagnose-") as folder:
             return self._co_simulated(self.build(folder))
 
     def _co_simulated(self, fmu: Path) -> tuple[BeforeAfter, LawRun | None]:
         law = self.diagnosis.law if self.with_law else None
-        with fitting(f"{self.record.source}: the corrected FMU cannot be run"):
+        with numeric_errors(f"{self.record.source}: the corrected FMU cannot be run"):
             with_law = None if law is None else run_with_law(self.diagnosis, law, fmu)
             return before_and_after(self.diagnosis, fmu), with_law
 
@@ -136,7 +136,7 @@ class DiagnosisResult(Result):
         """Write what ``plot`` draws as CSV.
 
         Args:
-            path: the file.
+            path: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.
@@ -169,7 +169,7 @@ class DiagnosisResult(Result):
         if d.law is not None:
             yield f"Learned law: of what is left at the {d.law.site}, {d.law.words}"
         if self.with_law:
-            yield law_words(d, self.law_run if "_simulated" in self.__dict__ else None)
+            yield law_words(d, self.law_run if "_simulation" in self.__dict__ else None)
         for note in d.notes:
             yield f"Note: {note}"
         yield f"Trust: {self.trust.level.word}"
@@ -184,11 +184,11 @@ class DiagnosisResult(Result):
         found = diagnosis_found(self.diagnosis)
         return msgspec.structs.replace(
             found,
-            learned_law=law_found(found.learned_law, self.law_run, self.test[0].signals[0].unit),
+            learned_law=law_result(found.learned_law, self.law_run, self.test[0].signals[0].unit),
             model=str(place / self.fmu_name),
             cosimulation=DifferenceFound(self.runs.difference, "rad"),
             validation=None if self.validation is None else test_found(self.validation, self.diagnosis.settings.report),
-            live=corrected_live(self.diagnosis, self.runs),
+            live=live_corrected_model(self.diagnosis, self.runs),
             seconds=self.seconds,
         )
 
@@ -202,15 +202,15 @@ class DiagnosisResult(Result):
         from orchestrator.diagnosis.report.figures import draw_workings
 
         fmu = self.build(folder)
-        if "_simulated" not in self.__dict__:  # else it would be built again
-            self.__dict__["_simulated"] = self._co_simulated(fmu)
+        if "_simulation" not in self.__dict__:  # else it would be built again
+            self.__dict__["_simulation"] = self._co_simulated(fmu)
         draw_workings(folder, self.diagnosis)
         self.write_csv(folder / "diagnose.csv")
         (folder / "corrected.toml").write_text(corrected_model(self.diagnosis.model, self.diagnosis), encoding="utf-8")
         self.plot(folder / "diagnose_signals.png")
 
 
-def _tables(found: DiagnosisResult) -> Iterator[Block]:
+def _tables(diagnosis: DiagnosisResult) -> Iterator[Block]:
     rows = [
         [
             ", ".join(effect_words(label) for label in step.before.labels) or "parameters",
@@ -219,12 +219,15 @@ def _tables(found: DiagnosisResult) -> Iterator[Block]:
             f"{tried.comparison.t:.1f}",
             "added" if tried.label == step.taken else "",
         ]
-        for step in found.diagnosis.workings.search.steps
+        for step in diagnosis.diagnosis.workings.search.steps
         for tried in step.tried[:SHOWN]
     ]
     if rows:
         yield table("What was tried", ("on top of", "effect", "gain [%]", "over its error", ""), rows)
-    for title, shown in (("Misfit on test data", found.test), ("Misfit on the other record", (found.validation,))):
+    for title, shown in (
+        ("Misfit on test data", diagnosis.test),
+        ("Misfit on the other record", (diagnosis.validation,)),
+    ):
         signals = [(test, one) for test in shown if test is not None for one in test.signals]
         rows = [
             [test.source, one.signal, *(f"{getattr(one, name):.4g}" for name in STAGES), one.unit]
@@ -232,7 +235,7 @@ def _tables(found: DiagnosisResult) -> Iterator[Block]:
         ]
         if rows:
             yield table(title, ("record", "signal", "as given", "re-fitted", "with effects", "noise", "unit"), rows)
-    tests = [test for test in (*found.test, found.validation) if test is not None]
+    tests = [test for test in (*diagnosis.test, diagnosis.validation) if test is not None]
     torque = [(test.source, test.torque) for test in tests if test.torque]
     if torque:
         rows = [[source, *(f"{100.0 * share:.2f} %" for share in shares)] for source, shares in torque]

@@ -11,20 +11,7 @@ from orchestrator.records.record import Record
 
 
 def plausible_record(record: Record | Path | str, model: Model, motor_only: bool, **reading: Any) -> Record:
-    """Return a record that fits the model at all.
-
-    Args:
-        record: a record or its path.
-        model: what it is compared with.
-        motor_only: leave the load encoder out; the record must then have a torque.
-        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
-
-    Returns:
-        The record.
-
-    Raises:
-        RecordError: the record is wrong, or cannot be of this machine.
-    """
+    """Return a record that fits the model at all."""
     measured = as_record(record, model, torque_needed=motor_only, **reading)
     measured = measured.without_load_encoder() if motor_only else measured
     if measured.has_torque:  # without one the plant plays no part
@@ -33,14 +20,7 @@ def plausible_record(record: Record | Path | str, model: Model, motor_only: bool
 
 
 def require_linear(model: Model) -> None:
-    """Refuse models that the estimators would not see whole.
-
-    Args:
-        model: the model.
-
-    Raises:
-        ScenarioError: it has no gap, or nonlinear effects.
-    """
+    """Refuse models that the estimators would not see whole."""
     if model.fmu != "Drivetrain":
         raise ScenarioError(f"{model.source}: `fmu` must be Drivetrain to have a gap, but is {model.fmu}")
     for name, entry in model.parameters.items():

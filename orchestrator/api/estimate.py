@@ -10,13 +10,13 @@ from typing import Any, ClassVar
 
 import msgspec
 
-from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnose import diagnose as find_missing
 from orchestrator.api.diagnosed import DiagnosisResult
 from orchestrator.api.estimable import plausible_record, require_linear
-from orchestrator.api.live import fitted_live
-from orchestrator.api.methods import HEAD, MethodResult, described, method_entry, method_row
-from orchestrator.api.numerics import fitting
+from orchestrator.api.live import live_fitted_model
+from orchestrator.api.methods import HEAD, MethodResult, describe_record, method_entry, method_row
+from orchestrator.api.numerics import numeric_errors
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.diagnosis.report.summary import play_of
 from orchestrator.diagnosis.selection.grading import Grade
@@ -48,7 +48,7 @@ class EstimateResult(Result):
     """The half-gap at the load; of several methods, that of the first that applies.
 
     Attributes:
-        record: the measured record.
+        record: the measured record, as the methods used it.
         model: what it was compared with.
         methods: what each method says.
         diagnosis: what the model misses, where it does not explain the record; else None.
@@ -80,7 +80,7 @@ class EstimateResult(Result):
         """The estimate of the first method that applies.
 
         Raises:
-            NotApplicableError: none does.
+            NotApplicableError: no method gives a gap for this record.
         """
         if not self.estimates:
             raise NotApplicableError("; ".join(f"{m.method}: {m.reason}" for m in self.methods))
@@ -166,7 +166,7 @@ class EstimateResult(Result):
         rows = [method_row(m) for m in self.methods if m.estimate is not None]
         unfit = [f"{m.method} does not apply: {m.reason}" for m in self.methods if m.estimate is None]
         sizes = [f"{self.best.method}: {self._play()}"] if self.estimates and self.best.visible else []
-        floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_beside(self.estimates)}"]
+        floor = [] if self.repeats is None else [f"{in_words(self.repeats)}{_compare_diagnosis(self.estimates)}"]
         return [table(title, HEAD, rows), *sizes, *floor, *messages, *doubts, *unfit, *missing]
 
     def results(self, place: Path | None = None) -> EstimateFound:
@@ -178,13 +178,13 @@ class EstimateResult(Result):
         answer = msgspec.structs.asdict(best) | {"trust": self.trust.found()}
         return EstimateFound(
             **answer,
-            record=described(r),
+            record=describe_record(r),
             estimates=entries,
-            more_records=tuple(described(other) for other in self.more) or None,
+            more_records=tuple(describe_record(other) for other in self.more) or None,
             repeats=None if repeats is None else RepeatsFound(repeats.sources, repeats.floor),
             method=self.best.method if self.estimates else None,
             play=self._play().found() if self.estimates and math.isfinite(self.alpha) else None,
-            live=None if fit is None or r.missing or not math.isfinite(fit.alpha) else fitted_live(r, fit),
+            live=None if fit is None or r.missing or not math.isfinite(fit.alpha) else live_fitted_model(r, fit),
             diagnosis=None if self.diagnosis is None else self.diagnosis.results((place or Path()) / DIAGNOSIS),
             undiagnosed=self.undiagnosed or None,
             settings=as_tables(self.settings),
@@ -205,7 +205,7 @@ class EstimateResult(Result):
         """Write data, figures, ``estimate.json``, ``report.html`` and the diagnosis into a folder that exists.
 
         Args:
-            folder: where to.
+            folder: that gets the files, made when missing.
             place: the folder that they will be moved to.
             arguments: what was asked for (default: the arguments of the call).
         """
@@ -264,13 +264,13 @@ def estimate(
         ScenarioError: there is no such method, or the model has effects that estimators would not see.
         ConvergenceError: a method finds no solution, or not within the time limit.
 
-    Example:
+    Examples:
         >>> gap = oc.estimate("machine.csv", oc.read_model("machine.toml"))
         >>> gap.interval[0] < gap.alpha < gap.interval[1]
         True
     """
     model = read_model(None) if model is None else model
-    chosen = chosen_settings(settings, EstimationSettings)
+    chosen = choose_settings(settings, EstimationSettings)
     if method is not None and method != "all" and method not in METHODS:
         raise ScenarioError(f"`method` must be one of {', '.join(METHODS)}, all, but is {method!r}", "method")
     require_linear(model)
@@ -285,9 +285,9 @@ def estimate(
     for name in METHODS if method == "all" else (method,):
         begun = time.perf_counter()
         try:
-            with fitting(f"{measured.source}: `{name}` finds no solution for this record"):
+            with numeric_errors(f"{measured.source}: `{name}` finds no solution for this record"):
                 progress(name, name.replace("_", " "), 0.0)
-                fitted = _fitted(name, measured, more, model, time_limit, chosen, partial(progress, name))
+                fitted = _estimate_by(name, measured, more, model, time_limit, chosen, partial(progress, name))
                 bound = _bound(measured, model, [*(m.estimate for m in found if m.estimate is not None), fitted])
         except NotApplicableError as error:
             found.append(MethodResult(name, None, math.inf, time.perf_counter() - begun, str(error)))
@@ -297,33 +297,26 @@ def estimate(
     judged = tuple(replace(m, trust=trust.get(m.method)) for m in found)
     given = {"record": measured.source, "model": model.source, "method": method, "motor_only": motor_only}
     missing, why = None, ""
-    if diagnose and _unexplained(judged):
+    if diagnose and _is_unexplained(judged):
         progress(DIAGNOSIS, "diagnosing", 0.0)
-        missing, why = _diagnosed([measured, *more], model, partial(progress, DIAGNOSIS))
+        missing, why = _try_diagnosis([measured, *more], model, partial(progress, DIAGNOSIS))
     first = () if missing is None else _of_diagnosis(missing)
     repeats = repeats_of([measured, *more])
     return EstimateResult(measured, model, (*first, *judged), missing, given, tuple(more), repeats, chosen, why)
 
 
 def default_method(records: Sequence[Record]) -> str:
-    """Return the method for records when none is asked for.
-
-    Args:
-        records: of one machine.
-
-    Returns:
-        A key of ``METHODS``.
-    """
+    """Return the method for records when none is asked for."""
     return DEFAULT_METHOD if all(record.has_torque for record in records) else WITHOUT_TORQUE
 
 
-def _beside(estimates: Sequence[Estimate]) -> str:
+def _compare_diagnosis(estimates: Sequence[Estimate]) -> str:
     """Return the encoders' noise as the likelihood fitted it, to be read beside the floor of repeats."""
     noise = next((e.diagnostics["measurement_noise"] for e in estimates if e.method == FITTED), None)
     return "" if noise is None else f"; the encoders' noise as fitted: {' and '.join(f'{x:.3g}' for x in noise)} rad"
 
 
-def _unexplained(methods: Sequence[MethodResult]) -> bool:
+def _is_unexplained(methods: Sequence[MethodResult]) -> bool:
     """Return whether the fit of all parameters shows that the model does not explain the record."""
     fit = next((m for m in methods if m.method == FITTED and m.estimate is not None), None)
     if fit is None or fit.estimate is None or fit.trust is None:
@@ -331,7 +324,7 @@ def _unexplained(methods: Sequence[MethodResult]) -> bool:
     return bool(fit.estimate.diagnostics["lacking"]) or fit.trust.level is Level.RED
 
 
-def _diagnosed(
+def _try_diagnosis(
     records: Sequence[Record], model: Model, report: Callable[[str, float], None]
 ) -> tuple[DiagnosisResult | None, str]:
     """Return what the model misses; or None, and why these records cannot be diagnosed."""
@@ -345,16 +338,16 @@ def _diagnosed(
         return None, str(error)
 
 
-def _of_diagnosis(found: DiagnosisResult) -> tuple[MethodResult, ...]:
+def _of_diagnosis(diagnosis: DiagnosisResult) -> tuple[MethodResult, ...]:
     """Return the half-gap of the corrected model, where one is named among what the model misses."""
-    gap = next((e.parameters["alpha"] for e in found.diagnosis.graded(Grade.LIKELY) if e.name == "backlash"), None)
+    gap = next((e.parameters["alpha"] for e in diagnosis.diagnosis.graded(Grade.LIKELY) if e.name == "backlash"), None)
     if gap is None:
         return ()
     estimate = Estimate(DIAGNOSIS, gap.value, gap.standard_error, gap.interval)
-    return (MethodResult(DIAGNOSIS, estimate, math.inf, found.seconds, trust=found.trust),)
+    return (MethodResult(DIAGNOSIS, estimate, math.inf, diagnosis.seconds, trust=diagnosis.trust),)
 
 
-def _fitted(
+def _estimate_by(
     name: str,
     record: Record,
     more: Sequence[Record],
@@ -363,11 +356,7 @@ def _fitted(
     settings: EstimationSettings,
     report: Callable[[str, float], None],
 ) -> Estimate:
-    """Return the estimate of one method; all but the likelihood take one whole record.
-
-    Raises:
-        NotApplicableError: there are several records, or samples are missing.
-    """
+    """Return the estimate of one method; all but the likelihood take one whole record."""
     if name != WITHOUT_TORQUE and not all(one.has_torque for one in (record, *more)):
         raise NotApplicableError("needs the torque `u`, which the record does not have")
     if name == DEFAULT_METHOD:

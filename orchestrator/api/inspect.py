@@ -20,7 +20,7 @@ from orchestrator.estimation.inspection.channels import (
     reversals_of,
 )
 from orchestrator.estimation.inspection.machine import as_model, is_of, rough_machine, visible_effects
-from orchestrator.estimation.inspection.starter import OF_DEFAULT, assumed_columns, starter
+from orchestrator.estimation.inspection.starter import OF_DEFAULT, assume_columns, starter
 from orchestrator.estimation.inspection.sufficiency import SEEN, Sufficiency, sufficiency
 from orchestrator.estimation.inspection.verdict import verdict_of
 from orchestrator.estimation.methods import two_encoders
@@ -48,7 +48,7 @@ class InspectResult(Result):
     """What a record holds and would show.
 
     Attributes:
-        record: the record.
+        record: as it was read, with the units it was converted from.
         model: the machine that the judgement is for: the given one, or a rough one from the record.
         channels: facts of each column.
         excitation: the torque's power by frequency.
@@ -95,7 +95,7 @@ class InspectResult(Result):
         """Say whether the record suffices, what it lacks, and what would do better.
 
         Returns:
-            A sentence each.
+            One sentence for each thing that the log shows or lacks.
         """
         return verdict_of(self.sufficiency, self.reversals, self.two_angles)
 
@@ -204,7 +204,7 @@ def inspect(
         RecordError: the record cannot be read, or a column is missing or ambiguous.
         ScenarioError: the model cannot be read.
 
-    Example:
+    Examples:
         >>> seen = oc.inspect("machine.csv")
         >>> seen.smallest_gap < 0.001
         True
@@ -214,7 +214,7 @@ def inspect(
     assumed: tuple[str, ...] = ()
     columns = dict(base.columns)
     if not isinstance(record, Record):
-        columns, assumed = assumed_columns(Path(record), columns, base.header)
+        columns, assumed = assume_columns(Path(record), columns, base.header)
         base = replace(base, columns=columns)
     measured = as_record(record, base, torque_needed=False, part=part, resample=resample, rate=rate)
     machine, origin, more = _machine(measured, base, given=model is not None, sure=not assumed)
@@ -234,14 +234,7 @@ def inspect(
 
 
 def _machine(record: Record, base: Model, given: bool, sure: bool) -> tuple[Model, Mapping[str, str], tuple[str, ...]]:
-    """Return the machine that the judgement is for, where each of its values is from, and what was assumed.
-
-    Args:
-        record: the record.
-        base: the model that was given, or the default one.
-        given: whether one was given.
-        sure: whether nothing was assumed of the columns.
-    """
+    """Return the machine that the judgement is for, where each of its values is from, and what was assumed."""
     if given:
         said_of = {name: OF_GIVEN if name in base.stated else OF_DEFAULT for name in base.plant.linear}
         return base, said_of, ()

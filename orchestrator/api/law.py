@@ -11,28 +11,13 @@ from pyfmu_sources.learned_plant import ON
 
 
 def request_law(diagnosis: Diagnosis) -> tuple[Diagnosis, bool]:
-    """Return a diagnosis of which the law was asked for in the FMU, and whether the FMU can have it.
-
-    Args:
-        diagnosis: of the record.
-
-    Returns:
-        The diagnosis, with a note that says why not.
-    """
+    """Return a diagnosis of which the law was asked for in the FMU, and whether the FMU can have it."""
     why = law_refusal(diagnosis)
     return (replace(diagnosis, notes=(*diagnosis.notes, why)), False) if why else (diagnosis, True)
 
 
 def law_words(diagnosis: Diagnosis, run: LawRun | None) -> str:
-    """Return in one sentence that the FMU has the law, and what it misses with it.
-
-    Args:
-        diagnosis: of the record.
-        run: of the FMU with the law on; None: it has not been run.
-
-    Returns:
-        The sentence.
-    """
+    """Return in one sentence that the FMU has the law, and what it misses with it."""
     text = f"In the FMU: the corrected FMU has this law, off until its parameter `{ON}` is 1"
     if run is None:
         return text
@@ -41,17 +26,8 @@ def law_words(diagnosis: Diagnosis, run: LawRun | None) -> str:
     return f"{text}; with it on, free runs on the test part miss {missed}"
 
 
-def law_found(law: LearnedFound | None, run: LawRun | None, unit: str) -> LearnedFound | None:
-    """Return the law as ``diagnose.json`` has it, with what the FMU makes of it.
-
-    Args:
-        law: as the diagnosis says it.
-        run: of the FMU with the law on; None: it has none.
-        unit: of the measured positions.
-
-    Returns:
-        The law; None: none was learned.
-    """
+def law_result(law: LearnedFound | None, run: LawRun | None, unit: str) -> LearnedFound | None:
+    """Return the law as ``diagnose.json`` has it, with what the FMU makes of it."""
     if law is None or run is None:
         return law
     runs = tuple(LawRunFound(row, starts) for row, starts in zip(run.rows, run.starts, strict=True))

@@ -13,30 +13,18 @@ LEAST_ROWS = 100
 STARTS = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
 
 
-def corrected_live(diagnosis: Diagnosis, runs: BeforeAfter) -> LiveFound:
-    """Return the corrected model and the starts of its runs over the test part.
-
-    Args:
-        diagnosis: of the record.
-        runs: over its test part.
-
-    Returns:
-        What a page needs to simulate it.
-    """
+def live_corrected_model(diagnosis: Diagnosis, runs: BeforeAfter) -> LiveFound:
+    """Return the corrected model and the starts of its runs over the test part."""
     plant = diagnosis.model.plant
     values = start_values(plant, diagnosis.workings.final)
     return LiveFound(plant.name, diagnosis.workings.records[0].step, values, list(runs.rows), list(runs.starts))
 
 
-def fitted_live(record: Record, fit: Estimate) -> LiveFound:
+def live_fitted_model(record: Record, fit: Estimate) -> LiveFound:
     """Return the fitted model, which starts anew from the fitted states every two seconds.
 
     Args:
-        record: without missing samples.
-        fit: by ``maximum_likelihood``.
-
-    Returns:
-        What a page needs to simulate it.
+        record: with every sample of its grid, missing ones filled.
     """
     rows = list(range(0, record.size - 1, max(round(SPAN / record.step), LEAST_ROWS)))
     states, p = fit.curves["states"], fit.curves["model"]

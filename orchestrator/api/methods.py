@@ -16,7 +16,6 @@ class MethodResult:
     """What one method says.
 
     Attributes:
-        method: its name.
         estimate: the estimate, or None where the method does not apply.
         bound: the record's Cramer-Rao bound on the standard error [rad].
         seconds: wall time [s].
@@ -32,27 +31,13 @@ class MethodResult:
     trust: Trust | None = None
 
 
-def described(record: Record) -> RecordFound:
-    """Return rows, step, source of a record, and what was detected and assumed when it was read.
-
-    Args:
-        record: the record.
-
-    Returns:
-        The entry of ``estimate.json``.
-    """
+def describe_record(record: Record) -> RecordFound:
+    """Return rows, step, source of a record, and what was detected and assumed when it was read."""
     return RecordFound(record.size, record.step, record.source, record.missing, tuple(record.notes))
 
 
 def method_row(result: MethodResult) -> list[str]:
-    """Return the row of a method that applies, under ``HEAD``.
-
-    Args:
-        result: of the method.
-
-    Returns:
-        The cells.
-    """
+    """Return the row of a method that applies, under ``HEAD``."""
     estimate = result.estimate
     assert estimate is not None
     low, high = estimate.interval
@@ -72,14 +57,7 @@ def _number(value: float) -> float | None:
 
 
 def method_entry(result: MethodResult) -> MethodFound:
-    """Return what ``estimate.json`` says of a method.
-
-    Args:
-        result: of the method.
-
-    Returns:
-        The entry.
-    """
+    """Return what ``estimate.json`` says of a method."""
     estimate = result.estimate
     if estimate is None:
         return MethodFound(not_applicable=result.reason)

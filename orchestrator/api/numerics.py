@@ -10,19 +10,10 @@ from orchestrator.errors import ConvergenceError
 
 
 @contextmanager
-def fitting(what: str) -> Iterator[None]:
+def numeric_errors(what: str) -> Iterator[None]:
     """Run fits in a ``with`` block: trial steps may overflow in silence; a singular system is one line for the user.
 
     Fits are spread over the cores, and their matrices are small: threads of linear algebra would only be in their way.
-
-    Args:
-        what: beginning of the error's text, such as "record.csv: no model can be fitted to this record".
-
-    Yields:
-        Nothing.
-
-    Raises:
-        ConvergenceError: linear algebra failed.
     """
     with np.errstate(all="ignore"), _one_thread():
         try:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.api.arguments import chosen_experiment, not_negative
+from orchestrator.api.arguments import choose_experiment, not_negative
 from orchestrator.api.shown import Block, Result, table, write_columns
 from orchestrator.building.build import ensure_built
 from orchestrator.errors import ScenarioError
@@ -85,7 +85,7 @@ class PairResult(Result):
         """Write the signals as CSV.
 
         Args:
-            path: the file.
+            path: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.
@@ -166,7 +166,7 @@ def run_pair(
     Args:
         alpha: half-gap [rad] at the load.
         noise: standard deviation of the encoder noise of the loop with a gap [rad].
-        seed: of that noise.
+        seed: of the encoder noise of both loops.
         experiment: "default", "thesis" or an ``Experiment``.
         backlash_model: "dead_zone", "nordin", "hysteresis", "rigid_impact" or "elastic_impact" (default: the
             experiment's).
@@ -180,7 +180,7 @@ def run_pair(
         ScenarioError: an argument is out of its range, or names nothing.
         SimulationError: the run went wrong.
 
-    Example:
+    Examples:
         >>> pair = oc.run_pair(alpha=0.02)
         >>> round(pair.estimate.alpha, 4)
         0.02
@@ -189,7 +189,7 @@ def run_pair(
     not_negative("noise", noise)
     if seed < 0:
         raise ScenarioError(f"`seed` must not be negative, but is {seed}", "seed")
-    chosen = with_settings(chosen_experiment(experiment, backlash_model), noise=noise)
+    chosen = with_settings(choose_experiment(experiment, backlash_model), noise=noise)
     given = {"alpha": alpha, "noise": noise, "experiment": chosen.name, "backlash_model": chosen.backlash_model}
     given |= {"start": dict(start)} if start else {}
     fmus = ensure_built(FMUS)

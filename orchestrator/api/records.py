@@ -43,7 +43,7 @@ def read_record(
     Raises:
         RecordError: the file cannot be read or is no such record; the text names row and column.
 
-    Example:
+    Examples:
         >>> record = oc.read_record("machine.csv")
         >>> record.size, round(record.duration, 2)
         (4000, 20.0)
@@ -64,7 +64,7 @@ def read_model(path: Path | str | None = None) -> Model:
     Raises:
         ScenarioError: the file cannot be read, or a name, value or unit in it is wrong.
 
-    Example:
+    Examples:
         >>> model = oc.read_model("machine.toml")
         >>> model.fmu, model.parameters["J_l"].unit
         ('Drivetrain', 'kg.m2')
@@ -73,20 +73,7 @@ def read_model(path: Path | str | None = None) -> Model:
 
 
 def as_record(given: Record | Path | str, model: Model, torque_needed: bool = True, **reading: Any) -> Record:
-    """Return a record, read with the model's columns where a path is given.
-
-    Args:
-        given: a record or the path of one.
-        model: whose ``columns`` say what the file calls them.
-        torque_needed: whether two angles without a torque are refused.
-        reading: ``part``, ``resample``, ``rate`` and ``header`` of ``read_record``, for a path.
-
-    Returns:
-        The record.
-
-    Raises:
-        RecordError: as ``read_record``.
-    """
+    """Return a record, read with the model's columns where a path is given."""
     if not isinstance(given, Record):
         header = reading.pop("header", None)
         header = model.header if header is None else header

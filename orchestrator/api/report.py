@@ -19,7 +19,7 @@ def report(directory: Path | str, command: str | None = None) -> Path:
         ScenarioError: there are no results, or several and ``command`` is not given, or they are damaged.
         OutputError: the directory cannot be written.
 
-    Example:
+    Examples:
         >>> oc.run_pair(alpha=0.02).save("results").name
         'report.html'
         >>> oc.report("results").name

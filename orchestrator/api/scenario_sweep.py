@@ -6,10 +6,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, varied
+from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.engine import DesignCases, Row, Status, Sweep, parse_design
-from orchestrator.scenarios.isolated import Safety, described
+from orchestrator.scenarios.isolated import Safety, describe_walls
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.sweep import SUMMARIES, scenario_work
 from orchestrator.shared.results import SweepFound, SweptScenario, WallsFound
@@ -20,10 +20,10 @@ class ScenarioSweepResult(AnySweepResult):
     """A sweep of a scenario; of each recorded signal the last value, the extremes, the mean and the rms.
 
     Attributes:
-        scenario: what was run.
-        cases: the cases, indexable.
-        sweep: the finished cases.
-        seed: of random parameters.
+        scenario: as read from its file, before parameters are varied.
+        cases: varied values by case, computed when asked for.
+        sweep: outcomes of the finished cases, in case order.
+        seed: from which random and Sobol parameters are drawn.
         parquet: whether ``save`` writes Parquet too.
         arguments: what was asked for.
         isolation: the walls around the FMUs that are not ours.
@@ -95,7 +95,7 @@ def sweep_scenario(
         scenario: a ``Scenario`` or a TOML scenario file.
         vary: parameters by ``instance.variable``, as in ``sweep``.
         samples: draws of what ``vary`` makes random or sobol (default: 16).
-        seed: of random parameters.
+        seed: from which random and Sobol parameters are drawn.
         options: where and how cases run.
         **more: fields of ``RunOptions`` instead of ``options``.
 
@@ -106,18 +106,18 @@ def sweep_scenario(
         ScenarioError: the scenario or an argument is wrong.
         SimulationError: the place where cases run is gone. A case that fails is a row, not an error.
 
-    Example:
+    Examples:
         >>> result = oc.sweep_scenario("loop.toml", {"plant.J_l": "range:5.3:5.9:3"})
         >>> len(result), result.failed
         (3, 0)
     """
     options = options or RunOptions(**more)
-    words = varied(vary)
+    words = format_varied(vary)
     cases = DesignCases(parse_design(words, draws_of(samples, words), seed), seed)
     chosen = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
     done = options.run(cases, scenario_work(chosen, cases, options.trust))
     given = {"scenario": chosen.origin or chosen.name, "vary": list(words), "samples": samples}
-    walls = described(chosen.system, Safety(trust=options.trust))
+    walls = describe_walls(chosen.system, Safety(trust=options.trust))
     return ScenarioSweepResult(chosen, cases, done, seed, options.parquet, given, walls)
 
 

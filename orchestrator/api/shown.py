@@ -6,7 +6,7 @@ from html import escape
 from pathlib import Path
 from typing import Any, ClassVar
 
-from orchestrator.shared.output import staged, write_result
+from orchestrator.shared.output import stage_output, write_result
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Result:
         """Write data, figures, ``COMMAND.json`` and ``report.html`` into a folder that exists.
 
         Args:
-            folder: where to.
+            folder: that gets the files, made when missing.
             place: the folder that they will be moved to, which the JSON file names.
             arguments: what was asked for, as the JSON file says it (default: the arguments of the call).
         """
@@ -97,7 +97,7 @@ class Result:
             OutputError: the folder cannot be written.
         """
         place = Path(out)
-        with staged(place, self.replaces) as folder:
+        with stage_output(place, self.replaces) as folder:
             self.write(folder, place)
         return place / "report.html"
 
@@ -109,16 +109,7 @@ class Result:
 
 
 def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> TextTable:
-    """Make a table from any sequences of texts.
-
-    Args:
-        title: above the table.
-        columns: headings, with units in brackets.
-        rows: one text for each column.
-
-    Returns:
-        The table.
-    """
+    """Make a table from any sequences of texts."""
     return TextTable(title, tuple(columns), tuple(tuple(row) for row in rows))
 
 
@@ -144,11 +135,7 @@ def write_columns(path: Path, columns: Mapping[str, Any]) -> None:
     """Write arrays as CSV with exact numbers.
 
     Args:
-        path: the file.
         columns: arrays of shape (n,) by heading, in their order.
-
-    Raises:
-        OutputError: the file cannot be written.
     """
     import csv
 

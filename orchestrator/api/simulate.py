@@ -13,11 +13,11 @@ from orchestrator.errors import ScenarioError
 from orchestrator.master import result as master
 from orchestrator.master.signals import Constant
 from orchestrator.scenarios import scenario as scenarios
-from orchestrator.scenarios.isolated import Safety, described
+from orchestrator.scenarios.isolated import Safety, describe_walls
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.shared.operating_system import LIMITS
-from orchestrator.shared.results import RemarkFound, SignalFound, SignalsFound, WallsFound
+from orchestrator.shared.results import EventsFound, RemarkFound, SignalFound, SignalsFound, WallsFound
 
 Array = NDArray[np.float64]
 HEAD = ("signal", "unit", "first", "last", "smallest", "largest")
@@ -29,7 +29,7 @@ class SimulationResult(Result):
 
     Attributes:
         run: times, signals, units and what the run took.
-        title: of the table.
+        title: above the printed table: the scenario's name.
         isolation: the walls around the run: which FMUs are not ours, and what the system could not enforce.
         command: whose result directory ``save`` makes.
         arguments: what was asked for.
@@ -44,14 +44,8 @@ class SimulationResult(Result):
     def __getitem__(self, name: str) -> Array:
         """Return a recorded signal.
 
-        Args:
-            name: ``instance.variable``.
-
         Returns:
             Its values at ``time``, shape (n,), in ``units[name]``.
-
-        Raises:
-            KeyError: it is not recorded.
         """
         if name not in self.run.names:
             raise KeyError(f"`name` must be one of {', '.join(self.run.names)}, but is {name!r}")
@@ -81,7 +75,7 @@ class SimulationResult(Result):
         """Write times and signals as CSV.
 
         Args:
-            path: the file.
+            path: of the CSV file to write.
 
         Raises:
             OutputError: it cannot be written.
@@ -102,9 +96,15 @@ class SimulationResult(Result):
     def blocks(self) -> Sequence[Block]:
         """Return the table of the signals, and what is to be known of the run."""
         return [
-            table(f"{self.title}: {self.steps} steps", HEAD, self._rows()),
+            table(f"{self.title}: {self.steps} steps{self._events()}", HEAD, self._rows()),
             *(f"Note: {remark}" for remark in self.run.remarks),
         ]
+
+    def _events(self) -> str:
+        """Return how many events there were, of a system that can have some."""
+        took = self.run.statistics.events
+        ticks = f" and {took.ticks} ticks of clocks" if took.ticks else ""
+        return f", {len(took.times)} events{ticks}" if took.instants else ""
 
     def _rows(self) -> list[list[str]]:
         rows = []
@@ -118,7 +118,9 @@ class SimulationResult(Result):
         """Return what the JSON file says of the run."""
         signals = [SignalFound(*row) for row in self._rows()]
         remarks = [RemarkFound(r.instance, r.text, r.count) for r in self.run.remarks]
-        return SignalsFound(signals=signals, steps=self.steps, remarks=remarks, isolation=self.isolation)
+        took = self.run.statistics.events
+        events = EventsFound(list(took.times), took.instants, took.ticks, list(took.late)) if took.instants else None
+        return SignalsFound(signals=signals, steps=self.steps, events=events, remarks=remarks, isolation=self.isolation)
 
     def write_files(self, folder: Path) -> None:
         """Write the signals as CSV; of ``simulate`` also the figure."""
@@ -155,7 +157,7 @@ def simulate(
         InputError: the file, an FMU or an argument is wrong; the text names the file and every problem in it.
         SimulationError: the run went wrong.
 
-    Example:
+    Examples:
         >>> result = oc.simulate("loop.toml", stop=2.0)
         >>> result["plant.theta_l"].shape
         (2001,)
@@ -181,7 +183,7 @@ def _run(
     given: Mapping[str, Any],
 ) -> SimulationResult:
     safety = safety or Safety()
-    walls = described(scenario.system, safety)
+    walls = describe_walls(scenario.system, safety)
     if walls.not_enforced and tell is not None:
         tell(f"FMUs that are not ours run with {LIMITS}, but {walls.not_enforced}")
     result = scenarios.simulate(scenario if stop is None else replace(scenario, stop=stop), safety)
@@ -201,20 +203,8 @@ def run_ssp(
     """Run an SSP file, whatever its name; see ``simulate``.
 
     Args:
-        path: the file.
         stop: end [s].
         step: communication step [s].
-        inputs: constant values of outer inputs, by name.
-        jacobi: run all FMUs side by side.
-        safety: how far FMUs are trusted.
-        tell: as in ``simulate``.
-
-    Returns:
-        Times and recorded signals.
-
-    Raises:
-        ScenarioError: the file or an argument is wrong.
-        SimulationError: the run went wrong.
     """
     if step is not None and not 0.0 < step < float("inf"):
         raise ScenarioError(f"`step` must be finite and positive, but is {step!r}", "step")

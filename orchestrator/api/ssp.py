@@ -8,7 +8,7 @@ from typing import Any
 from orchestrator.building.build import ensure_built
 from orchestrator.paired.cosimulation import FMUS
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.scenario import paired_scenario
+from orchestrator.paired.scenario import scenario_of_pair
 from orchestrator.scenarios.scenario import Scenario, load_scenario
 from orchestrator.scenarios.ssp.write import write_ssp
 
@@ -18,7 +18,7 @@ class ExportedSsp:
     """An SSP file that was written.
 
     Attributes:
-        path: the file.
+        path: of the SSP file that was written.
         scenario: what is in it.
     """
 
@@ -66,12 +66,12 @@ def export_ssp(
         ScenarioError: the scenario has what SSP cannot express, or a number is out of its range.
         OutputError: the file cannot be written.
 
-    Example:
+    Examples:
         >>> print(oc.export_ssp("paired.ssp", alpha=0.02))
         paired.ssp: 6 FMUs, 20 connections
     """
     if scenario is None:
-        chosen = paired_scenario(Experiment(), ensure_built(FMUS), alpha, reference)
+        chosen = scenario_of_pair(Experiment(), ensure_built(FMUS), alpha, reference)
     else:
         chosen = scenario if isinstance(scenario, Scenario) else load_scenario(Path(scenario))
     write_ssp(Path(path), chosen)

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.api.arguments import chosen_experiment, chosen_settings
-from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, varied
+from orchestrator.api.arguments import choose_experiment, choose_settings
+from orchestrator.api.cases import MOST_ROWS_SHOWN, AnySweepResult, RunOptions, Varied, draws_of, format_varied
 from orchestrator.api.shown import Block, table
 from orchestrator.building.fastest import PYTHON, ensure_fastest
 from orchestrator.engine import (
@@ -40,9 +40,9 @@ class SweepResult(AnySweepResult):
     """A sweep of the paired loops.
 
     Attributes:
-        plan: what was varied.
-        cases: the cases, indexable.
-        sweep: the finished cases.
+        plan: sizes, noise levels, seeds and varied parameters.
+        cases: varied values by case, computed when asked for.
+        sweep: outcomes of the finished cases, in case order.
         fmus: paths of the three FMUs.
         calibrations: by noise level [rad].
         parquet: whether ``save`` writes Parquet too.
@@ -212,18 +212,18 @@ def sweep(
         CalibrationError: a size outside what the experiment claims.
         SimulationError: the place where cases run is gone. A case that fails is a row, not an error.
 
-    Example:
+    Examples:
         >>> result = oc.sweep(sizes=[0.01, 0.02], noise=0.0)
         >>> len(result), result.failed
         (2, 0)
     """
     options = options or RunOptions(**more)
     levels = _levels(noise)
-    words = varied(vary)
-    calibrated = chosen_settings(settings, MapSettings)
+    words = format_varied(vary)
+    calibrated = choose_settings(settings, MapSettings)
     text = sizes if isinstance(sizes, str) else ",".join(repr(float(size)) for size in sizes)
     count = draws_of(samples, words, text)
-    chosen = chosen_experiment(experiment, backlash_model)
+    chosen = choose_experiment(experiment, backlash_model)
     plan = SweepPlan(chosen, text, levels, seeds, seed, words, count)
     cases = plan.cases()
     if tell is not None:

@@ -9,7 +9,7 @@ import msgspec
 
 from orchestrator.api.shown import Block, Result, table
 from orchestrator.paired.calibration import estimate_gap, load_or_calibrate
-from orchestrator.paired.compiled_loop import compiled_loop
+from orchestrator.paired.compiled_loop import make_loop
 from orchestrator.paired.experiment import thesis_experiment
 from orchestrator.paired.metric import difference_sum
 from orchestrator.paired.thesis import published
@@ -38,7 +38,7 @@ class ThesisResult(Result):
         table: Table 4.1, recomputed with the thesis's own map.
         estimates: our estimates of the table's sizes [rad].
         errata: what the thesis prints and should.
-        arguments: none.
+        arguments: always empty, as `thesis` takes none.
     """
 
     command: ClassVar[str] = "thesis"
@@ -116,7 +116,7 @@ def thesis() -> ThesisResult:
     Returns:
         Gains, Table 4.1 and errata, each published value beside the recomputed one.
 
-    Example:
+    Examples:
         >>> ours = oc.thesis()
         >>> len(ours.estimates)
         8
@@ -127,7 +127,7 @@ def thesis() -> ThesisResult:
 def _our_estimates() -> tuple[float, ...]:
     experiment = thesis_experiment()
     calibration = load_or_calibrate(experiment)
-    loop = compiled_loop(experiment)
+    loop = make_loop(experiment)
     errors = experiment.encoder_errors(0)
     twin = loop.run(0.0, errors)[:, 2]
     sums = [difference_sum(loop.run(row.alpha, errors)[:, 2], twin) for row in published.TABLE_4_1]

@@ -12,15 +12,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def write_archive(path: Path, members: Mapping[str, bytes]) -> None:
-    """Write ``members`` (name in the archive to content) sorted, with fixed dates and permissions, all or nothing.
-
-    Args:
-        path: the archive.
-        members: content by name.
-
-    Raises:
-        FmuError: the file cannot be written.
-    """
+    """Write ``members`` (name in the archive to content) sorted, with fixed dates and permissions, all or nothing."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, part = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=".part", dir=path.parent)
@@ -46,17 +38,7 @@ def _entry(name: str) -> zipfile.ZipInfo:
 
 
 def read_archive(path: Path) -> dict[str, bytes]:
-    """Return the members of an archive, without its folders.
-
-    Args:
-        path: the archive.
-
-    Returns:
-        Content by name.
-
-    Raises:
-        FmuError: the file is missing or no zip archive.
-    """
+    """Return the members of an archive, without its folders."""
     try:
         with zipfile.ZipFile(path) as archive:
             return {name: archive.read(name) for name in archive.namelist() if not name.endswith("/")}

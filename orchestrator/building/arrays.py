@@ -17,10 +17,8 @@ class Array:
     """One variable of FMI 3.0: the variables of a table from ``first`` on, in row-major order.
 
     Attributes:
-        name: without indices.
         first: place in the table, which is the value reference.
         dimensions: sizes; none for a scalar.
-        variables: the elements.
     """
 
     name: str
@@ -34,12 +32,6 @@ def arrays(table: Sequence[FmuVariable]) -> Iterator[Array]:
 
     Variables ``name[1]``, ``name[2]`` and so on that stand in a row, and are whole and alike in causality,
     variability, type and bounds, are one array; all others are scalars.
-
-    Args:
-        table: of a slave.
-
-    Yields:
-        The variables, in order.
     """
     place = 0
     while place < len(table):
@@ -60,14 +52,14 @@ def _dimensions(table: Sequence[FmuVariable], place: int) -> tuple[int, ...]:
     indices: list[tuple[int, ...]] = []
     for variable in table[place:]:
         element = _ELEMENT.fullmatch(variable.name)
-        if element is None or element[1] != start[1] or not _alike(variable, table[place]):
+        if element is None or element[1] != start[1] or not _is_same_kind(variable, table[place]):
             break
         indices.append(tuple(int(number) for number in element[2].split(",")))
     dimensions = indices[-1]
     return dimensions if indices == list(_row_major(dimensions)) else ()
 
 
-def _alike(a: FmuVariable, b: FmuVariable) -> bool:
+def _is_same_kind(a: FmuVariable, b: FmuVariable) -> bool:
     return (a.causality, a.variability, a.type, a.bounds) == (b.causality, b.variability, b.type, b.bounds)
 
 

@@ -36,9 +36,6 @@ def default_directory(fmi: int = 2) -> Path:
 
     Args:
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        The folder, which may not exist yet.
     """
     beside = ROOT / "fmus"
     folder = beside if (ROOT / "pyproject.toml").exists() and os.access(beside, os.W_OK) else Path("fmus")
@@ -48,19 +45,7 @@ def default_directory(fmi: int = 2) -> Path:
 def ensure_built(
     names: Sequence[str] | None = None, directory: Path | None = None, force: bool = False
 ) -> dict[str, Path]:
-    """Return the path of each FMU in ``names`` (default: all), after building what is missing or stale.
-
-    Args:
-        names: which FMUs.
-        directory: where they are (default: :func:`default_directory`).
-        force: build also what is up to date.
-
-    Returns:
-        Path by name.
-
-    Raises:
-        FmuError: a name is unknown, a build fails or ``directory`` cannot be written.
-    """
+    """Return the path of each FMU in ``names`` (default: all), after building what is missing or stale."""
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = default_directory() if directory is None else directory
     return {recipe.name: _ensure(recipe, folder, force) for recipe in recipes}
@@ -73,23 +58,7 @@ def build_variant(
     directory: Path | None = None,
     law: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Build (unless it is there already) an FMU called ``name`` that is ``base`` with other start values.
-
-    Args:
-        name: model name and model identifier, a C identifier.
-        base: the FMU that it varies.
-        start_values: value by parameter name; an enumeration is given by the name of its item or its number.
-        directory: where it goes (default: where the others are).
-        law: a learned one that it has besides, off until it is switched on, as
-            ``pyfmu_sources.learned_plant.law_variables`` takes it.
-
-    Returns:
-        The FMU's path.
-
-    Raises:
-        FmuError: the name is no identifier, a parameter is unknown or out of range, no law can act in the plant, or
-            the build fails.
-    """
+    """Build (unless it is there already) an FMU called ``name`` that is ``base`` with other start values."""
     if not IDENTIFIER.fullmatch(name) or name in catalogue():
         raise FmuError(f"`name` must be a new C identifier of at most 100 characters, but is {name!r}")
     starts = _start_numbers(start_values or {})
@@ -104,11 +73,7 @@ def build_variant(
 
 
 def _start_numbers(values: Mapping[str, float | str]) -> dict[str, float]:
-    """Return start values as numbers, an enumeration's item as its own.
-
-    Raises:
-        FmuError: a value is neither.
-    """
+    """Return start values as numbers, an enumeration's item as its own."""
     return {parameter: _number(value) for parameter, value in values.items()}
 
 
@@ -127,20 +92,13 @@ def _number(value: float | str) -> float:
 def _ensure(recipe: Recipe, directory: Path, force: bool = False) -> Path:
     path = directory / f"{recipe.name}.fmu"
     current = fingerprint(recipe, find_toolchain().identity)
-    if force or stamp_of(path) != current or not trusted(path):
+    if force or stamp_of(path) != current or not is_trusted(path):
         _build(recipe, path, current)
     return path
 
 
-def trusted(path: Path) -> bool:
-    """Tell whether the file is what we built; a stamp alone can be forged, save beside sources as open.
-
-    Args:
-        path: of an FMU.
-
-    Returns:
-        True when it may run in this process.
-    """
+def is_trusted(path: Path) -> bool:
+    """Tell whether the file is what we built; a stamp alone can be forged, save beside sources as open."""
     if is_ours(path):
         return True
     own = (ROOT / "fmus" / folder for folder in ("", "native", "fmi3", "fmi3/native"))
@@ -152,9 +110,6 @@ def trusted(path: Path) -> bool:
 
 def stamp_of(path: Path) -> str | None:
     """Return the fingerprint inside the FMU at ``path``; ``None`` where there is none.
-
-    Args:
-        path: of an FMU.
 
     Returns:
         64 hexadecimal digits.

@@ -46,9 +46,6 @@ class Target:
 
         Args:
             fmi: version of FMI, 2 or 3.
-
-        Returns:
-            The names.
         """
         return (self.folder,) if fmi == 2 else self.folders3
 
@@ -87,14 +84,7 @@ class Compiler:
 
 @cache
 def find_compiler(here: bool = False) -> Compiler | None:
-    """Return zig if it is installed, else the local C compiler, else ``None``.
-
-    Args:
-        here: for this platform alone; the local compiler, which is quicker, comes first then.
-
-    Returns:
-        The compiler and the platforms that it compiles for.
-    """
+    """Return zig if it is installed, else the local C compiler, else ``None``."""
     local = [t for t in TARGETS if t.system == sys.platform and platform.machine().lower() in t.machines]
     zig = _zig(tuple(local) if here else TARGETS)
     cc = _local(tuple(local))
@@ -122,29 +112,16 @@ def _first_line(path: str) -> str:
 
 
 def compile_library(compiler: Compiler, target: Target, name: str, sources: Mapping[str, bytes]) -> bytes:
-    """Return the shared library of an FMU for one platform, the same bytes for the same sources and compiler.
-
-    Args:
-        compiler: from :func:`find_compiler`.
-        target: one of its platforms.
-        name: model identifier; ``NAME.c`` is compiled.
-        sources: content by file name.
-
-    Returns:
-        The library.
-
-    Raises:
-        FmuError: the compiler fails or warns.
-    """
+    """Return the shared library of an FMU for one platform, the same bytes for the same sources and compiler."""
     machines = target.zig if compiler.is_zig else ("",)
     with tempfile.TemporaryDirectory() as folder:
         for file, content in sources.items():
             (Path(folder) / file).write_bytes(content)
-        parts = [_compiled(compiler, target, machine, name, Path(folder)) for machine in machines]
+        parts = [_compile(compiler, target, machine, name, Path(folder)) for machine in machines]
     return parts[0] if len(parts) == 1 else universal(parts)
 
 
-def _compiled(compiler: Compiler, target: Target, machine: str, name: str, folder: Path) -> bytes:
+def _compile(compiler: Compiler, target: Target, machine: str, name: str, folder: Path) -> bytes:
     library = f"{name}{target.suffix}"
     zig = ZIG_WINDOWS_FLAGS if target.system == "win32" else ZIG_FLAGS
     speed = zig if compiler.is_zig else ("-O3",)
@@ -165,18 +142,7 @@ def _compiled(compiler: Compiler, target: Target, machine: str, name: str, folde
 
 
 def compile_web_module(compiler: Compiler, sources: Mapping[str, bytes]) -> bytes:
-    """Return a WebAssembly module.
-
-    Args:
-        compiler: zig.
-        sources: content by file name; ``live.c`` and what ends in ``_part.c`` is compiled, the rest is included.
-
-    Returns:
-        Its bytes.
-
-    Raises:
-        FmuError: the compiler fails or warns.
-    """
+    """Return a WebAssembly module."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for file, content in sources.items():
@@ -188,11 +154,7 @@ def compile_web_module(compiler: Compiler, sources: Mapping[str, bytes]) -> byte
 
 
 def _run(compiler: Compiler, command: Sequence[str], folder: Path, what: str) -> None:
-    """Run the compiler.
-
-    Raises:
-        FmuError: it fails or warns.
-    """
+    """Run the compiler."""
     cache = str(cache_directory("zig"))
     environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": cache, "ZIG_LOCAL_CACHE_DIR": cache}
     try:
@@ -218,14 +180,7 @@ def _options(target: Target, machine: str, library: str) -> list[str]:
 
 
 def universal(parts: Sequence[bytes]) -> bytes:
-    """Return one Mach-O library for several machines: a table of contents, then each at a page of its own.
-
-    Args:
-        parts: one library per machine.
-
-    Returns:
-        The library.
-    """
+    """Return one Mach-O library for several machines: a table of contents, then each at a page of its own."""
     alignment = 14
     offsets, end = [], 1 << alignment
     for part in parts:

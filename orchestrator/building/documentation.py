@@ -55,13 +55,8 @@ def documentation(
     """Return members of the archive: a page, the licence and the icon.
 
     Args:
-        recipe: of the FMU.
         description: its model description in FMI 2.0.
-        platforms: of a native FMU, for which it has binaries; none for an FMU that runs Python.
         fmi: version of FMI that the FMU has, 2 or 3.
-
-    Returns:
-        Content by name in the archive.
     """
     fragments = [f"{recipe.plain}.html"]
     if recipe.law is not None:

@@ -25,7 +25,7 @@ from orchestrator.building.native_sources import slave_class
 from orchestrator.building.sources import recipe_of
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.extraction import content_hash
-from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.instances import make_slave
 from orchestrator.shared.cache import cache_directory
 
 NATIVE, PYTHON = "native", "Python"
@@ -37,30 +37,14 @@ _PROBE_STARTS = {"alpha": 0.002, "theta_m_start": 0.02}
 
 @dataclass(frozen=True)
 class FmuBuilds:
-    """Built FMUs.
-
-    Attributes:
-        paths: by name.
-        kind: ``NATIVE`` or ``PYTHON``.
-    """
+    """Built FMUs."""
 
     paths: Mapping[str, Path]
     kind: str
 
 
 def ensure_fastest(names: Sequence[str], meanwhile: Callable[[], object] | None = None) -> FmuBuilds:
-    """Return our FMUs as they run fastest on this machine with the bits of the Python FMUs.
-
-    Args:
-        names: which FMUs; what takes longest to compile should come first.
-        meanwhile: something that can be done, in another thread, while the largest is compiled.
-
-    Returns:
-        Native builds for this platform, from the user's cache, or the Python FMUs.
-
-    Raises:
-        FmuError: a build fails.
-    """
+    """Return our FMUs as they run fastest on this machine with the bits of the Python FMUs."""
     if find_compiler(here=True) is not None:
         with contextlib.suppress(FmuError):  # whatever a compiler lacks, the Python FMUs are there
             folder = cache_directory("native")
@@ -75,15 +59,7 @@ def ensure_fastest(names: Sequence[str], meanwhile: Callable[[], object] | None 
 
 
 def same_bits(name: str, path: Path) -> bool:
-    """Return whether a native FMU gives the bits of its Python slave here; a comparison that held is remembered.
-
-    Args:
-        name: of the FMU.
-        path: of the native build.
-
-    Returns:
-        True when all outputs agree to the last bit.
-    """
+    """Return whether a native FMU gives the bits of its Python slave here; a comparison that held is remembered."""
     place = (content_hash(path), sys.version, platform.platform(), *platform.libc_ver(), platform.processor())
     mark = cache_directory("same_bits") / hashlib.sha256("\n".join(place).encode()).hexdigest()[:32]
     if mark.exists():
@@ -104,7 +80,7 @@ def _agree(name: str, cls: Any, path: Path, variant: Mapping[str, Any]) -> bool:
     of = {c: [v for v in cls.table if v.causality == c and v.type == "Real"] for c in ("input", "output", "parameter")}
     matrices = {v.name: rng.uniform(-0.4, 0.4) for v in of["parameter"] if "[" in v.name}
     starts = {**matrices, **{k: v for k, v in _PROBE_STARTS.items() if k in places}, **variant}
-    python, native = cls(), FmuSlave(name, path)
+    python, native = cls(), make_slave(name, path)
     try:
         native.set(starts)
         for key, value in starts.items():

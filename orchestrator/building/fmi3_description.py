@@ -16,16 +16,7 @@ INDICATOR = "indicator"
 
 
 def fmi3_description(cls: Any, name: str, native: bool) -> Element:
-    """Return the root element without fingerprint and token.
-
-    Args:
-        cls: the adapter, its table complete.
-        name: model name and model identifier.
-        native: whether it is translated to C, which alone has directional derivatives.
-
-    Returns:
-        The element.
-    """
+    """Return the root element without fingerprint and token."""
     root = Element(
         "fmiModelDescription",
         {

@@ -6,14 +6,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 
 def build_description(name: str) -> bytes:
-    """Return ``sources/buildDescription.xml``: one file of C99, with the C library's mathematics.
-
-    Args:
-        name: model identifier.
-
-    Returns:
-        The file's content.
-    """
+    """Return ``sources/buildDescription.xml``: one file of C99, with the C library's mathematics."""
     root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     build = SubElement(root, "BuildConfiguration", {"modelIdentifier": name})
     files = SubElement(build, "SourceFileSet", {"language": "C99"})
@@ -26,12 +19,6 @@ def terminals_and_icons(cls: Any) -> bytes:
     """Return ``terminalsAndIcons/terminalsAndIcons.xml``: the icon's place, and the terminals of a slave.
 
     Torques flow; angles and speeds are signals. Terminals connect what has the same name in both.
-
-    Args:
-        cls: the adapter.
-
-    Returns:
-        The file's content.
     """
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     picture = SubElement(root, "GraphicalRepresentation")

@@ -19,27 +19,12 @@ SECTIONS = (("Inputs", "input"), ("Outputs", "output"), ("Parameters", "paramete
 
 
 def tables(fmus: dict[str, Path]) -> str:
-    """Return the sections of all FMUs as Markdown.
-
-    Args:
-        fmus: path by name.
-
-    Returns:
-        The text.
-    """
+    """Return the sections of all FMUs as Markdown."""
     return "\n".join(_section(read_archive(path)["modelDescription.xml"]) for path in fmus.values())
 
 
 def with_tables(page: str, text: str) -> str:
-    """Return the page with what stands between its two marks replaced by ``text``.
-
-    Args:
-        page: with the two marks.
-        text: to stand between them.
-
-    Returns:
-        The page.
-    """
+    """Return the page with what stands between its two marks replaced by ``text``."""
     before, rest = page.split(BEGIN)
     after = rest.split(END)[1]
     return f"{before}{BEGIN}\n{text}\n{END}{after}"

@@ -49,11 +49,7 @@ class Toolchain:
 
 
 def find_toolchain() -> Toolchain:
-    """Return what this machine offers.
-
-    Returns:
-        Compiler, libpython and interpreter, as far as there are any.
-    """
+    """Return what this machine offers."""
     linux = sys.platform == "linux" and platform.machine() == "x86_64"
     compiler = local_compiler() if linux else None
     folder = sysconfig.get_config_var("LIBDIR") or ""
@@ -65,36 +61,12 @@ def find_toolchain() -> Toolchain:
 
 
 def compile_launcher(toolchain: Toolchain, wrapper: str) -> bytes:
-    """Return the shared library, the same bytes wherever it is compiled.
-
-    Args:
-        toolchain: what to compile with.
-        wrapper: file name of PythonFMU's library, which the launcher opens.
-
-    Returns:
-        The library.
-
-    Raises:
-        FmuError: the compiler fails.
-    """
+    """Return the shared library, the same bytes wherever it is compiled."""
     return compile_host(toolchain, SOURCE, {}, f'-DWRAPPER="{wrapper}"')
 
 
 def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], *options: str) -> bytes:
-    """Return a shared library that finds a Python, the same bytes wherever it is compiled.
-
-    Args:
-        toolchain: what to compile with.
-        source: file name of the source.
-        files: content by file name of what is not in ``native/``.
-        options: of the compiler.
-
-    Returns:
-        The library.
-
-    Raises:
-        FmuError: the compiler fails.
-    """
+    """Return a shared library that finds a Python, the same bytes wherever it is compiled."""
     assert toolchain.compiler is not None
     with tempfile.TemporaryDirectory() as folder:
         shutil.copytree(NATIVE, folder, dirs_exist_ok=True)
@@ -105,8 +77,8 @@ def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], 
             toolchain.compiler,
             *("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden", "-Wl,--build-id=none"),
             *options,
-            f"-DPYTHON_LIBRARY={_quoted(library)}",
-            f"-DPYTHON_PROGRAM=L{_quoted(toolchain.program if library else '')}",
+            f"-DPYTHON_LIBRARY={_quote(library)}",
+            f"-DPYTHON_PROGRAM=L{_quote(toolchain.program if library else '')}",
             *("-o", "launcher.so", source, "-ldl", "-lpthread", "-lm"),
         ]
         try:
@@ -119,6 +91,6 @@ def compile_host(toolchain: Toolchain, source: str, files: Mapping[str, bytes], 
         return (Path(folder) / "launcher.so").read_bytes()
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'

@@ -65,18 +65,7 @@ __attribute__((export_name("live_gains"))) int live_gains(const double *given, d
 
 
 def live_module(names: Sequence[str], regulator: bool = False) -> bytes | None:
-    """Return the module of some FMUs, from the user's cache if it was made before; None where there is no zig.
-
-    Args:
-        names: of the FMUs; a plan numbers them in this order.
-        regulator: with the gains of a sampled regulator (``live_gains``).
-
-    Returns:
-        Its bytes.
-
-    Raises:
-        FmuError: the sources cannot be translated or compiled.
-    """
+    """Return the module of some FMUs, from the user's cache if it was made before; None where there is no zig."""
     compiler = find_compiler()
     if compiler is None or not compiler.is_zig:
         return None

@@ -32,12 +32,10 @@ class LiveSystem:
     """FMUs that are stepped one after the other, in this order.
 
     Attributes:
-        instances: at most eight.
+        instances: FMUs of the system, at most 8.
         connections: output to input, ``instance.variable``; several inputs may have one output.
         signals: what is added to an input from outside, shape (steps + 1,): at initialisation, then in each step.
-        record: outputs, ``instance.variable``.
         step: communication step [s].
-        steps: how many.
     """
 
     instances: tuple[LiveInstance, ...]
@@ -53,14 +51,7 @@ class LiveSystem:
         return tuple(dict.fromkeys(instance.fmu for instance in self.instances))
 
     def plan(self) -> tuple[list[float], dict[str, int]]:
-        """Write the system as numbers.
-
-        Returns:
-            The plan, and where in it the value of each ``instance.variable`` is.
-
-        Raises:
-            FmuError: a variable or a choice is unknown.
-        """
+        """Write the system as numbers. Return the plan, and where in it the value of each ``instance.variable`` is."""
         numbers: list[float] = [self.step, self.steps, len(self.instances)]
         places: dict[str, int] = {}
         for instance in self.instances:
@@ -83,11 +74,7 @@ class LiveSystem:
         return numbers, places
 
     def table(self) -> Array:
-        """Write the outer signals as numbers.
-
-        Returns:
-            Row after row, flat; equal signals are one row.
-        """
+        """Write the outer signals as numbers. Return row after row, flat; equal signals are one row."""
         return np.concatenate([np.frombuffer(row) for row in self._rows()] or [np.zeros(1)])
 
     def _rows(self) -> list[bytes]:
@@ -102,15 +89,8 @@ class LiveSystem:
         return (number, *_variable(self.instances[number].fmu, variable))
 
 
-def held(values: Array) -> Array:
-    """Return samples that are held over a step as the row of a signal.
-
-    Args:
-        values: at the communication points.
-
-    Returns:
-        That of initialisation, then that of each step: the sample at its beginning.
-    """
+def hold_row(values: Array) -> Array:
+    """Return samples that are held over a step as the row of a signal."""
     return np.concatenate([values[:1], values[:-1]])
 
 

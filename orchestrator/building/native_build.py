@@ -10,7 +10,7 @@ from pathlib import Path
 import orchestrator.building.translation
 from orchestrator import __version__
 from orchestrator.building.archive import write_archive
-from orchestrator.building.build import default_directory, stamp_of, trusted
+from orchestrator.building.build import default_directory, is_trusted, stamp_of
 from orchestrator.building.compilers import FLAGS, TARGETS, Compiler, compile_library, find_compiler
 from orchestrator.building.documentation import documentation
 from orchestrator.building.fmi3_description import fmi3_description
@@ -32,9 +32,6 @@ def native_directory(fmi: int = 2) -> Path:
 
     Args:
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        The folder, which may not exist yet.
     """
     return default_directory(fmi) / "native"
 
@@ -49,30 +46,16 @@ def ensure_native(
     """Return the path of each native FMU in ``names`` (default: all), after building what is missing or stale.
 
     Args:
-        names: which FMUs.
-        directory: where they are (default: :func:`native_directory`).
-        force: build also what is up to date.
         here: for this platform alone, with the local compiler where there is one: a second instead of half a minute.
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        Path by name.
-
-    Raises:
-        FmuError: a name is unknown, there is no compiler, a slave is outside the translated subset, or the
-            directory cannot be written.
     """
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = native_directory(fmi) if directory is None else directory
     return {recipe.name: _ensure(recipe, folder, force, here, fmi) for recipe in recipes}
 
 
-def _needed_compiler(here: bool = False) -> Compiler:
-    """Return the compiler, see :func:`find_compiler`.
-
-    Raises:
-        FmuError: there is none.
-    """
+def _require_compiler(here: bool = False) -> Compiler:
+    """Return the compiler, see :func:`find_compiler`."""
     compiler = find_compiler(here)
     if compiler is None:
         raise FmuError(NO_COMPILER)
@@ -80,11 +63,7 @@ def _needed_compiler(here: bool = False) -> Compiler:
 
 
 def native_remark() -> str | None:
-    """Return one line on what is missing for all platforms, or ``None``.
-
-    Returns:
-        The line.
-    """
+    """Return one line on what is missing for all platforms, or ``None``."""
     compiler = find_compiler()
     if compiler is None or compiler.is_zig:
         return None
@@ -99,12 +78,7 @@ def native_fingerprint(recipe: Recipe, compiler: Compiler, fmi: int = 2) -> str:
     """Return what changes whenever a native build would.
 
     Args:
-        recipe: of the FMU.
-        compiler: what makes the binaries.
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        A hash.
     """
     options = {
         "fmi": fmi,
@@ -141,10 +115,10 @@ def _builder_files() -> tuple[Path, ...]:
 
 
 def _ensure(recipe: Recipe, directory: Path, force: bool, here: bool, fmi: int) -> Path:
-    compiler = _needed_compiler(here)
+    compiler = _require_compiler(here)
     path = directory / f"{recipe.name}.fmu"
     current = native_fingerprint(recipe, compiler, fmi)
-    if force or stamp_of(path) != current or not trusted(path):
+    if force or stamp_of(path) != current or not is_trusted(path):
         write_archive(path, _native_members(recipe, compiler, current, fmi))
         record(path)
     return path
@@ -154,13 +128,7 @@ def _native_members(recipe: Recipe, compiler: Compiler, fingerprint: str, fmi: i
     """Return the members of the archive.
 
     Args:
-        recipe: of the FMU.
-        compiler: what makes the binaries.
-        fingerprint: from :func:`native_fingerprint`.
         fmi: version of FMI, 2 or 3.
-
-    Raises:
-        FmuError: the slave is outside the translated subset, or the compiler fails.
     """
     cls = slave_class(recipe, fmi)
     sources = c_sources(recipe, cls, PLACEHOLDER, fmi)

@@ -16,16 +16,7 @@ _SHARED = (
 
 
 def native_description(recipe: Recipe, cls: Any, indicators: int) -> Element:
-    """Return the root element without fingerprint and GUID.
-
-    Args:
-        recipe: of the FMU.
-        cls: its adapter, from ``slave_class``.
-        indicators: number of event indicators.
-
-    Returns:
-        The element.
-    """
+    """Return the root element without fingerprint and GUID."""
     root: Element = importlib.import_module("pyfmu_sources.model_xml").model_description(cls, recipe.name)
     root.set("generationTool", "backlash-cosim")
     cosimulation = root.find("CoSimulation")

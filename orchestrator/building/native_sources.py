@@ -58,14 +58,7 @@ def slave_class(recipe: Recipe, fmi: int = 2) -> Any:
     """Return the adapter of a recipe with the recipe's name and start values, as a class of its own.
 
     Args:
-        recipe: of the FMU.
         fmi: version of FMI, 2 or 3; in the latter event indicators are variables too.
-
-    Returns:
-        The class.
-
-    Raises:
-        FmuError: a start value is unknown or out of range.
     """
     base = getattr(importlib.import_module(f"pyfmu_sources.{recipe.module}"), recipe.class_name)
     cls: Any = type(base.__name__, (base,), {"__module__": base.__module__, "__doc__": base.__doc__})
@@ -89,14 +82,7 @@ def _state_variables(cls: Any) -> Iterator[FmuVariable]:
 
 
 def indicator_total(cls: Any) -> int:
-    """Return how many event indicators a slave has.
-
-    Args:
-        cls: the adapter.
-
-    Returns:
-        The number.
-    """
+    """Return how many event indicators a slave has."""
     return len(get_type_hints(cls.indicators)["return"].__args__) if hasattr(cls, "indicators") else 0
 
 
@@ -110,16 +96,7 @@ def c_sources(recipe: Recipe, cls: Any, guid: str, fmi: int = 2) -> dict[str, by
     """Return the members of ``sources/``: file name to content.
 
     Args:
-        recipe: of the FMU.
-        cls: from :func:`slave_class`.
-        guid: of the FMU.
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        Content by file name.
-
-    Raises:
-        FmuError: the slave is outside the subset that can be translated; the message names file and line.
     """
     translated = translate_slave(cls, _runtime_names(), fmi)
     files = ", ".join(path.name for path in closure(recipe.module) if path.stem not in _PYTHON_ONLY)
@@ -148,14 +125,7 @@ def _is_needed(header: str, cls: Any, types: str) -> bool:
 
 
 def count_table(cls: Any) -> str:
-    """Return the C table of how many values there are at each value reference, and where event indicators stand.
-
-    Args:
-        cls: from :func:`slave_class`.
-
-    Returns:
-        The definition.
-    """
+    """Return the C table of how many values there are at each value reference, and where event indicators stand."""
     counts = [0] * len(cls.table)
     indicators = ""
     for array in arrays(cls.table):
@@ -167,14 +137,7 @@ def count_table(cls: Any) -> str:
 
 
 def indicator_count(source: bytes) -> int:
-    """Return how many event indicators the C of a slave defines.
-
-    Args:
-        source: C of a slave.
-
-    Returns:
-        The number.
-    """
+    """Return how many event indicators the C of a slave defines."""
     found = re.search(rb"#define INDICATORS (\d+)", source)
     return int(found[1]) if found else 0
 

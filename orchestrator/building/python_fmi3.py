@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.building.archive import write_archive
-from orchestrator.building.build import default_directory, stamp_of, trusted
+from orchestrator.building.build import default_directory, is_trusted, stamp_of
 from orchestrator.building.documentation import documentation
 from orchestrator.building.fmi3_description import fmi3_description
 from orchestrator.building.fmi3_files import terminals_and_icons
@@ -56,15 +56,7 @@ def ensure_python_fmi3(
     """Return the path of each FMU of FMI 3.0 that runs Python (default: all), after building what is missing or stale.
 
     Args:
-        names: which FMUs.
         directory: where they are (default: ``fmi3/`` beside those of FMI 2.0).
-        force: build also what is up to date.
-
-    Returns:
-        Path by name.
-
-    Raises:
-        FmuError: a name is unknown, there is no C compiler for Linux, or ``directory`` cannot be written.
     """
     recipes = [recipe_of(name) for name in (catalogue() if names is None else names)]
     folder = default_directory(3) if directory is None else directory
@@ -77,7 +69,7 @@ def _ensure(recipe: Recipe, directory: Path, force: bool) -> Path:
         raise FmuError("Python FMUs of FMI 3.0 need a C compiler (cc) on Linux x86_64, but there is none")
     path = directory / f"{recipe.name}.fmu"
     current = _fingerprint(recipe, toolchain)
-    if force or stamp_of(path) != current or not trusted(path):
+    if force or stamp_of(path) != current or not is_trusted(path):
         write_archive(path, _members(recipe, toolchain, current))
         record(path)
     return path

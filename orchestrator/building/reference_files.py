@@ -30,15 +30,7 @@ TOLERANCE = "1e-6"
 
 
 def reference_files(recipe: Recipe, description: Element) -> dict[str, bytes]:
-    """Return members of the archive, none for a variant: its reference would have to be computed for it.
-
-    Args:
-        recipe: of the FMU.
-        description: its model description.
-
-    Returns:
-        Content by name in the archive.
-    """
+    """Return members of the archive, none for a variant: its reference would have to be computed for it."""
     path = DATA / f"{recipe.class_name}_reference.csv"
     if recipe.starts or not path.exists():
         return {}

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.building.reference_files import DATA, PARAMETERS, STEPS
-from orchestrator.building.starts import STORED, default_starts, designed_starts
+from orchestrator.building.starts import STORED, default_starts, design_starts
 from orchestrator.plants.reference import ReferencePlant, first_flank, reference_sample
 
 Array = NDArray[np.float64]
@@ -27,14 +27,7 @@ Row = dict[str, float]
 
 
 def reference_run(class_name: str) -> list[Row]:
-    """Return the rows of an experiment: time, the inputs held until the next row, and the outputs.
-
-    Args:
-        class_name: of the adapter.
-
-    Returns:
-        The rows, the heading first.
-    """
+    """Return the rows of an experiment: time, the inputs held until the next row, and the outputs."""
     run = {"Drivetrain": _plant, "LqrController": _controller, "KalmanEstimator": _estimator}
     return run[class_name]()
 
@@ -120,7 +113,7 @@ def _as_csv(rows: list[Row]) -> bytes:
 
 def main() -> None:
     """Write the files, the start values first: the runs use them."""
-    STORED.write_text(json.dumps(designed_starts(), indent=1) + "\n", encoding="ascii")
+    STORED.write_text(json.dumps(design_starts(), indent=1) + "\n", encoding="ascii")
     for name in PARAMETERS:
         (DATA / f"{name}_reference.csv").write_bytes(_as_csv(reference_run(name)))
 

@@ -43,11 +43,7 @@ class Recipe:
 
 @cache
 def catalogue() -> dict[str, Recipe]:
-    """Return the recipe of every adapter ``pyfmu_sources/*_slave.py``, by the name of its class.
-
-    Returns:
-        Recipes by name.
-    """
+    """Return the recipe of every adapter ``pyfmu_sources/*_slave.py``, by the name of its class."""
     recipes = {}
     for path in sorted(SOURCES.glob(f"*{SUFFIX}.py")):
         if path.stem in BASES:
@@ -58,17 +54,7 @@ def catalogue() -> dict[str, Recipe]:
 
 
 def recipe_of(name: str) -> Recipe:
-    """Return the recipe called ``name``.
-
-    Args:
-        name: of one of our FMUs.
-
-    Returns:
-        The recipe.
-
-    Raises:
-        FmuError: there is none.
-    """
+    """Return the recipe called ``name``."""
     try:
         return catalogue()[name]
     except KeyError:
@@ -76,18 +62,7 @@ def recipe_of(name: str) -> Recipe:
 
 
 def with_law(recipe: Recipe, law: Mapping[str, Any]) -> Recipe:
-    """Return the recipe of a plant with a learned law.
-
-    Args:
-        recipe: of the plant without it.
-        law: as ``pyfmu_sources.learned_plant.law_variables`` takes it.
-
-    Returns:
-        The recipe.
-
-    Raises:
-        FmuError: the plant has no adapter for one.
-    """
+    """Return the recipe of a plant with a learned law."""
     module = _law_module(recipe)
     if not takes_law(recipe):
         raise FmuError(f"a learned law must act in a plant that has `pyfmu_sources/{module}.py`, but there is none")
@@ -95,14 +70,7 @@ def with_law(recipe: Recipe, law: Mapping[str, Any]) -> Recipe:
 
 
 def takes_law(recipe: Recipe) -> bool:
-    """Tell whether a plant has an adapter in which a learned law acts.
-
-    Args:
-        recipe: of the plant.
-
-    Returns:
-        True when it has.
-    """
+    """Tell whether a plant has an adapter in which a learned law acts."""
     return (SOURCES / f"{_law_module(recipe)}.py").exists()
 
 
@@ -112,14 +80,7 @@ def _law_module(recipe: Recipe) -> str:
 
 @cache
 def closure(module: str) -> tuple[Path, ...]:
-    """Return the files of ``pyfmu_sources`` that ``module`` imports, directly or not, and its own, sorted.
-
-    Args:
-        module: its name without the package.
-
-    Returns:
-        Paths.
-    """
+    """Return the files of ``pyfmu_sources`` that ``module`` imports, directly or not, and its own, sorted."""
     found: dict[str, Path] = {}
     waiting = [module]
     while waiting:
@@ -128,11 +89,11 @@ def closure(module: str) -> tuple[Path, ...]:
         if name in found or not path.exists():
             continue
         found[name] = path
-        waiting += _imported(path)
+        waiting += _import_names(path)
     return tuple(found[name] for name in sorted(found))
 
 
-def _imported(path: Path) -> list[str]:
+def _import_names(path: Path) -> list[str]:
     names: list[str] = []
     for node in ast.walk(ast.parse(path.read_bytes())):
         if isinstance(node, ast.ImportFrom) and node.level == 1:
@@ -142,9 +103,6 @@ def _imported(path: Path) -> list[str]:
 
 def digest(parts: Iterable[bytes]) -> str:
     """Return a SHA-256 of ``parts``, hexadecimal, in which their borders count.
-
-    Args:
-        parts: in an order that counts.
 
     Returns:
         64 hexadecimal digits.
@@ -157,10 +115,6 @@ def digest(parts: Iterable[bytes]) -> str:
 
 def fingerprint(recipe: Recipe, launcher: str) -> str:
     """Return what changes whenever a build of ``recipe`` would: sources, builder, versions, ``launcher``.
-
-    Args:
-        recipe: of the FMU.
-        launcher: identity of the compiler and interpreter.
 
     Returns:
         64 hexadecimal digits.

@@ -12,7 +12,6 @@ def stamp(description: Element, fingerprint: str) -> None:
     """Put in the fingerprint, by which a stale FMU is recognised.
 
     Args:
-        description: root of the model description.
         fingerprint: 64 hexadecimal digits.
     """
     if description.attrib["fmiVersion"] == "3.0":
@@ -27,29 +26,13 @@ def stamp(description: Element, fingerprint: str) -> None:
 
 
 def content_guid(description: Element, members: Mapping[str, bytes]) -> str:
-    """Return the GUID that follows from the content.
-
-    Args:
-        description: root of the model description.
-        members: content by name in the archive.
-
-    Returns:
-        The GUID, in braces.
-    """
+    """Return the GUID that follows from the content."""
     content = [part for name in sorted(members) for part in (name.encode(), members[name])]
     return "{" + str(uuid.UUID(digest([ElementTree.tostring(description), *content])[:32])) + "}"
 
 
 def final_text(description: Element, guid: str) -> bytes:
-    """Return ``modelDescription.xml``.
-
-    Args:
-        description: root of the model description.
-        guid: in braces.
-
-    Returns:
-        The file's content.
-    """
+    """Return ``modelDescription.xml``."""
     description.set("guid" if description.attrib["fmiVersion"] == "2.0" else "instantiationToken", guid)
     for element in description.iter():
         element.text = element.tail = None

@@ -19,24 +19,13 @@ ENCODER_NOISE = 1e-4
 
 
 def default_starts(class_name: str) -> dict[str, float]:
-    """Return the stored start values that are designed rather than written down: those of two FMUs, else none.
-
-    Args:
-        class_name: of the adapter.
-
-    Returns:
-        Value by parameter.
-    """
+    """Return the stored start values that are designed rather than written down: those of two FMUs, else none."""
     stored: dict[str, dict[str, float]] = json.loads(STORED.read_text(encoding="ascii"))
     return stored.get(class_name, {})
 
 
-def designed_starts() -> dict[str, dict[str, float]]:
-    """Return the start values as this machine designs them, by class name, to twelve digits.
-
-    Returns:
-        Values by class name and parameter.
-    """
+def design_starts() -> dict[str, dict[str, float]]:
+    """Return the start values as this machine designs them, by class name, to twelve digits."""
     designs = {"LqrController": _controller(), "KalmanEstimator": _estimator()}
     return {name: {key: float(f"{value:.12g}") for key, value in values.items()} for name, values in designs.items()}
 

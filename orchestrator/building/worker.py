@@ -42,13 +42,7 @@ keep(globals())
 
 
 def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
-    """Build ``recipe`` into ``target``.
-
-    Args:
-        recipe: of the FMU.
-        target: the FMU's path.
-        fingerprint: by which a stale FMU is recognised.
-    """
+    """Build ``recipe`` into ``target``."""
     starts = default_starts(recipe.plain) | dict(recipe.starts)
     runtime = runtime_files()
     sources = {path.name: path.read_bytes() for path in closure(recipe.module)}
@@ -64,8 +58,8 @@ def build(recipe: Recipe, target: Path, fingerprint: str) -> None:
     sources |= {"entry.py": entry.encode(), "__init__.py": b'"""The sources of one FMU."""\n'}
     loaded = LOADED.format(package=package, name=recipe.class_name)
     with tempfile.TemporaryDirectory() as folder:
-        members = _built_by_pythonfmu(Path(folder), package, sources, loaded, recipe.name)
-    write_archive(target, _completed(members, package, runtime, fingerprint, recipe))
+        members = _build_by_pythonfmu(Path(folder), package, sources, loaded, recipe.name)
+    write_archive(target, _complete(members, package, runtime, fingerprint, recipe))
 
 
 def runtime_files() -> dict[str, bytes]:
@@ -80,7 +74,7 @@ def runtime_files() -> dict[str, bytes]:
     return {"__init__.py": b'"""PythonFMU."""\n'} | {f"{m}.py": (folder / f"{m}.py").read_bytes() for m in RUNTIME}
 
 
-def _built_by_pythonfmu(
+def _build_by_pythonfmu(
     folder: Path, package: str, sources: dict[str, bytes], loaded: str, name: str
 ) -> dict[str, bytes]:
     from pythonfmu import FmuBuilder
@@ -94,7 +88,7 @@ def _built_by_pythonfmu(
     return read_archive(Path(built))
 
 
-def _completed(
+def _complete(
     members: dict[str, bytes], package: str, runtime: dict[str, bytes], fingerprint: str, recipe: Recipe
 ) -> dict[str, bytes]:
     """Return the members with PythonFMU put into the package, the launcher, all documents and the GUID."""
@@ -133,11 +127,7 @@ def pythonfmu_license() -> bytes:
 
 
 def main() -> int:
-    """Read the recipe from standard input; return 0, or 2 with one line on standard error.
-
-    Returns:
-        The exit code.
-    """
+    """Read the recipe from standard input; return 0, or 2 with one line on standard error."""
     request = json.load(sys.stdin)
     recipe = Recipe(request["name"], request["module"], request["class_name"], request["starts"], request["law"])
     try:

@@ -113,7 +113,7 @@ def read_policy(path: Path) -> Policy:
     try:
         policy = msgspec.toml.decode(data, type=Policy)
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
-        raise InputError(f"the policy {path} must be such a file, but: {error}") from None
+        raise InputError(f"the policy {path} must be a valid policy file, but is not: {error}") from None
     for place, pattern in _patterns(policy):
         if not _fitting([pattern]):
             raise InputError(f"{path}: `{place}` must name a rule or a group such as `archive.*`, but is {pattern!r}")

@@ -6,7 +6,7 @@ The rules are data: a line each in ``tables``, in groups headed by the stage of 
 
 The column of a version holds the section of its text (2.0.4 and 3.0.2), `*` for a rule that is not the standard's but
 of use for FMUs of this version, or `-` where the rule does not apply.
-docs/check.md shows the table; a test compares them.
+docs/rules.md shows the table; a test compares them.
 """
 
 from collections.abc import Mapping

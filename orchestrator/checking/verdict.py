@@ -165,7 +165,7 @@ def read_baseline(path: Path) -> frozenset[str]:
     except OSError as error:
         raise InputError(f"the baseline {path} must be readable, but is not: {error.strerror}") from None
     except (msgspec.MsgspecError, RecursionError) as error:
-        raise InputError(f"the baseline {path} must be one, but: {error}") from None
+        raise InputError(f"the baseline {path} must be a list of known findings, but is not: {error}") from None
     if "known" not in entries:
         raise InputError(f"the baseline {path} must have the list `known`, but has none")
     return frozenset(entry.fingerprint for entry in entries["known"])

@@ -38,11 +38,7 @@ _SUMMARY = "GITHUB_STEP_SUMMARY"
 
 
 def add_check_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options.
-
-    Args:
-        parser: of the command or the program.
-    """
+    """Add the options."""
     parser.add_argument("--static", action="store_true", help="execute nothing")
     add_trust(parser)
     parser.add_argument(
@@ -69,15 +65,8 @@ def add_check_arguments(parser: argparse.ArgumentParser) -> None:
         )
 
 
-def chosen_options(args: argparse.Namespace) -> CheckOptions:
-    """Return how the arguments want FMUs to be checked.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The options.
-    """
+def check_options(args: argparse.Namespace) -> CheckOptions:
+    """Return how the arguments want FMUs to be checked."""
     return CheckOptions(
         static=args.static,
         trust=args.trust,
@@ -87,18 +76,7 @@ def chosen_options(args: argparse.Namespace) -> CheckOptions:
 
 
 def read_arguments(args: argparse.Namespace) -> Policy:
-    """Return the policy that the arguments name, with what they say themselves, after a look at where reports go.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The policy.
-
-    Raises:
-        InputError: the file of the policy is wrong.
-        OutputError: a report cannot be written.
-    """
+    """Return the policy that the arguments name, with what they say themselves, after a look at where reports go."""
     for option, target in _targets(args):
         _require_place(target, option)
     if args.github and not os.environ.get(_SUMMARY):
@@ -112,16 +90,8 @@ def read_arguments(args: argparse.Namespace) -> Policy:
 def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
     """Mend FMUs, where that was asked for, and say what was mended.
 
-    Args:
-        args: of the command line.
-        paths: of the FMUs.
-
     Returns:
         What to check: the mended FMUs, and those with nothing to mend.
-
-    Raises:
-        FmuError: two FMUs have one name.
-        OutputError: the folder cannot be made.
     """
     if args.fix is None:
         return list(paths)
@@ -135,7 +105,7 @@ def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
     found = []
     for path, target in zip(paths, targets, strict=True):
         try:
-            repair = mend_fmu(path, target, chosen_options(args).archive)
+            repair = mend_fmu(path, target, check_options(args).archive)
         except UnmendableError as error:  # the check says the same as a finding
             print(plain(f"{path}: not mended: {error}"))
             repair = Repair((), ())
@@ -149,14 +119,7 @@ def mend_fmus(args: argparse.Namespace, paths: Sequence[Path]) -> list[Path]:
 
 @contextmanager
 def verdicts_shown(count: int) -> Iterator[Callable[[Verdict], None]]:
-    """Yield what prints a verdict; on a terminal the number of FMUs that are done stands below.
-
-    Args:
-        count: of FMUs.
-
-    Yields:
-        The function.
-    """
+    """Yield what prints a verdict; on a terminal the number of FMUs that are done stands below."""
     shows = sys.stderr.isatty()
     done = 0
 
@@ -170,7 +133,7 @@ def verdicts_shown(count: int) -> Iterator[Callable[[Verdict], None]]:
             sys.stderr.write("\r\x1b[K")
             sys.stderr.flush()
 
-    def shown(verdict: Verdict) -> None:
+    def show(verdict: Verdict) -> None:
         nonlocal done
         done += 1
         clear()
@@ -179,21 +142,13 @@ def verdicts_shown(count: int) -> Iterator[Callable[[Verdict], None]]:
 
     progress()
     try:
-        yield shown
+        yield show
     finally:
         clear()
 
 
 def write_reports(args: argparse.Namespace, verdicts: Sequence[Verdict]) -> None:
-    """Write the reports that were asked for, each whole or not at all.
-
-    Args:
-        args: of the command line.
-        verdicts: one for each FMU.
-
-    Raises:
-        OutputError: a report cannot be written.
-    """
+    """Write the reports that were asked for, each whole or not at all."""
     writers = {f"--{name}": writer for name, (_, writer) in _REPORTS.items()} | {"--write-baseline": baseline_of}
     for option, target in _targets(args):
         _write(target, writers[option](verdicts), option)

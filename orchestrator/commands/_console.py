@@ -9,18 +9,14 @@ from rich.console import Console
 from rich.table import Table
 
 from orchestrator.api.shown import Block
-from orchestrator.commands._lines import PIPE_WIDTH, folded
+from orchestrator.commands._lines import PIPE_WIDTH, fold
 
 
 def print_blocks(blocks: Sequence[Block]) -> None:
-    """Print what a result shows of itself: lines as they are, tables by ``print_table``.
-
-    Args:
-        blocks: lines and tables.
-    """
+    """Print what a result shows of itself: lines as they are, tables by ``print_table``."""
     for block in blocks:
         if isinstance(block, str):
-            sys.stdout.write(f"{folded(block, sys.stdout)}\n")
+            sys.stdout.write(f"{fold(block, sys.stdout)}\n")
         else:
             print_table(block.title, block.columns, block.rows)
 
@@ -29,11 +25,6 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
     """Print a table; its width is the terminal's, or ``PIPE_WIDTH`` in a pipe.
 
     Where its words do not fit side by side, each row becomes a list of named values.
-
-    Args:
-        title: above the table.
-        columns: headings.
-        rows: one text for each column.
     """
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else PIPE_WIDTH
     widths = _widths(columns, rows, width - 3 * len(columns) - 1)
@@ -78,10 +69,6 @@ def _as_list(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], 
 
 
 def say(text: str) -> None:
-    """Tell a person at a terminal what takes time; say nothing in a pipe.
-
-    Args:
-        text: what is being done.
-    """
+    """Tell a person at a terminal what takes time; say nothing in a pipe."""
     if sys.stderr.isatty():
         sys.stderr.write(f"{text} ...\n")

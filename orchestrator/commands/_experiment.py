@@ -7,11 +7,7 @@ from orchestrator.paired.experiment import BACKLASH_MODELS, EXPERIMENTS
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--experiment`` and ``--backlash-model``.
-
-    Args:
-        parser: of the command.
-    """
+    """Add ``--experiment`` and ``--backlash-model``."""
     parser.add_argument(
         "--experiment", default="default", metavar="NAME", help=f"{' or '.join(EXPERIMENTS)} (default: %(default)s)"
     )
@@ -24,15 +20,7 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def refuse_with_scenario(arguments: argparse.Namespace, defaults: dict[str, object]) -> None:
-    """Refuse options of the pair that differ from their ``defaults``: beside ``--scenario`` they would do nothing.
-
-    Args:
-        arguments: of the command line.
-        defaults: value by name of the argument.
-
-    Raises:
-        ScenarioError: one does.
-    """
+    """Refuse options of the pair that differ from their ``defaults``: beside ``--scenario`` they would do nothing."""
     for name, default in (defaults | {"experiment": "default", "backlash_model": "dead_zone"}).items():
         if getattr(arguments, name) != default:
             option = "--" + name.replace("_", "-")

@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestrator.checking.batch import check_fmus, find_fmus
 from orchestrator.commands._check import (
     add_check_arguments,
-    chosen_options,
+    check_options,
     mend_fmus,
     read_arguments,
     verdicts_shown,
@@ -21,9 +21,6 @@ from orchestrator.shared.version import __version__
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Check FMUs and return the exit code: 0 all are ok, 1 one fails, 2 bad input.
-
-    Args:
-        argv: words of the command line (default: those of this process).
 
     Returns:
         The exit code; 130 after Ctrl-C.
@@ -41,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if not (args.static or args.trust):
             note_missing_walls()
         with verdicts_shown(len(paths)) as progress:
-            verdicts = check_fmus(paths, chosen_options(args), policy, progress)
+            verdicts = check_fmus(paths, check_options(args), policy, progress)
         write_reports(args, verdicts)
         return 0 if all(verdict.ok for verdict in verdicts) else 1
 

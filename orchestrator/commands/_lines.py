@@ -7,16 +7,8 @@ from typing import TextIO
 PIPE_WIDTH = 140  # of tables in a pipe; also the widest lines of text on a terminal, for the eye
 
 
-def folded(text: str, stream: TextIO) -> str:
-    """Return lines as ``stream`` should get them: folded between words where a person reads them.
-
-    Args:
-        text: one or more lines.
-        stream: where they go.
-
-    Returns:
-        The lines.
-    """
+def fold(text: str, stream: TextIO) -> str:
+    """Return lines as ``stream`` should get them: folded between words where a person reads them."""
     if not stream.isatty():
         return text
     width = min(shutil.get_terminal_size().columns, PIPE_WIDTH)

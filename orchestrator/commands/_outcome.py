@@ -6,23 +6,16 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any, TextIO, cast
 
-from orchestrator.commands._lines import folded
-from orchestrator.commands._parser import one_line, worded
+from orchestrator.commands._lines import fold
+from orchestrator.commands._parser import one_line, word_error
 from orchestrator.errors import InputError, OrchestratorError
 
 
 def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
     """Run a program's work and return its exit code: that of the work, 2 for bad input, 1 for other errors.
 
-    Args:
-        run: the work; what it prints to standard output is dropped once the reader has gone.
-        flags: what ``flags_of`` returned.
-
     Returns:
         The exit code; 130 after Ctrl-C.
-
-    Raises:
-        BrokenPipeError: the reader of the standard error stream has gone.
     """
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of any script, whatever the terminal's encoding
@@ -32,10 +25,10 @@ def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
         sys.stdout.flush()
         return code
     except OrchestratorError as error:
-        _say(f"error: {one_line(worded(error, flags))}")
+        _say(f"error: {one_line(word_error(error, flags))}")
         return 2 if isinstance(error, InputError) else 1
     except KeyboardInterrupt as interruption:  # an engine's says what is kept and how to go on
-        text = worded(interruption, flags)
+        text = word_error(interruption, flags)
         _say(f"interrupted: {text}" if text else "interrupted")
         return 130
     except BrokenPipeError:
@@ -47,7 +40,7 @@ def exit_code(run: Callable[[], int], flags: Mapping[str, str]) -> int:
 
 def _say(text: str) -> None:
     """Write one line to standard error, folded between words on a terminal."""
-    sys.stderr.write(f"{folded(text, sys.stderr)}\n")
+    sys.stderr.write(f"{fold(text, sys.stderr)}\n")
 
 
 class ForgivingStream:
@@ -60,14 +53,7 @@ class ForgivingStream:
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        """Write ``text``; after the reader has gone away, write nothing.
-
-        Args:
-            text: to be written.
-
-        Returns:
-            The number of characters.
-        """
+        """Write ``text``; after the reader has gone away, write nothing."""
         try:
             return int(self._stream.write(text))
         except BrokenPipeError:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from orchestrator.commands._lines import folded
+from orchestrator.commands._lines import fold
 
 LARGEST_WHOLE_NUMBER = 10**18
 # What argparse says of an argument, and how that is said here.
@@ -32,29 +32,12 @@ class Parser(argparse.ArgumentParser):
             self.register("type", kind, reader)
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where help is, and exit with 2.
-
-        Args:
-            message: argparse's words.
-
-        Returns:
-            Never.
-        """
-        self.exit(2, folded(f"error: {one_line(_worded(message))}; see {self.prog} --help", sys.stderr) + "\n")
+        """Say what is wrong and where help is, and exit with 2."""
+        self.exit(2, fold(f"error: {one_line(_word_message(message))}; see {self.prog} --help", sys.stderr) + "\n")
 
 
 def _whole(text: str) -> int:
-    """Return a whole number of a size that everything can handle.
-
-    Args:
-        text: a word of the command line.
-
-    Returns:
-        The number.
-
-    Raises:
-        ArgumentTypeError: it is none, or has more than 18 digits.
-    """
+    """Return a whole number of a size that everything can handle."""
     try:
         value = int(text)
     except ValueError:
@@ -65,17 +48,7 @@ def _whole(text: str) -> int:
 
 
 def number(text: str) -> float:
-    """Return a finite number.
-
-    Args:
-        text: a word of the command line.
-
-    Returns:
-        The number.
-
-    Raises:
-        ArgumentTypeError: it is none, or not finite.
-    """
+    """Return a finite number."""
     try:
         value = float(text)
     except ValueError:
@@ -86,64 +59,32 @@ def number(text: str) -> float:
 
 
 def _path(text: str) -> Path:
-    """Return a path; an empty one, which would mean the working directory, is a mistake of a script.
-
-    Args:
-        text: a word of the command line.
-
-    Returns:
-        The path.
-
-    Raises:
-        ArgumentTypeError: it is empty.
-    """
+    """Return a path; an empty one, which would mean the working directory, is a mistake of a script."""
     if not text:
         raise argparse.ArgumentTypeError("must be a path, but is empty")
     return Path(text)
 
 
 def one_line(message: str) -> str:
-    """Return a message whose line breaks and control characters are written out.
-
-    Args:
-        message: of any origin.
-
-    Returns:
-        Printable text.
-    """
+    """Return a message whose line breaks and control characters are written out."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in message)
 
 
 def flags_of(parser: argparse.ArgumentParser) -> dict[str, str]:
-    """Return what the command line calls each argument, by its name in Python.
-
-    Args:
-        parser: of the command.
-
-    Returns:
-        Flag by name.
-    """
+    """Return what the command line calls each argument, by its name in Python."""
     actions = parser._actions  # argparse has no public list of them
     return {a.dest: a.option_strings[-1] if a.option_strings else str(a.metavar or a.dest) for a in actions}
 
 
-def worded(error: BaseException, flags: Mapping[str, str]) -> str:
-    """Return an error's text in which the arguments that it speaks of have their names of the command line.
-
-    Args:
-        error: raised by the API.
-        flags: what ``flags_of`` returned.
-
-    Returns:
-        The text.
-    """
+def word_error(error: BaseException, flags: Mapping[str, str]) -> str:
+    """Return an error's text in which the arguments that it speaks of have their names of the command line."""
     text = str(error)
     for name in getattr(error, "arguments", ()):
         text = text.replace(f"`{name}`", f"`{flags.get(name, name)}`")
     return text
 
 
-def _worded(message: str) -> str:
+def _word_message(message: str) -> str:
     named = re.fullmatch(r"argument (.+?): (.*)", message, re.DOTALL)
     if named is None:
         return re.sub(r"^the following arguments are required: (.*)", r"`\1` must be given, but is not", message)

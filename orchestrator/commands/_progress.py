@@ -18,11 +18,7 @@ MIB = 1024**2
 
 
 def add_engine_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--workers``, ``--scheduler``, ``--resume``, ``--time-limit`` and ``--memory-limit``.
-
-    Args:
-        parser: of the command.
-    """
+    """Add ``--workers``, ``--scheduler``, ``--resume``, ``--time-limit`` and ``--memory-limit``."""
     defaults = CaseLimits()
     parser.add_argument("--workers", type=int, metavar="N", help="worker processes (default: one per core)")
     parser.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="run on this Dask cluster instead")
@@ -71,11 +67,7 @@ class CaseProgress:
             self._bar.stop()
 
     def update(self, progress: Progress) -> None:
-        """Show where the run stands.
-
-        Args:
-            progress: numbers of cases.
-        """
+        """Show where the run stands."""
         now = time.monotonic()
         fresh = progress.done - progress.resumed
         rate = fresh / max(now - self._start, 1e-9)
@@ -94,11 +86,7 @@ def line(progress: Progress, rate: float) -> str:
     """Return progress in words; ``rate`` in cases per second.
 
     Args:
-        progress: numbers of cases.
         rate: [1/s].
-
-    Returns:
-        One line.
     """
     left = f", {_duration((progress.total - progress.done) / rate)} left" if rate > 0.0 else ""
     return f"{progress.done} of {progress.total} cases, {rate:.1f} per second{left}, {progress.failed} failed"

@@ -13,12 +13,7 @@ RATES = (1.0, 1e6)  # Hz
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser, rate_too: str = "") -> None:
-    """Add the options; ``rate_too`` is what else ``--rate`` means to the command.
-
-    Args:
-        parser: of the command.
-        rate_too: words for the help, or nothing.
-    """
+    """Add the options; ``rate_too`` is what else ``--rate`` means to the command."""
     group = parser.add_argument_group("reading of records")
     group.add_argument("--part", metavar="START:END", help="keep this part of each record [s], from its first row on")
     group.add_argument(
@@ -34,17 +29,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser, rate_too: str = "") -
 
 
 def reading_of(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the options by the names that ``read_record`` has for them.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        Arguments by name.
-
-    Raises:
-        ScenarioError: an option is out of its range.
-    """
+    """Return the options by the names that ``read_record`` has for them."""
     if args.rate is not None and not RATES[0] <= args.rate <= RATES[1]:
         raise ScenarioError(f"`rate` must be between {RATES[0]:g} and {RATES[1]:g}, but is {args.rate:g}", "rate")
     if args.header is not None and args.header < 0:
@@ -53,14 +38,7 @@ def reading_of(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def what_was_read(records: Iterable[Record]) -> list[str]:
-    """Return one line for each record that says what was detected and assumed.
-
-    Args:
-        records: that were read.
-
-    Returns:
-        The lines.
-    """
+    """Return one line for each record that says what was detected and assumed."""
     return [f"{record.source}: {'; '.join(record.notes)}" for record in records if record.notes]
 
 

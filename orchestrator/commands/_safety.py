@@ -8,11 +8,7 @@ from orchestrator.shared.isolation.limits import MEBIBYTE
 
 
 def add_safety_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--trust``, ``--time-limit``, ``--memory-limit`` and ``--allow-nonfinite``.
-
-    Args:
-        parser: of the command.
-    """
+    """Add ``--trust``, ``--time-limit``, ``--memory-limit`` and ``--allow-nonfinite``."""
     add_trust(parser)
     parser.add_argument(
         "--time-limit", type=positive, metavar="S",
@@ -25,14 +21,7 @@ def add_safety_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--allow-nonfinite", action="store_true", help="keep results with NaN or infinities")
 
 
-def chosen_safety(arguments: argparse.Namespace) -> Safety:
-    """Return what the arguments say.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The limits and whether FMUs are trusted.
-    """
+def safety_of(arguments: argparse.Namespace) -> Safety:
+    """Return what the arguments say."""
     memory = int(arguments.memory_limit * MEBIBYTE)
     return Safety(arguments.trust, arguments.time_limit, memory, arguments.allow_nonfinite)

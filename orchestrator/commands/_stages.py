@@ -15,14 +15,7 @@ DIAGNOSIS_START, DIAGNOSIS_PER_ROW, DIAGNOSED_ROWS = 5.0, 0.01, 9000  # s, s for
 
 
 def diagnosis_seconds(rows: int) -> float:
-    """Return about how long a diagnosis takes, before its first fit tells.
-
-    Args:
-        rows: of the record.
-
-    Returns:
-        Seconds.
-    """
+    """Return about how long a diagnosis takes, before its first fit tells."""
     return DIAGNOSIS_START + DIAGNOSIS_PER_ROW * min(rows, DIAGNOSED_ROWS)
 
 
@@ -51,19 +44,13 @@ class Stages:
             self._live.stop()
 
     def begin(self, stage: str, seconds: float) -> None:
-        """Start a piece of work that is expected to take so many seconds.
-
-        Args:
-            stage: what is done, in a few words.
-            seconds: that it will take.
-        """
+        """Start a piece of work that is expected to take so many seconds."""
         self._stage, self._expected, self._begun = stage, seconds, time.monotonic()
 
     def at(self, stage: str, share: float) -> None:
         """Say what is done now, and which share of the piece of work is behind.
 
         Args:
-            stage: what is done, in a few words.
             share: 0 to 1.
         """
         self._stage = stage
@@ -71,11 +58,7 @@ class Stages:
             self._expected = (time.monotonic() - self._begun) / min(share, 1.0)
 
     def left(self) -> float:
-        """Return the time that is left of the piece of work.
-
-        Returns:
-            Seconds.
-        """
+        """Return the time that is left of the piece of work."""
         return max(self._expected - (time.monotonic() - self._begun), 0.0)
 
     def _line(self) -> RenderableType:

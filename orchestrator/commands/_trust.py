@@ -9,28 +9,14 @@ from orchestrator.shared.operating_system import LIMITS
 
 
 def add_trust(parser: argparse.ArgumentParser) -> None:
-    """Add ``--trust``.
-
-    Args:
-        parser: of the command.
-    """
+    """Add ``--trust``."""
     parser.add_argument(
         "--trust", action="store_true", help="run FMUs that are not ours with all rights of the user, without walls"
     )
 
 
 def positive(text: str) -> float:
-    """Return a positive number of a size that means something.
-
-    Args:
-        text: a word of the command line.
-
-    Returns:
-        The number, below 1e9.
-
-    Raises:
-        ArgumentTypeError: it is none, or out of range.
-    """
+    """Return a positive number of a size that means something."""
     value = number(text)
     if not 0 < value < 1e9:
         raise argparse.ArgumentTypeError(f"must be positive and below 1e9, but is {text}")
@@ -44,9 +30,5 @@ def note_missing_walls() -> None:
 
 
 def note(text: str) -> None:
-    """Write a line for the user to know, to the standard error stream.
-
-    Args:
-        text: without a line break.
-    """
+    """Write a line for the user to know, to the standard error stream."""
     sys.stderr.write(f"note: {text}\n")

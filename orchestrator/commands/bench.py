@@ -5,20 +5,13 @@ import sys
 
 from orchestrator.api.benchmark import benchmark
 from orchestrator.commands._console import print_blocks
-from orchestrator.paired.bench.tools import TOOLS
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what the benchmark takes.
-
-    Args:
-        parser: of the command.
-    """
+    """Add what the benchmark takes."""
     parser.add_argument("--rounds", type=int, default=3, metavar="N", help="turns that every tool gets (default: 3)")
-    parser.add_argument(
-        "--tools", default=",".join(TOOLS), metavar="A,B", help="which tools (default: all, installed or not)"
-    )
+    parser.add_argument("--tools", metavar="A,B", help="which tools (default: all, installed or not)")
     parser.add_argument(
         "--python",
         action="append",
@@ -31,18 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Measure, print the tables, write JSON.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
-    tools = [name.strip() for name in arguments.tools.split(",")]
-    with staged(arguments.out) as folder:
+    """Measure, print the tables, write JSON."""
+    with stage_output(arguments.out) as folder:
         result = benchmark(
-            tools,
+            arguments.tools and [name.strip() for name in arguments.tools.split(",")],
             rounds=arguments.rounds,
             pythons=dict(word.partition("=")[::2] for word in arguments.python),
             scaling_too=arguments.scaling,
@@ -51,8 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
         result.write(folder, arguments.out)
     print_blocks(result.blocks())
-    base = result.base.title if result.base else "nothing"
-    print_blocks([f"Ratios: {base} over the row's tool. Written to {arguments.out}"])
+    print_blocks([f"Ratios: the first tool that ran over the row's tool. Written to {arguments.out}"])
     return 0
 
 

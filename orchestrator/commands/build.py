@@ -3,26 +3,22 @@
 import argparse
 from pathlib import Path
 
-from orchestrator.api.build import PLATFORMS, VERSIONS, build, shown
+from orchestrator.api.build import PLATFORMS, VERSIONS, build, short_path
 from orchestrator.building.build import default_directory
 from orchestrator.building.native_build import native_directory
 from orchestrator.commands._console import print_blocks
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's arguments.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the command's arguments."""
     parser.add_argument("names", nargs="*", metavar="FMU", help="which FMUs (default: all)")
     parser.add_argument(
         "--directory",
         type=Path,
         default=None,
         metavar="DIR",
-        help=f"where FMUs go (default: {shown(default_directory())}, native ones {shown(native_directory())})",
+        help=f"where FMUs go (default: {short_path(default_directory())}, --native: {short_path(native_directory())})",
     )
     parser.add_argument(
         "--native", action="store_true", help="translate to C and compile: FMUs that need no Python at run time"
@@ -38,15 +34,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Build what is missing or stale and say what this machine cannot give.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-    """
-    with staged(args.out) as folder:
+    """Build what is missing or stale and say what this machine cannot give."""
+    with stage_output(args.out) as folder:
         result = build(
             args.names,
             directory=args.directory,

@@ -6,15 +6,11 @@ from pathlib import Path
 from orchestrator.api.calibrate import calibrate
 from orchestrator.commands._console import print_blocks, say
 from orchestrator.commands._trust import note_missing_walls
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the arguments of the command."""
     parser.add_argument("record", type=Path, metavar="DATA.csv", help="measured record")
     parser.add_argument("--fmu", type=Path, required=True, metavar="ANY.fmu", help="any FMI 2.0 co-simulation FMU")
     parser.add_argument("--map", type=Path, required=True, metavar="MAP.toml", help="columns and uncertain parameters")
@@ -22,16 +18,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fit, print the parameters, write JSON and report.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Fit, print the parameters, write JSON and report."""
     note_missing_walls()
-    with staged(args.out) as folder:
+    with stage_output(args.out) as folder:
         found = calibrate(args.record, args.fmu, args.map, settings=args.settings, progress=say)
         found.write(folder, args.out)
         print_blocks(found.blocks())

@@ -7,15 +7,11 @@ from orchestrator.api.build import build
 from orchestrator.api.check import check, find_fmus
 from orchestrator.commands._check import add_check_arguments, mend_fmus, read_arguments, verdicts_shown, write_reports
 from orchestrator.commands._trust import note_missing_walls
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the arguments of the command."""
     parser.add_argument(
         "fmus", nargs="*", type=Path, metavar="FMU", help="FMUs, unpacked FMUs or folders with FMUs (default: our own)"
     )
@@ -23,20 +19,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Check every FMU; 1 when any fails.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Check every FMU; 1 when any fails."""
     paths = find_fmus(args.fmus) if args.fmus else list(build().paths.values())
     policy = read_arguments(args)
     paths = mend_fmus(args, paths)
     if not (args.static or args.trust):
         note_missing_walls()
-    with staged(args.out) as folder:
+    with stage_output(args.out) as folder:
         with verdicts_shown(len(paths)) as progress:
             result = check(
                 paths,

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.arguments import choose_settings
 from orchestrator.api.diagnose import comparable_record, diagnose
 from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks, say
@@ -14,15 +14,11 @@ from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.commands._trust import note_missing_walls
 from orchestrator.diagnosis.settings import DiagnosisSettings
 from orchestrator.errors import ScenarioError
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the arguments of the command."""
     parser.add_argument(
         "records", type=Path, nargs="+", metavar="DATA", help=f"measured records of one machine ({FORMATS})"
     )
@@ -59,23 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        ScenarioError: options that do not belong together.
-    """
+    """Diagnose, print what was found, write JSON, CSV, figures, report and the corrected FMU."""
     if args.fmu is not None or args.scenario is not None:
         return _any_fmu(args)
     if args.map is not None or args.draft_map:
         raise ScenarioError("`map` and `draft_map` must come with an FMU, but none is given", "map", "draft_map")
     model = read_model(args.model)
-    settings = chosen_settings(args.settings, DiagnosisSettings)
+    settings = choose_settings(args.settings, DiagnosisSettings)
     if args.time_limit is not None and not 0.0 < args.time_limit < 1e9:
         raise ScenarioError(f"`time_limit` must be positive and below 1e9 s, but is {args.time_limit:g}", "time_limit")
     reading = reading_of(args)
@@ -85,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
     files = {"record": args.records[0], "model": args.model, "settings": args.settings, "validate": args.validate}
     files["test"] = args.test
     given = {name: path and str(path) for name, path in files.items()}
-    with staged(args.out) as folder:
-        with _shown(sum(record.size for record in records)) as progress:
+    with stage_output(args.out) as folder:
+        with _show_stages(sum(record.size for record in records)) as progress:
             found = diagnose(
                 records, model, validate=other, test=tested, settings=settings, search=not args.no_search,
                 with_law=args.with_law, time_limit=args.time_limit, progress=progress,
@@ -120,13 +106,13 @@ def _any_fmu(args: argparse.Namespace) -> int:
     note_missing_walls()
     if args.draft_map:
         text = draft_map(args.records[0], fmu)
-        with staged(args.out) as folder:
+        with stage_output(args.out) as folder:
             (folder / "map.toml").write_text(text, encoding="utf-8")
         print_blocks([f"Written to {args.out / 'map.toml'}: look it over, and give it with --map"])
         return 0
     if args.map is None:
         raise ScenarioError("`map` must be given with an FMU; `draft_map` writes a first one", "map", "draft_map")
-    with staged(args.out, FmuDiagnosisResult.replaces) as folder:
+    with stage_output(args.out, FmuDiagnosisResult.replaces) as folder:
         found = diagnose(
             args.records, fmu, args.map, validate=args.validate, test=args.test, settings=args.settings,
             search=not args.no_search, time_limit=args.time_limit, progress=lambda done, expected, what: say(what),
@@ -141,7 +127,7 @@ def _any_fmu(args: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _shown(rows: int) -> Iterator[Callable[[int, int, str], None]]:
+def _show_stages(rows: int) -> Iterator[Callable[[int, int, str], None]]:
     """Show stages with the time left on a terminal; yield the progress callback of a diagnosis."""
     with Stages() as stages:
         stages.begin("diagnosing", diagnosis_seconds(rows))

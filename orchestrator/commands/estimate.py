@@ -13,7 +13,7 @@ import msgspec
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from orchestrator.api.arguments import chosen_settings
+from orchestrator.api.arguments import choose_settings
 from orchestrator.api.design import DEFAULT_SIZE, RANGES, check_design, design
 from orchestrator.api.estimable import plausible_record, require_linear
 from orchestrator.api.estimate import (
@@ -30,13 +30,13 @@ from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of, what_was_read
 from orchestrator.commands._stages import Stages, diagnosis_seconds
 from orchestrator.errors import ScenarioError
-from orchestrator.estimation.cost import expected_seconds
+from orchestrator.estimation.cost import estimate_seconds
 from orchestrator.estimation.protocol import METHODS
 from orchestrator.estimation.settings import EstimationSettings
 from orchestrator.records.model_file import Model
 from orchestrator.records.record import Record
 from orchestrator.reporting import write_report
-from orchestrator.shared.output import staged, write_result
+from orchestrator.shared.output import stage_output, write_result
 from orchestrator.shared.results.estimate import EstimateFound
 
 
@@ -69,11 +69,7 @@ LOW_RATE = 200.0  # Hz, which shows the shafts that the methods are made for
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the arguments of the command."""
     parser.add_argument(
         "records",
         type=Path,
@@ -111,30 +107,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Estimate or design, print tables, write JSON, CSV, figures and report.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Estimate or design, print tables, write JSON, CSV, figures and report."""
     options = _design_options(args)
     model = read_model(args.model)
     require_linear(model)
-    settings = chosen_settings(args.settings, EstimationSettings)
+    settings = choose_settings(args.settings, EstimationSettings)
     reading = reading_of(args)
     records = [plausible_record(path, model, args.motor_only, **reading) for path in args.records]
     if args.design:
         check_design(model, args.size, **options)
-    with staged(args.out) as folder:
+    with stage_output(args.out) as folder:
         results = EstimateFound()
         blocks: list[Block] = []
         found: EstimateResult | None = None
         if records:
             _announce(records, model, args)
             blocks += what_was_read(records)
-            with _shown(records, model) as progress:
+            with _show_stages(records, model) as progress:
                 found = estimate(
                     records,
                     model,
@@ -150,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
             found.write_diagnosis(folder, args.out)
             results = found.results(args.out)
         if args.design:
-            size = args.size if args.size is not None else _seen(found)
+            size = args.size if args.size is not None else _design_size(found)
             with _progress() as advance:
                 plan = design(
                     model, size, **options, motor_only=args.motor_only, progress=lambda done, total: advance()
@@ -176,7 +165,7 @@ def _announce(records: list[Record], model: Model, args: argparse.Namespace) -> 
     if (args.method or default_method(records)) not in (DEFAULT_METHOD, "all") or not records[0].has_torque:
         return
     rows = sum(record.size for record in records)
-    seconds = expected_seconds(records, model)
+    seconds = estimate_seconds(records, model)
     if seconds > ANNOUNCED_FROM:
         rate = 1.0 / records[0].step
         cheaper = "" if rate <= LOW_RATE else f"; with --rate {LOW_RATE:g} {seconds * LOW_RATE / rate:.0f} s"
@@ -191,11 +180,7 @@ def _plain(value: Any) -> Any:
 
 
 def _design_options(args: argparse.Namespace) -> dict[str, float]:
-    """Return the value of each of ``DESIGN_OPTIONS``, by name; refuse options that would have no effect.
-
-    Raises:
-        ScenarioError: an option is given where nothing reads it.
-    """
+    """Return the value of each of ``DESIGN_OPTIONS``, by name; refuse options that would have no effect."""
     if args.time_limit is not None and not args.time_limit > 0.0:
         raise ScenarioError(f"`time_limit` must be positive, but is {args.time_limit:g}", "time_limit")
     if not args.records:
@@ -213,20 +198,20 @@ def _design_options(args: argparse.Namespace) -> dict[str, float]:
     }
 
 
-def _seen(found: EstimateResult | None) -> float:
+def _design_size(estimate: EstimateResult | None) -> float:
     """Return the half-gap [rad] to design for: the one that the record shows, if any."""
-    shown = [e.alpha for e in (found.estimates if found is not None else ()) if e.visible and e.alpha > 0.0]
+    shown = [e.alpha for e in (estimate.estimates if estimate is not None else ()) if e.visible and e.alpha > 0.0]
     least, most = RANGES["size"]
     return min(max(shown[0], least), most) if shown else DEFAULT_SIZE
 
 
 @contextmanager
-def _shown(records: list[Record], model: Model) -> Iterator[Callable[[str, str, float], None]]:
+def _show_stages(records: list[Record], model: Model) -> Iterator[Callable[[str, str, float], None]]:
     """Show stages with the time left on a terminal; yield what is to be called at each."""
     rows = sum(record.size for record in records)
     with Stages() as stages:
         fitted = sys.stderr.isatty() and records[0].has_torque
-        stages.begin("preparing", expected_seconds(records, model) if fitted else 0.0)
+        stages.begin("preparing", estimate_seconds(records, model) if fitted else 0.0)
         known = [DEFAULT_METHOD]
 
         def show(work: str, stage: str, share: float) -> None:

@@ -8,33 +8,22 @@ from orchestrator.api.inspect import STARTER, inspect
 from orchestrator.api.records import read_model
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._reading import FORMATS, add_reading_arguments, reading_of
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the arguments of the command."""
     parser.add_argument("record", type=Path, metavar="DATA", help=f"measured record ({FORMATS})")
     parser.add_argument("--model", type=Path, metavar="FILE.toml", help="the machine, as far as it is known")
     add_reading_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Look at the record, print what it holds, write JSON, picture, report and a model file to start from.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Look at the record, print what it holds, write JSON, picture, report and a model file to start from."""
     model = None if args.model is None else read_model(args.model)
     found = inspect(args.record, model, **reading_of(args))
     given = {"record": str(args.record), "model": args.model and str(args.model)}
-    with staged(args.out) as folder:
+    with stage_output(args.out) as folder:
         found.write(
             folder,
             args.out,

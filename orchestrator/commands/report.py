@@ -9,23 +9,12 @@ FLAGS = {"command": "--command"}  # of which the parser stores another name
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command.
-
-    Args:
-        parser: of the command.
-    """
+    """Add the arguments of the command."""
     parser.add_argument("directory", type=Path, metavar="DIR", help="where a command left its results")
     parser.add_argument("--command", dest="of", metavar="COMMAND", help="whose results, where DIR holds several")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write ``DIR/report.html`` and print its path.
-
-    Args:
-        args: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Write ``DIR/report.html`` and print its path."""
     print(report(args.directory, args.of))
     return 0

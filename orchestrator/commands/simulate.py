@@ -8,17 +8,13 @@ from orchestrator.api.shown import Result
 from orchestrator.api.simulate import simulate
 from orchestrator.commands._console import print_blocks
 from orchestrator.commands._experiment import add_experiment_arguments, refuse_with_scenario
-from orchestrator.commands._safety import add_safety_arguments, chosen_safety
+from orchestrator.commands._safety import add_safety_arguments, safety_of
 from orchestrator.commands._trust import note
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what a run takes.
-
-    Args:
-        parser: of the command.
-    """
+    """Add what a run takes."""
     add_experiment_arguments(parser)
     parser.add_argument("--alpha", type=float, default=0.02, metavar="RAD", help="half-gap (default: %(default)s)")
     parser.add_argument("--noise", type=float, default=0.0, metavar="RAD", help="encoder noise (default: none)")
@@ -28,17 +24,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run, print a table, write CSV, JSON and figure.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Run, print a table, write CSV, JSON and figure."""
     if arguments.scenario is not None:
         refuse_with_scenario(arguments, {"alpha": 0.02, "noise": 0.0, "seed": 0})
-    with staged(arguments.out) as folder:
+    with stage_output(arguments.out) as folder:
         result = _run(arguments)
         result.write(folder, arguments.out)
     print_blocks(result.blocks())
@@ -48,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _run(arguments: argparse.Namespace) -> Result:
     if arguments.scenario is not None:
-        return simulate(arguments.scenario, safety=chosen_safety(arguments), tell=note)
+        return simulate(arguments.scenario, safety=safety_of(arguments), tell=note)
     return run_pair(
         arguments.alpha,
         noise=arguments.noise,

@@ -7,22 +7,18 @@ from pathlib import Path
 from orchestrator.api.simulate import run_ssp
 from orchestrator.api.ssp import export_ssp
 from orchestrator.commands._console import print_blocks
-from orchestrator.commands._safety import add_safety_arguments, chosen_safety
+from orchestrator.commands._safety import add_safety_arguments, safety_of
 from orchestrator.commands._trust import note
 from orchestrator.errors import ScenarioError
 from orchestrator.reporting import write_report
-from orchestrator.shared.output import staged, write_result
+from orchestrator.shared.output import stage_output, write_result
 
 ACTIONS = ("export", "run")
 PAIR = {"alpha": 0.02, "reference": 0.5}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what both actions take.
-
-    Args:
-        parser: of the command.
-    """
+    """Add what both actions take."""
     parser.add_argument("action", choices=ACTIONS, help="export: write an SSP file; run: simulate one")
     parser.add_argument("file", type=Path, nargs="?", metavar="FILE.ssp", help="run: the SSP file")
     parser.add_argument(
@@ -44,14 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write or run an SSP file.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Write or run an SSP file."""
     return _export(arguments) if arguments.action == "export" else _run(arguments)
 
 
@@ -62,7 +51,7 @@ def _export(arguments: argparse.Namespace) -> int:
     if arguments.scenario is not None:
         _refuse(arguments, "`ssp export --scenario`", PAIR)
     name = "paired.ssp" if arguments.scenario is None else f"{arguments.scenario.stem}.ssp"
-    with staged(arguments.out) as folder:
+    with stage_output(arguments.out) as folder:
         written = export_ssp(folder / name, arguments.scenario, alpha=arguments.alpha, reference=arguments.reference)
         write_result(folder, "ssp", _words(arguments), None, written.results())
         write_report(folder, "ssp")
@@ -78,14 +67,14 @@ def _run(arguments: argparse.Namespace) -> int:
     _refuse(arguments, "`ssp run`", PAIR)
     if arguments.file is None:
         raise ScenarioError("`ssp run` must be given an SSP file, but is given none")
-    with staged(arguments.out) as folder:
+    with stage_output(arguments.out) as folder:
         result = run_ssp(
             arguments.file,
             stop=arguments.stop,
             step=arguments.step,
             inputs=_inputs(arguments.input),
             jacobi=arguments.jacobi,
-            safety=chosen_safety(arguments),
+            safety=safety_of(arguments),
             tell=note,
         )
         result.write(folder, arguments.out, _words(arguments))

@@ -12,7 +12,7 @@ from orchestrator.commands._progress import CaseProgress, add_engine_arguments
 from orchestrator.commands._trust import add_trust, note_missing_walls
 from orchestrator.engine import choose_tls
 from orchestrator.errors import ScenarioError
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 # Where and how a sweep ran does not change what it found.
 NOT_PART_OF_THE_RESULT = frozenset(
@@ -24,11 +24,7 @@ PAIR_ONLY = frozenset({"experiment", "backlash_model", *PAIR_DEFAULTS})
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what a sweep takes.
-
-    Args:
-        parser: of the command.
-    """
+    """Add what a sweep takes."""
     add_experiment_arguments(parser)
     parser.add_argument(
         "--sizes",
@@ -66,14 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the sweep, print the table, write the results; 1 when a case failed.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
+    """Run the sweep, print the table, write the results; 1 when a case failed."""
     if arguments.scenario is not None:
         refuse_with_scenario(arguments, PAIR_DEFAULTS)
     levels = _levels(arguments.noise)
@@ -81,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     given = {name: value for name, value in vars(arguments).items() if name not in unused}
     if arguments.settings is not None:
         given["settings"] = str(arguments.settings)
-    with staged(arguments.out) as folder:
+    with stage_output(arguments.out) as folder:
         with CaseProgress("sweep") as progress:
             result = _sweep(arguments, levels, progress)
         with result:

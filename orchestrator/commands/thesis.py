@@ -4,28 +4,17 @@ import argparse
 
 from orchestrator.api.thesis import thesis
 from orchestrator.commands._console import print_blocks
-from orchestrator.shared.output import staged
+from orchestrator.shared.output import stage_output
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Nothing to add: the thesis is what it is.
-
-    Args:
-        parser: of the command.
-    """
+    """Nothing to add: the thesis is what it is."""
     del parser
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Recompute, print and write.
-
-    Args:
-        arguments: of the command line.
-
-    Returns:
-        The exit code.
-    """
-    with staged(arguments.out) as folder:
+    """Recompute, print and write."""
+    with stage_output(arguments.out) as folder:
         result = thesis()
         result.write(folder, arguments.out)
     print_blocks(result.blocks())

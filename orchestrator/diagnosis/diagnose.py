@@ -157,7 +157,7 @@ def _law(verdict: str, remaining: Sequence[Dependence], settings: DiagnosisSetti
 
 def _notes(found: SearchResult, record: RecordEvidence, test: Sequence[TestMisfit]) -> tuple[str, ...]:
     notes = [
-        f"nothing moves in the last {one.rows} rows of {one.source}, which are its test part: they test nothing"
+        f"nothing moves in the last {one.rows} rows of {one.source}, which are its test part: the test says nothing"
         for one in test
         if one.still
     ]

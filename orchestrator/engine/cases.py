@@ -35,11 +35,7 @@ class Case:
     seed: int
 
     def generator(self) -> np.random.Generator:
-        """Return this case's own random generator: a function of (sweep seed, index) and of nothing else.
-
-        Returns:
-            The generator.
-        """
+        """Return this case's own random generator: a function of (sweep seed, index) and of nothing else."""
         return np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(0, self.index)))
 
 
@@ -55,11 +51,7 @@ class Cases(Protocol):
     def __getitem__(self, index: int) -> Case: ...
 
     def definition(self) -> Mapping[str, Any]:
-        """Return plain JSON data that determine every case.
-
-        Returns:
-            Plain data; equal definitions mean equal cases.
-        """
+        """Return plain JSON data that determine every case."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +69,6 @@ class Outcome:
 
     Attributes:
         index: the case's index.
-        status: how it ended.
         message: one line, empty when it went well.
         values: one per result column when ``status`` is ``DONE``, else empty.
     """
@@ -102,7 +93,6 @@ class Progress:
 
     Attributes:
         done: finished cases, failed and resumed ones included.
-        total: number of cases.
         failed: finished cases whose status is not ``done``.
         resumed: cases that were finished before this run started.
     """

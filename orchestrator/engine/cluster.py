@@ -19,7 +19,7 @@ from distributed import Client, KilledWorker, Security, Worker, WorkerPlugin
 
 from orchestrator.engine.cases import Case, Outcome, Status
 from orchestrator.engine.loop import LoopThread
-from orchestrator.engine.pools import CaseLimits, LaneOfThread, Pool, Tls, assignment, contents, pickled
+from orchestrator.engine.pools import CaseLimits, LaneOfThread, Pool, Tls, assignment, contents, pickle_work
 from orchestrator.engine.supply import Supply
 from orchestrator.engine.work import Work
 from orchestrator.errors import ScenarioError, SimulationError
@@ -42,11 +42,7 @@ class DaskCluster:
     tls: Tls | None = None
 
     def __call__(self, work: Work, limits: CaseLimits) -> "ClusterPool":
-        """Connect, and hand the work to every worker.
-
-        Raises:
-            ScenarioError: there is no scheduler at the address, or its workers cannot run this version.
-        """
+        """Connect, and hand the work to every worker."""
         thread = LoopThread()
         try:
             client = self._client(thread)
@@ -114,7 +110,7 @@ class ClusterPool(Pool):
         files = contents(work)
         try:
             client.wait_for_workers(1, timeout=FIRST_WORKER_LIMIT)
-            client.register_plugin(_Arrival(self._plugin, pickled(work), files, limits), name=self._plugin)
+            client.register_plugin(_Arrival(self._plugin, pickle_work(work), files, limits), name=self._plugin)
         except TimeoutError:
             raise SimulationError(f"the Dask cluster has had no worker for {FIRST_WORKER_LIMIT:g} s") from None
         except ScenarioError:

@@ -33,17 +33,10 @@ class Design(Protocol):
 
         Args:
             index: of the row, from 0.
-
-        Returns:
-            A value per name.
         """
 
     def definition(self) -> Mapping[str, Any]:
-        """Return plain JSON data that determine every row.
-
-        Returns:
-            Plain data.
-        """
+        """Return plain JSON data that determine every row."""
 
 
 @dataclass(frozen=True)
@@ -137,22 +130,11 @@ class Bounds:
             raise ScenarioError(f"`{self.name}` must be positive for a logarithmic draw, but is {self.low}:{self.high}")
 
     def at(self, fraction: float) -> float:
-        """Map ``fraction`` in [0, 1) into the interval.
-
-        Args:
-            fraction: of the way from ``low`` to ``high``.
-
-        Returns:
-            The value.
-        """
+        """Map ``fraction`` in [0, 1) into the interval."""
         return _between(self.low, self.high, fraction, self.logarithmic)
 
     def definition(self) -> Mapping[str, Any]:
-        """Return name, bounds and spacing.
-
-        Returns:
-            Plain data.
-        """
+        """Return name, bounds and spacing."""
         return {"name": self.name, "low": self.low, "high": self.high, "logarithmic": self.logarithmic}
 
 

@@ -37,13 +37,7 @@ class Journal:
     Args:
         path: the file; its directory is made when missing.
         definition: plain JSON data that determine every row.
-        total: number of cases.
         resume: go on with an existing file instead of refusing it.
-
-    Raises:
-        ScenarioError: the file belongs to another sweep, holds finished cases that nobody asked to go on with,
-            or is in use.
-        OutputError: the file cannot be written.
     """
 
     def __init__(self, path: Path, definition: Mapping[str, Any], total: int, resume: bool) -> None:
@@ -54,7 +48,7 @@ class Journal:
         self._bits = bytearray((total + 7) // 8)
         self._made = _make_directories(path.parent)
         try:
-            self._descriptor = _opened(path)
+            self._descriptor = _open(path)
         except OSError as error:
             _remove_directories(self._made)
             raise OutputError(f"cannot write {path}: {error.strerror}") from None
@@ -81,14 +75,7 @@ class Journal:
         return bool(self._bits[index >> 3] & (1 << (index & 7)))
 
     def append(self, outcomes: Iterable[Outcome]) -> None:
-        """Record finished cases; they are on the disk when this returns.
-
-        Args:
-            outcomes: of cases of this sweep; those that are recorded already are passed over.
-
-        Raises:
-            JournalFullError: they could not all be written; earlier ones are untouched.
-        """
+        """Record finished cases; they are on the disk when this returns."""
         fresh = [o for o in outcomes if o.index not in self]
         if not fresh:
             return
@@ -109,9 +96,6 @@ class Journal:
         """Yield the finished cases in case order, reading them one at a time.
 
         Needs eight bytes per case for the offsets, in a temporary file beside the journal, and nothing else.
-
-        Yields:
-            Each outcome.
         """
         with self._offset_table() as table, self._stream() as stream:
             offsets = np.memmap(table, dtype=np.uint64, mode="r+", shape=(self.total,))
@@ -284,12 +268,8 @@ def _is_case(entry: Any, total: int) -> bool:
     return False
 
 
-def _opened(path: Path) -> int:
-    """Open the file at ``path`` itself, made when missing; links are not followed, and nothing is waited for.
-
-    Raises:
-        ScenarioError: there is something else than a plain file.
-    """
+def _open(path: Path) -> int:
+    """Open the file at ``path`` itself, made when missing; links are not followed, and nothing is waited for."""
     flags = os.O_RDWR | os.O_CREAT | PLAIN_FILE
     try:
         descriptor = os.open(path, flags, 0o644)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from orchestrator.engine.cases import Case, Outcome, Status
 from orchestrator.engine.work import Work
-from orchestrator.engine.worker import BATCH_TIME, Assignment, finished_cases, read_answer
+from orchestrator.engine.worker import BATCH_TIME, Assignment, count_finished, read_answer
 from orchestrator.errors import ChildError, SimulationError
 from orchestrator.shared.isolation.jail import Jail
 from orchestrator.shared.isolation.limits import MEBIBYTE, Limits
@@ -26,7 +26,7 @@ KILLS = 5  # SIGKILL comes from others, on a busy or full machine more than once
 PREPARATION_LIMIT = 600.0
 LARGEST_ANSWER = 64 * MEBIBYTE
 _BOUNDLESS = 1 << 50
-_ENTRY = "orchestrator.engine.worker:opened"
+_ENTRY = "orchestrator.engine.worker:open_worker"
 _BEYOND = {
     "memory": "used too much memory",
     "disk": "wrote too many files",
@@ -73,10 +73,6 @@ class Lane:
 
         Returns:
             How some of them ended, at least one.
-
-        Raises:
-            LaneClosedError: the lane was closed.
-            OrchestratorError: no worker process can be prepared.
         """
         with self._lock:
             self._busy = True
@@ -120,7 +116,7 @@ class Lane:
             reason, killed = error.reason, error.reason == "signal" and error.code == KILLED
         except SimulationError:  # it had no memory left to answer with
             reason = "exit"
-        place = min(finished_cases(jail.scratch / "tmp"), len(cases) - 1)
+        place = min(count_finished(jail.scratch / "tmp"), len(cases) - 1)
         index = cases[place].index
         self._discard()
         if reason == "time":

@@ -5,19 +5,7 @@ from orchestrator.errors import ScenarioError
 
 
 def choose_pool(workers: int | None, scheduler: str | None, tls: Tls | None = None) -> OpenPool:
-    """Return where to run: the Dask cluster at ``scheduler`` when given, else processes of this machine.
-
-    Args:
-        workers: number of processes of this machine.
-        scheduler: address of a Dask scheduler.
-        tls: needed for, and only for, an address that begins with ``tls://``.
-
-    Returns:
-        What opens the pool when cases are run.
-
-    Raises:
-        ScenarioError: both are given, a bad number of workers, or the extra ``dask`` is not installed.
-    """
+    """Return where to run: the Dask cluster at ``scheduler`` when given, else processes of this machine."""
     encrypted = (scheduler or "").startswith("tls://")
     if encrypted and tls is None:
         text = "`tls_ca`, `tls_cert` and `tls_key` must be given with a `scheduler` at tls://, but are not"

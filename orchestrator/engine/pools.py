@@ -46,21 +46,10 @@ class Pool(Protocol):
 
         Args:
             cases: to run, at least one.
-
-        Returns:
-            Its future.
         """
 
     def outcome_of_loss(self, case: Case, error: BaseException) -> Outcome | None:
-        """Return the outcome of a case that its executor has given up, ``None`` when ``error`` is no such thing.
-
-        Args:
-            case: to run.
-            error: what the future ended with.
-
-        Returns:
-            The outcome, if the case is to blame.
-        """
+        """Return the outcome of a case that its executor has given up, ``None`` when ``error`` is no such thing."""
 
     def slots(self) -> int:
         """Return how many cases can run at the same time, at present.
@@ -91,7 +80,7 @@ class LocalProcesses:
         count = self.workers or usable_cores()
         supply = Supply(contents(work), work.unpacked)
         try:
-            return LocalPool(count, supply, assignment(work, pickled(work), supply, limits))
+            return LocalPool(count, supply, assignment(work, pickle_work(work), supply, limits))
         except BaseException:
             supply.close()
             raise
@@ -103,7 +92,6 @@ class Tls:
 
     Attributes:
         authority: certificate of the authority that has signed those of scheduler, workers and clients.
-        certificate: of this client.
         key: private key of this client.
     """
 
@@ -113,19 +101,7 @@ class Tls:
 
 
 def choose_tls(authority: Path | None, certificate: Path | None, key: Path | None) -> Tls | None:
-    """Return what the three options say; ``None`` when none is given.
-
-    Args:
-        authority: file of the certificate authority.
-        certificate: file of this side's certificate.
-        key: file of its key.
-
-    Returns:
-        The three files.
-
-    Raises:
-        ScenarioError: some are missing, or cannot be read.
-    """
+    """Return what the three options say; ``None`` when none is given."""
     options = {"tls_ca": authority, "tls_cert": certificate, "tls_key": key}
     if authority is None or certificate is None or key is None:
         missing = [name for name, path in options.items() if path is None]
@@ -199,17 +175,7 @@ class LaneOfThread:
 
 
 def contents(work: Work) -> dict[str, bytes]:
-    """Return the content of the work's files by name.
-
-    Args:
-        work: how to run one case.
-
-    Returns:
-        Bytes by name.
-
-    Raises:
-        FmuError: one cannot be read.
-    """
+    """Return the content of the work's files by name."""
     found = {}
     for name, path in work.files.items():
         try:
@@ -223,29 +189,13 @@ def assignment(work: Work, pickled_work: bytes, supply: Supply, limits: CaseLimi
     """Return what worker processes are told.
 
     Args:
-        work: how to run one case.
-        pickled_work: what ``pickled`` returned.
-        supply: where the work's files are.
         limits: time [s] and memory [bytes] per case.
-
-    Returns:
-        What a worker process is started with.
     """
     return Assignment(pickled_work, supply.paths, limits.time, limits.memory, len(work.columns), work.walls)
 
 
-def pickled(work: Work) -> bytes:
-    """Return the work as bytes for a worker process; its files travel apart.
-
-    Args:
-        work: how to run one case.
-
-    Returns:
-        The bytes.
-
-    Raises:
-        ScenarioError: ``prepare``, ``run`` or ``payload`` cannot be pickled, or workers could not find the functions.
-    """
+def pickle_work(work: Work) -> bytes:
+    """Return the work as bytes for a worker process; its files travel apart."""
     if "__main__" in (work.prepare.__module__, work.run.__module__):
         raise ScenarioError(
             "the work of a sweep must be in a module that workers can import, but is in the main program"

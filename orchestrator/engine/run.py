@@ -50,11 +50,7 @@ class Sweep:
         return self._journal.failed
 
     def rows(self) -> Iterator[Row]:
-        """Yield one row per finished case, in case order.
-
-        Yields:
-            Each case with its outcome.
-        """
+        """Yield one row per finished case, in case order."""
         for outcome in self._journal.outcomes():
             yield Row(self.cases[outcome.index], outcome)
 
@@ -81,22 +77,10 @@ def run_cases(
     was stopped and resumed.
 
     Args:
-        cases: what to run.
-        work: how to run one case.
-        journal_path: the durable store, normally in the result directory.
-        open_pool: where to run; default ``LocalProcesses()``.
-        limits: time and memory per case.
-        resume: go on with the journal of an earlier run that was stopped.
         on_progress: called whenever cases have become durable, and at least about four times a second.
 
     Returns:
         The finished cases; the caller closes it.
-
-    Raises:
-        ScenarioError: bad arguments, or a journal that must not be continued (see ``Journal``).
-        JournalFullError: no room for finished cases; what was finished before is kept.
-        SimulationError: the place where cases run is gone (no worker can be prepared, the cluster is lost).
-        Interrupted: Ctrl-C.
     """
     journal = Journal(journal_path, _definition(cases, work), len(cases), resume)
     try:
@@ -138,7 +122,7 @@ class _Queue:
         """Return the next cases; none when there are none left."""
         return self._returned.popleft() if self._returned else tuple(islice(self._waiting, self._size))
 
-    def answered(self, batch: Sequence[Case], outcomes: Sequence[Outcome]) -> None:
+    def take_answer(self, batch: Sequence[Case], outcomes: Sequence[Outcome]) -> None:
         """Take back what of a batch was not run, and adapt to what was."""
         done = {outcome.index for outcome in outcomes}
         left = tuple(case for case in batch if case.index not in done)
@@ -165,7 +149,9 @@ def _run(cases: Cases, pool: Pool, journal: Journal, on_progress: Callable[[Prog
             if slots:
                 last_slot = time.monotonic()
             elif time.monotonic() - last_slot > NO_SLOT_LIMIT:
-                raise SimulationError(f"no worker has been there for {NO_SLOT_LIMIT:g} s; {_kept(journal)}", "resume")
+                raise SimulationError(
+                    f"no worker was connected for {NO_SLOT_LIMIT:g} s; {_hint_of_rest(journal)}", "resume"
+                )
             while len(running) < max(1, slots) * QUEUED_PER_SLOT:
                 batch = queue.batch()
                 if not batch:
@@ -184,7 +170,7 @@ def _submit(pool: Pool, batch: Sequence[Case], journal: Journal) -> "Future[list
     try:
         return pool.submit(batch)
     except (BrokenExecutor, RuntimeError, OSError) as error:
-        raise SimulationError(f"cases can no longer be run: {error}; {_kept(journal)}", "resume") from None
+        raise SimulationError(f"no further case can be run: {error}; {_hint_of_rest(journal)}", "resume") from None
 
 
 def _record(
@@ -211,17 +197,17 @@ def _record(
                 queue.alone(batch)
             continue
         outcomes += found
-        queue.answered(batch, found)
+        queue.take_answer(batch, found)
     journal.append(outcomes)
     if isinstance(lost, SimulationError):
-        raise SimulationError(f"{lost}; {_kept(journal)}", "resume")
+        raise SimulationError(f"{lost}; {_hint_of_rest(journal)}", "resume")
     if isinstance(lost, CancelledError):
-        raise SimulationError(f"the connection to the workers is lost; {_kept(journal)}", "resume")
+        raise SimulationError(f"the connection to the workers is lost; {_hint_of_rest(journal)}", "resume")
     if lost is not None:
         raise lost
 
 
-def _kept(journal: Journal) -> str:
+def _hint_of_rest(journal: Journal) -> str:
     return (
         f"{journal.done} of {journal.total} cases are kept: go on with `resume`"
         if journal.done

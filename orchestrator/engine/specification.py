@@ -23,17 +23,6 @@ def parse_design(specifications: Sequence[str], samples: int, seed: int) -> Prod
 
     Lists and ranges make a full grid. All random parameters are drawn together, ``samples`` times, and so are
     all Sobol ones; each grid point is combined with every draw.
-
-    Args:
-        specifications: the texts.
-        samples: number of draws of the random and Sobol parameters.
-        seed: of the draws.
-
-    Returns:
-        The design; its number of rows is the product of those of its parts.
-
-    Raises:
-        ScenarioError: a specification that cannot be read; the text names it; or a negative seed.
     """
     if seed < 0:
         raise ScenarioError(f"`seed` must not be negative, but is {seed}", "seed")
@@ -61,14 +50,7 @@ def parse_design(specifications: Sequence[str], samples: int, seed: int) -> Prod
 
 
 def draws(specifications: Iterable[str]) -> bool:
-    """Return whether any parameter is drawn, so that a number of samples means something.
-
-    Args:
-        specifications: the texts.
-
-    Returns:
-        True when one is random or Sobol.
-    """
+    """Return whether any parameter is drawn, so that a number of samples means something."""
     return any(_split(text)[1].partition(":")[0].removeprefix("log") in DRAWN for text in specifications)
 
 

@@ -17,16 +17,10 @@ class Supply:
     """Files by name in a scratch folder; to be closed.
 
     Args:
-        files: content by name.
         unpacked: the files are archives, and workers get the folders into which they are unpacked.
 
     Attributes:
-        paths: where they are.
         folder: the folder that holds them all.
-
-    Raises:
-        OutputError: there is no room for them.
-        FmuError: a file is not an archive that may be unpacked.
     """
 
     def __init__(self, files: Mapping[str, bytes], unpacked: bool) -> None:
@@ -35,12 +29,12 @@ class Supply:
         self.paths: dict[str, Path] = {}
         try:
             for name, content in files.items():
-                self.paths[name] = self._placed(content, unpacked, name)
+                self.paths[name] = self._place(content, unpacked, name)
         except BaseException:
             self.close()
             raise
 
-    def _placed(self, content: bytes, unpacked: bool, name: str) -> Path:
+    def _place(self, content: bytes, unpacked: bool, name: str) -> Path:
         target = self.folder / hashlib.sha256(content).hexdigest()[:24]
         file = target.with_suffix(".fmu")
         if target.exists() or (file.exists() and not unpacked):

@@ -14,30 +14,12 @@ PARQUET_ROWS = 10_000
 
 
 def header(names: Sequence[str], columns: Sequence[ResultColumn]) -> list[str]:
-    """Return the names of the table's columns: case, varied parameters, status, results, message.
-
-    Args:
-        names: of the varied parameters.
-        columns: of the results.
-
-    Returns:
-        The names.
-    """
+    """Return the names of the table's columns: case, varied parameters, status, results, message."""
     return ["case", *names, "status", *(c.name for c in columns), "message"]
 
 
 def write_csv(path: Path, names: Sequence[str], columns: Sequence[ResultColumn], rows: Iterable[Row]) -> None:
-    """Write the table as CSV: floats with as many digits as they need to be read back exactly, missing ones empty.
-
-    Args:
-        path: the file.
-        names: of the varied parameters.
-        columns: of the results.
-        rows: in case order.
-
-    Raises:
-        OutputError: the file cannot be written, as when the disk is full.
-    """
+    """Write the table as CSV: floats with as many digits as they need to be read back exactly, missing ones empty."""
     try:
         with path.open("w", encoding="utf-8", newline="") as stream:
             writer = csv.writer(stream, lineterminator="\n")
@@ -50,27 +32,13 @@ def write_csv(path: Path, names: Sequence[str], columns: Sequence[ResultColumn],
 
 
 def require_parquet() -> None:
-    """Refuse to begin what could not be written at the end.
-
-    Raises:
-        ScenarioError: the extra ``parquet`` is not installed.
-    """
+    """Refuse to begin what could not be written at the end."""
     if find_spec("pyarrow") is None:
         raise ScenarioError("`parquet` needs the extra [parquet]: pip install 'backlash-cosim[parquet]'", "parquet")
 
 
 def write_parquet(path: Path, names: Sequence[str], columns: Sequence[ResultColumn], rows: Iterable[Row]) -> None:
-    """Write the table as Parquet, ``PARQUET_ROWS`` rows at a time. A parameter's type is that of its first value.
-
-    Args:
-        path: the file.
-        names: of the varied parameters.
-        columns: of the results.
-        rows: in case order.
-
-    Raises:
-        ScenarioError: the extra ``parquet`` is not installed.
-    """
+    """Write the table as Parquet, ``PARQUET_ROWS`` rows at a time. A parameter's type is that of its first value."""
     require_parquet()
     import pyarrow
     import pyarrow.parquet
@@ -97,9 +65,9 @@ def _cells(row: Row, names: Sequence[str], columns: Sequence[ResultColumn]) -> l
     return [outcome.index, *(row.case.parameters[n] for n in names), outcome.status.value, *values, outcome.message]
 
 
-def _chain(first: Row, rest: Iterator[Row]) -> Iterator[Row]:
+def _chain(first: Row, rows: Iterator[Row]) -> Iterator[Row]:
     yield first
-    yield from rest
+    yield from rows
 
 
 def _batches(rows: Iterator[Row]) -> Iterator[list[Row]]:

@@ -46,14 +46,8 @@ class Work:
 def file_hash(path: Path) -> str:
     """Return the sha256 of a file's content.
 
-    Args:
-        path: the file.
-
     Returns:
         64 hexadecimal digits.
-
-    Raises:
-        FmuError: the file cannot be read.
     """
     try:
         with path.open("rb") as stream:
@@ -64,11 +58,6 @@ def file_hash(path: Path) -> str:
 
 def evaluate(work: Work, prepared: Any, case: Case) -> tuple[Outcome, bool]:
     """Run one case; whatever goes wrong in it becomes the outcome's status and message.
-
-    Args:
-        work: how to run one case.
-        prepared: what the work's ``prepare`` returned in this process.
-        case: to run.
 
     Returns:
         The outcome, and whether the process can be trusted with another case: not after a slave has failed in it, nor
@@ -98,14 +87,7 @@ def _plain(column: ResultColumn, value: Any) -> Value:
 
 
 def one_line(error: BaseException) -> str:
-    """Return an exception as one line that is the same in every run (no memory addresses).
-
-    Args:
-        error: any exception.
-
-    Returns:
-        At most ``MESSAGE_LENGTH`` characters.
-    """
+    """Return an exception as one line that is the same in every run (no memory addresses)."""
     text = " ".join(str(error).split())
     name = type(error).__name__
     line = f"{name}: {text}" if text else name

@@ -18,7 +18,7 @@ from typing import Any
 from orchestrator.engine.cases import Case, Outcome, Status, Value
 from orchestrator.engine.work import MESSAGE_LENGTH, Work, evaluate, one_line
 from orchestrator.errors import OrchestratorError, SimulationError
-from orchestrator.shared.operating_system import allocated_memory, set_limits, write_at
+from orchestrator.shared.operating_system import memory_usage, set_limits, write_at
 
 ORPHAN_MARGIN = 30.0
 BATCH_TIME = 0.5
@@ -34,7 +34,6 @@ class Assignment:
     """What a worker process is for.
 
     Attributes:
-        work: the pickled ``Work``.
         files: local path of each of the work's files.
         time_limit: seconds that a case may take; the lane enforces it, the worker only outlives it by
             ``ORPHAN_MARGIN`` when the lane is gone.
@@ -59,17 +58,11 @@ class Answer:
     spent: bool
 
 
-def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
+def open_worker(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
     """Prepare the work and return what runs a batch of cases.
-
-    Args:
-        assignment: the work with its files and limits.
 
     Returns:
         A function from cases to the outcomes of as many of them as ``BATCH_TIME`` allows, as plain data.
-
-    Raises:
-        SimulationError: the work cannot be prepared in this process.
     """
     work: Work = pickle.loads(assignment.work)
     try:
@@ -78,7 +71,7 @@ def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
         raise
     except Exception as error:
         raise SimulationError(f"a worker process cannot be prepared: {one_line(error)}") from None
-    base = allocated_memory()
+    base = memory_usage()
     if assignment.memory and base:
         set_limits({"RLIMIT_DATA": base + assignment.memory})
     silence = os.open(os.devnull, os.O_WRONLY)
@@ -96,7 +89,7 @@ def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
             write_at(place, _COUNT.pack(len(found)), 0)
             outcome, sound = evaluate(work, prepared, case)
             found.append([outcome.index, outcome.status.value, outcome.message, list(outcome.values)])
-            spent = not sound or (bool(assignment.memory) and allocated_memory() - base > assignment.memory // 2)
+            spent = not sound or (bool(assignment.memory) and memory_usage() - base > assignment.memory // 2)
             if spent or time.monotonic() - begin > BATCH_TIME:
                 break
         faulthandler.cancel_dump_traceback_later()
@@ -105,11 +98,8 @@ def opened(assignment: Assignment) -> Callable[[Sequence[Case]], list[Any]]:
     return run
 
 
-def finished_cases(temporary: Path) -> int:
+def count_finished(temporary: Path) -> int:
     """Return how many cases of its batch a worker process had finished, as it claims.
-
-    Args:
-        temporary: the process's temporary folder.
 
     Returns:
         The number; 0 where the process has left none.
@@ -122,11 +112,6 @@ def finished_cases(temporary: Path) -> int:
 
 def read_answer(message: Any, cases: Sequence[Case], columns: int) -> Answer | None:
     """Return what a worker answered to a batch; ``None`` when it is no such answer.
-
-    Args:
-        message: what came over the wire.
-        cases: that were asked for.
-        columns: number of results of a case that is done.
 
     Returns:
         Outcomes of at least one case, and whether the process must be replaced.

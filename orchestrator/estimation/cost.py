@@ -12,17 +12,8 @@ RUNS = 800.0  # of the filter, that a fit of twenty unknowns with its interval t
 PROBED_ROWS = 1000
 
 
-def expected_seconds(records: Sequence[Record], model: Model, threads: int = 2) -> float:
-    """Return about how long ``maximum_likelihood`` will take [s], from the time of one run over some rows.
-
-    Args:
-        records: of one machine.
-        model: what they are compared with.
-        threads: that share the work.
-
-    Returns:
-        The time [s].
-    """
+def estimate_seconds(records: Sequence[Record], model: Model, threads: int = 2) -> float:
+    """Return about how long ``maximum_likelihood`` will take [s], from the time of one run over some rows."""
     probe = records[0].part(0, min(records[0].size, PROBED_ROWS))
     problem = make_problem(probe, model)
     likelihood, start = Likelihood(problem), problem.start

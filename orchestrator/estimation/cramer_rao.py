@@ -23,13 +23,6 @@ def bound_of_fit(likelihood: Likelihood, fit: GapFit) -> float:
     The Fisher information of the innovations form: for Gaussian one-step errors e with variance s,
     ``sum(e' e'^T / s) + sum(s' s'^T / s^2) / 2``, plus that of the priors. Where the fit found no process noise this
     is the information of the deterministic plant.
-
-    Args:
-        likelihood: of the record.
-        fit: its maximum.
-
-    Returns:
-        The bound.
     """
     column = list(fit.free).index(likelihood.problem.index(ALPHA))
     return math.sqrt(fit.covariance[column, column])
@@ -45,15 +38,7 @@ def bound(
     """Return the bound [rad] on alpha at known true ``values`` of the unknowns, for a deterministic plant.
 
     Args:
-        problem: record and unknowns, or those of several records of one machine; the measured angles play no part
-            beyond the linearisation.
-        values: true value of each parameter, ``alpha`` and initial state by name; others stay at their prior means.
         noise: true standard deviation [rad] of each encoder, rounding included.
-        torque: process noise, next to none.
-        threads: that share the work.
-
-    Returns:
-        The bound.
     """
     likelihood = Likelihood(problem, threads) if isinstance(problem, GapProblem) else JointLikelihood(problem, threads)
     problem = likelihood.problem
@@ -67,12 +52,12 @@ def bound(
         elif name.startswith("log_noise_"):
             theta[n] = math.log(noise[0] if name.endswith("theta_m") else noise[1])
     free = np.array([n for n, name in enumerate(problem.names) if not name.startswith(NOISE_PREFIXES)])
-    information = _refined_information(likelihood, theta, free)
+    information = _refine_information(likelihood, theta, free)
     column = list(free).index(problem.index(ALPHA))
     return math.sqrt(inverse(information)[column, column])
 
 
-def _refined_information(likelihood: Likelihood, theta: Array, free: NDArray[np.int64]) -> Array:
+def _refine_information(likelihood: Likelihood, theta: Array, free: NDArray[np.int64]) -> Array:
     """Return the Fisher information, its differences matched to the standard errors that it implies."""
     point = likelihood.at(theta)
     information = np.eye(free.size)
@@ -85,11 +70,7 @@ def truth_values(linear: Mapping[str, float], alpha: float, *states: Array) -> d
     """Return true values by the names of the unknowns: linear parameters, alpha and initial states (5,).
 
     Args:
-        linear: true value of each linear parameter.
         alpha: true half-gap [rad].
-
-    Returns:
-        Value by name.
     """
     values = {**linear, ALPHA: alpha}
     for number, state in enumerate(states, start=1):
@@ -102,12 +83,7 @@ def bound_at(record: Record, model: Model, alpha: float) -> float:
     """Return the bound [rad] for a half-gap ``alpha`` on a record, for the nominal plant and modest torque noise.
 
     Args:
-        record: the record.
-        model: of the machine.
         alpha: [rad].
-
-    Returns:
-        The bound.
     """
     problem = make_problem(record, model)
     noise = problem.noise.measured

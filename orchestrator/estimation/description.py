@@ -17,14 +17,7 @@ from pyfmu_sources.drivetrain_parameters import P_I
 
 
 def describe(fit: GapFit) -> Estimate:
-    """Return the estimate of a fit: interval, visibility, and what else the fit says.
-
-    Args:
-        fit: the maximum of the likelihood of a record.
-
-    Returns:
-        The estimate.
-    """
+    """Return the estimate of a fit: interval, visibility, and what else the fit says."""
     likelihood = fit.likelihood
     problem, settings = likelihood.problem, likelihood.settings.verdict
     place = problem.index("alpha")
@@ -59,12 +52,14 @@ def describe(fit: GapFit) -> Estimate:
         "measurement_noise": list(likelihood.noise(fit.point.theta).measured[: white.shape[1]]),
     }
     visible, message = _verdict(alpha, low, high, traversals)
-    still = _standing_still(problem.outputs, likelihood.noise(fit.point.theta).measured, settings)
+    still = _stillness_note(problem.outputs, likelihood.noise(fit.point.theta).measured, settings)
     message = still or message
     if "cannot be seen" in message:  # then no number is an answer
         visible, alpha, error, low, high = False, math.nan, math.inf, 0.0, math.inf
     drive = float(np.sqrt(np.mean(kept.states[:, 4] ** 2)))
-    lacking = _lacking(diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I], problem.record.size, settings)
+    lacking = _model_warning(
+        diagnostics, drive, likelihood.parameters(fit.point.theta)[P_I], problem.record.size, settings
+    )
     diagnostics["lacking"] = lacking
     message = "; ".join(text for text in (message, lacking) if text)
     curves = {"states": kept.states, "contacts": kept.contacts, "errors": kept.errors, "profile": curve}
@@ -116,7 +111,7 @@ def _verdict(alpha: float, low: float, high: float, traversals: int) -> tuple[bo
     return False, "the gap cannot be seen: every size fits the record; `design` proposes an excitation"
 
 
-def _standing_still(outputs: Array, noise: tuple[float, float], settings: GapVerdictSettings) -> str:
+def _stillness_note(outputs: Array, noise: tuple[float, float], settings: GapVerdictSettings) -> str:
     """Return the sentence that says which side does not move beyond its noise, or nothing."""
     sides = (("motor", settings.least_travel_motor), ("load", settings.least_travel_load))
     for n, (name, least) in enumerate(sides[: outputs.shape[1]]):
@@ -129,15 +124,13 @@ def _standing_still(outputs: Array, noise: tuple[float, float], settings: GapVer
     return ""
 
 
-def _lacking(diagnostics: dict[str, Any], drive: float, ratio: float, rows: int, settings: GapVerdictSettings) -> str:
+def _model_warning(
+    diagnostics: dict[str, Any], drive: float, ratio: float, rows: int, settings: GapVerdictSettings
+) -> str:
     """Return the warning that the model lacks something, or nothing.
 
     Args:
-        diagnostics: of the fit.
         drive: effective value of the motor's torque [N.m].
-        ratio: gear ratio.
-        rows: of the record.
-        settings: thresholds.
     """
     worst = max(abs(value) for value in diagnostics["innovation_autocorrelation"])
     motor, load = diagnostics["torque_noise"]

@@ -69,19 +69,9 @@ def design(
     """Return the time grid (n,) [s] and all candidates, the best first.
 
     Args:
-        model: plant and encoders.
         alpha: half-gap that shall be measured, or the smallest that shall be seen [rad].
-        limits: of torque and speed.
         duration: of the record [s].
-        rate: samples per second.
-        motor_only: whether there is no load encoder.
-        tell: called with candidates done and in all.
-
-    Returns:
-        The grid and the candidates.
-
-    Raises:
-        DesignError: limits, size, duration or rate are not positive, or the record would be too short or too long.
+        rate: sampling rate [Hz].
     """
     for name, value in (("torque", limits.torque), ("speed", limits.speed), ("alpha", alpha), ("rate", rate)):
         if not (math.isfinite(value) and value > 0.0):
@@ -115,15 +105,9 @@ def simple_candidates(
     """Return square pulses and multisines alone, without a search; the best first. See ``design``.
 
     Args:
-        model: of the machine.
         alpha: half-gap that shall be measured [rad].
-        limits: of torque and speed.
         duration: of the record [s].
-        rate: samples per second.
-        motor_only: whether there is no load encoder.
-
-    Returns:
-        The candidates.
+        rate: sampling rate [Hz].
     """
     time = np.arange(round(duration * rate)) / rate
     task = _Task(time, model, alpha, limits, motor_only)
@@ -233,15 +217,10 @@ def bound_of_excitation(
     """Return the bound [rad] on a half-gap ``alpha`` that a torque would give on the model's plant, from rest.
 
     Args:
-        model: plant, and how far each parameter may be off.
         time: (n,) [s], uniform.
         u: (n,) torque [N.m].
         alpha: half-gap [rad].
         noise: standard deviation of each encoder [rad].
-        motor_only: whether there is no load encoder.
-
-    Returns:
-        The bound; infinite where the plant cannot be simulated under this torque.
     """
     values = list(model.values)
     values[P_ALPHA] = alpha

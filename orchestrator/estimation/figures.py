@@ -26,14 +26,7 @@ def _figure(rows: int, size: tuple[float, float]) -> tuple[Figure, list]:
 
 
 def draw_fit(path: Path, record: Record, estimate: Estimate, ratio: float) -> None:
-    """Draw record against fitted model over the liveliest seconds, time in the gap shaded, and the innovations.
-
-    Args:
-        path: the picture.
-        record: the record.
-        estimate: of the record.
-        ratio: of the gear.
-    """
+    """Draw record against fitted model over the liveliest seconds, time in the gap shaded, and the innovations."""
     states, contacts, errors = (estimate.curves[name] for name in ("states", "contacts", "errors"))
     span = _liveliest(record, contacts)
     t = record.time[span]
@@ -80,14 +73,7 @@ def _shade(axis, time: Array, contacts: Array) -> None:  # type: ignore[no-untyp
 
 
 def draw_profile(path: Path, profile: Profile, estimate: Estimate, limit: float) -> None:
-    """Draw the profile likelihood with the interval that it gives.
-
-    Args:
-        path: the picture.
-        profile: of alpha.
-        estimate: of the record.
-        limit: drop at which the interval ends.
-    """
+    """Draw the profile likelihood with the interval that it gives."""
     figure, (axis,) = _figure(1, (6.5, 4.2))
     signed = np.sign(profile.alpha - estimate.alpha) * np.sqrt(np.maximum(profile.drop, 0.0))
     fine = np.linspace(signed[0], signed[-1], 200)
@@ -108,13 +94,7 @@ def draw_profile(path: Path, profile: Profile, estimate: Estimate, limit: float)
 
 
 def draw_online(path: Path, record: Record, estimate: Estimate) -> None:
-    """Draw the online estimate over time with its 95 % band.
-
-    Args:
-        path: the picture.
-        record: the record.
-        estimate: of the record.
-    """
+    """Draw the online estimate over time with its 95 % band."""
     figure, (axis,) = _figure(1, (8.0, 4.2))
     alpha, deviation = estimate.curves["alpha"], estimate.curves["deviation"]
     reach = NORMAL_95 * deviation
@@ -131,12 +111,7 @@ def draw_online(path: Path, record: Record, estimate: Estimate) -> None:
 
 
 def draw_flanks(path: Path, estimate: Estimate) -> None:
-    """Draw the load's distance from mid-gap over the points of an estimate from two encoders, coloured by flank.
-
-    Args:
-        path: the picture.
-        estimate: by ``two_encoders``.
-    """
+    """Draw the load's distance from mid-gap over the points of an estimate from two encoders, coloured by flank."""
     figure, (axis,) = _figure(1, (8.0, 4.2))
     time, twist, flank = (estimate.curves[name] for name in ("time", "twist", "flank"))
     for side, colour, label in ((-1, BLUE, "lower flank"), (0, GREY, "between"), (1, ORANGE, "upper flank")):
@@ -156,9 +131,7 @@ def draw_design(path: Path, time: Array, best: Excitation) -> None:
     """Draw the proposed torque record.
 
     Args:
-        path: the picture.
         time: (n,) [s].
-        best: the candidate.
     """
     figure, (axis,) = _figure(1, (8.0, 3.6))
     axis.step(time, best.u, where="post", color=BLUE, linewidth=0.9)

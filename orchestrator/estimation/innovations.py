@@ -51,13 +51,6 @@ def affine_model(p: tuple[float, ...], impulse: float = 0.0) -> AffineModel:
     ``impulse`` [N.m.s] is what the shaft lacks at the load when the teeth touch, and has too much when they part,
     beside a damper ``c`` that acts from the first moment of contact on: half of ``c`` times the depth within which a
     real contact's damping sets in (Hunt and Crossley 1975). It fades with the gap: without one, nothing touches.
-
-    Args:
-        p: the plant's parameters.
-        impulse: see above.
-
-    Returns:
-        The matrices of its three modes.
     """
     chosen = list(p)
     chosen[P_MODEL] = float(DEAD_ZONE)
@@ -132,15 +125,10 @@ def innovations(
     """Run the filter over a record.
 
     Args:
-        model: plant.
         u: (n,) requested torque, held over a sample [N.m].
         y: (n, 2) motor and load angle, or (n, 1) motor angle only [rad]; NaN: missing, its update is skipped.
         step: sample time [s].
         x0: (5,) state at the first sample, taken as exact (its uncertainty is the fit's business).
-        noise: measurement and process noise.
-        keep: whether to return the states.
-        soft: whether the flanks are blurred by the uncertainty of the twist (statistical linearisation) instead of
-            followed sharply: coarser, but smooth in every unknown, so a fit may start with it.
         u_deviation: (n,) standard deviation of the torque where it is not known [N.m], or None.
 
     Returns:
@@ -165,13 +153,8 @@ def simulate(model: AffineModel, u: Array, step: float, x0: Array) -> Array:
     """Return the states (n, 5) of the plant that is fed ``u`` (n,) from ``x0`` (5,), without any measurement.
 
     Args:
-        model: plant.
         u: requested torque, held over a sample [N.m].
         step: sample time [s].
-        x0: state at the first sample, SI units.
-
-    Returns:
-        The states, SI units.
     """
     phi, gain_u, gain_1 = _discrete(model, step)
     states = np.empty((u.size, STATES))

@@ -74,15 +74,7 @@ class JointLikelihood(Likelihood):
 
 
 def by_record(estimate: Estimate, records: Sequence[Record]) -> Estimate:
-    """Return a joint estimate with what each record says, and with the curves of the first one.
-
-    Args:
-        estimate: of all records together.
-        records: in the order of the fit.
-
-    Returns:
-        The estimate.
-    """
+    """Return a joint estimate with what each record says, and with the curves of the first one."""
     edges = np.cumsum([0, *(record.size for record in records)])
     curves, evidence = dict(estimate.curves), []
     for record, start, stop in zip(records, edges[:-1], edges[1:], strict=True):

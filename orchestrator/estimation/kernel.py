@@ -24,7 +24,6 @@ def transition(a, b_u, b_1, h, phi, gain_u, gain_1):  # type: ignore[no-untyped-
         a: (5, 5) matrix of one mode.
         b_u, b_1: (5,) rates by the torque, and constant ones; of one mode or (modes, 5).
         h: [s].
-        phi, gain_u, gain_1: what a sample makes of state, torque and constant rates; of one mode or of all.
     """
     for r in range(5):
         for c in range(5):
@@ -150,7 +149,6 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
         normal: (5,) the twist as a row: ``normal @ x``.
         alpha: half-gap [rad].
         jump: (5,) what an impulse at the flank does to the state.
-        phi, gain_u, gain_1: what a sample makes of state, torque and constant rates; of one mode or of all.
         h: [s].
         u: torque [N.m], of a sample or (n,).
         x: (5,) state.
@@ -218,7 +216,7 @@ def propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x,
 
 
 @kept(nogil=True)
-def blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore[no-untyped-def]
+def advance_blurred(mats, b_u, b_1, normal, alpha, cov, h, u, x, total):  # type: ignore[no-untyped-def]
     """Advance ``x`` over ``h`` with the dead zone averaged over the twist's distribution (Booton 1954).
 
     Args:
@@ -285,7 +283,6 @@ def run_free(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u, x0,
         normal: (5,) the twist as a row: ``normal @ x``.
         alpha: half-gap [rad].
         jump: (5,) what an impulse at the flank does to the state.
-        phi, gain_u, gain_1: what a sample makes of state, torque and constant rates; of one mode or of all.
         h: [s].
         u: torque [N.m], of a sample or (n,).
         x0: (5,) first state.
@@ -330,7 +327,6 @@ def run_filter(  # type: ignore[no-untyped-def]
         normal: (5,) the twist as a row: ``normal @ x``.
         alpha: half-gap [rad].
         jump: (5,) what an impulse at the flank does to the state.
-        phi, gain_u, gain_1: what a sample makes of state, torque and constant rates; of one mode or of all.
         h: [s].
         u: torque [N.m], of a sample or (n,).
         u_variance: of the torque [N^2.m^2].
@@ -342,7 +338,6 @@ def run_filter(  # type: ignore[no-untyped-def]
         variances: (n, outputs) filled.
         states: (n, 5) filled.
         contacts: (n,) filled, or (0,).
-        soft: whether the flanks are blurred.
     """
     n, outputs = y.shape
     x = x0.copy()
@@ -376,7 +371,7 @@ def run_filter(  # type: ignore[no-untyped-def]
             for r in range(5):
                 states[k, r] = x[r]
         if soft:
-            blurred(mats, b_u, b_1, normal, alpha, cov, h, u[k], x, total)
+            advance_blurred(mats, b_u, b_1, normal, alpha, cov, h, u[k], x, total)
         else:
             propagate(mats, b_u, b_1, normal, alpha, jump, phi, gain_u, gain_1, h, u[k], x, total, gain)
         for r in range(5):

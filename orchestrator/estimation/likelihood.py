@@ -47,11 +47,9 @@ class GapFit:
     """A maximum of the likelihood.
 
     Attributes:
-        point: where it is.
         free: (k,) indices of the unknowns that were fitted.
         information: (k, k) Fisher information of the free unknowns, prior included.
         covariance: (k, k) its inverse.
-        iterations: scoring steps taken.
         converged: whether the last step changed the objective by less than the tolerance.
         likelihood: the likelihood with what the fit has learnt of it, for the next fit.
     """
@@ -105,12 +103,7 @@ class Likelihood:
         """Return the likelihood with other flanks, information or bounds of the unknowns.
 
         Args:
-            soft: whether flanks are blurred (default: as they are).
             information: (unknowns, unknowns) of the unknowns (default: the last one).
-            problem: the same with other bounds (default: as it is).
-
-        Returns:
-            Another likelihood, which shares the threads.
         """
         other = copy(self)
         other.soft = self.soft if soft is None else soft
@@ -133,9 +126,6 @@ class Likelihood:
 
         Args:
             theta: (unknowns,).
-
-        Returns:
-            The parameters, in the order of the plant's table.
         """
         p = list(self.problem.base)
         for place, name in self._places:
@@ -147,27 +137,13 @@ class Likelihood:
 
         Args:
             theta: (unknowns,).
-
-        Returns:
-            The levels.
         """
         measured = [math.exp(min(max(theta[n], LEAST_LOG_NOISE), LARGEST_LOG_NOISE)) for n in self._noise]
         motor, load = (math.exp(min(theta[n], LARGEST_LOG_NOISE)) for n in self._torque)
         return NoiseLevels((measured[0], measured[-1]), (motor, load))
 
     def run(self, theta: Array, keep: bool = False) -> Innovations:
-        """Return the innovations at ``theta``.
-
-        Args:
-            theta: values of the unknowns.
-            keep: whether states are kept for figures.
-
-        Returns:
-            The innovations and their variances.
-
-        Raises:
-            TimeLimitError: the time for this record is over.
-        """
+        """Return the innovations at ``theta``."""
         if time.monotonic() > self.deadline:
             raise TimeLimitError(
                 "`time_limit` must be longer for this record, or its `rate` lower", "time_limit", "rate"
@@ -188,9 +164,6 @@ class Likelihood:
 
         Args:
             theta: (unknowns,).
-
-        Returns:
-            The point.
         """
         result = self.run(theta)
         deviance = result.deviance
@@ -206,11 +179,7 @@ class Likelihood:
         hundredth of a standard deviation far: the unknowns themselves may be correlated to one part in 1e9.
 
         Args:
-            point: where they are taken.
             free: (k,) indices of the free unknowns.
-
-        Returns:
-            Both, and the likelihood that knows this information.
         """
         base = point.result
         error, spread, back = self._differences(point, free)
@@ -228,7 +197,6 @@ class Likelihood:
         """Return what each row adds to the gradient (k,) of half the objective, without the prior.
 
         Args:
-            point: where they are taken.
             free: (k,) indices of the free unknowns.
 
         Returns:
@@ -296,14 +264,8 @@ def maximise(
     Steps are damped until the objective falls; an unknown at its bound stays there while the score points outward.
 
     Args:
-        likelihood: of the record.
         start: (unknowns,).
-        free: indices of the unknowns that are fitted.
-        iterations: at most.
-        tolerance: change of the objective at which it ends.
-
-    Returns:
-        The maximum.
+        iterations: largest number of steps of the optimiser.
     """
     unknowns = likelihood.problem.unknowns
     places = np.array(list(free), dtype=np.int64)

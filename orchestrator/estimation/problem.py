@@ -8,7 +8,7 @@ import numpy as np
 from orchestrator.estimation.innovations import Array, NoiseLevels
 from orchestrator.records.model_file import Encoder, Model
 from orchestrator.records.record import Record, quantisation_step
-from orchestrator.shared.inference.noise import lagged_rms, robust_noise
+from orchestrator.shared.inference.noise import rms_behind_lag, robust_noise
 from pyfmu_sources.drivetrain_parameters import NAMES, P_ALPHA
 
 STATE_NAMES = ("theta_m_start", "omega_m_start", "theta_l_start", "omega_l_start", "T_m_start")
@@ -43,7 +43,6 @@ class GapProblem:
     """A record and what is unknown about it.
 
     Attributes:
-        record: the record.
         base: parameter tuple of the model.
         unknowns: every unknown, in the order of the vector; free or not is decided per fit.
         outputs: (n, 1 or 2) measured angles [rad].
@@ -71,9 +70,6 @@ class GapProblem:
     def index(self, name: str) -> int:
         """Return the place of an unknown in the vector.
 
-        Args:
-            name: of the unknown.
-
         Returns:
             The place, from 0.
         """
@@ -84,13 +80,6 @@ def make_problem(record: Record, model: Model) -> GapProblem:
     """Return the estimation problem of a record under a model.
 
     With the motor encoder alone only alpha times the gear ratio can be seen, so the ratio then counts as exact.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        The problem.
     """
     both = record.theta_l is not None
     outputs = record.theta_m[:, None] if record.theta_l is None else np.column_stack([record.theta_m, record.theta_l])
@@ -135,7 +124,7 @@ def make_problem(record: Record, model: Model) -> GapProblem:
 
 def _torque_unit(record: Record, lag: float) -> float:
     """Return the rms of the drive's torque, ``lag`` [s] behind the request, over the nearest of usual drives."""
-    rms = lagged_rms(record.u, record.step, lag)
+    rms = rms_behind_lag(record.u, record.step, lag)
     return rms / min(max(rms, DRIVES[0]), DRIVES[1])
 
 
@@ -166,14 +155,6 @@ def measurement_noise(record: Record, model: Model, column: str) -> float:
     The estimate takes the third difference of the column, in which motion hardly shows (its gain on white noise
     is sqrt(20)); rounding adds a twelfth of the squared count. What is stated of an encoder holds for its own samples,
     not for averages of them.
-
-    Args:
-        record: the record.
-        model: of the machine.
-        column: "theta_m" or "theta_l".
-
-    Returns:
-        The standard deviation.
     """
     values = record.theta_m if column == "theta_m" else record.theta_l
     assert values is not None
@@ -187,14 +168,6 @@ def rounding_noise(record: Record, model: Model, column: str) -> float:
     """Return the standard deviation that rounding to counts gives an encoder's angle [rad].
 
     No fitted noise is smaller: while a machine rests, its rounding errors are all the same, but they do not go away.
-
-    Args:
-        record: the record.
-        model: of the machine.
-        column: "theta_m" or "theta_l".
-
-    Returns:
-        A count over the square root of twelve; 0.0: the column is not rounded.
     """
     values = record.theta_m if column == "theta_m" else record.theta_l
     assert values is not None
@@ -204,14 +177,6 @@ def rounding_noise(record: Record, model: Model, column: str) -> float:
 
 
 def with_least_torque_noise(problem: GapProblem, least: tuple[float, float]) -> GapProblem:
-    """Return the problem with at least this much torque noise [N.m.s^0.5] at motor and load.
-
-    Args:
-        problem: to start from.
-        least: at motor and load.
-
-    Returns:
-        The problem.
-    """
+    """Return the problem with at least this much torque noise [N.m.s^0.5] at motor and load."""
     low = {f"log_torque_{side}": math.log(value) for side, value in zip(("motor", "load"), least, strict=True)}
     return replace(problem, unknowns=tuple(replace(u, lower=low.get(u.name, u.lower)) for u in problem.unknowns))

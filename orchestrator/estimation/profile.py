@@ -22,7 +22,6 @@ class Profile:
 
         Args:
             best: the estimate [rad].
-            limit: drop at which the interval ends.
 
         Returns:
             Lower and upper end [rad]; the upper one is infinite where the profile does not reach it.
@@ -35,14 +34,7 @@ class Profile:
 
 
 def profile(fit: GapFit) -> Profile:
-    """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0).
-
-    Args:
-        fit: the maximum.
-
-    Returns:
-        The profile.
-    """
+    """Return the profile likelihood of alpha, out to beyond the interval on both sides (or to alpha = 0)."""
     likelihood = fit.likelihood
     place = likelihood.problem.index("alpha")
     column = list(fit.free).index(place)
@@ -55,7 +47,7 @@ def profile(fit: GapFit) -> Profile:
         reach = 0.5 * edge * deviation
         for _ in range(14):
             alpha = max(best + side * reach, 0.0)
-            held = _constrained(likelihood, fit, place, alpha, slope)
+            held = _fit_constrained(likelihood, fit, place, alpha, slope)
             likelihood, drop = held.likelihood, held.point.objective - fit.point.objective
             entries.append((alpha, drop))
             if drop > edge**2 or alpha == 0.0:
@@ -68,7 +60,7 @@ def profile(fit: GapFit) -> Profile:
     return Profile(np.array([e[0] for e in entries]), np.array([e[1] for e in entries]))
 
 
-def _constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
+def _fit_constrained(likelihood: Likelihood, fit: GapFit, place: int, alpha: float, slope: Array) -> GapFit:
     """Return the best fit found with alpha held: the linear prediction, then some scoring steps."""
     unknowns = likelihood.problem.unknowns
     theta = fit.point.theta.copy()

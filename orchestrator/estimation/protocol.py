@@ -74,10 +74,10 @@ def estimator(name: str) -> Estimator:
     """Return the estimator called ``name``, a key of ``METHODS``; only its module is imported.
 
     Args:
-        name: of the method.
+        name: one of `METHODS`.
 
     Returns:
-        The function.
+        Its function of a record and a model.
     """
     module = importlib.import_module(f"orchestrator.estimation.methods.{name}")
     function: Estimator = module.estimate

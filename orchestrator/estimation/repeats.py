@@ -13,14 +13,7 @@ SEGMENT = 2.0  # s, over which runs are compared
 
 
 def in_words(repeats: Repeats) -> str:
-    """Return the floor in words.
-
-    Args:
-        repeats: what they differ by.
-
-    Returns:
-        One sentence and the floor.
-    """
+    """Return the floor in words."""
     sides = {"theta_m": "motor", "theta_l": "load"}
     sizes = " and ".join(f"{value:.3g} rad at the {sides[name]}" for name, value in repeats.floor.items())
     return (
@@ -30,14 +23,7 @@ def in_words(repeats: Repeats) -> str:
 
 
 def repeats_of(records: Sequence[Record]) -> Repeats | None:
-    """Return what records with the same torque differ by.
-
-    Args:
-        records: of one machine, with the same encoders.
-
-    Returns:
-        The floor; None: no two have the same torque and sample time.
-    """
+    """Return what records with the same torque differ by."""
     if not all(record.has_torque for record in records):
         return None
     names = ("theta_m",) if records[0].theta_l is None else ("theta_m", "theta_l")

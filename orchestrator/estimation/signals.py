@@ -33,15 +33,8 @@ class ShaftSignals:
 def shaft_signals(record: Record, model: Model) -> ShaftSignals:
     """Return the derived signals of a record with both encoders.
 
-    Args:
-        record: the record.
-        model: of the machine.
-
     Returns:
         Twist [rad], its rate [rad/s], the shaft's torque and its noise [N.m].
-
-    Raises:
-        NotApplicableError: there is no load encoder.
     """
     from scipy.signal import savgol_filter
 

@@ -14,14 +14,7 @@ from orchestrator.shared.inference.normal import NORMAL_95
 
 
 def write_tables(directory: Path, record: Record, estimates: Iterable[Estimate], ratio: float) -> None:
-    """Write ``estimate.csv``, ``profile.csv``, ``online.csv`` and ``flanks.csv``, as far as there is data.
-
-    Args:
-        directory: where to.
-        record: the measured record.
-        estimates: of which those by ``maximum_likelihood``, ``ekf`` and ``two_encoders`` have curves.
-        ratio: fitted gear ratio.
-    """
+    """Write ``estimate.csv``, ``profile.csv``, ``online.csv`` and ``flanks.csv``, as far as there is data."""
     for estimate in estimates:
         if estimate.method == "maximum_likelihood":
             _write(directory / "estimate.csv", _fit_columns(record, estimate, ratio))

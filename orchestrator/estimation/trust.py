@@ -18,16 +18,7 @@ FITTED = "maximum_likelihood"
 def trust_of_estimates(
     estimates: Sequence[Estimate], model: Model, settings: TrustSettings | None = None
 ) -> dict[str, Trust]:
-    """Return how far each estimate of one record can be trusted.
-
-    Args:
-        estimates: of the methods that apply, each once.
-        model: what the record was compared with.
-        settings: where green ends.
-
-    Returns:
-        Method -> trust.
-    """
+    """Return how far each estimate of one record can be trusted."""
     chosen = settings or TrustSettings()
     fit = next((e for e in estimates if e.method == FITTED), None)
     own = trust_of(_of_fit(fit, model, chosen)) if fit is not None else None
@@ -38,7 +29,7 @@ def trust_of_estimates(
         elif estimate.method == "two_encoders" and own is None:
             found[estimate.method] = trust_of([Reason(Level.AMBER, estimate.message)])  # what it cannot see, it says
         else:
-            found[estimate.method] = trust_of(_beside(estimate, fit, own))
+            found[estimate.method] = trust_of(_compare_methods(estimate, fit, own))
     return found
 
 
@@ -54,7 +45,7 @@ def _of_fit(fit: Estimate, model: Model, settings: TrustSettings) -> Iterator[Re
     elif fit.visible:
         traversals = int(fit.diagnostics.get("traversals", settings.least_traversals))
         if traversals < settings.least_traversals:
-            yield Reason(Level.AMBER, f"the gap is traversed {traversals} times only")
+            yield Reason(Level.AMBER, f"the gap is traversed only {traversals} times")
         if fit.standard_error > settings.widest * fit.alpha:
             yield Reason(Level.AMBER, "the standard error is more than a fifth of the half-gap")
     yield from _of_values(fit.diagnostics.get("parameters", {}), model, settings)
@@ -76,18 +67,18 @@ def _of_values(
         yield Reason(level, f"{text} {stated.uncertainty:.2g}")
 
 
-def _beside(estimate: Estimate, fit: Estimate | None, own: Trust | None) -> Iterator[Reason]:
+def _compare_methods(estimate: Estimate, fit: Estimate | None, fit_trust: Trust | None) -> Iterator[Reason]:
     """Yield what keeps a method that does not check itself from green."""
     if estimate.message:
         yield Reason(Level.AMBER, estimate.message)
-    if fit is None or own is None:
+    if fit is None or fit_trust is None:
         yield Reason(
             Level.AMBER,
             f"{estimate.method} does not check whether the model explains the record, and its interval holds scatter "
-            f"alone; {FITTED} beside it would tell",
+            f"alone: run {FITTED} too",
         )
         return
     low, high = estimate.interval
     if not low <= fit.alpha <= high:
         yield Reason(Level.RED, f"its interval does not hold the half-gap of {FITTED}, {fit.alpha:.5g} rad")
-    yield Reason(own.level, f"{FITTED} beside it is {own.level.word}")
+    yield Reason(fit_trust.level, f"{FITTED} beside it is {fit_trust.level.word}")

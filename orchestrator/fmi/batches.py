@@ -6,23 +6,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from orchestrator.master.protocol import Signals, Variable
+from orchestrator.fmi.access import FLOATS, FMI2_TYPES, FMI3_TYPES, Access
+from orchestrator.master.protocol import Signals
 
-_C_TYPES: dict[str, Any] = {
-    "Real": ctypes.c_double,
-    "Integer": ctypes.c_int,
-    "Enumeration": ctypes.c_int,
-    "Boolean": ctypes.c_int,
-    "String": ctypes.c_char_p,
-}
-FUNCTION_TYPES = {
-    "Real": "Real",
-    "Integer": "Integer",
-    "Enumeration": "Integer",
-    "Boolean": "Boolean",
-    "String": "String",
-}
-"""What FMI 2.0 calls a type in the names of its functions."""
+Elements = list[tuple[int, list[Any], int]]
+"""Elements of arrays: place among the values of a call, array, place in it."""
+Arrays = dict[int, list[Any]]
+"""The values that the arrays of an instance were last set to, by value reference."""
 
 
 @dataclass(frozen=True)
@@ -31,52 +21,124 @@ class VariableBatch:
 
     Attributes:
         positions: of the variables in the list asked for.
-        references: value references as a C array.
+        places: of their values in ``values``.
         values: C array that the call reads or fills.
+        references: value references as a C array.
+        rest: elements of arrays that keep their values, but are set along with others.
+        kept: elements of arrays that are set.
         call: returns the status.
         function: its name, for messages.
     """
 
     positions: list[int]
-    references: Any
+    places: list[int]
     values: Any
+    references: Any
+    rest: Elements
+    kept: Elements
     call: Callable[[], int]
     function: str
 
+    @property
+    def whole(self) -> bool:
+        """Whether values and variables are the same, one for one in the same order."""
+        return self.places == list(range(len(self.values)))
 
-def make_batches(
-    library: Any, component: Any, variables: Sequence[Variable], direction: str, buffer: Signals | None = None
-) -> list[VariableBatch]:
-    """Return the calls that set or read variables, one for each type.
+    def complete(self) -> None:
+        """Note the elements of arrays that are about to be set, and fill in those that keep their values."""
+        for place, array, element in self.kept:
+            array[element] = self.values[place]
+        for place, array, element in self.rest:
+            self.values[place] = array[element]
 
-    Args:
+
+@dataclass(frozen=True)
+class Functions:
+    """The functions of one instance that set and read variables.
+
+    Attributes:
         library: the FMU's, loaded.
         component: first argument of every call.
-        variables: to set or read, in the order of ``buffer``.
-        direction: "Set" or "Get".
-        buffer: shape (len(variables),); Reals that are neighbours in it are passed in place.
-
-    Returns:
-        The batches.
+        version: of FMI.
+        arrays: see ``Arrays``.
     """
-    groups: dict[str, list[int]] = {}
-    for position, variable in enumerate(variables):
-        groups.setdefault(FUNCTION_TYPES[variable.type], []).append(position)
-    batches = []
-    for kind, positions in groups.items():
-        count = len(positions)
-        references = (ctypes.c_uint * count)(*(variables[p].reference for p in positions))
-        values = (_C_TYPES[kind] * count)()
-        adjacent = positions == list(range(positions[0], positions[0] + count))
-        if buffer is not None and kind == "Real" and adjacent:
-            values = (ctypes.c_double * count).from_buffer(buffer[positions[0] : positions[0] + count].data)
-        function = f"fmi2{direction}{kind}"
-        entry = library[function]
+
+    library: Any
+    component: Any
+    version: str
+    arrays: Arrays
+
+    def batches(self, accesses: Sequence[Access], direction: str, buffer: Signals | None = None) -> list[VariableBatch]:
+        """Return the calls that set or read variables, one for each type.
+
+        Args:
+            accesses: of the variables, in the order of ``buffer``.
+            direction: "Set" or "Get".
+            buffer: shape (len(accesses),); neighbours in it that the FMU takes as doubles are passed in place.
+
+        Returns:
+            The batches.
+        """
+        groups: dict[str, list[int]] = {}
+        for position, access in enumerate(accesses):
+            groups.setdefault(access.kind, []).append(position)
+        return [self._batch(kind, accesses, positions, direction, buffer) for kind, positions in groups.items()]
+
+    def _batch(
+        self, kind: str, accesses: Sequence[Access], positions: list[int], direction: str, buffer: Signals | None
+    ) -> VariableBatch:
+        firsts: dict[int, int] = {}  # place of the first element, by reference
+        total = 0
+        for position in positions:
+            access = accesses[position]
+            if access.reference not in firsts:
+                firsts[access.reference] = total
+                total += access.size
+        places = [firsts[accesses[p].reference] + accesses[p].element for p in positions]
+        c_type = (FMI2_TYPES if self.version == "2.0" else FMI3_TYPES)[kind]
+        values = (c_type * total)()
+        adjacent = positions == list(range(positions[0], positions[0] + total)) and places == list(range(total))
+        if buffer is not None and c_type is ctypes.c_double and adjacent:
+            values = (ctypes.c_double * total).from_buffer(buffer[positions[0] : positions[0] + total].data)
+        mine = [accesses[p] for p in positions] if direction == "Set" else []
+        kept, rest = self._elements(mine, firsts, set(places), c_type)
+        function = f"{'fmi2' if self.version == '2.0' else 'fmi3'}{direction}{kind}"
+        entry = self.library[function]
         entry.restype = ctypes.c_int
         entry.argtypes = None
-        call = partial(entry, component, references, ctypes.c_size_t(count), values)
-        batches.append(VariableBatch(positions, references, values, call, function))
-    return batches
+        references = (ctypes.c_uint * len(firsts))(*firsts)
+        counts = [ctypes.c_size_t(len(firsts)), values, *([] if self.version == "2.0" else [ctypes.c_size_t(total)])]
+        call = partial(entry, self.component, references, *counts)
+        return VariableBatch(positions, places, values, references, rest, kept, call, function)
+
+    def _elements(
+        self, accesses: Sequence[Access], firsts: dict[int, int], covered: set[int], c_type: Any
+    ) -> tuple[Elements, Elements]:
+        """Return the elements of arrays that are set by a batch, and those that are filled in."""
+        kept: Elements = []
+        rest: Elements = []
+        for reference, size in {a.reference: a.size for a in accesses if a.size > 1}.items():
+            empty = b"" if c_type is ctypes.c_char_p else 0
+            array = self.arrays.setdefault(reference, [empty] * size)
+            for element in range(size):
+                place = firsts[reference] + element
+                (kept if place in covered else rest).append((place, array, element))
+        return kept, rest
+
+
+def in_c(value: Any, values: Any) -> Any:
+    """Return a value as a C array takes it.
+
+    Args:
+        value: number, truth value or text.
+        values: the C array.
+
+    Returns:
+        The value.
+    """
+    if isinstance(value, str):
+        return value.encode()
+    return float(value) if values._type_ in FLOATS else int(value)
 
 
 def shares(values: Any, buffer: Signals) -> bool:

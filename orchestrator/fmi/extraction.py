@@ -70,7 +70,7 @@ def _private_root() -> Path:
     return _root[1].path
 
 
-def library_of(name: str, path: Path, folder: Path, identifier: str) -> Path:
+def library_of(name: str, path: Path, folder: Path, identifier: str, version: str) -> Path:
     """Return the shared library of an FMU for this platform.
 
     Args:
@@ -78,6 +78,7 @@ def library_of(name: str, path: Path, folder: Path, identifier: str) -> Path:
         path: of the FMU.
         folder: into which it has been unpacked.
         identifier: its ``modelIdentifier``.
+        version: of FMI, on which the platform's name depends.
 
     Returns:
         The library.
@@ -85,8 +86,10 @@ def library_of(name: str, path: Path, folder: Path, identifier: str) -> Path:
     Raises:
         FmuError: there is none, or it has another name.
     """
-    from fmpy import platform, sharedLibraryExtension
+    from fmpy import platform as platform2
+    from fmpy import platform_tuple, sharedLibraryExtension
 
+    platform = platform2 if version == "2.0" else platform_tuple
     library = folder / "binaries" / platform / f"{identifier}{sharedLibraryExtension}"
     if library.is_file():
         return library

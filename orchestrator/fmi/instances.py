@@ -3,9 +3,31 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from orchestrator.fmi.event_slave3 import EventFmuSlave
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.slave2 import Fmu2Slave
+from orchestrator.fmi.slave3 import Fmu3Slave
 from orchestrator.master.system import Instance, Start
+
+
+def make_slave(name: str, path: Path, description: FmuDescription | None = None) -> FmuSlave:
+    """Return a new instance of the FMU at ``path``, of its version of FMI.
+
+    Args:
+        name: of the instance.
+        path: the FMU's file or the folder of an unpacked one.
+        description: what ``read_description`` returned, if it has been read already.
+
+    Returns:
+        The slave.
+
+    Raises:
+        FmuError: the FMU cannot be read, loaded or instantiated here.
+    """
+    known = read_description(path) if description is None else description
+    kind = Fmu2Slave if known.version == "2.0" else EventFmuSlave if known.model.has_events else Fmu3Slave
+    return kind(name, path, known)
 
 
 @dataclass(frozen=True)
@@ -17,10 +39,12 @@ class FmuFactory:
 
     def __call__(self, name: str) -> FmuSlave:
         """Return a new slave called ``name``."""
-        return FmuSlave(name, self.path, self.description)
+        return make_slave(name, self.path, self.description)
 
 
-def fmu_instance(name: str, path: Path, start: Start | None = None, solver_tolerance: float | None = None) -> Instance:
+def fmu_instance(
+    name: str, path: Path, start: Start | None = None, solver_tolerance: float | None = None, events: bool = False
+) -> Instance:
     """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
 
     Args:
@@ -28,6 +52,7 @@ def fmu_instance(name: str, path: Path, start: Start | None = None, solver_toler
         path: the FMU's file or the folder of an unpacked one.
         start: values by variable name.
         solver_tolerance: relative tolerance for the FMU's own solver; None: its default.
+        events: use event mode, where the FMU has it.
 
     Returns:
         The instance, whose slave is made when a session needs it.
@@ -35,5 +60,5 @@ def fmu_instance(name: str, path: Path, start: Start | None = None, solver_toler
     Raises:
         FmuError: see ``read_description``.
     """
-    description = read_description(path)
+    description = read_description(path, events)
     return Instance(name, description.model, FmuFactory(path, description), start or {}, solver_tolerance)

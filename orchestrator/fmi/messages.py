@@ -123,3 +123,25 @@ def logging_callbacks(inbox: Inbox) -> Any:
     callbacks.componentEnvironment = number
     callbacks.inbox = inbox
     return callbacks
+
+
+_LOG_MESSAGE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
+
+
+@_LOG_MESSAGE
+def _log_message(environment: int | None, status: int, category: bytes, message: bytes | None) -> None:
+    _log(environment, b"", status, category, message)
+
+
+def log_message_callback(inbox: Inbox) -> tuple[int, Any]:
+    """Return what FMI 3.0 takes to put warnings and worse of one instance into ``inbox``.
+
+    Args:
+        inbox: of the instance, which must keep it.
+
+    Returns:
+        The instance's environment, and an ``fmi3LogMessageCallback``.
+    """
+    number = next(_numbers)
+    _inboxes[number] = inbox
+    return number, _log_message

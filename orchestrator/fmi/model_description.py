@@ -1,21 +1,25 @@
-"""What the master needs of a ``modelDescription.xml`` of FMI 2.0 for co-simulation; ``check`` looks at all the rest."""
+"""What the master needs of a model description of FMI 2.0 or 3.0 for co-simulation; ``check`` looks at all the rest."""
 
-import math
+import re
 import zipfile
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lxml import etree
 
 from orchestrator.errors import FmuError
-from orchestrator.master.protocol import ModelInterface, Unit, Value, Variable
+from orchestrator.fmi import variables2, variables3
+from orchestrator.fmi.access import Access
+from orchestrator.fmi.clocks import EventFeatures, UnusableError, clock_names, read_clocks
+from orchestrator.master.protocol import ModelInterface, Unit, Variable
 
 MAXIMUM_XML = 64 * 2**20
 """Bytes of XML beyond which a model description is refused: ten times the largest seen in the wild."""
 
-_TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 _EXPONENTS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+_INTERFACES = {"ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
 
 
 @dataclass(frozen=True)
@@ -24,33 +28,53 @@ class FmuDescription:
 
     Attributes:
         model: the interface as masters see it.
-        guid: to be handed over at instantiation.
+        version: of FMI, "2.0" or "3.0".
+        guid: to be handed over at instantiation; FMI 3.0 calls it a token.
         identifier: name of the shared library.
         python: the FMU runs Python in this very process.
         once: only one instance per process is allowed.
+        access: where the value of each variable is, by its name.
+        events: what event mode needs to know.
+        left_out: what of the FMU is not there for the master, in words; empty for nothing.
     """
 
     model: ModelInterface
+    version: str
     guid: str
     identifier: str
     python: bool
     once: bool
+    access: Mapping[str, Access]
+    events: EventFeatures = field(default_factory=EventFeatures)
+    left_out: str = ""
 
 
-def read_description(path: Path) -> FmuDescription:
+def read_description(path: Path, events: bool = True) -> FmuDescription:
     """Read the model description of the FMU at ``path``, a file or the folder of an unpacked one.
 
     Args:
         path: a file or a folder.
+        events: use event mode, where the FMU has it; False: steps pass over events.
 
     Returns:
         The description.
 
     Raises:
-        FmuError: the file is missing, no FMU, not FMI 2.0 or not for co-simulation.
+        FmuError: the file is missing, no FMU, not FMI 2.0 or 3.0, or not for co-simulation; or it has clocks, which
+            tick in event mode, and that is not used.
     """
-    if path.is_dir():
-        return _read_unpacked(path)
+    description = _read_unpacked(path) if path.is_dir() else _read_archive(path)
+    if events or not description.model.has_events:
+        return description
+    if clocks := [*description.model.clocks, *description.events.timed]:
+        raise FmuError(f"{path}: its clocks ({clock_names(clocks)}) tick in event mode, which is not used here")
+    model = replace(
+        description.model, has_events=False, output_derivatives=0, inputs_inside_steps=frozenset(), clocks={}
+    )
+    return replace(description, model=model, events=EventFeatures())
+
+
+def _read_archive(path: Path) -> FmuDescription:
     try:
         with zipfile.ZipFile(path) as archive:
             info = archive.getinfo("modelDescription.xml")
@@ -66,7 +90,12 @@ def read_description(path: Path) -> FmuDescription:
         raise FmuError(f"`fmu` must be a readable zip archive, but {path} is not: {error}") from None
     except Exception as error:  # zlib.error and what else a damaged archive makes zipfile raise
         raise FmuError(f"`fmu` must be an intact zip archive, but {path} is not: {error}") from None
-    return parse_description(content, str(path), python="resources/slavemodule.txt" in names)
+    return parse_description(content, str(path), python=_runs_python(names))
+
+
+def _runs_python(names: Iterable[str]) -> bool:
+    """Tell by the names of an FMU's files whether it runs Python: PythonFMU's, and ours of FMI 3.0."""
+    return any(re.fullmatch(r"resources/(slavemodule\.txt|[^/]*/fmi3_bridge\.py)", name) for name in names)
 
 
 def _read_unpacked(folder: Path) -> FmuDescription:
@@ -77,7 +106,9 @@ def _read_unpacked(folder: Path) -> FmuDescription:
         content = file.read_bytes()
     except OSError as error:
         raise FmuError(f"`fmu` must hold a modelDescription.xml, but {folder} does not: {error.strerror}") from None
-    python = (folder / "resources" / "slavemodule.txt").exists()
+    resources = folder / "resources"
+    files = [*resources.glob("slavemodule.txt"), *resources.glob("*/fmi3_bridge.py")]
+    python = _runs_python(file.relative_to(folder).as_posix() for file in files)
     return parse_description(content, str(folder), python)
 
 
@@ -93,49 +124,103 @@ def parse_description(content: bytes, origin: str, python: bool = False) -> FmuD
         The description.
 
     Raises:
-        FmuError: it is no FMI 2.0 co-simulation description.
+        FmuError: it is no co-simulation description of FMI 2.0 or 3.0, or needs what no master here does.
     """
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
         root = etree.fromstring(content, parser)
     except (etree.XMLSyntaxError, ValueError) as error:
         raise FmuError(f"{origin}: modelDescription.xml must be well-formed XML, but is not: {error}") from None
-    version = root.get("fmiVersion")
-    if root.tag != "fmiModelDescription" or version != "2.0":
-        raise FmuError(f"{origin}: must be an FMI 2.0 FMU, but has fmiVersion {version!r}")
+    version = root.get("fmiVersion") or ""
+    if root.tag != "fmiModelDescription" or not re.fullmatch(r"2\.0|3\.\d+", version):
+        raise FmuError(f"{origin}: must be an FMI 2.0 or 3.0 FMU, but has fmiVersion {version!r}")
     cosimulation = root.find("CoSimulation")
     if cosimulation is None:
-        raise FmuError(f"{origin}: must be an FMU for co-simulation, but has no CoSimulation element")
+        has = " and ".join(words for tag, words in _INTERFACES.items() if root.find(tag) is not None)
+        alone = f": it is for {has} alone" if has else ""
+        raise FmuError(f"{origin}: must be an FMU for co-simulation, but has no CoSimulation element{alone}")
     try:
-        return _description(root, cosimulation, python)
+        return (_description2 if version == "2.0" else _description3)(root, cosimulation, python)
+    except UnusableError as error:
+        raise FmuError(f"{origin}: {error}") from None
     except (KeyError, ValueError, IndexError, TypeError) as error:
-        raise FmuError(f"{origin}: modelDescription.xml must follow FMI 2.0, but does not: {error}") from None
+        raise FmuError(f"{origin}: modelDescription.xml must follow FMI {version}, but does not: {error}") from None
 
 
-def _description(root: etree._Element, cosimulation: etree._Element, python: bool) -> FmuDescription:
-    variables = _variables(root)
-    names = [v.name for v in variables]
-    if len(set(names)) < len(names):
-        twice = next(name for name, count in Counter(names).items() if count > 1)
-        raise ValueError(f"the variable {twice!r} is declared twice")
-    identifier = cosimulation.attrib["modelIdentifier"]
-    if not identifier.replace("_", "a").isalnum():
-        raise ValueError(f"modelIdentifier {identifier!r} is no C identifier")
+def _description2(root: etree._Element, cosimulation: etree._Element, python: bool) -> FmuDescription:
+    variables, accesses = variables2.read_variables(root)
+    names = _unique([v.name for v in variables])
     model = ModelInterface(
         name=root.attrib["modelName"],
         variables=dict(zip(names, variables, strict=True)),
         units=_units(root),
-        feedthrough=_feedthrough(root, variables),
+        feedthrough=variables2.read_feedthrough(root, variables),
         can_save_state=_flag(cosimulation, "canGetAndSetFMUstate"),
         can_vary_step=_flag(cosimulation, "canHandleVariableCommunicationStepSize"),
     )
     return FmuDescription(
         model=model,
+        version="2.0",
         guid=root.attrib["guid"],
-        identifier=identifier,
+        identifier=_identifier(cosimulation),
         python=python or "PythonFMU" in (root.get("generationTool") or ""),
         once=_flag(cosimulation, "canBeInstantiatedOnlyOncePerProcess"),
+        access=dict(zip(names, accesses, strict=True)),
     )
+
+
+def _description3(root: etree._Element, cosimulation: etree._Element, python: bool) -> FmuDescription:
+    found = variables3.read_variables(root)
+    variables: Sequence[Variable] = found.scalars
+    names = _unique([v.name for v in variables])
+    has_events = _flag(cosimulation, "hasEventMode")
+    clocks, events, left_out = read_clocks(found)
+    if found.clocks and not has_events:
+        raise ValueError(f"it has clocks ({clock_names(list(found.clocks))}), but no event mode")
+    model = ModelInterface(
+        name=root.attrib["modelName"],
+        variables=dict(zip(names, variables, strict=True)),
+        units=_units(root),
+        feedthrough=variables3.read_feedthrough(root, found),
+        can_save_state=_flag(cosimulation, "canGetAndSetFMUState"),
+        can_vary_step=_flag(cosimulation, "canHandleVariableCommunicationStepSize"),
+        has_events=has_events,
+        output_derivatives=int(cosimulation.get("maxOutputDerivativeOrder", "0")) if has_events else 0,
+        inputs_inside_steps=events.inside
+        if has_events and _flag(cosimulation, "providesIntermediateUpdate")
+        else frozenset(),
+        clocks=clocks,
+    )
+    return FmuDescription(
+        model=model,
+        version="3.0",
+        guid=root.attrib["instantiationToken"],
+        identifier=_identifier(cosimulation),
+        python=python or "PythonFMU" in (root.get("generationTool") or ""),
+        once=_flag(cosimulation, "canBeInstantiatedOnlyOncePerProcess"),
+        access=dict(zip(names, found.accesses, strict=True)),
+        events=events,
+        left_out=_left_out(found.binaries, left_out),
+    )
+
+
+def _left_out(binaries: Sequence[str], clocks: Sequence[str]) -> str:
+    texts = [f"{kind} {clock_names(names)}" for kind, names in (("Binary", binaries), ("clocks", clocks)) if names]
+    return f"variables that nothing here can use are left as they are: {'; '.join(texts)}" if texts else ""
+
+
+def _unique(names: list[str]) -> list[str]:
+    if len(set(names)) < len(names):
+        twice = next(name for name, count in Counter(names).items() if count > 1)
+        raise ValueError(f"the variable {twice!r} is declared twice")
+    return names
+
+
+def _identifier(cosimulation: etree._Element) -> str:
+    identifier = cosimulation.attrib["modelIdentifier"]
+    if not identifier.replace("_", "a").isalnum():
+        raise ValueError(f"modelIdentifier {identifier!r} is no C identifier")
+    return identifier
 
 
 def _flag(element: etree._Element, name: str) -> bool:
@@ -153,62 +238,3 @@ def _units(root: etree._Element) -> dict[str, Unit]:
             exponents = tuple(int(base.get(e, "0")) for e in _EXPONENTS)
             units[name] = Unit(name, exponents, float(base.get("factor", "1")), float(base.get("offset", "0")))
     return units
-
-
-def _variables(root: etree._Element) -> list[Variable]:
-    types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/SimpleType")}
-    found = []
-    for scalar in root.findall("ModelVariables/ScalarVariable"):
-        kind = next((child for child in scalar if child.tag in _TYPES), None)
-        if kind is None:
-            raise ValueError(f"the variable {scalar.get('name')!r} has no type")
-        found.append(_variable(scalar, kind, types))
-    return found
-
-
-def _variable(scalar: etree._Element, kind: etree._Element, types: dict[str, etree._Element]) -> Variable:
-    declared = types.get(kind.get("declaredType", ""))
-    inherited = None if declared is None else declared.find(str(kind.tag))
-    name, causality = scalar.attrib["name"], scalar.get("causality", "local")
-
-    def attribute(key: str) -> str | None:
-        own = kind.get(key)
-        return own if own is not None or inherited is None else inherited.get(key)
-
-    items = [] if inherited is None else inherited.findall("Item")
-    low, high = attribute("min"), attribute("max")
-    return Variable(
-        name=name,
-        causality=causality,
-        type=str(kind.tag),
-        unit=attribute("unit") or None,
-        variability=scalar.get("variability", "continuous" if kind.tag == "Real" else "discrete"),
-        start=_start(str(kind.tag), kind.get("start"), name),
-        minimum=None if low is None else float(low),
-        maximum=None if high is None else float(high),
-        items=tuple((item.attrib["name"], int(item.attrib["value"])) for item in items),
-        description=scalar.get("description", ""),
-        reference=int(scalar.attrib["valueReference"]),
-    )
-
-
-def _start(kind: str, text: str | None, name: str) -> Value | None:
-    if text is None or kind == "String":
-        return text
-    if kind == "Boolean":
-        return text in {"true", "1"}
-    value = float(text) if kind == "Real" else int(text)
-    if not math.isfinite(value):
-        raise ValueError(f"the start value of {name!r} is {text}")
-    return value
-
-
-def _feedthrough(root: etree._Element, variables: list[Variable]) -> dict[str, frozenset[str]]:
-    direct = {}
-    for unknown in root.findall("ModelStructure/Outputs/Unknown"):
-        listed = unknown.get("dependencies")
-        if listed is not None:
-            known = [variables[int(index) - 1] for index in listed.split()]
-            output = variables[int(unknown.attrib["index"]) - 1]
-            direct[output.name] = frozenset(v.name for v in known if v.causality == "input")
-    return direct

@@ -1,21 +1,26 @@
 """An FMU instance in a process of its own, as a slave of this one: for FMUs that allow one instance a process."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from orchestrator.errors import ChildError, SlaveError
+from orchestrator.fmi.event_slave3 import EventFmuSlave
+from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import FmuDescription
 from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.protocol import (
+    EventSlave,
+    EventUpdate,
     ModelInterface,
     RunEndedError,
     Signals,
     Slave,
     StepDiscardedError,
+    StepOutcome,
     Transfer,
     Value,
 )
@@ -35,7 +40,7 @@ def opened(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, li
     Returns:
         Called with a method's name and arguments, it gives what that returns.
     """
-    host = _Host(FmuSlave(*request))
+    host = _Host(make_slave(*request))
     return lambda asked: getattr(host, asked[0])(*asked[1])
 
 
@@ -60,17 +65,36 @@ class _Host:
         buffer[:] = values
         transfer()
 
-    def receive(self, number: int) -> Signals:
+    def receive(self, number: int, values: Signals) -> Signals:
         transfer, buffer = self._transfers[number]
+        buffer[:] = values  # variables of clocks keep their values between ticks
         transfer()
         return buffer
 
+    def do_step(self, time: float, step: float) -> list[Any]:
+        return self._judged(lambda: self._slave.do_step(time, step))
+
     def step(self, time: float, step: float) -> list[Any]:
+        assert isinstance(self._slave, EventFmuSlave)
+        slave, found = self._slave, []
+        said = self._judged(lambda: found.append(slave.step(time, step)))
+        return [said, found[0].reached if found else time, bool(found) and found[0].event]
+
+    @staticmethod
+    def _judged(advance: Callable[[], None]) -> list[Any]:
+        """Do a step; return how it went: a code, what was said, when, and whether it was at an event."""
         try:
-            self._slave.do_step(time, step)
+            advance()
+        except RunEndedError as error:
+            return [ENDED, str(error), error.time, error.at_event]
         except StepDiscardedError as error:
-            return [ENDED if isinstance(error, RunEndedError) else DISCARDED, str(error), error.time]
-        return [DONE, "", time]
+            return [DISCARDED, str(error), error.time, False]
+        return [DONE, "", 0.0, False]
+
+    def update_discrete_states(self) -> list[Any]:
+        assert isinstance(self._slave, EventFmuSlave)
+        update = self._slave.update_discrete_states()
+        return [update.again, update.next_event, update.ends_run]
 
     def get_state(self) -> int:
         number = max(self._states, default=0) + 1
@@ -133,7 +157,7 @@ class RemoteSlave(Slave):
         number = self._ask("bind", "receives", list(names))
 
         def receive() -> None:
-            values = self._ask("receive", number)
+            values = self._ask("receive", number, buffer.copy())
             if not (isinstance(values, np.ndarray) and values.shape == buffer.shape and values.dtype == np.float64):
                 raise SlaveError(f"{self.name}: its process must return {len(names)} values, but does not")
             buffer[:] = values
@@ -147,10 +171,16 @@ class RemoteSlave(Slave):
         self._ask("start")
 
     def do_step(self, time: float, step: float) -> None:
-        match self._ask("step", time, step):
-            case [int() as status, str() as text, float() as reached]:
+        self._judge(self._ask("do_step", time, step))
+
+    def _judge(self, said: Any) -> None:
+        """Raise for a step that was not done, by what the child says of it."""
+        match said:
+            case [int() as status, str() as text, float() as reached, bool() as at_event]:
+                if status == ENDED:
+                    raise RunEndedError(text, self.name, reached, at_event)
                 if status != DONE:
-                    raise (RunEndedError if status == ENDED else StepDiscardedError)(text, self.name, reached)
+                    raise StepDiscardedError(text, self.name, reached)
             case _:
                 raise SlaveError(f"{self.name}: its process must say how a step went, but does not")
 
@@ -189,6 +219,51 @@ class RemoteSlave(Slave):
         self._jail.close()
 
 
+class EventRemoteSlave(RemoteSlave, EventSlave):
+    """One instance with events; see ``EventSlave``. Its inputs are held over a step, for a step is one call here."""
+
+    def step(self, time: float, step: float) -> StepOutcome:
+        match self._ask("step", time, step):
+            case [list() as said, float() as reached, bool() as event]:
+                self._judge(said)
+                return StepOutcome(reached, event)
+        raise SlaveError(f"{self.name}: its process must say how a step went, but does not")
+
+    def enter_event_mode(self) -> None:
+        self._ask("enter_event_mode")
+
+    def tick(self, clocks: Sequence[str]) -> None:
+        self._ask("tick", list(clocks))
+
+    def update_discrete_states(self) -> EventUpdate:
+        match self._ask("update_discrete_states"):
+            case [bool() as again, (float() | None) as next_event, bool() as ends_run]:
+                return EventUpdate(again, next_event, ends_run)
+        raise SlaveError(f"{self.name}: its process must say what an event led to, but does not")
+
+    def leave_event_mode(self) -> None:
+        self._ask("leave_event_mode")
+
+    def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
+        if values is not None:
+            raise SlaveError(f"{self.name}: inputs must be held over steps in a process of its own, but are fed")
+
+    def output_rates(self, names: Sequence[str], order: int = 1) -> list[float]:
+        return [float(rate) for rate in self._ask("output_rates", list(names), order)]
+
+
+def without_feed(description: FmuDescription) -> FmuDescription:
+    """Return the description of an FMU whose instances run in processes of their own.
+
+    Args:
+        description: of the FMU.
+
+    Returns:
+        The same, but nothing is set inside steps.
+    """
+    return replace(description, model=replace(description.model, inputs_inside_steps=frozenset()))
+
+
 @dataclass(frozen=True)
 class RemoteFactory:
     """Makes slaves of the FMU unpacked in ``folder``, each in a process of its own; see ``RemoteSlave``."""
@@ -200,4 +275,5 @@ class RemoteFactory:
 
     def __call__(self, name: str) -> RemoteSlave:
         """Return a new slave called ``name``."""
-        return RemoteSlave(name, self.folder, self.description, self.limits, self.walls)
+        kind = EventRemoteSlave if self.description.model.has_events else RemoteSlave
+        return kind(name, self.folder, self.description, self.limits, self.walls)

@@ -1,30 +1,27 @@
-"""FMUs as slaves: FMI 2.0 co-simulation through FMPy. At run time nothing else in the project calls FMPy.
+"""FMUs as slaves: what instances of all versions of FMI share; ``slave2`` and ``slave3`` know the functions of each.
 
-FMPy loads the library and instantiates; the calls that are made at every step go straight to the library, through
-preallocated buffers, one batched call per type and direction. Python FMUs are called with the interpreter lock
-held (``ctypes.PyDLL``): they would take it back at once.
+The calls that are made at every step go straight to the library, through preallocated buffers, one batched call per
+type and direction. Python FMUs are called with the interpreter lock held (``ctypes.PyDLL``): they would take it back at
+once.
 """
 
 import ctypes
-import math
 import operator
+from abc import abstractmethod
 from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, ClassVar
 
 from orchestrator.errors import FmuError, SlaveError
-from orchestrator.fmi.batches import FUNCTION_TYPES, VariableBatch, make_batches, shares
-from orchestrator.fmi.extraction import content_hash, extracted, library_of
-from orchestrator.fmi.farewell import ends_cleanly
-from orchestrator.fmi.messages import DISCARD, ERROR, FATAL, OK, PENDING, STATUS, WARNING, Inbox, logging_callbacks
+from orchestrator.fmi.access import Access
+from orchestrator.fmi.addresses import native_calls
+from orchestrator.fmi.batches import Functions, VariableBatch, in_c, shares
+from orchestrator.fmi.extraction import content_hash
+from orchestrator.fmi.messages import DISCARD, ERROR, FATAL, OK, PENDING, STATUS, WARNING, Inbox
 from orchestrator.fmi.model_description import FmuDescription, read_description
 from orchestrator.fmi.shorter_steps import ShorterSteps
 from orchestrator.master.protocol import (
-    KINDS,
     ModelInterface,
     NativeCalls,
     RunEndedError,
@@ -38,7 +35,6 @@ from orchestrator.master.result import RunRemark
 
 SETS_KEPT = 16
 """Lists of names whose call is kept: runs that differ in values alone set the same names."""
-_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3  # of fmi2StatusKind
 
 _only_ones: set[str] = set()
 
@@ -55,6 +51,9 @@ class FmuSlave(Slave):
         FmuError: the FMU cannot be read, loaded or instantiated here.
     """
 
+    PREFIX: ClassVar[str]  # of the functions' names
+    STATE: ClassVar[str]  # what the functions of saved states call one
+
     def __init__(self, name: str, path: Path, description: FmuDescription | None = None) -> None:
         self.name = name
         self.path = path
@@ -67,22 +66,14 @@ class FmuSlave(Slave):
         self._reached: float | None = None  # s, in a run
         self._once = ""
         self._sets: dict[tuple[str, ...], tuple[list[VariableBatch], list[Value]]] = {}
-        self._early: list[Mapping[str, Value]] | None = []  # set before the experiment was set up; None: it is
         self._reserve()
         try:
-            self._fmu = self._load()
-            self._instantiate()
+            self._library, self._component = self._instantiate()
         except BaseException:
             self._release()
             raise
-        if self._description.python:
-            ends_cleanly(Path(self._fmu.dll._name).parent)
-        loader = ctypes.PyDLL if self._description.python else ctypes.CDLL
-        self._library: Any = loader(self._fmu.dll._name, handle=self._fmu.dll._handle)
-        self._component = ctypes.c_void_p(self._fmu.component)
-        self._step = self._library.fmi2DoStep
-        self._step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
-        self._step.restype = ctypes.c_int
+        self._functions = Functions(self._library, self._component, self._description.version, {})
+        self._forget_arrays()
 
     # Loading -------------------------------------------------------------------------------------------------
 
@@ -99,29 +90,25 @@ class FmuSlave(Slave):
         _only_ones.discard(self._once)
         self._closed = True
 
-    def _load(self) -> Any:
-        from fmpy.fmi2 import FMU2Slave
+    @abstractmethod
+    def _instantiate(self) -> tuple[Any, ctypes.c_void_p]:
+        """Return the loaded library and an instance of it.
 
-        folder = extracted(self.path)
-        identifier = self._description.identifier
-        library = library_of(self.name, self.path, folder, identifier)
-        try:
-            return FMU2Slave(
-                guid=self._description.guid,
-                modelIdentifier=identifier,
-                unzipDirectory=str(folder),
-                instanceName=self.name,
-                libraryPath=str(library),
-            )
-        except Exception as error:  # FMPy raises bare Exception, ctypes AttributeError
-            raise FmuError(f"{self.name}: the binary of {self.path} cannot be loaded: {error}") from None
+        Raises:
+            FmuError: it cannot be loaded or instantiated.
+        """
 
-    def _instantiate(self) -> None:
-        callbacks = logging_callbacks(self._inbox)
-        try:
-            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
-        except Exception:
-            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._said()}") from None
+    @abstractmethod
+    def _free(self) -> None:
+        """Free the instance, and the library unless it runs Python."""
+
+    def _forget_arrays(self) -> None:
+        """Let the values of arrays be those of a new instance."""
+        for name, access in self._description.access.items():
+            start = self.model.variables[name].start
+            if access.size > 1 and start is not None:
+                array = self._functions.arrays.setdefault(access.reference, [0] * access.size)
+                array[access.element] = start.encode() if isinstance(start, str) else start
 
     # Calls ---------------------------------------------------------------------------------------------------
 
@@ -140,7 +127,7 @@ class FmuSlave(Slave):
             if status:
                 self._inbox.warn(f"{what}{moment}")
             return
-        self._worst = max(self._worst, status if status != PENDING else FATAL)
+        self._worst = max(self._worst, status if status < PENDING else FATAL)
         if "KeyboardInterrupt" in self._said():  # Ctrl-C reached the Python inside the FMU
             raise KeyboardInterrupt
         label = STATUS[status] if 0 <= status < len(STATUS) else str(status)
@@ -148,25 +135,21 @@ class FmuSlave(Slave):
         if status == PENDING:
             raise SlaveError(f"{text}: it must do its steps while it is called, but goes on by itself")
         if status == DISCARD:
-            ends = what == "fmi2DoStep" and self._ends_run()
+            ends = what.endswith("DoStep") and self._ends_run()
             raise (RunEndedError if ends else StepDiscardedError)(text, self.name, self._reached or 0.0)
         raise SlaveError(text)
 
     def _ends_run(self) -> bool:
         """Whether the FMU wants the run to end, after a step that it discarded."""
-        ends = ctypes.c_int(0)
-        answered = self._library.fmi2GetBooleanStatus(self._component, _TERMINATED, ctypes.byref(ends)) == OK
-        return answered and bool(ends.value)
+        return False
 
+    @abstractmethod
     def last_successful_time(self) -> float | None:
         """Return how far the FMU came in a step that it discarded.
 
         Returns:
             The time [s]; None where it does not say.
         """
-        time = ctypes.c_double(math.nan)
-        status = self._library.fmi2GetRealStatus(self._component, _LAST_SUCCESSFUL_TIME, ctypes.byref(time))
-        return time.value if status == OK and math.isfinite(time.value) else None
 
     def take_remarks(self) -> list[RunRemark]:
         """Return warnings and shortened steps since this was last asked.
@@ -175,7 +158,8 @@ class FmuSlave(Slave):
             The remarks.
         """
         shortened = [] if self._shorter is None else self._shorter.take_remarks()
-        return [*self._inbox.take_remarks(self.name), *shortened]
+        left_out = [RunRemark(self.name, self._description.left_out)] if self._description.left_out else []
+        return [*left_out, *self._inbox.take_remarks(self.name), *shortened]
 
     def shorten_steps(self) -> bool:
         """Do steps that the FMU discards in shorter ones, from the next run on.
@@ -193,37 +177,38 @@ class FmuSlave(Slave):
             raise SlaveError(f"{self.name}: {what} must not be called after a failure, but was")
 
     def _call(self, function: str, *arguments: Any) -> None:
+        """Call a function, named without its prefix, and judge its status."""
+        function = f"{self.PREFIX}{function}"
         if self._closed or self._worst >= ERROR:
             self._alive(function)
         status = getattr(self._library, function)(self._component, *arguments)
         if status:
             self._check(status, function)
 
-    def _batches(self, names: Sequence[str], direction: str, buffer: Signals | None = None) -> list[VariableBatch]:
-        variables = [self.model.variables[name] for name in names]
-        return make_batches(self._library, self._component, variables, direction, buffer)
+    # Values --------------------------------------------------------------------------------------------------
+
+    def _accesses(self, names: Sequence[str]) -> list[Access]:
+        return [self._description.access[name] for name in names]
 
     def set(self, values: Mapping[str, Value]) -> None:
-        """Set variables of any type by name; what is set before :meth:`begin` is set once more by that."""
-        self._alive("fmi2Set")
-        if self._early is not None:
-            self._early.append(dict(values))
+        """Set variables of any type by name."""
+        self._alive(f"{self.PREFIX}Set")
         names = tuple(values)
         kept = self._sets.get(names)
         if kept is None:
             if len(self._sets) >= SETS_KEPT:
                 self._sets.clear()
-            kept = self._sets[names] = (self._batches(names, "Set"), [])
+            kept = self._sets[names] = (self._functions.batches(self._accesses(names), "Set"), [])
         batches, last = kept
         given = list(values.values())
         if not last or not all(map(operator.is_, last, given)):
             last[:] = []
             for batch in batches:
-                for k, position in enumerate(batch.positions):
-                    value = given[position]
-                    batch.values[k] = value.encode() if isinstance(value, str) else value
+                for place, position in zip(batch.places, batch.positions, strict=True):
+                    batch.values[place] = in_c(given[position], batch.values)
             last[:] = given
         for batch in batches:
+            batch.complete()
             status = batch.call()
             if status:
                 self._check(status, self._naming(batch, names))
@@ -234,28 +219,28 @@ class FmuSlave(Slave):
 
     def get(self, names: Sequence[str]) -> list[Value]:
         """Return variables of any type by name."""
-        self._alive("fmi2Get")
+        self._alive(f"{self.PREFIX}Get")
         found: list[Value] = [0.0] * len(names)
-        for batch in self._batches(names, "Get"):
+        for batch in self._functions.batches(self._accesses(names), "Get"):
             self._check(batch.call(), self._naming(batch, names))
-            for position, value in zip(batch.positions, batch.values, strict=True):
-                kind = self.model.variables[names[position]].type
+            for position, place in zip(batch.positions, batch.places, strict=True):
+                kind, value = self.model.variables[names[position]].type, batch.values[place]
                 decoded = (value or b"").decode("utf-8", "replace") if kind == "String" else value
                 found[position] = bool(decoded) if kind == "Boolean" else decoded
         return found
 
     def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
         """Return a call that sets the numeric variables ``names`` from ``buffer``; shape (len(names),)."""
-        batches = self._batches(names, "Set", buffer)
+        batches = self._functions.batches(self._accesses(names), "Set", buffer)
         if len(batches) == 1 and isinstance(batches[0].values, ctypes.Array) and shares(batches[0].values, buffer):
             return self._direct(batches[0])
 
         def send() -> None:
             for batch in batches:
                 if not shares(batch.values, buffer):
-                    whole = batch.values._type_ is ctypes.c_int
-                    for k, position in enumerate(batch.positions):
-                        batch.values[k] = int(buffer[position]) if whole else float(buffer[position])
+                    for place, position in zip(batch.places, batch.positions, strict=True):
+                        batch.values[place] = in_c(buffer[position], batch.values)
+                batch.complete()
                 self._alive(batch.function)
                 self._check(batch.call(), batch.function)
 
@@ -263,7 +248,7 @@ class FmuSlave(Slave):
 
     def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
         """Return a call that reads the numeric variables ``names`` into ``buffer``; shape (len(names),)."""
-        batches = self._batches(names, "Get", buffer)
+        batches = self._functions.batches(self._accesses(names), "Get", buffer)
         if len(batches) == 1 and shares(batches[0].values, buffer):
             return self._direct(batches[0])
         converted = [batch for batch in batches if not shares(batch.values, buffer)]
@@ -273,8 +258,8 @@ class FmuSlave(Slave):
                 self._alive(batch.function)
                 self._check(batch.call(), batch.function)
             for batch in converted:
-                for position, value in zip(batch.positions, batch.values, strict=True):
-                    buffer[position] = value
+                for place, position in zip(batch.places, batch.positions, strict=True):
+                    buffer[position] = batch.values[place]
 
         return receive
 
@@ -290,136 +275,91 @@ class FmuSlave(Slave):
 
         return transfer
 
-    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
-        """Set the experiment up and enter initialisation mode."""
-        self.messages.clear()
-        self._call(
-            "fmi2SetupExperiment",
-            ctypes.c_int(tolerance is not None),
-            ctypes.c_double(tolerance or 0.0),
-            ctypes.c_double(start),
-            ctypes.c_int(stop is not None),
-            ctypes.c_double(stop or 0.0),
-        )
-        early, self._early = self._early or [], None
-        for values in early:  # 20-sim's FMUs forget in fmi2SetupExperiment what was set before it
-            self.set(values)
-        self._call("fmi2EnterInitializationMode")
-        self._reached = start
+    # A run ---------------------------------------------------------------------------------------------------
 
     def start(self) -> None:
         """Exit initialisation mode."""
-        self._call("fmi2ExitInitializationMode")
+        self._call("ExitInitializationMode")
 
     def do_step(self, time: float, step: float) -> None:
         """Advance from ``time`` to ``time + step`` [s], inputs held."""
         if self._worst >= ERROR:
-            self._alive("fmi2DoStep")
+            self._alive(f"{self.PREFIX}DoStep")
         if self._shorter is not None:
             self._shorter.do_step(time, step)
         else:
             self.try_step(time, step)
 
+    @abstractmethod
     def try_step(self, time: float, step: float) -> None:
-        """Call ``fmi2DoStep`` once; see ``do_step``.
+        """Step once; see ``do_step``.
 
         Args:
             time: [s].
             step: [s].
         """
-        status = self._step(self._component, time, step, 1)
-        self._reached = time
-        if status:
-            self._check(status, "fmi2DoStep")
-        self._reached = time + step
 
     def get_state(self) -> Any:
         """Return a handle of a copy of the whole state."""
         state = ctypes.c_void_p()
-        self._call("fmi2GetFMUstate", ctypes.byref(state))
+        self._call(f"Get{self.STATE}", ctypes.byref(state))
         return state
 
     def set_state(self, state: Any) -> None:
         """Return to a state; the handle stays valid."""
-        self._call("fmi2SetFMUstate", state)
+        self._call(f"Set{self.STATE}", state)
 
     def free_state(self, state: Any) -> None:
         """Give a handle back; after a failure it is left to the FMU."""
         if not self._closed and self._worst < ERROR:
-            self._call("fmi2FreeFMUstate", ctypes.byref(state))
+            self._call(f"Free{self.STATE}", ctypes.byref(state))
 
     def terminate(self) -> None:
         """End the run."""
-        self._call("fmi2Terminate")
+        self._call("Terminate")
 
     def reset(self) -> None:
         """Return to the condition of a new instance."""
-        self._call("fmi2Reset")
-        self._reached, self._early = None, []
+        self._call("Reset")
+        self._reached = None
+        self._forget_arrays()
 
     def close(self) -> None:
         """Free the instance, unless it failed fatally; its library stays loaded when it runs Python."""
         if self._closed:
             return
         self._release()
-        if self._worst >= FATAL:
-            return
-        self._fmu.fmi2FreeInstance(self._fmu.component)
-        if not self._description.python:
-            self._fmu.freeLibrary()
+        if self._worst < FATAL:
+            self._free()
 
     def __del__(self) -> None:
-        if not getattr(self, "_closed", True) and hasattr(self, "_library"):
+        if not getattr(self, "_closed", True) and hasattr(self, "_functions"):
             self.close()
 
     # The compiled loop -----------------------------------------------------------------------------------------
 
     def native_calls(self, inputs: Sequence[str], outputs: Sequence[str]) -> NativeCalls | None:
-        """Return addresses for calls from machine code; ``None`` where types do not allow it.
+        """Return addresses for calls from machine code; ``None`` where it cannot make them.
 
         Args:
-            inputs: names of the inputs: Reals first, then Integers and Enumerations, then Booleans.
-            outputs: names of the outputs, in such an order.
+            inputs: names of the inputs.
+            outputs: names of the outputs.
 
         Returns:
             The addresses.
         """
-        lists = [[self._kind(name) for name in names] for names in (inputs, outputs)]
-        if (
-            self._shorter is not None
-            or self._worst >= ERROR
-            or any(kinds != sorted(kinds) or kinds[-1:] == [len(KINDS)] for kinds in lists)
-        ):
+        if self._shorter is not None or self._worst >= ERROR or self.model.has_events:
             return None
-
-        def address(function: str) -> int:
-            found = getattr(self._library, function, None)
-            return 0 if found is None else int(ctypes.cast(found, ctypes.c_void_p).value or 0)
-
-        def references(names: Sequence[str], kind: int) -> NDArray[np.uint32]:
-            variables = self.model.variables
-            return np.array([variables[n].reference for n in names if self._kind(n) == kind], dtype=np.uint32)
-
-        kinds = range(len(KINDS))
-        return NativeCalls(
-            component=int(self._component.value or 0),
-            set=(address("fmi2SetReal"), address("fmi2SetInteger"), address("fmi2SetBoolean")),
-            get=(address("fmi2GetReal"), address("fmi2GetInteger"), address("fmi2GetBoolean")),
-            do_step=address("fmi2DoStep"),
-            inputs=tuple(references(inputs, kind) for kind in kinds),
-            outputs=tuple(references(outputs, kind) for kind in kinds),
-            python=self._description.python,
-        )
-
-    def _kind(self, name: str) -> int:
-        """Return the place of a variable's type in ``KINDS``; behind the last for Strings."""
-        return (*KINDS, "String").index(FUNCTION_TYPES[self.model.variables[name].type])
+        variables = self.model.variables
+        if any(variables[name].type == "String" for name in (*inputs, *outputs)):
+            return None
+        return native_calls(self._functions, self._accesses(inputs), self._accesses(outputs), self._description.python)
 
     def warned(self, count: int, function: str, time: float) -> None:
         """Take warnings that the compiled loop met.
 
         Args:
-            count: of calls that returned fmi2Warning.
+            count: of calls that returned a warning.
             function: name of the FMI function that returned the first.
             time: when [s].
         """
@@ -429,7 +369,7 @@ class FmuSlave(Slave):
         """Raise for a status that the compiled loop met.
 
         Args:
-            status: an ``fmi2Status``.
+            status: of FMI.
             function: name of the FMI function that returned it.
             time: when [s].
         """

@@ -12,10 +12,8 @@ windows grow again, no faster than the time since the event. They end where a so
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +24,7 @@ from orchestrator.master.layout import Layout
 from orchestrator.master.pieces import CELLS, NODES, piece_times, piece_weights
 from orchestrator.master.protocol import RunEndedError, StepDiscardedError
 from orchestrator.master.result import Statistics
+from orchestrator.master.rollback import rollback
 from orchestrator.master.signals import GRID_SLACK, Signal
 from orchestrator.master.waveform import Waveform
 from orchestrator.master.wiring import Stage, Wiring
@@ -128,11 +127,19 @@ def run_adaptive(
         ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.
         ConvergenceError: the tolerance cannot be met with the smallest step allowed.
     """
-    _check(wiring.layout)
+    check_adaptive(wiring.layout)
     return _Run(wiring, signals, start, stop, settings, rows, record).run()
 
 
-def _check(layout: Layout) -> None:
+def check_adaptive(layout: Layout) -> None:
+    """Refuse a system that cannot go back or that holds values by itself.
+
+    Args:
+        layout: plan of the signals.
+
+    Raises:
+        ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.
+    """
     for instance in layout.system.instances:
         model = instance.model
         if not (model.can_save_state and model.can_vary_step):
@@ -147,7 +154,17 @@ def _check(layout: Layout) -> None:
             )
 
 
-def _window_end(time: float, length: float, target: float) -> float:
+def window_end(time: float, length: float, target: float) -> float:
+    """Return where a window ends [s] that shall have a length, so that no little one is left before ``target``.
+
+    Args:
+        time: where it begins [s].
+        length: wanted [s].
+        target: beyond which it must not go [s].
+
+    Returns:
+        The time.
+    """
     left = target - time
     if left <= 1.01 * length:
         return target
@@ -203,7 +220,7 @@ class _Run:
             event: _Event | None = None
             crossed = -math.inf
             while time < target:
-                end = _window_end(time, length, target) if event is None else event.window_end(time)
+                end = window_end(time, length, target) if event is None else event.window_end(time)
                 short = event is not None or end - time < SHORT * longest
                 share = EVENT_SHARE if short else 1.0
                 attempt = self._attempt(time, end, guess, share)
@@ -239,29 +256,10 @@ class _Run:
                 f"{self.settings.smallest:g} s; use a larger tolerance, or algorithm 'iterated' for an algebraic loop"
             )
 
-    @contextmanager
-    def _saved(self) -> Iterator[Callable[[], None]]:
-        """Yield a call that takes all slaves and signals back to now."""
-        states: list[tuple[Stage, Any]] = []
-        values = self.wiring.values.copy()
-
-        def restore() -> None:
-            for stage, state in states:
-                stage.slave.set_state(state)
-            self.wiring.values[:] = values
-
-        try:
-            for stage in self.wiring.stages:
-                states.append((stage, stage.slave.get_state()))
-            yield restore
-        finally:
-            for stage, state in states:
-                stage.slave.free_state(state)
-
     def _attempt(self, start: float, end: float, guess: Waveform | None, share: float) -> _Attempt:
         """Try one window; leave the slaves at its end when its error is within ``share``, else at its start."""
         middle, length = 0.5 * (start + end), end - start
-        with self._saved() as restore:
+        with rollback(self.wiring) as restore:
             try:
                 whole = self._sweep(start, end, guess)
                 restore()
@@ -316,7 +314,7 @@ class _Run:
             guessed = guess.at(times)[:, self.outputs]
             nodes[1:, self.outputs] = guessed[1:] + (initial[self.outputs] - guessed[0])
         feeds = self._signal_nodes(times)
-        with self._saved() as restore:
+        with rollback(self.wiring) as restore:
             for sweep in range(SWEEPS):
                 if sweep:
                     restore()

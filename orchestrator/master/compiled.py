@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.master.protocol import KINDS, NativeCalls
+from orchestrator.master.protocol import NativeCalls, NativeTransfer
 from orchestrator.master.wiring import Wiring
 from orchestrator.shared.machine_code import compiled_library
 
@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 Slots = NDArray[np.int64]
 
 SOURCE = Path(__file__).with_name("loop.c")
-FUNCTIONS = (*(f"fmi2Set{kind}" for kind in KINDS), "fmi2DoStep", *(f"fmi2Get{kind}" for kind in KINDS))
+NUMBERS = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "b1")
+"""Types of values in C, in the order of ``loop.c``."""
 
 FIRST_CHUNK, MOST_STEPS = 64, 1 << 20
 CHUNK_TIME = 0.1
@@ -31,21 +32,31 @@ CHUNK_TIME = 0.1
 _Address, _Whole, _Real = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 
 
+class _Transfer(ctypes.Structure):
+    _fields_ = (
+        ("function", _Address),
+        ("references", _Address),
+        ("variables", _Whole),
+        ("count", _Whole),
+        ("number", _Whole),
+        ("sized", _Whole),
+    )
+
+
 class _Slave(ctypes.Structure):
     _fields_ = (
         ("component", _Address),
         ("step", _Address),
-        ("set", _Address * 3),
-        ("get", _Address * 3),
-        ("inputs", _Address * 3),
-        ("outputs", _Address * 3),
-        ("input_counts", _Whole * 3),
-        ("output_counts", _Whole * 3),
+        ("reports", _Whole),
+        ("inputs", _Address),
+        ("outputs", _Address),
+        ("input_transfers", _Whole),
+        ("output_transfers", _Whole),
         ("first_input", _Whole),
         ("first_output", _Whole),
         ("first_feed", _Whole),
         ("feeds", _Whole),
-        ("whole", _Address),
+        ("scratch", _Address),
         ("warnings", _Whole),
         ("first_call", _Whole),
         ("first_step", _Whole),
@@ -110,6 +121,23 @@ def prepare() -> None:
     compiled_library(SOURCE)
 
 
+def _transfers(transfers: Sequence[NativeTransfer]) -> Any:
+    """Return transfers as ``loop.c`` takes them; the arrays of references must live as long."""
+    return (_Transfer * max(len(transfers), 1))(
+        *(
+            _Transfer(
+                t.function, t.references.ctypes.data, len(t.references), t.count, NUMBERS.index(t.number), t.sized
+            )
+            for t in transfers
+        )
+    )
+
+
+def _called(native: NativeCalls, call: int) -> str:
+    """Return the name of a call, as ``loop.c`` counts them."""
+    return [*(t.name for t in native.inputs), native.step_name, *(t.name for t in native.outputs)][call]
+
+
 class CompiledWiring:
     """The slaves of a wiring, ready for machine code.
 
@@ -122,22 +150,20 @@ class CompiledWiring:
     def __init__(self, wiring: Wiring, natives: Sequence[NativeCalls], run_steps: Any) -> None:
         self._wiring, self._natives, self._run_steps = wiring, list(natives), run_steps
         blocks = [stage.block for stage in wiring.stages]
-        longest = max((len(r) for n in natives for r in (*n.inputs[1:], *n.outputs[1:])), default=0)
-        self._whole = np.zeros(max(longest, 1), dtype=np.int32)
+        longest = max((t.count for n in natives for t in (*n.inputs, *n.outputs)), default=1)
+        self._scratch = np.zeros(longest, dtype=np.int64)
+        self._transfers = [(_transfers(n.inputs), _transfers(n.outputs)) for n in natives]
         feeds = [feed for block in blocks for feed in block.feeds]
         self._feeds = (_Feed * max(len(feeds), 1))(
             *(_Feed(f.slot, f.source, f.signal, f.plain, f.factor, f.offset, f.quantum) for f in feeds)
         )
         self._slaves = (_Slave * len(blocks))()
         first = 0
-        for slave, native, block in zip(self._slaves, natives, blocks, strict=True):
-            slave.component, slave.step, slave.whole = native.component, native.do_step, self._whole.ctypes.data
-            for kind in range(3):
-                slave.set[kind], slave.get[kind] = native.set[kind], native.get[kind]
-                slave.inputs[kind] = native.inputs[kind].ctypes.data
-                slave.outputs[kind] = native.outputs[kind].ctypes.data
-                slave.input_counts[kind] = len(native.inputs[kind])
-                slave.output_counts[kind] = len(native.outputs[kind])
+        for slave, native, transfers, block in zip(self._slaves, natives, self._transfers, blocks, strict=True):
+            slave.component, slave.step, slave.reports = native.component, native.do_step, native.reports
+            slave.inputs, slave.outputs = map(ctypes.addressof, transfers)
+            slave.input_transfers, slave.output_transfers = len(native.inputs), len(native.outputs)
+            slave.scratch = self._scratch.ctypes.data
             slave.first_input, slave.first_output = block.first_input, block.first_output
             slave.first_feed, slave.feeds = first, len(block.feeds)
             first += len(block.feeds)
@@ -168,10 +194,11 @@ class CompiledWiring:
         try:
             self._run(job, out, start, step)
         finally:
-            for slave, stage in zip(self._slaves, self._wiring.stages, strict=True):
+            for slave, native, stage in zip(self._slaves, self._natives, self._wiring.stages, strict=True):
                 if slave.warnings:
                     warned: Any = stage.slave
-                    warned.warned(slave.warnings, FUNCTIONS[slave.first_call], start + slave.first_step * step)
+                    name = _called(native, slave.first_call)
+                    warned.warned(slave.warnings, name, start + slave.first_step * step)
 
     def _run(self, job: _Run, out: Array, start: float, step: float) -> None:
         failure = _Failure()
@@ -181,7 +208,8 @@ class CompiledWiring:
             status = self._run_steps(ctypes.byref(job), begin, end, ctypes.byref(failure))
             if status:
                 failed: Any = self._wiring.stages[failure.slave].slave
-                failed.failed(status, FUNCTIONS[failure.call], start + failure.step * step)
+                name = _called(self._natives[failure.slave], failure.call)
+                failed.failed(status, name, start + failure.step * step)
             taken = time.perf_counter() - clock
             chunk = (
                 min(2 * chunk, MOST_STEPS) if taken < 0.5 * CHUNK_TIME else max(1, round(chunk * CHUNK_TIME / taken))

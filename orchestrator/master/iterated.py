@@ -94,7 +94,7 @@ def run_iterated(
         ScenarioError: an instance of a loop cannot save its state.
         ConvergenceError: a loop does not settle.
     """
-    groups = _groups(wiring)
+    groups = loop_groups(wiring)
     passes = 0
     for n in range(steps):
         time = start + n * settings.step
@@ -108,7 +108,18 @@ def run_iterated(
     return passes
 
 
-def _groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], NDArray[np.int64]]]:
+def loop_groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], Slots]]:
+    """Return the stages in execution order, those of one algebraic loop together, with the unknowns of each loop.
+
+    Args:
+        wiring: bound slaves.
+
+    Returns:
+        Stages and slots of each group; no slots for a group without a loop.
+
+    Raises:
+        ScenarioError: an instance of a loop cannot save its state.
+    """
     loops = wiring.layout.system.loops()
     groups: list[tuple[tuple[Stage, ...], Slots]] = []
     done: set[str] = set()

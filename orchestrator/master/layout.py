@@ -160,7 +160,7 @@ def _needed(system: System, record: Sequence[str]) -> dict[str, tuple[str, ...]]
         assert found is not None
         if variable not in fed[name]:
             wanted[name][variable] = found
-    return {name: _by_type(variables) for name, variables in wanted.items()}
+    return {i.name: _in_order(wanted[i.name], i.model.variables) for i in system.instances}
 
 
 def _state_outputs(system: System) -> list[str]:
@@ -183,11 +183,21 @@ def _fed(system: System) -> dict[str, tuple[str, ...]]:
         found = system.variable(address)
         assert found is not None
         targets[name][variable] = found
-    return {name: _by_type(variables) for name, variables in targets.items()}
+    return {i.name: _in_order(targets[i.name], i.model.variables) for i in system.instances}
 
 
-def _by_type(variables: Mapping[str, Variable]) -> tuple[str, ...]:
-    return tuple(sorted(variables, key=lambda name: _TYPE_ORDER[variables[name].type]))
+def _in_order(variables: Mapping[str, Variable], declared: Mapping[str, Variable]) -> tuple[str, ...]:
+    """Return names by type; what shares a reference, as elements of an array do, is together and as declared."""
+    firsts: dict[tuple[str, int], int] = {}
+    for place, v in enumerate(variables.values()):
+        firsts.setdefault((v.type, v.reference), place)
+    places = {name: place for place, name in enumerate(declared)} if len(firsts) < len(variables) else {}
+
+    def key(name: str) -> tuple[int, int, int]:
+        v = variables[name]
+        return _TYPE_ORDER[v.type], firsts[v.type, v.reference], places.get(name, 0)
+
+    return tuple(sorted(variables, key=key))
 
 
 def _feed(

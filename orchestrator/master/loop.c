@@ -1,33 +1,48 @@
 /* The loop of fixed_step.py in machine code: same values, same order, no interpreter between the slaves' calls.
  *
- * The functions of an FMU (FMI 2.0) are called by address; all else is arithmetic on arrays that compiled.py owns.
- * Signals are doubles in one array, `values`. A slave's inputs lie side by side in it, and so do its outputs: Reals,
- * then Integers, then Booleans. */
+ * The functions of a slave are called by address; all else is arithmetic on arrays that compiled.py owns. Signals are
+ * doubles in one array, `values`. A slave's inputs lie side by side in it, and so do its outputs, in the order of the
+ * transfers that set and read them. */
 
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-typedef int (*Set)(void *component, const uint32_t *references, size_t count, const void *values);
-typedef int (*Get)(void *component, const uint32_t *references, size_t count, void *values);
+typedef int (*Set)(void *component, const uint32_t *references, size_t variables, const void *values);
+typedef int (*SizedSet)(void *component, const uint32_t *references, size_t variables, const void *values, size_t count);
+typedef int (*Get)(void *component, const uint32_t *references, size_t variables, void *values);
+typedef int (*SizedGet)(void *component, const uint32_t *references, size_t variables, void *values, size_t count);
 typedef int (*Step)(void *component, double time, double length, int no_rollback);
+typedef int (*ReportingStep)(void *component, double time, double length, bool no_rollback, bool *event, bool *end,
+                             bool *early, double *reached);
+typedef void (*Function)(void);
 
-enum { WARNING = 1, KINDS = 3, DO_STEP = 3, FIRST_GET = 4 };
+enum { WARNING = 1, ENDED = 16, LEFT_EARLY = 17 };
+typedef enum { F8, F4, I1, U1, I2, U2, I4, U4, I8, U8, B1 } Number;
+
+typedef struct {
+    Function function;
+    const uint32_t *references;
+    int64_t variables;
+    int64_t count; /* of values */
+    int64_t number;
+    int64_t sized; /* the function takes `count` too */
+} Transfer;
 
 typedef struct {
     void *component;
-    Step step;
-    Set set[KINDS];
-    Get get[KINDS];
-    const uint32_t *inputs[KINDS];
-    const uint32_t *outputs[KINDS];
-    int64_t input_counts[KINDS];
-    int64_t output_counts[KINDS];
+    Function step;
+    int64_t reports; /* `step` is a ReportingStep */
+    const Transfer *inputs;
+    const Transfer *outputs;
+    int64_t input_transfers;
+    int64_t output_transfers;
     int64_t first_input;
     int64_t first_output;
     int64_t first_feed;
     int64_t feeds;
-    int *whole; /* as many as the longest list of Integers or Booleans */
+    void *scratch; /* 8 bytes for each value of the longest transfer */
     int64_t warnings; /* calls that returned a warning, and which was the first: call and step as in Failure */
     int64_t first_call;
     int64_t first_step;
@@ -61,7 +76,7 @@ typedef struct {
 
 /* Where a run ended that a slave did not go on with. */
 typedef struct {
-    int64_t call; /* 0 to 2: fmi2SetReal, -Integer, -Boolean; 3: fmi2DoStep; 4 to 6: fmi2GetReal, ... */
+    int64_t call; /* counted: the transfers of the inputs, the step, the transfers of the outputs */
     int64_t slave;
     int64_t step;
 } Failure;
@@ -89,9 +104,55 @@ static void gather(const Run *run, const Slave *slave, int64_t column)
     }
 }
 
-static int whole_of(double value)
+/* Whole numbers beyond a type's range, and what is none, become its least one. */
+#define PACK(type, least, most) \
+    for (int64_t k = 0; k < count; k++) \
+        ((type *)scratch)[k] = values[k] >= (double)(least) && values[k] <= (double)(most) ? (type)values[k] : (least); \
+    break;
+
+static void pack(Number number, const double *values, int64_t count, void *scratch)
 {
-    return value >= -2147483648.0 && value <= 2147483647.0 ? (int)value : INT32_MIN;
+    switch (number) {
+    case F8:
+        break;
+    case F4:
+        for (int64_t k = 0; k < count; k++)
+            ((float *)scratch)[k] = (float)values[k];
+        break;
+    case I1: PACK(int8_t, INT8_MIN, INT8_MAX)
+    case U1: PACK(uint8_t, 0, UINT8_MAX)
+    case I2: PACK(int16_t, INT16_MIN, INT16_MAX)
+    case U2: PACK(uint16_t, 0, UINT16_MAX)
+    case I4: PACK(int32_t, INT32_MIN, INT32_MAX)
+    case U4: PACK(uint32_t, 0, UINT32_MAX)
+    case I8: PACK(int64_t, INT64_MIN, 9223372036854774784.0)
+    case U8: PACK(uint64_t, 0, 18446744073709549568.0)
+    case B1:
+        for (int64_t k = 0; k < count; k++)
+            ((bool *)scratch)[k] = values[k] != 0.0;
+    }
+}
+
+#define UNPACK(type) \
+    for (int64_t k = 0; k < count; k++) \
+        values[k] = (double)((const type *)scratch)[k]; \
+    break;
+
+static void unpack(Number number, double *values, int64_t count, const void *scratch)
+{
+    switch (number) {
+    case F8: break;
+    case F4: UNPACK(float)
+    case I1: UNPACK(int8_t)
+    case U1: UNPACK(uint8_t)
+    case I2: UNPACK(int16_t)
+    case U2: UNPACK(uint16_t)
+    case I4: UNPACK(int32_t)
+    case U4: UNPACK(uint32_t)
+    case I8: UNPACK(int64_t)
+    case U8: UNPACK(uint64_t)
+    case B1: UNPACK(bool)
+    }
 }
 
 static int noted(Slave *slave, int status, int64_t call, int64_t step)
@@ -103,44 +164,60 @@ static int noted(Slave *slave, int status, int64_t call, int64_t step)
     return status;
 }
 
+static int set(const Slave *slave, const Transfer *t, const double *values)
+{
+    const void *given = t->number == F8 ? (const void *)values : slave->scratch;
+    pack((Number)t->number, values, t->count, slave->scratch);
+    return t->sized ? ((SizedSet)t->function)(slave->component, t->references, (size_t)t->variables, given, (size_t)t->count)
+                    : ((Set)t->function)(slave->component, t->references, (size_t)t->variables, given);
+}
+
+static int get(const Slave *slave, const Transfer *t, double *values)
+{
+    void *taken = t->number == F8 ? (void *)values : slave->scratch;
+    const int status =
+        t->sized ? ((SizedGet)t->function)(slave->component, t->references, (size_t)t->variables, taken, (size_t)t->count)
+                 : ((Get)t->function)(slave->component, t->references, (size_t)t->variables, taken);
+    if (status <= WARNING)
+        unpack((Number)t->number, values, t->count, slave->scratch);
+    return status;
+}
+
+static int step(const Slave *slave, double time, double length)
+{
+    bool event = false, end = false, early = false;
+    double reached = time;
+    if (!slave->reports)
+        return ((Step)slave->step)(slave->component, time, length, 1);
+    const int status =
+        ((ReportingStep)slave->step)(slave->component, time, length, true, &event, &end, &early, &reached);
+    return status > WARNING ? status : end ? ENDED : event || early ? LEFT_EARLY : status;
+}
+
 /* Send the inputs and step; `call` is what was called last. */
 static int advance(Slave *slave, double *values, double time, double length, int64_t n, int64_t *call)
 {
     const double *inputs = values + slave->first_input;
-    for (int kind = 0; kind < KINDS; kind++) {
-        const int64_t count = slave->input_counts[kind];
-        int status;
-        if (!count)
-            continue;
-        *call = kind;
-        for (int64_t k = 0; kind && k < count; k++)
-            slave->whole[k] = whole_of(inputs[k]);
-        status = slave->set[kind](slave->component, slave->inputs[kind], (size_t)count,
-                                  kind ? (const void *)slave->whole : (const void *)inputs);
-        if (noted(slave, status, *call, n) > WARNING)
+    for (*call = 0; *call < slave->input_transfers; ++*call) {
+        const Transfer *transfer = slave->inputs + *call;
+        const int status = noted(slave, set(slave, transfer, inputs), *call, n);
+        if (status > WARNING)
             return status;
-        inputs += count;
+        inputs += transfer->count;
     }
-    *call = DO_STEP;
-    return noted(slave, slave->step(slave->component, time, length, 1), DO_STEP, n);
+    return noted(slave, step(slave, time, length), *call, n);
 }
 
 static int receive(Slave *slave, double *values, int64_t n, int64_t *call)
 {
     double *outputs = values + slave->first_output;
-    for (int kind = 0; kind < KINDS; kind++) {
-        const int64_t count = slave->output_counts[kind];
-        int status;
-        if (!count)
-            continue;
-        *call = FIRST_GET + kind;
-        status = slave->get[kind](slave->component, slave->outputs[kind], (size_t)count,
-                                  kind ? (void *)slave->whole : (void *)outputs);
-        if (noted(slave, status, *call, n) > WARNING)
+    for (int64_t k = 0; k < slave->output_transfers; k++) {
+        const Transfer *transfer = slave->outputs + k;
+        *call = slave->input_transfers + 1 + k;
+        const int status = noted(slave, get(slave, transfer, outputs), *call, n);
+        if (status > WARNING)
             return status;
-        for (int64_t k = 0; kind && k < count; k++)
-            outputs[k] = slave->whole[k];
-        outputs += count;
+        outputs += transfer->count;
     }
     return 0;
 }

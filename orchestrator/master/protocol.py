@@ -33,7 +33,15 @@ class StepDiscardedError(SlaveError):
 
 
 class RunEndedError(StepDiscardedError):
-    """A slave asked for the end of the run instead of a step."""
+    """A slave asked for the end of the run instead of a step, or at an event.
+
+    Attributes:
+        at_event: it did so at an event, to which the run has come; else at a step that it has not done.
+    """
+
+    def __init__(self, text: str, instance: str = "", time: float = math.nan, at_event: bool = False) -> None:
+        super().__init__(text, instance, time)
+        self.at_event = at_event
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +123,7 @@ class ModelInterface:
         can_vary_step: ``do_step`` takes steps of any length.
         has_events: its slaves are ``EventSlave``.
         output_derivatives: order up to which ``EventSlave.output_rates`` knows derivatives of outputs; 0: none.
-        takes_inputs_inside_steps: ``EventSlave.feed`` works.
+        inputs_inside_steps: names of the continuous inputs that ``EventSlave.feed`` takes.
         clocks: periodic input clocks by name, which the master ticks.
     """
 
@@ -127,7 +135,7 @@ class ModelInterface:
     can_vary_step: bool = True
     has_events: bool = False
     output_derivatives: int = 0
-    takes_inputs_inside_steps: bool = False
+    inputs_inside_steps: frozenset[str] = frozenset()
     clocks: Mapping[str, "PeriodicClock"] = field(default_factory=dict)
 
     def named(self, causality: str) -> tuple[str, ...]:
@@ -154,30 +162,52 @@ class ModelInterface:
         return frozenset(self.named("input")) if declared is None else declared
 
 
-KINDS = ("Real", "Integer", "Boolean")
-"""Types of signals as functions of FMI 2.0 name them, in the order in which an instance's signals lie."""
+@dataclass(frozen=True)
+class NativeTransfer:
+    """A C function that sets or reads neighbouring signals: ``status f(component, references, n, values)``.
+
+    Attributes:
+        function: its address.
+        name: for messages.
+        number: what a value is in C, as NumPy writes it: "f8", "i4", "b1" and so on.
+        sized: the function takes the number of values as a fifth argument.
+        references: of the variables, shape (n,).
+        count: number of values.
+    """
+
+    function: int
+    name: str
+    number: str
+    sized: bool
+    references: NDArray[np.uint32]
+    count: int
+
+
+ENDED, LEFT_EARLY = 16, 17
+"""Statuses of a native step that did not end as asked: the run is to end; the step returned early, or with an event."""
 
 
 @dataclass(frozen=True)
 class NativeCalls:
-    """What machine code needs to step a slave without the interpreter: C functions with FMI 2.0's signatures.
+    """What machine code needs to step a slave without the interpreter: C functions, which return 0, 1 or worse.
 
     Attributes:
         component: first argument of every call.
-        set: addresses of ``status f(component, references, count, values)``, one for each of ``KINDS``.
-        get: addresses, likewise.
         do_step: address of ``status f(component, time, step, no_rollback)``.
-        inputs: references of the inputs, those of each of ``KINDS``.
-        outputs: references of the outputs, likewise.
+        step_name: its name, for messages.
+        reports: the flag of ``do_step`` is a ``bool``, and four pointers follow: to three ``bool`` (event, end of the
+            run, early return) and the time reached.
+        inputs: calls that set the inputs, in their order.
+        outputs: calls that read the outputs, in their order.
         python: the functions run Python.
     """
 
     component: int
-    set: tuple[int, int, int]
-    get: tuple[int, int, int]
     do_step: int
-    inputs: tuple[NDArray[np.uint32], ...]
-    outputs: tuple[NDArray[np.uint32], ...]
+    step_name: str
+    reports: bool
+    inputs: tuple[NativeTransfer, ...]
+    outputs: tuple[NativeTransfer, ...]
     python: bool
 
 
@@ -333,7 +363,7 @@ class EventSlave(Slave, Protocol):
     Call order, in place of ``(send* do_step receive*)*`` of ``Slave``::
 
         start()                                 ends initialisation; the slave is in event mode
-        (send* receive* [tick] update_discrete_states)*   instants at one time, until none needs another
+        ([tick] (send* receive*)* update_discrete_states)*   instants at one time, until none needs another
         leave_event_mode()
         (send* step receive* (enter_event_mode instants leave_event_mode)?)*
 
@@ -380,7 +410,7 @@ class EventSlave(Slave, Protocol):
         """Say what continuous inputs are inside steps, from now on.
 
         Args:
-            names: of inputs.
+            names: of inputs, all of them among ``ModelInterface.inputs_inside_steps``.
             values: a value per name at a time [s]; ``None``: inputs are held again.
         """
 

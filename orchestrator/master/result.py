@@ -12,6 +12,39 @@ LOOPS = PYTHON, MACHINE_CODE = "Python", "machine code"
 
 
 @dataclass(frozen=True)
+class EventStatistics:
+    """The events of a run.
+
+    Attributes:
+        times: when slaves had events, rising [s], the first 50,000; each once, however many instants it took.
+        instants: updates of all slaves at one time, over the whole run: initial ones, ticks and source jumps included.
+        ticks: of clocks.
+        late: how long after each event that slaves could not be taken back to it was taken [s].
+    """
+
+    times: tuple[float, ...] = ()
+    instants: int = 0
+    ticks: int = 0
+    late: tuple[float, ...] = ()
+
+
+def claimed_events(claimed: object) -> EventStatistics:
+    """Return the events that a child process sends, as far as they are such.
+
+    Args:
+        claimed: times, numbers of instants and ticks, and delays.
+
+    Returns:
+        The events.
+    """
+    match claimed:
+        case [list() as times, int() as instants, int() as ticks, list() as late]:
+            numbers = [tuple(t for t in found if isinstance(t, float)) for found in (times, late)]
+            return EventStatistics(numbers[0], instants, ticks, numbers[1])
+    return EventStatistics()
+
+
+@dataclass(frozen=True)
 class Statistics:
     """What a run took.
 
@@ -21,6 +54,7 @@ class Statistics:
         do_steps: calls of ``do_step`` by instance, undone ones included.
         sweeps: passes over all instances, undone ones included.
         loop: what called the slaves: ``PYTHON`` or ``MACHINE_CODE``.
+        events: of slaves that have any.
     """
 
     steps: int
@@ -28,6 +62,7 @@ class Statistics:
     do_steps: Mapping[str, int]
     sweeps: int
     loop: str = PYTHON
+    events: EventStatistics = EventStatistics()
 
 
 @dataclass(frozen=True)

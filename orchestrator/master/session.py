@@ -11,16 +11,20 @@ from numpy.typing import NDArray
 from orchestrator.errors import FmuError, ScenarioError, SimulationError, SlaveError
 from orchestrator.master.adaptive import run_adaptive
 from orchestrator.master.algorithms import Adaptive, Algorithm, GaussSeidel, Iterated, Jacobi, step_count
+from orchestrator.master.clocks import clock_problems
+from orchestrator.master.event_steps import FixedSteps
+from orchestrator.master.event_windows import EventWindows
+from orchestrator.master.events import EventIteration
 from orchestrator.master.fixed_step import run_sequential, run_simultaneous
 from orchestrator.master.iterated import backward_slots, initialise, run_iterated
 from orchestrator.master.layout import Layout, lay_out
 from orchestrator.master.own_steps import own_step_remarks
 from orchestrator.master.problems import Problem, raise_problems
 from orchestrator.master.protocol import RunEndedError, Slave, StepDiscardedError, Value
-from orchestrator.master.result import MACHINE_CODE, PYTHON, Recording, RunRemark, Statistics
+from orchestrator.master.result import MACHINE_CODE, PYTHON, EventStatistics, Recording, RunRemark, Statistics
 from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, Quantity, System, split
-from orchestrator.master.wiring import Wiring, wire
+from orchestrator.master.wiring import Wiring, gather, wire
 
 if TYPE_CHECKING:
     from orchestrator.master.compiled import CompiledWiring
@@ -56,7 +60,7 @@ class Session:
         self, system: System, record: Sequence[str], algorithm: Algorithm, stop: float, start: float = 0.0
     ) -> None:
         names = tuple(record)
-        raise_problems(system.problems() + system.record_problems(names))
+        raise_problems(system.problems() + system.record_problems(names) + clock_problems(system))
         self.system, self.record, self.algorithm = system, names, algorithm
         self.start, self.stop = start, stop
         self.steps = step_count(start, stop, algorithm.step)
@@ -66,6 +70,7 @@ class Session:
         self._cut = backward_slots(self.layout, [block.name for block in self.layout.blocks])
         self._slaves: dict[str, Slave] = {}
         self._wiring: Wiring | None = None
+        self._events: EventIteration | None = None
         self._compiled: CompiledWiring | None = None
         self._used: set[str] = set()
         self._do_steps = 0
@@ -87,7 +92,7 @@ class Session:
         for slave in self._slaves.values():
             slave.close()
         self._slaves.clear()
-        self._wiring = self._compiled = None
+        self._wiring = self._events = self._compiled = None
 
     @staticmethod
     def _created(instance: Instance) -> Slave:
@@ -155,9 +160,11 @@ class Session:
                 if not allow_early_end:
                     raise SlaveError(f"{error}: it wants the run to end, but the whole run is needed") from None
                 steps = math.floor((error.time - self.start) / self.algorithm.step + 1e-6)
-                text = f"ended the run at t = {self._times[steps]:g} s of {self.stop:g} s (fmi2Discard, terminated)"
+                how = "at an event" if error.at_event else "fmi2Discard, terminated"
+                text = f"ended the run at t = {self._times[steps]:g} s of {self.stop:g} s ({how})"
                 calls = dict.fromkeys((block.name for block in self.layout.blocks), steps)
-                return Statistics(steps, 0, calls, steps), [RunRemark(error.instance, text)]
+                events = EventStatistics() if self._events is None else self._events.statistics()
+                return Statistics(steps, 0, calls, steps, events=events), [RunRemark(error.instance, text)]
             except StepDiscardedError as error:
                 shorten = getattr(self._slaves[error.instance], "shorten_steps", None)
                 if isinstance(self.algorithm, Adaptive) or shorten is None or not shorten():
@@ -170,6 +177,8 @@ class Session:
         for slave in self._slaves.values():
             take = getattr(slave, "take_remarks", None)
             found += [] if take is None else take()
+        if self._events is not None:
+            found += self._events.remarks()
         if not isinstance(self.algorithm, Adaptive):
             found += own_step_remarks(self.system, self.record, rows, self.start, self.algorithm.step)
         return found
@@ -191,6 +200,8 @@ class Session:
                 for instance in self.system.instances:
                     self._slaves[instance.name] = self._created(instance)
                 self._wiring = wire(self.layout, self._slaves)
+                if any(instance.model.has_events for instance in self.system.instances):
+                    self._events = EventIteration(self._wiring)
             except BaseException:
                 self.close()
                 raise
@@ -232,12 +243,21 @@ class Session:
         for stage in wiring.stages:
             stage.slave.start()
         for stage in wiring.stages:
-            stage.receive()
+            if not stage.slave.model.has_events:
+                stage.receive()
 
     def _go(self, wiring: Wiring, table: Array, rows: Array, signals: Mapping[int, Signal]) -> Statistics:
         algorithm, steps = self.algorithm, self.steps
         record = np.array(self.layout.recorded, dtype=np.int64)
-        np.take(wiring.values, record, out=rows[0], mode="clip")
+        try:
+            if self._events is not None:
+                self._events.begin(self.start, lambda stage: gather(stage, wiring.view, table, 0))
+        finally:
+            np.take(wiring.values, record, out=rows[0], mode="clip")
+        if self._events is not None and not isinstance(algorithm, Adaptive):
+            run = FixedSteps(self._events, algorithm, table, self.start)
+            run.run(steps, rows, record)
+            return Statistics(steps, run.undone, self._calls(), run.passes, events=self._events.statistics())
         match algorithm:
             case GaussSeidel() | Jacobi():
                 loop = self._fixed_step(wiring, table, rows, record, algorithm)
@@ -246,11 +266,17 @@ class Session:
                 )
             case Iterated():
                 sweeps = run_iterated(wiring, table, self.start, algorithm, steps, rows, record)
+            case Adaptive() if self._events is not None:
+                return EventWindows(self._events, signals, self.start, self.stop, algorithm).run(rows, record)
             case Adaptive():
                 return run_adaptive(wiring, signals, self.start, self.stop, algorithm, rows, record)
             case _:
                 raise ScenarioError(f"`algorithm` must be a master algorithm, but is {algorithm!r}")
         return Statistics(steps, 0, dict.fromkeys((block.name for block in self.layout.blocks), steps), sweeps)
+
+    def _calls(self) -> dict[str, int]:
+        """Return the calls for a step by instance, of a system with events."""
+        return {} if self._events is None else {stage.name: stage.steps for stage in self._events.stages}
 
     def _fixed_step(
         self, wiring: Wiring, table: Array, rows: Array, record: Slots, algorithm: GaussSeidel | Jacobi

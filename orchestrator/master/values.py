@@ -5,6 +5,9 @@ import math
 
 from orchestrator.master.protocol import Value, Variable
 
+_INT32 = -(2**31), 2**31 - 1
+"""Whole numbers that every type of them can hold, save for those that a variable's limits say are longer."""
+
 
 def one_line(text: str) -> str:
     """Return ``text`` with what would break the line, or steer a terminal, written as escapes.
@@ -67,11 +70,12 @@ def typed_value(variable: Variable, value: Value) -> tuple[Value | None, str | N
         if value not in literals:
             return None, f"must be one of {', '.join(literals)}, but is {value!r}{nearest(value, list(literals))}"
         return literals[value], None
-    if not _is_number(value, whole=kind != "Real"):
-        need = "a finite number" if kind == "Real" else "an integer of 32 bits"
+    low, high = variable.minimum, variable.maximum
+    widest = (low is None or low >= _INT32[0]) and (high is None or high <= _INT32[1])
+    if not _is_number(value, whole=kind != "Real") or (kind != "Real" and widest and not _fits(value)):
+        need = "a finite number" if kind == "Real" else "an integer of 32 bits" if widest else "a whole number"
         return None, f"must be {need}, but is {_short(value)}"
     assert not isinstance(value, str)
-    low, high = variable.minimum, variable.maximum
     if (low is not None and value < low) or (high is not None and value > high):
         text = (
             f"must be at least {low:g}"
@@ -88,8 +92,13 @@ def _is_number(value: Value, whole: bool) -> bool:
     if isinstance(value, (bool, str)):
         return False
     if isinstance(value, int):
-        return abs(value) <= (2**31 - 1 if whole else 2**1000)
-    return math.isfinite(value) and (not whole or (value.is_integer() and abs(value) <= 2**31 - 1))
+        return abs(value) <= 2**1000
+    return math.isfinite(value) and (not whole or value.is_integer())
+
+
+def _fits(value: Value) -> bool:
+    """Whether a number is within 32 bits."""
+    return not isinstance(value, str) and _INT32[0] <= value <= _INT32[1]
 
 
 def _short(value: Value) -> str:

@@ -1,6 +1,6 @@
 """Slaves bound to the slots of a layout: flat lists of bound calls, so that a step looks nothing up."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +25,8 @@ class Stage:
         block: its part of the layout.
         copies: ``(inputs, outputs)`` pairs of equal length: runs of neighbouring slots that are mere copies.
         mixed: feeds that are more than a copy.
-        send: moves the input slots into the slave.
-        receive: moves the slave's outputs into its slots.
+        send: moves the input slots into the slave; those of clocks are not among them.
+        receive: moves the slave's outputs into its slots; likewise.
         do_step: the slave's own.
     """
 
@@ -72,20 +72,78 @@ def wire(layout: Layout, slaves: Mapping[str, Slave]) -> Wiring:
     return Wiring(values, view, stages, layout)
 
 
-def _nothing() -> None:
-    return
+def nothing() -> None:
+    """Move no value."""
+
+
+def bind_send(slave: Slave, block: Block, names: Sequence[str], values: Signals) -> Transfer:
+    """Return a call that moves some of a block's inputs from their slots into the slave.
+
+    Args:
+        slave: whose inputs.
+        block: its part of the layout.
+        names: of the inputs.
+        values: the slots.
+
+    Returns:
+        Called without arguments.
+    """
+    if not names:
+        return nothing
+    slots = np.array([block.first_input + block.inputs.index(name) for name in names])
+    buffer = np.empty(len(names))
+    move = slave.sends(names, buffer)
+
+    def send() -> None:
+        np.take(values, slots, out=buffer, mode="clip")
+        move()
+
+    return send
+
+
+def bind_receive(slave: Slave, block: Block, names: Sequence[str], values: Signals) -> Transfer:
+    """Return a call that moves some of a block's outputs from the slave into their slots.
+
+    Args:
+        slave: whose outputs.
+        block: its part of the layout.
+        names: of the outputs.
+        values: the slots.
+
+    Returns:
+        Called without arguments.
+    """
+    if not names:
+        return nothing
+    slots = np.array([block.first_output + block.outputs.index(name) for name in names])
+    buffer = np.empty(len(names))
+    move = slave.receives(names, buffer)
+
+    def receive() -> None:
+        move()
+        values[slots] = buffer
+
+    return receive
 
 
 def _stage(block: Block, slave: Slave, values: Signals, view: View) -> Stage:
     inputs = values[block.first_input : block.first_input + len(block.inputs)]
     outputs = values[block.first_output : block.first_output + len(block.outputs)]
+    clocked = {name for clock in slave.model.clocks.values() for name in clock.variables}
+    if clocked:
+        free = [name for name in block.inputs if name not in clocked]
+        send = bind_send(slave, block, free, values)
+        receive = bind_receive(slave, block, [name for name in block.outputs if name not in clocked], values)
+    else:
+        send = slave.sends(block.inputs, inputs) if block.inputs else nothing
+        receive = slave.receives(block.outputs, outputs) if block.outputs else nothing
     return Stage(
         slave=slave,
         block=block,
         copies=_copies(block.feeds, view),
         mixed=tuple(feed for feed in block.feeds if not feed.plain),
-        send=slave.sends(block.inputs, inputs) if block.inputs else _nothing,
-        receive=slave.receives(block.outputs, outputs) if block.outputs else _nothing,
+        send=send,
+        receive=receive,
         do_step=slave.do_step,
     )
 

@@ -28,18 +28,11 @@ def run_pair_within(
 
     Args:
         time_limit: [s], the start of the child process included.
-        experiment, fmus, alpha, seed, start: see ``run_pair``.
-
-    Returns:
-        The run.
-
-    Raises:
-        SimulationError: it took longer, or went wrong.
     """
     limits = Limits(time_limit, _BOUNDLESS, _BOUNDLESS, math.inf, _BOUNDLESS, _BOUNDLESS, _BOUNDLESS, 1 << 16)
     argument = (experiment, {name: path.absolute() for name, path in fmus.items()}, alpha, seed, dict(start or {}))
     try:
-        with Jail("orchestrator.paired.apart:opened", argument, limits=limits, walls=False) as jail:
+        with Jail("orchestrator.paired.apart:open_run", argument, limits=limits, walls=False) as jail:
             jail.start(time_limit)
             found = pickle.loads(jail.call(None, most=_BOUNDLESS))
     except ChildError as error:
@@ -51,13 +44,6 @@ def run_pair_within(
     return found
 
 
-def opened(argument: tuple[Any, ...]) -> Callable[[Any], bytes]:
-    """Return a handler that does the run.
-
-    Args:
-        argument: those of ``run_pair``.
-
-    Returns:
-        Called with anything, it gives the pickled result.
-    """
+def open_run(argument: tuple[Any, ...]) -> Callable[[Any], bytes]:
+    """Return a handler that does the run."""
     return lambda _: pickle.dumps(run_pair(*argument))

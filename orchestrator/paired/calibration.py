@@ -60,7 +60,6 @@ class Calibration(msgspec.Struct, frozen=True):
         level: what the interval claims to cover.
         runs: how many runs it was made from.
         seed_branch: the branch of the seed tree that they came from.
-        settings: of the calibration.
     """
 
     experiment: dict[str, object]
@@ -100,18 +99,11 @@ class CalibratedLoop(Protocol):
         Args:
             alpha: half-gap [rad].
             errors: errors [rad] of both encoders, each (n,).
-
-        Returns:
-            The signals.
         """
 
 
 class GapMap:
-    """A calibration, ready to be asked many times.
-
-    Args:
-        calibration: the map.
-    """
+    """A calibration, ready to be asked many times."""
 
     def __init__(self, calibration: Calibration) -> None:
         self._calibration = calibration
@@ -124,12 +116,6 @@ class GapMap:
 
         Args:
             total: the metric S [rad].
-
-        Returns:
-            The half-gap and its interval.
-
-        Raises:
-            CalibrationError: ``total`` lies outside what was calibrated; nothing is extrapolated.
         """
         calibration = self._calibration
         low, high = np.exp(calibration.log_sum[0]), np.exp(calibration.log_sum[-1])
@@ -151,17 +137,7 @@ def estimate_gap(calibration: Calibration, total: float) -> GapEstimate:
     """Return the half-gap that the metric ``total`` [rad] stands for, see ``GapMap.estimate``.
 
     Args:
-        calibration: of the experiment.
         total: S [rad].
-
-    Returns:
-        The half-gap and its interval.
-
-    Returns:
-        The half-gap and its 95 % interval [rad].
-
-    Raises:
-        CalibrationError: ``total`` lies outside what was calibrated.
     """
     return GapMap(calibration).estimate(total)
 
@@ -179,19 +155,7 @@ def load_or_calibrate(
     progress: Callable[[str], None] | None = None,
     settings: MapSettings = DEFAULT_SETTINGS,
 ) -> Calibration:
-    """Return the calibration of ``experiment``: the one that comes with these sources, or the user's, or a new one.
-
-    Args:
-        experiment: what is calibrated.
-        progress: told what is going on.
-        settings: of the calibration.
-
-    Returns:
-        The map.
-
-    Raises:
-        CalibrationError: S is not strictly monotone over the sizes claimed.
-    """
+    """Return the calibration of ``experiment``: the one that comes with these sources, or the user's, or a new one."""
     name = f"{_digest(experiment, settings)}.json"
     if (SHIPPED / name).exists():
         return msgspec.json.decode((SHIPPED / name).read_bytes(), type=Calibration)
@@ -210,14 +174,7 @@ def load_or_calibrate(
 
 
 def calibration_text(calibration: Calibration) -> str:
-    """Return a calibration as JSON, from which it is read again exactly.
-
-    Args:
-        calibration: the map.
-
-    Returns:
-        The text.
-    """
+    """Return a calibration as JSON, from which it is read again exactly."""
     return msgspec.json.format(msgspec.json.encode(calibration), indent=1).decode()
 
 
@@ -240,43 +197,23 @@ def _sources() -> tuple[Path, ...]:
 
 
 def calibrate(experiment: Experiment, settings: MapSettings = DEFAULT_SETTINGS) -> Calibration:
-    """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds.
-
-    Args:
-        experiment: what is calibrated.
-        settings: of the calibration.
-
-    Returns:
-        The map.
-
-    Raises:
-        CalibrationError: S is not strictly monotone over the sizes claimed.
-    """
+    """Return the calibrated map of ``experiment``, made from runs of its own sizes and seeds."""
     builds = ensure_fastest(FMUS)
     if builds.kind != NATIVE:
-        from orchestrator.paired.compiled_loop import compiled_loop  # numba takes its time to import
+        from orchestrator.paired.compiled_loop import make_loop  # numba takes its time to import
 
-        return calibrate_loop(compiled_loop(experiment), settings)
+        return calibrate_loop(make_loop(experiment), settings)
     with closing(NativeLoop(experiment, builds.paths)) as loop:
         return calibrate_loop(loop, settings, usable_cores())
 
 
 def calibrate_loop(loop: CalibratedLoop, settings: MapSettings, threads: int = 1) -> Calibration:
-    """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`.
-
-    Args:
-        loop: what runs it.
-        settings: of the calibration.
-        threads: in which ``loop.run`` is called; the map does not depend on their number.
-
-    Returns:
-        The map.
-    """
+    """Return the calibrated map of anything that runs the experiment's loop; see :func:`calibrate`."""
     with ThreadPoolExecutor(threads) as pool:
-        return _calibrated(loop, settings, pool.map)
+        return _calibrate(loop, settings, pool.map)
 
 
-def _calibrated(loop: CalibratedLoop, settings: MapSettings, each: Each) -> Calibration:
+def _calibrate(loop: CalibratedLoop, settings: MapSettings, each: Each) -> Calibration:
     experiment = loop.experiment
     zero = (np.zeros(experiment.steps + 1), np.zeros(experiment.steps + 1))
     twin = loop.run(0.0, zero)[:, 2]
@@ -347,20 +284,20 @@ def _noisy_map(
     clean = monotone_cubic(log_alpha, log_sum)
     count = settings.seeds_per_size
 
-    def drawn(job: int) -> float:
+    def draw(job: int) -> float:
         n, seed = divmod(job, count)
         return float(np.log(_noisy_sum(loop, twin, float(np.exp(nodes[n])), _generator(0, n, seed))))
 
-    draws = np.array(list(each(drawn, range(settings.noisy_sizes * count)))).reshape(-1, count)
+    draws = np.array(list(each(draw, range(settings.noisy_sizes * count)))).reshape(-1, count)
     shift = draws.mean(axis=1) - clean(nodes)
     variance = draws.var(axis=1, ddof=1)
-    moved = log_sum + monotone_cubic(nodes, _smoothed(shift))(log_alpha)
+    moved = log_sum + monotone_cubic(nodes, _smooth(shift))(log_alpha)
     slope = monotone_cubic(log_alpha, moved).slope(log_alpha)
-    deviation = np.exp(0.5 * monotone_cubic(nodes, np.log(_smoothed(variance)))(log_alpha))
+    deviation = np.exp(0.5 * monotone_cubic(nodes, np.log(_smooth(variance)))(log_alpha))
     return moved, deviation / np.maximum(np.abs(slope), settings.least_slope)
 
 
-def _smoothed(values: Array) -> Array:
+def _smooth(values: Array) -> Array:
     """Return ``values`` averaged with their neighbours, weights 1 2 3 2 1."""
     padded = np.pad(values, 2, mode="edge")
     return np.convolve(padded, np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0, mode="valid")

@@ -33,9 +33,6 @@ class CompiledLoop:
         Args:
             alpha: half-gap [rad].
             errors: errors [rad] of both encoders, each of shape (steps + 1,).
-
-        Returns:
-            The signals.
         """
         e = self.experiment
         p = _plant_parameters(e, alpha)
@@ -75,15 +72,8 @@ def _plant_parameters(experiment: Experiment, alpha: float) -> tuple[float, ...]
     )
 
 
-def compiled_loop(experiment: Experiment) -> CompiledLoop:
-    """Return the loop of ``experiment``, designed and ready to run.
-
-    Args:
-        experiment: what is run.
-
-    Returns:
-        The loop.
-    """
+def make_loop(experiment: Experiment) -> CompiledLoop:
+    """Return the loop of ``experiment``, designed and ready to run."""
     estimator = experiment.estimator()
     S = estimator.S_inverse
     reference, speed = experiment.reference()
@@ -93,13 +83,13 @@ def compiled_loop(experiment: Experiment) -> CompiledLoop:
         speed,
         experiment.regulator().gains,
         (
-            _nested(estimator.A),
+            _as_tuples(estimator.A),
             tuple(float(b) for b in estimator.B),
-            _nested(estimator.L),
+            _as_tuples(estimator.L),
             (float(S[0, 0]), float(S[0, 1]), float(S[1, 1])),
         ),
     )
 
 
-def _nested(matrix: Array) -> tuple[tuple[float, ...], ...]:
+def _as_tuples(matrix: Array) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(v) for v in row) for row in matrix)

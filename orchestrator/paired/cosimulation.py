@@ -46,13 +46,7 @@ def loop_system(
     start values no loop has a gap.
 
     Args:
-        experiment: what is run.
-        fmus: paths of the three ``FMUS``.
         prefixes: ``(MACHINE,)``, ``(TWIN,)`` or both.
-        values: what ``loop_values`` returned for the experiment (default: it is asked).
-
-    Returns:
-        The system.
     """
     if values is None:
         values = loop_values(experiment)
@@ -70,14 +64,7 @@ def loop_system(
 
 @cache
 def loop_values(experiment: Experiment) -> LoopValues:
-    """Return the parameters of a loop without a gap, designed once for each experiment.
-
-    Args:
-        experiment: what is run.
-
-    Returns:
-        Values by name, for each of the three ``FMUS``.
-    """
+    """Return the parameters of a loop without a gap, designed once for each experiment."""
     e, v = experiment, experiment.values
     gains = {f"K[{n}]": gain for n, gain in enumerate(e.regulator().gains, start=1)}
     controller = gains | {
@@ -106,14 +93,7 @@ def _estimator_parameters(estimator: KalmanFilter) -> dict[str, float]:
 
 
 def loop_connections(prefix: str) -> tuple[tuple[str, str], ...]:
-    """Return what is connected in one loop.
-
-    Args:
-        prefix: of its instances.
-
-    Returns:
-        Outputs and the inputs that they feed, ``instance.variable``.
-    """
+    """Return what is connected in one loop."""
     plant, estimator, controller = (f"{prefix}{part}" for part in PARTS)
     return (
         (f"{controller}.u", f"{plant}.u"),
@@ -170,8 +150,6 @@ class LoopSession:
     """One loop of three FMUs, instantiated once and run for any number of sizes. Use as a context manager.
 
     Args:
-        experiment: what is run.
-        fmus: paths of the three ``FMUS``.
         record: which of ``RECORDED``; fewer are quicker.
         values: what ``loop_values`` returned for the experiment (default: it is asked).
     """
@@ -210,13 +188,6 @@ class LoopSession:
         Args:
             alpha: half-gap [rad]; zero for the loop without a gap.
             errors: errors [rad] of both encoders at the communication points; default none.
-            start: further parameters by ``instance.variable``.
-
-        Returns:
-            Times [s] and the recorded signals.
-
-        Raises:
-            SlaveError: a slave refused or failed a call.
         """
         values = plant_values(self._experiment, alpha) | dict(start or {})
         signals = None
@@ -230,11 +201,7 @@ def plant_values(experiment: Experiment, alpha: float) -> dict[str, Value]:
     """Return the parameters of the plant with a half-gap ``alpha`` [rad].
 
     Args:
-        experiment: gives the backlash model.
         alpha: half-gap [rad]; zero for the loop without a gap.
-
-    Returns:
-        Value by ``instance.variable``.
     """
     model = experiment.backlash_model if alpha else "none"
     return {"plant.alpha": alpha, "plant.backlash_model": model}

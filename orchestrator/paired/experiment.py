@@ -53,7 +53,7 @@ class Experiment:
         backlash_model: of the loop with a gap.
         smallest: smallest half-gap claimed [rad].
         largest: largest half-gap claimed [rad].
-        values: the drivetrain.
+        values: parameters of the drivetrain, in SI units.
     """
 
     name: str = "default"
@@ -96,7 +96,7 @@ class Experiment:
         """Return the state feedback of both loops.
 
         Returns:
-            The gains.
+            State feedback gains and the gain of the reference, discrete at the control step.
         """
         weights = np.diag(self.state_weights)
         return design_regulator(five_state_model(self.values), weights, self.torque_weight, self.sample_time)
@@ -105,7 +105,7 @@ class Experiment:
         """Return the Kalman filter of both loops; it assumes no backlash and is never told of any.
 
         Returns:
-            The filter.
+            Gain and model of the steady-state Kalman filter.
         """
         variance = self.assumed_encoder_noise**2
         return design_estimator(
@@ -116,7 +116,7 @@ class Experiment:
         """Return the errors [rad] of motor and load encoder at the communication points, for one ``seed``.
 
         Args:
-            seed: of the noise.
+            seed: from which the noise of both encoders is drawn.
 
         Returns:
             Two arrays (steps + 1,).
@@ -137,11 +137,7 @@ class Experiment:
 
 
 def thesis_experiment() -> Experiment:
-    """Return the default experiment scaled to the sizes of the thesis's Table 4.1.
-
-    Returns:
-        The experiment.
-    """
+    """Return the default experiment scaled to the sizes of the thesis's Table 4.1."""
     default = Experiment()
     return replace(
         default,
@@ -156,18 +152,8 @@ def thesis_experiment() -> Experiment:
 EXPERIMENTS = ("default", "thesis")
 
 
-def named_experiment(name: str) -> Experiment:
-    """Return the experiment ``name``.
-
-    Args:
-        name: a key of ``EXPERIMENTS``.
-
-    Returns:
-        The experiment.
-
-    Raises:
-        ScenarioError: there is no such experiment.
-    """
+def experiment_of(name: str) -> Experiment:
+    """Return the experiment ``name``."""
     if name not in EXPERIMENTS:
         raise ScenarioError(f"`experiment` must be one of {', '.join(EXPERIMENTS)}, but is {name!r}")
     return Experiment() if name == "default" else thesis_experiment()

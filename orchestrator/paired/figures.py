@@ -26,11 +26,7 @@ def draw_pair(path: Path, with_gap: LoopRun, without_gap: LoopRun, reference: Ar
     """Draw both load positions against time, their difference and the torques, with the time in the gap shaded.
 
     Args:
-        path: the picture.
-        with_gap: the loop with a gap.
-        without_gap: the loop without one.
         reference: (n,) wanted load angle [rad].
-        title: above the picture.
     """
     figure, axes = _figure(3, (8.0, 7.5))
     time = with_gap.time
@@ -72,13 +68,11 @@ def draw_estimates(
     """Draw estimated against actual half-gap, and below it their relative deviation, each with its interval.
 
     Args:
-        path: the picture.
         actual: (n,) half-gaps [rad].
         estimated: (n,) [rad].
         lower: (n,) ends of the intervals [rad].
         upper: (n,) ends of the intervals [rad].
         noise: (n,) encoder noise of each case [rad].
-        title: above the picture.
     """
     figure, axes = _figure(2, (6.6, 7.4))
     ends = np.array([actual.min(), actual.max()])
@@ -127,11 +121,9 @@ def draw_errors(path: Path, actual: Array, estimated: Array, noise: Array, title
     """Draw the error in percent against the actual half-gap, one colour for each noise level.
 
     Args:
-        path: the picture.
         actual: (n,) half-gaps [rad].
         estimated: (n,) [rad].
         noise: (n,) encoder noise of each case [rad].
-        title: above the picture.
     """
     figure, (axis,) = _figure(1, (7.0, 4.2))
     percent = 100.0 * np.abs(estimated - actual) / actual
@@ -186,10 +178,8 @@ def draw_signals(path: Path, time: Array, signals: Mapping[str, Array], units: M
     """Draw signals against time, those of one unit in one panel.
 
     Args:
-        path: the picture.
         time: (n,) [s].
         signals: (n,) each, by name.
-        units: unit by name.
     """
     names = list(dict.fromkeys(units[name] for name in signals))
     figure, axes = _figure(len(names), (8.0, 1.2 + 2.2 * len(names)))

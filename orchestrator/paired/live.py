@@ -15,7 +15,7 @@ from orchestrator.paired.cosimulation import (
     plant_values,
 )
 from orchestrator.paired.experiment import Experiment
-from orchestrator.plants.design import five_state_model, sampled
+from orchestrator.plants.design import discretise, five_state_model
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,7 @@ def pair_system(experiment: Experiment, alpha: float, seed: int, start: Mapping[
     """Return both loops with the values of a run; the loop with a gap comes first.
 
     Args:
-        experiment: what both share.
         alpha: half-gap [rad].
-        seed: of the encoder noise.
-        start: further start values by ``instance.variable``.
-
-    Returns:
-        The system.
     """
     values, given = loop_values(experiment), plant_values(experiment, alpha) | dict(start)
     instances: list[LiveInstance] = []
@@ -67,15 +61,8 @@ def pair_system(experiment: Experiment, alpha: float, seed: int, start: Mapping[
 
 
 def regulator_design(experiment: Experiment) -> RegulatorDesign:
-    """Return what the regulator of an experiment is designed from.
-
-    Args:
-        experiment: with the drivetrain, the weights and the sample time.
-
-    Returns:
-        The sampled model and the weights.
-    """
-    A, B = sampled(five_state_model(experiment.values), experiment.sample_time)
+    """Return what the regulator of an experiment is designed from."""
+    A, B = discretise(five_state_model(experiment.values), experiment.sample_time)
     weights = (*experiment.state_weights, experiment.torque_weight)
     return RegulatorDesign(
         tuple(A.ravel().tolist()), tuple(B[:, 0].tolist()), tuple(map(float, weights)), experiment.sample_time

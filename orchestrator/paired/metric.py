@@ -17,9 +17,6 @@ def difference_sum(with_gap: Array, without_gap: Array) -> float:
     Args:
         with_gap: (n,) estimated load angle of the loop with a gap [rad].
         without_gap: (n,) that of the loop without one [rad].
-
-    Returns:
-        S [rad].
     """
     return float(np.abs(with_gap - without_gap).sum())
 
@@ -46,12 +43,6 @@ def error_statistics(actual: Array, estimated: Array, lower: Array, upper: Array
         estimated: (n,) their estimates.
         lower: (n,) lower ends of the intervals.
         upper: (n,) upper ends.
-
-    Returns:
-        Errors [%] and the share of intervals that hold the actual size.
-
-    Raises:
-        ValueError: the arrays are empty or differ in shape.
     """
     if not len(actual) or not len(actual) == len(estimated) == len(lower) == len(upper):
         raise ValueError("the arrays must be of one length of at least 1")
@@ -67,17 +58,7 @@ def error_statistics(actual: Array, estimated: Array, lower: Array, upper: Array
 
 
 def trust_of_sweep(statistics: Iterable[ErrorStatistics], level: float, failed: int, unlikely: float = 1e-3) -> Trust:
-    """Return how far the estimates of a sweep can be trusted: whether their intervals hold the sizes that were run.
-
-    Args:
-        statistics: of the estimates, at each noise level.
-        level: share of the intervals that should hold the size.
-        failed: cases without an estimate.
-        unlikely: probability of so few held intervals at that level, below which they count as wrong.
-
-    Returns:
-        The trust, with a reason for each noise level whose intervals hold too few sizes.
-    """
+    """Return how far the estimates of a sweep can be trusted: whether their intervals hold the sizes that were run."""
     from scipy.special import bdtr  # every worker process would pay for its import
 
     found = [Reason(Level.AMBER, f"{failed} cases failed")] if failed else []

@@ -26,28 +26,14 @@ class MonotoneCubic:
     coefficients: Array
 
     def __call__(self, at: ArrayLike) -> Array:
-        """Return the values at ``at``, of the same shape.
-
-        Args:
-            at: where.
-
-        Returns:
-            The values.
-        """
+        """Return the values at ``at``, of the same shape."""
         piece, s = self._place(at)
         c3, c2, c1, c0 = self.coefficients[:, piece]
         square = s * s
         return np.asarray(c0 + c1 * s + c2 * square + c3 * (square * s))
 
     def slope(self, at: ArrayLike) -> Array:
-        """Return the derivatives at ``at``, of the same shape.
-
-        Args:
-            at: where.
-
-        Returns:
-            The derivatives.
-        """
+        """Return the derivatives at ``at``, of the same shape."""
         piece, s = self._place(at)
         c3, c2, c1, _ = self.coefficients[:, piece]
         return np.asarray(c1 + (2.0 * c2) * s + (3.0 * c3) * (s * s))
@@ -65,9 +51,6 @@ def monotone_cubic(x: ArrayLike, y: ArrayLike) -> MonotoneCubic:
     Args:
         x: shape (n,), increasing, at least three.
         y: shape (n,).
-
-    Returns:
-        The interpolation.
     """
     nodes, values = np.array(x, dtype=np.float64), np.array(y, dtype=np.float64)
     width = np.diff(nodes)

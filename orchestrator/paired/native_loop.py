@@ -21,11 +21,7 @@ class NativeLoop:
     """The loop of an experiment, to be closed.
 
     Args:
-        experiment: what is run.
         fmus: paths of the three native FMUs.
-
-    Attributes:
-        experiment: as given.
     """
 
     def __init__(self, experiment: Experiment, fmus: Mapping[str, Path]) -> None:

@@ -36,21 +36,14 @@ def run_pair(
     """Co-simulate the loop with a half-gap ``alpha`` [rad] and its twin without one, side by side.
 
     Args:
-        experiment: what both loops share.
-        fmus: paths of ``Drivetrain``, ``KalmanEstimator`` and ``LqrController``.
         alpha: half-gap [rad]; any size, for the estimate says itself when it cannot be trusted.
-        seed: of the encoder noise of the loop with a gap.
-        start: further parameters by ``instance.variable``.
 
     Returns:
         Both loops, S and the estimate.
-
-    Raises:
-        SlaveError: a slave refused or failed a call.
     """
     prefixes = (MACHINE, TWIN)
     system = loop_system(experiment, fmus, prefixes)
-    record = [_prefixed(prefix, address) for prefix in prefixes for address in RECORDED.values()]
+    record = [_add_prefix(prefix, address) for prefix in prefixes for address in RECORDED.values()]
     errors = experiment.encoder_errors(seed)
     signals = {k: Samples(e, experiment.sample_time) for k, e in zip(ERROR_SOURCES, errors, strict=True)}
     with Session(system, record, GaussSeidel(experiment.sample_time), experiment.duration) as session:
@@ -66,7 +59,7 @@ def run_pair(
     return PairRun(machine, twin, total, estimate)
 
 
-def _prefixed(prefix: str, address: str) -> str:
+def _add_prefix(prefix: str, address: str) -> str:
     return f"{prefix}{address}"
 
 
@@ -74,12 +67,7 @@ def with_settings(experiment: Experiment, backlash_model: str | None = None, noi
     """Return ``experiment`` with another backlash model or another encoder noise [rad].
 
     Args:
-        experiment: to start from.
-        backlash_model: its name; None: unchanged.
         noise: [rad]; None: unchanged.
-
-    Returns:
-        The experiment.
     """
     if backlash_model is not None:
         experiment = replace(experiment, backlash_model=backlash_model)

@@ -15,20 +15,12 @@ from orchestrator.scenarios.scenario import Scenario
 RECORDED = ("plant.theta_m", "plant.theta_l", "estimator.theta_l_hat", "controller.u")
 
 
-def paired_scenario(experiment: Experiment, fmus: Mapping[str, Path], alpha: float, reference: float) -> Scenario:
+def scenario_of_pair(experiment: Experiment, fmus: Mapping[str, Path], alpha: float, reference: float) -> Scenario:
     """Return both loops with half-gap ``alpha`` [rad] in the first, led to the load angle ``reference`` [rad].
 
     Args:
-        experiment: what both loops share.
-        fmus: paths of the three ``FMUS``.
         alpha: [rad].
         reference: [rad].
-
-    Returns:
-        The scenario.
-
-    Raises:
-        ScenarioError: a number is negative or not finite.
     """
     for name, value, low in (("alpha", alpha, 0.0), ("reference", reference, -1e12)):
         if not low <= value <= 1e12:

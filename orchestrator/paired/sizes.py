@@ -25,17 +25,6 @@ def read_sizes(text: str, experiment: Experiment) -> Sizes:
 
     Random sizes are drawn from all that the experiment claims, evenly in the logarithm; those of the thesis's
     experiment evenly from 1.2 to 4.8 rad, as the thesis did.
-
-    Args:
-        text: in one of these forms.
-        experiment: which claims a range of sizes.
-
-    Returns:
-        The sizes as the engine reads them.
-
-    Raises:
-        ScenarioError: the text has none of these forms, or a size that is not finite and positive.
-        CalibrationError: a size that the experiment does not claim.
     """
     kind, _, rest = text.strip().partition(":")
     if kind == "random":

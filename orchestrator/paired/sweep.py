@@ -59,15 +59,7 @@ class SweepPlan:
     samples: int = 1
 
     def cases(self) -> DesignCases:
-        """Return the cases, checked against the range that the experiment claims.
-
-        Returns:
-            The cases.
-
-        Raises:
-            ScenarioError: a specification that cannot be read, or a count below 1.
-            CalibrationError: a size outside the calibrated range.
-        """
+        """Return the cases, checked against the range that the experiment claims."""
         if not 1 <= self.repetitions <= MAX_CASES:
             raise ScenarioError(f"`seeds` must be 1 to {MAX_CASES:,}, but is {self.repetitions:g}", "seeds")
         for level in self.noise:
@@ -87,15 +79,8 @@ class SweepPlan:
     ) -> dict[float, Calibration]:
         """Return the calibration of each noise level; ``progress`` is told of those that must be made.
 
-        Args:
-            progress: is told what is calibrated.
-            settings: of the calibration.
-
         Returns:
             Calibration by noise level [rad].
-
-        Raises:
-            CalibrationError: S is not monotone for this experiment.
         """
         levels = {level: with_settings(self.experiment, noise=level) for level in self.noise}
         return {level: load_or_calibrate(experiment, progress, settings) for level, experiment in levels.items()}
@@ -105,12 +90,7 @@ def sweep_work(plan: SweepPlan, fmus: Mapping[str, Path], calibrations: Mapping[
     """Return what a worker process does for each case.
 
     Args:
-        plan: what is varied.
-        fmus: paths of the three ``FMUS``.
         calibrations: by noise level [rad].
-
-    Returns:
-        Columns, files and functions.
     """
     return Work(
         prepare=_prepare,
@@ -190,14 +170,7 @@ class SweepArrays:
 
 
 def gather(rows: Iterable[Row]) -> SweepArrays:
-    """Return the columns of all rows that are done.
-
-    Args:
-        rows: of the sweep.
-
-    Returns:
-        Columns of one length.
-    """
+    """Return the columns of all rows that are done."""
     collected = array("d")  # eight bytes a number: a million rows as tuples take a quarter of a gigabyte
     for row in rows:
         if row.outcome.status is Status.DONE:

@@ -23,15 +23,11 @@ SHORTEST = 1e-7
 LEAST_CYCLES = 1.5  # of a wave within the travel: what comes round less often is told from no spring
 
 
-def built_up(stated: float, fitted: float) -> float:
+def build_up_distance(stated: float, fitted: float) -> float:
     """Return the build-up distance [rad] that the FMU gets: the fitted one, or as stated where none was fitted.
 
     Args:
         stated: distance in the model's own parameters [rad]; 0: none.
-        fitted: logarithm of the distance that the analysis has.
-
-    Returns:
-        The distance; 0.0: none.
     """
     if fitted == PRESLIDING.default:
         return stated
@@ -40,15 +36,7 @@ def built_up(stated: float, fitted: float) -> float:
 
 
 def group(effect: str, *names: str) -> dict[str, str]:
-    """Return short name -> name in the table of an effect's parameters.
-
-    Args:
-        effect: its name.
-        names: of the parameters behind ``effects.EFFECT.``.
-
-    Returns:
-        The names.
-    """
+    """Return short name -> name in the table of an effect's parameters."""
     return {name.rpartition(".")[2]: f"effects.{effect}.{name}" for name in names}
 
 

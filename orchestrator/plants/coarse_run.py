@@ -29,10 +29,6 @@ def coarse_runner_of(plant: Plant, p: Any) -> Any:
     ``substeps`` are the Runge-Kutta steps of a sample, and of one in which friction may turn round or teeth meet.
     ``p`` is the plant's tuple followed by its nuisance parameters.
 
-    Args:
-        plant: whose equations it has.
-        p: parameters that it is to be called with.
-
     Returns:
         The function, of machine code; start (8,), early and late (n,), out (n, 2): the angles.
     """
@@ -61,13 +57,6 @@ def runs_coarsely(plant: Plant, p: Array) -> bool:
     """Tell whether such steps follow a model closely, at far less than its exact runs cost.
 
     So it is for two bodies with nonlinear effects of the bank, but none that makes impacts or a resonance of its own.
-
-    Args:
-        plant: the plant.
-        p: the parameters.
-
-    Returns:
-        True when they do.
     """
     shaft, added, drive = plant.shaft, plant.resonance, plant.drive
     if shaft is None or (shaft.gap and plant.value(p, shaft.gap) > 0.0):
@@ -81,15 +70,7 @@ def runs_coarsely(plant: Plant, p: Array) -> bool:
 
 
 def waves_of(plant: Plant, p: Array) -> dict[int, float]:
-    """Return the periods, in the motor's angle [rad], of what repeats in a model with position.
-
-    Args:
-        plant: the plant.
-        p: the parameters.
-
-    Returns:
-        Place of each amplitude -> period.
-    """
+    """Return the periods, in the motor's angle [rad], of what repeats in a model with position."""
     found = {}
     for effect in plant.bank:
         place = effect.places(plant)[effect.size]
@@ -105,8 +86,6 @@ def coarse_steps(plant: Plant, p: Array, h: float, turn: float) -> int:
     """Return the steps in a sample with which a free run follows a model's modes and its waves.
 
     Args:
-        plant: the plant.
-        p: the parameters.
         h: a sample [s].
         turn: the farthest that the motor turns in it [rad].
 

@@ -39,22 +39,12 @@ _SOURCES = Path(pyfmu_sources.__file__).parent
 
 @cache
 def compiled(name: str) -> ModuleType:
-    """Return a copy of ``pyfmu_sources.NAME`` whose functions are compiled by numba (at their first call).
-
-    Args:
-        name: of the source's module.
-
-    Returns:
-        The module; one copy per process and name.
-
-    Raises:
-        ModuleNotFoundError: there is no such source.
-    """
+    """Return a copy of ``pyfmu_sources.NAME`` whose functions are compiled by numba (at their first call)."""
     full_name = f"_compiled_{name}"
     original = f"{_PACKAGE}.{name}"
     if not (_SOURCES / f"{name}.py").exists():
         raise ModuleNotFoundError(original)
-    path = _copied_source(name)
+    path = _copy_source(name)
     spec = importlib.util.spec_from_file_location(original, path)
     assert spec is not None
     assert spec.loader is not None
@@ -82,7 +72,7 @@ def _options(name: str) -> dict[str, Any]:
 
 
 @cache
-def _copied_source(name: str) -> Path:
+def _copy_source(name: str) -> Path:
     """Return the copy of a source in a folder named by a hash of it and of all that it imports."""
     digest = hashlib.sha256(numba.__version__.encode())
     for module in sorted(_closure(name)):

@@ -92,7 +92,7 @@ class Resonance:
     frequency: str
 
 
-def _nothing_refused(values: Mapping[str, float]) -> str:
+def _accept_all(values: Mapping[str, float]) -> str:
     return ""
 
 
@@ -103,8 +103,6 @@ class Plant:
     The state of the analysis has eight places (as in ``pyfmu_sources.equations``), of which a plant may use fewer.
 
     Attributes:
-        name: of the FMU.
-        table: its parameters.
         linear: names of the parameters of the plant with every effect off.
         states: places of the state that the plant with every effect off uses.
         bodies: the driven body first; each has an encoder.
@@ -146,7 +144,7 @@ class Plant:
     nuisances: tuple[Parameter, ...] = ()
     enumerations: tuple[str, ...] = ()
     spread: float = 0.0
-    refused: Callable[[Mapping[str, float]], str] = _nothing_refused
+    refused: Callable[[Mapping[str, float]], str] = _accept_all
     realised: Callable[[Array], Array] | None = None
     learned: bool = False
     seldom: tuple[str, ...] = ()
@@ -167,27 +165,14 @@ class Plant:
         return tuple(body.encoder for body in self.bodies)
 
     def entry(self, place: int) -> Parameter:
-        """Return the table row of a parameter.
-
-        Args:
-            place: in the tuple of the analysis.
-
-        Returns:
-            Name, default, bounds and unit.
-        """
+        """Return the table row of a parameter."""
         return self.table[place] if place < len(self.table) else self.nuisances[place - len(self.table)]
 
     def index(self, name: str) -> int:
         """Return the place of a parameter in the flat tuple.
 
-        Args:
-            name: of the parameter.
-
         Returns:
             The place, from 0.
-
-        Raises:
-            ValueError: the plant has no such parameter.
         """
         if name not in self._index:
             raise ValueError(f"{name!r} is not a parameter of {self.name}")
@@ -198,10 +183,6 @@ class Plant:
 
         Args:
             p: the parameters of the analysis, (n,).
-            name: of the parameter.
-
-        Returns:
-            The value, in the parameter's unit.
         """
         return float(p[self.index(name)])
 
@@ -210,21 +191,11 @@ class Plant:
 
         Args:
             p: the parameters of the analysis, (n,).
-
-        Returns:
-            The ratio.
         """
         return self.value(p, self.shaft.ratio) if self.shaft else 1.0
 
     def extended(self, values: Sequence[float]) -> Array:
-        """Return the plant's values followed by the analysis's own parameters at their defaults.
-
-        Args:
-            values: of the table's parameters, in its order.
-
-        Returns:
-            Shape (n,).
-        """
+        """Return the plant's values followed by the analysis's own parameters at their defaults."""
         return np.array([*values, *(entry.default for entry in self.nuisances)])
 
     def own(self, p: Array) -> Array:
@@ -232,9 +203,6 @@ class Plant:
 
         Args:
             p: the parameters of the analysis, (n,).
-
-        Returns:
-            The parameters, in the order of the table.
         """
         return self.realised(p) if self.realised else np.asarray(p[: len(self.table)])
 
@@ -242,7 +210,6 @@ class Plant:
         """Return what requests (n,) [N.m] become behind a second lag and a limited rate.
 
         Args:
-            p: parameters.
             u: requests (n,), each held for ``h``.
             h: sample time [s].
 
@@ -287,9 +254,6 @@ class Plant:
 
         Args:
             p: the parameters of the analysis, (n,).
-
-        Returns:
-            The column that belongs to :meth:`jacobian`.
         """
         rate = self.stage().rates((0.0,) * STATES, (0.0, 0.0), self._plain(p), 1.0)
         return np.array([rate[s] for s in self.states])
@@ -307,9 +271,6 @@ class Plant:
         Args:
             p: the parameters of the analysis, (n,).
             h: [s].
-
-        Returns:
-            At least 1.
         """
         # The drive's lag does not count: it is solved exactly, and moved by nothing else.
         kept = [row for row, place in enumerate(self.states) if place != self.drive.torque]
@@ -321,8 +282,5 @@ class Plant:
 
         Args:
             p: the parameters of the analysis, (n,).
-
-        Returns:
-            The rate.
         """
         return float(np.max(np.abs(np.linalg.eigvals(self.jacobian(p)))))

@@ -83,14 +83,7 @@ class KalmanFilter:
 
 
 def six_state_model(values: DrivetrainValues) -> LinearModel:
-    """Return the model of eq. 3.5 with states ``ESTIMATOR_STATES`` and outputs ``(theta_m, theta_l)``.
-
-    Args:
-        values: the physical values, SI units.
-
-    Returns:
-        The model.
-    """
+    """Return the model of eq. 3.5 with states ``ESTIMATOR_STATES`` and outputs ``(theta_m, theta_l)``."""
     v = values
     A = np.zeros((6, 6))
     A[0, 1] = A[2, 3] = 1.0
@@ -110,14 +103,7 @@ def six_state_model(values: DrivetrainValues) -> LinearModel:
 
 
 def five_state_model(values: DrivetrainValues) -> LinearModel:
-    """Return the model without the load torque, states ``REGULATOR_STATES``: what a regulator can control.
-
-    Args:
-        values: the physical values, SI units.
-
-    Returns:
-        The model.
-    """
+    """Return the model without the load torque, states ``REGULATOR_STATES``: what a regulator can control."""
     six = six_state_model(values)
     keep = [0, 1, 2, 3, 5]
     return LinearModel(six.A[np.ix_(keep, keep)], six.B[keep], six.C[:, keep], REGULATOR_STATES)
@@ -126,14 +112,11 @@ def five_state_model(values: DrivetrainValues) -> LinearModel:
 def rank_report(model: LinearModel) -> RankReport:
     """Return ranks, uncontrollable modes, stabilisability and detectability of ``model``.
 
-    Args:
-        model: continuous in time.
-
     Returns:
         Ranks and the modes that are missed [1/s].
     """
-    stuck = _missed_modes(model.A, model.B)
-    hidden = _missed_modes(model.A.T, model.C.T)
+    stuck = _uncontrollable_modes(model.A, model.B)
+    hidden = _uncontrollable_modes(model.A.T, model.C.T)
     order = model.A.shape[0]
     return RankReport(
         order=order,
@@ -161,7 +144,7 @@ def _krylov_rank(A: Array, B: Array) -> int:
     return int(basis.shape[1])
 
 
-def _missed_modes(A: Array, B: Array) -> list[complex]:
+def _uncontrollable_modes(A: Array, B: Array) -> list[complex]:
     missed = []
     for mode in np.linalg.eigvals(A):
         pencil = np.hstack([A - mode * np.eye(A.shape[0]), B])
@@ -171,11 +154,10 @@ def _missed_modes(A: Array, B: Array) -> list[complex]:
     return missed
 
 
-def sampled(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
+def discretise(model: LinearModel, sample_time: float) -> tuple[Array, Array]:
     """Return (A, B) of ``model`` with its input held over ``sample_time`` [s].
 
     Args:
-        model: continuous in time.
         sample_time: [s].
 
     Returns:
@@ -195,16 +177,8 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
     """Return the sampled LQR of ``model`` for the continuous weights ``Q`` and ``R`` times the sample time.
 
     Args:
-        model: continuous in time.
         Q: (states, states) weights of the states.
-        R: weight of the torque.
         sample_time: [s].
-
-    Returns:
-        Gains and the poles of the closed loop.
-
-    Raises:
-        DesignError: ``model`` is not stabilisable, or the Riccati equation has no solution.
     """
     from scipy.linalg import eigvals, solve, solve_discrete_are
 
@@ -216,7 +190,7 @@ def design_regulator(model: LinearModel, Q: Array, R: float, sample_time: float)
             f"no input moves the mode at {modes} 1/s; leave the uncontrollable states out of the regulator and "
             "feed their estimate forward"
         )
-    A, B = map(np.ascontiguousarray, sampled(model, sample_time))
+    A, B = map(np.ascontiguousarray, discretise(model, sample_time))
     weight = np.array([[R * sample_time]])
     try:
         X = solve_discrete_are(A, B, Q * sample_time, weight)
@@ -234,23 +208,16 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
     """Return the stationary Kalman filter of ``model``.
 
     Args:
-        model: six-state model.
         process: intensities of the white noise on each state, 6 values, unit^2/s.
         measurement: variances of both encoders [rad2].
         sample_time: [s].
-
-    Returns:
-        The filter, sampled.
-
-    Raises:
-        DesignError: ``model`` is not detectable, or the Riccati equation has no solution.
     """
     from scipy.linalg import solve_discrete_are
 
     if not rank_report(model).detectable:
         raise DesignError("`model` must be detectable, but a mode that does not decay reaches no output")
-    A, B = sampled(model, sample_time)
-    Q = _sampled_noise(model.A, np.diag(process), sample_time)
+    A, B = discretise(model, sample_time)
+    Q = _noise_covariance(model.A, np.diag(process), sample_time)
     R = np.diag(measurement)
     try:
         P = solve_discrete_are(A.T, model.C.T, Q, R)
@@ -261,7 +228,7 @@ def design_estimator(model: LinearModel, process: Array, measurement: Array, sam
     return KalmanFilter(A, B[:, 0], L, np.linalg.inv(S), sample_time)
 
 
-def _sampled_noise(A: Array, intensity: Array, h: float) -> Array:
+def _noise_covariance(A: Array, intensity: Array, h: float) -> Array:
     """Return the covariance that white noise of ``intensity`` gathers in ``h`` (Van Loan, IEEE TAC 23(3), 1978)."""
     from scipy.linalg import expm
 

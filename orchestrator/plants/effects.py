@@ -24,22 +24,12 @@ class ParameterTable(Protocol):
     def index(self, name: str) -> int:
         """Return the place of a parameter in the plant's tuple.
 
-        Args:
-            name: in the plant's table.
-
         Returns:
             The place, from 0.
         """
 
     def entry(self, place: int) -> Parameter:
-        """Return the table row of a parameter.
-
-        Args:
-            place: in the plant's tuple.
-
-        Returns:
-            Name, default, bounds and unit.
-        """
+        """Return the table row of a parameter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +47,6 @@ class SignalScales:
         acceleration: rms of the load's acceleration [rad/s2].
         inertia: of the load, or of the only body [kg.m2].
         stiffness: of the shaft [N.m/rad]; 0: there is none.
-        ratio: of the gear.
         twist: (n,) twist of the shaft [rad]; empty: there is no shaft.
         twist_is_measured: by an encoder on either side; else it is that of the nominal model.
         angular: positions are angles, not metres.
@@ -79,25 +68,11 @@ class SignalScales:
     angular: bool = True
 
     def rms_speed(self, site: str) -> float:
-        """Return the rms speed [rad/s] of a body.
-
-        Args:
-            site: of the body.
-
-        Returns:
-            The speed.
-        """
+        """Return the rms speed [rad/s] of a body."""
         return rms(self.speeds[site])
 
     def torque_at(self, site: str) -> float:
-        """Return the rms of the drive's torque as a body behind the gear feels it [N.m].
-
-        Args:
-            site: of the body.
-
-        Returns:
-            The torque.
-        """
+        """Return the rms of the drive's torque as a body behind the gear feels it [N.m]."""
         return self.torque * (1.0 if site == "motor" else self.ratio)
 
     @property
@@ -116,9 +91,6 @@ def rms(values: Array) -> float:
 
     Args:
         values: any shape.
-
-    Returns:
-        The root.
     """
     return float(np.sqrt(np.mean(values * values))) + 1e-300
 
@@ -133,7 +105,6 @@ class Effect:
     """One row of a bank.
 
     Attributes:
-        name: of the effect.
         site: part of the machine at which it acts.
         kind: what sort of law it is; effects of one kind may stand for each other.
         parameters: short name -> name in the plant's table.
@@ -186,12 +157,5 @@ class Effect:
         return f"{self.name}@{self.site}"
 
     def places(self, plant: ParameterTable) -> dict[str, int]:
-        """Return the place of each parameter in the plant's tuple by short name, scanned ones last.
-
-        Args:
-            plant: to which the effect belongs.
-
-        Returns:
-            The places.
-        """
+        """Return the place of each parameter in the plant's tuple by short name, scanned ones last."""
         return {short: plant.index(name) for short, name in (self.parameters | self.scanned).items()}

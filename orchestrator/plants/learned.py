@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from orchestrator.plants.compiled import compiled
 from orchestrator.plants.description import CompiledEquations, Plant
-from orchestrator.plants.sample import completed, sample_of
+from orchestrator.plants.sample import complete_equations, sample_of
 from pyfmu_sources.drivetrain_parameters import BIG, Parameter
 from pyfmu_sources.learned_law import DRIVE, KNOTS, LOAD_ANGLE, LOAD_SPEED, MOTOR_SPEED, TWIST
 
@@ -26,7 +26,6 @@ class Argument:
 
     Attributes:
         code: its number in the compiled equations.
-        signal: in words.
         site: where the torque acts.
         unit: of the signal, of an angle in radians.
     """
@@ -38,14 +37,7 @@ class Argument:
 
 
 def arguments_of(plant: Plant) -> tuple[Argument, ...]:
-    """Return what a law of a plant may be a function of.
-
-    Args:
-        plant: the plant.
-
-    Returns:
-        Each argument, with the site at which the torque then acts.
-    """
+    """Return what a law of a plant may be a function of."""
     alone = (
         Argument(MOTOR_SPEED, "speed", "motor", "rad/s"),
         Argument(DRIVE, "torque of the drive", "motor", "N.m"),
@@ -61,11 +53,7 @@ def arguments_of(plant: Plant) -> tuple[Argument, ...]:
 
 
 def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the law's parameters.
-
-    Returns:
-        That of the argument's code, those of the knots, those of the values.
-    """
+    """Return the names of the law's parameters."""
     return (
         "law.argument",
         tuple(f"law.knot_{n}" for n in range(KNOTS)),
@@ -75,14 +63,7 @@ def names() -> tuple[str, tuple[str, ...], tuple[str, ...]]:
 
 @cache
 def with_law(plant: Plant) -> Plant:
-    """Return a plant with such a law, which is off until its argument is set.
-
-    Args:
-        plant: without it.
-
-    Returns:
-        The plant, with the law's parameters behind all others.
-    """
+    """Return a plant with such a law, which is off until its argument is set."""
     code, knots, values = names()
     added = (
         Parameter(code, "1", 0.0, 0.0, 100.0, "Argument of the learned law"),
@@ -98,7 +79,7 @@ def with_law(plant: Plant) -> Plant:
 def _stage(plant: Plant, first: int) -> CompiledEquations:
     from orchestrator.shared.numba_cache import kept
 
-    equations = completed(plant.stage())
+    equations = complete_equations(plant.stage())
     rates = equations.rates
     motor, last = plant.bodies[0], plant.bodies[-1]
     J_m, J_l = plant.index(motor.inertia), plant.index(last.inertia)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.plants.description import Plant
-from orchestrator.plants.design import LinearModel, sampled
+from orchestrator.plants.design import LinearModel, discretise
 from orchestrator.shared.numba_cache import kept
 
 Array = NDArray[np.float64]
@@ -17,7 +17,6 @@ def is_linear(plant: Plant, p: Array) -> bool:
     """Tell whether a model moves as the linear plant does: what acts on it changes the request or the encoders alone.
 
     Args:
-        plant: the plant.
         p: the parameters of the analysis.
 
     Returns:
@@ -38,46 +37,33 @@ def linear_run_of(plant: Plant, p: Array, first: float, h: float) -> Run:
     step adds up.
 
     Args:
-        plant: the plant.
-        p: the parameters of the analysis.
         first: length of the first piece [s].
         h: length of a sample [s].
-
-    Returns:
-        The function.
     """
     A, B = plant.jacobian(p), plant.request_column(p)
     places = list(moving(plant, p))
     rows = [plant.states.index(place) for place in places]
     A, B = A[np.ix_(rows, rows)], B[rows, None]
     model = LinearModel(A, B, C=np.eye(len(places)), states=())
-    before, by_early = sampled(model, first)
-    behind, by_late = sampled(model, h - first)
+    before, by_early = discretise(model, first)
+    behind, by_late = discretise(model, h - first)
     phi, by_early, by_late = behind @ before, (behind @ by_early).ravel(), by_late.ravel()
     shown = np.array([places.index(place) if place in places else -1 for place in (0, 2)])
 
     def run(start: Array, early: Array, late: Array, out: Array) -> None:
-        _repeated(start[places], phi, by_early, by_late, early, late, shown, out)
+        _repeat(start[places], phi, by_early, by_late, early, late, shown, out)
 
     return run
 
 
 def moving(plant: Plant, p: Array) -> tuple[int, ...]:
-    """Return the places of the states that the linear plant has: without a lag the drive has none.
-
-    Args:
-        plant: the plant.
-        p: the parameters of the analysis.
-
-    Returns:
-        The places, in the order of the plant's states.
-    """
+    """Return the places of the states that the linear plant has: without a lag the drive has none."""
     lagged = plant.value(p, plant.drive.lag) > 0.0
     return tuple(place for place in plant.states if place != plant.drive.torque or lagged)
 
 
 @kept(error_model="numpy", nogil=True)
-def _repeated(
+def _repeat(
     x: Array, phi: Array, by_early: Array, by_late: Array, early: Array, late: Array, shown: Array, out: Array
 ) -> None:  # fmt: skip
     k = x.size

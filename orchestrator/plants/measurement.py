@@ -10,26 +10,12 @@ SHIFT = Parameter("measurement.shift", "s", 0.0, -1.0, 1.0, "Time by which the l
 
 
 def longest_time(scales: SignalScales) -> float:
-    """Return the longest time [s] by which a torque can be late and not be taken for its neighbour.
-
-    Args:
-        scales: of the record.
-
-    Returns:
-        Somewhat more than a period of the highest frequency.
-    """
+    """Return the longest time [s] by which a torque can be late and not be taken for its neighbour."""
     return 1.2 / scales.cutoff
 
 
 def times(scales: SignalScales) -> tuple[float, ...]:
-    """Return times [s] to try of what is late or slow.
-
-    Args:
-        scales: of the record.
-
-    Returns:
-        Nine of them.
-    """
+    """Return times [s] to try of what is late or slow."""
     top = longest_time(scales)
     return tuple(float(t) for t in np.geomspace(max(0.3 * scales.step, top / 60.0), top, 9))
 

@@ -27,14 +27,7 @@ class ReferencePlant(DrivetrainValues):
     model: str = "dead_zone"
 
     def matrix(self, touching: bool) -> Array:
-        """Return A of ``x' = A x + B (u, T_l, offset)``, 5 x 5, of one mode (eq. 3.5 without T_l).
-
-        Args:
-            touching: whether the teeth are in contact.
-
-        Returns:
-            The matrix, SI units.
-        """
+        """Return A of ``x' = A x + B (u, T_l, offset)``, 5 x 5, of one mode (eq. 3.5 without T_l)."""
         k, c = (self.k, self.c) if touching else (0.0, 0.0)
         i, J_m, J_l = self.i, self.J_m, self.J_l
         return np.array(
@@ -48,14 +41,7 @@ class ReferencePlant(DrivetrainValues):
         )
 
     def inputs(self, touching: bool) -> Array:
-        """Return B, 5 x 3, for ``(u, T_l, offset)``; ``offset`` is the flank's angle [rad].
-
-        Args:
-            touching: whether the teeth are in contact.
-
-        Returns:
-            The matrix, SI units.
-        """
+        """Return B, 5 x 3, for ``(u, T_l, offset)``; ``offset`` is the flank's angle [rad]."""
         k = self.k if touching else 0.0
         return np.array(
             [
@@ -72,7 +58,6 @@ def linear_solution(plant: ReferencePlant, u: Array, h: float, start: Array, T_l
     """Return the exact states, shape (n + 1, 5), of a gear without gap: ``expm`` of the augmented matrix.
 
     Args:
-        plant: the drivetrain; ``alpha`` is not looked at.
         u: requested torque [N.m] of each of the n samples.
         h: sample time [s].
         start: start state, 5 values.
@@ -104,19 +89,13 @@ def reference_solution(
     """Return the states ``(theta_m, omega_m, theta_l, omega_l, T_m)``, shape (n + 1, 5), at the samples.
 
     Args:
-        plant: the drivetrain; its model is ``dead_zone`` or ``nordin``.
         u: requested torque [N.m] of each of the n samples, held.
         h: sample time [s].
         start: start state, 5 values; default zero.
         T_l: load torque [N.m].
-        rtol: relative tolerance of the integrator.
-        atol: absolute tolerance of the integrator.
 
     Returns:
         Angles [rad], speeds [rad/s] and the motor's torque [N.m].
-
-    Raises:
-        SimulationError: the integrator failed or the contact chatters.
     """
     x = np.zeros(6)
     if start is not None:
@@ -134,7 +113,6 @@ def first_flank(plant: ReferencePlant, x: Array) -> int:
     """Return the flank (-1, 0, 1) at which a state of at least 3 values starts.
 
     Args:
-        plant: the drivetrain.
         x: state; motor's angle [rad] first, load's angle third.
 
     Returns:
@@ -152,20 +130,11 @@ def reference_sample(
     """Return state (6 values: the five of ``reference_solution`` and the shaft's own twist) and flank after ``h``.
 
     Args:
-        plant: the plant.
         x: state at the start, 6 values.
         flank: which flank is in contact: -1, 0 or 1.
         u: requested torque [N.m], held.
         T_l: torque on the load [N.m], held.
         h: length [s].
-        rtol: relative tolerance of the integrator.
-        atol: absolute tolerance of the integrator.
-
-    Returns:
-        State and flank after ``h``.
-
-    Raises:
-        SimulationError: the integrator failed, or the sample has too many events.
     """
     time = 0.0
     for _ in range(MAX_EVENTS_PER_SAMPLE):
@@ -179,7 +148,7 @@ def reference_sample(
             return x, flank
         time = float(run.t[-1])
         which = next(k for k, hits in enumerate(run.t_events) if len(hits))
-        x, flank = _crossed(plant, x, flank, which)
+        x, flank = _cross(plant, x, flank, which)
     raise SimulationError("reference solution chatters at the edge of the gap")
 
 
@@ -225,7 +194,7 @@ def _events(plant: ReferencePlant, flank: int) -> list[Callable[[float, Array], 
     return list(chosen)
 
 
-def _crossed(plant: ReferencePlant, x: Array, flank: int, which: int) -> tuple[Array, int]:
+def _cross(plant: ReferencePlant, x: Array, flank: int, which: int) -> tuple[Array, int]:
     x = x.copy()
     if flank == 0:
         x[5] = 0.0

@@ -21,15 +21,17 @@ CALM = 0.02  # distances of presliding per sample below which it hardly changes
 
 
 @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-def _turned(bristle: float, speed: float, level: float, rest: float, varies: bool, distance: float, h: float) -> Any:
+def _turn_bristle(
+    bristle: float, speed: float, level: float, level_at_rest: float, varies: bool, distance: float, h: float
+) -> Any:
     """Return the bristle [rad] after ``h`` at constant speed and friction's mean direction (Dahl, LuGre).
 
     A level that depends on more than speed may go to zero within a step, and grow again: a bristle bends no farther
     than it allows, and where it follows at once, so does the direction.
     """
-    if level <= 1e-9 * rest or rest == 0.0:
+    if level <= 1e-9 * level_at_rest or level_at_rest == 0.0:
         return 0.0, 0.0
-    reach = distance * level / rest
+    reach = distance * level / level_at_rest
     settled = reach if speed > 0.0 else -reach
     ways = abs(speed) * h / reach
     if not varies:
@@ -49,16 +51,13 @@ def _near_rest(speed: float, acceleration: float, distance: float, h: float) -> 
 
 
 @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-def reached(speed: float, acceleration: float, h: float) -> float:
+def travel_bound(speed: float, acceleration: float, h: float) -> float:
     """Return how far [rad] a part may come within ``h``, half again of what its acceleration adds if it stays.
 
     Args:
         speed: of the part [rad/s].
         acceleration: [rad/s^2].
         h: [s].
-
-    Returns:
-        The way.
     """
     return abs(speed) * h + 0.75 * h * h * abs(acceleration)
 
@@ -123,19 +122,12 @@ class Sample(NamedTuple):
     sample: Any
 
 
-def completed(equations: CompiledEquations) -> CompiledEquations:
-    """Return a plant's equations with what it leaves out: levels of friction at rest, teeth and end stops.
-
-    Args:
-        equations: of the plant.
-
-    Returns:
-        The equations, none of them None.
-    """
+def complete_equations(equations: CompiledEquations) -> CompiledEquations:
+    """Return a plant's equations with what it leaves out: levels of friction at rest, teeth and end stops."""
     friction = equations.friction
 
     @njit(error_model="numpy", **ALGEBRA)
-    def rest(p: Any) -> Any:
+    def rest_levels(p: Any) -> Any:
         at_rest = friction((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), p)
         sliding = friction((0.0, 1e6, 0.0, 1e6, 0.0, 0.0, 0.0, 0.0), p)
         return (max(at_rest[0], sliding[0]), max(at_rest[1], sliding[1])), (False, False)
@@ -149,7 +141,7 @@ def completed(equations: CompiledEquations) -> CompiledEquations:
         return False
 
     return equations._replace(
-        rest=equations.rest or rest, flanks=equations.flanks or flanks, meets=equations.meets or meets
+        rest=equations.rest or rest_levels, flanks=equations.flanks or flanks, meets=equations.meets or meets
     )
 
 
@@ -158,14 +150,8 @@ def sample_of(plant: Plant) -> Sample:
     """Return the compiled equations of one sample.
 
     References are counted in them: equations of a plant that say nothing else inherit that, and may make arrays.
-
-    Args:
-        plant: whose equations they are.
-
-    Returns:
-        What prepares a run, and what runs one sample.
     """
-    friction, stage, (at_m, at_l), rest_of, flanks, meets = completed(plant.stage())
+    friction, stage, (at_m, at_l), rest_of, flanks, meets = complete_equations(plant.stage())
     at_lag = plant.index(plant.drive.lag)
 
     @njit(error_model="numpy", forceinline=True, **ALGEBRA)
@@ -208,8 +194,8 @@ def sample_of(plant: Plant) -> Sample:
             for _ in range(way[0]):
                 if rubs:
                     level = friction(x, p)
-                    bristle_m, sign_m = _turned(bristle_m, x[1], level[0], rest[0], varies[0], reach[0], way[1])
-                    bristle_l, sign_l = _turned(bristle_l, x[3], level[1], rest[1], varies[1], reach[1], way[1])
+                    bristle_m, sign_m = _turn_bristle(bristle_m, x[1], level[0], rest[0], varies[0], reach[0], way[1])
+                    bristle_l, sign_l = _turn_bristle(bristle_l, x[3], level[1], rest[1], varies[1], reach[1], way[1])
                     signs = (sign_m, sign_l)
                 x = advanced(x, signs, p, torque, way)
         return x, (bristle_m, bristle_l, signs[0], signs[1])
@@ -222,13 +208,6 @@ def parameters_of(plant: Plant, usual: bool) -> Any:
     """Return ``parameters(p)``, compiled: the parameters as a tuple, which no array of results may overlap.
 
     Equations that get them so read each once in a run, and leave out what constants do not ask for.
-
-    Args:
-        plant: whose parameters they are.
-        usual: ``plant.seldom`` are their defaults, as constants.
-
-    Returns:
-        The function.
     """
     fixed = {plant.index(name) for name in plant.seldom} if usual else set()
     entries = (repr(float(plant.entry(n).default)) if n in fixed else f"p[{n}]" for n in range(len(plant.names)))
@@ -237,15 +216,7 @@ def parameters_of(plant: Plant, usual: bool) -> Any:
 
 
 def is_usual(plant: Plant, p: Any) -> bool:
-    """Tell whether what models have seldom is absent from one, so that equations without it may run.
-
-    Args:
-        plant: the plant.
-        p: the parameters of the analysis.
-
-    Returns:
-        True when each of ``plant.seldom`` is its default.
-    """
+    """Tell whether what models have seldom is absent from one, so that equations without it may run."""
     return all(p[place] == default for place, default in _seldom(plant))
 
 

@@ -105,7 +105,7 @@ class Record:
         """Return the same record with ``theta_l`` dropped.
 
         Returns:
-            A copy.
+            A copy whose `theta_l` is None.
         """
         return replace(self, theta_l=None)
 
@@ -146,9 +146,6 @@ def runs_of(flags: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int
 
     Args:
         flags: (n,).
-
-    Returns:
-        First row of each run, and the row after its last.
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return edges[::2], edges[1::2]

@@ -26,11 +26,6 @@ def check_finite(values: Array, name: str, source: str) -> None:
 
     Args:
         values: (n,).
-        name: of the column.
-        source: file name, for messages.
-
-    Raises:
-        RecordError: the message names row and column.
     """
     bad = np.flatnonzero(np.isinf(values) | (np.abs(values) > LARGEST_VALUE))
     if bad.size:
@@ -55,11 +50,6 @@ def check_range(values: Array, name: str, source: str) -> None:
 
     Args:
         values: (n,) [rad].
-        name: of the column.
-        source: file name, for messages.
-
-    Raises:
-        RecordError: the message names row and column.
     """
     far = np.flatnonzero(np.abs(values) > LARGEST_ANGLE)
     if far.size:
@@ -75,11 +65,6 @@ def check_driven(u: Array, label: str, source: str) -> None:
 
     Args:
         u: (n,) [N.m].
-        label: name of the column in the file.
-        source: file name, for messages.
-
-    Raises:
-        RecordError: it is, so the column is another or nothing drove the machine.
     """
     if not np.any(u[np.isfinite(u)]):
         raise RecordError(
@@ -88,15 +73,12 @@ def check_driven(u: Array, label: str, source: str) -> None:
         )
 
 
-def moving_span(theta: Array, time: Array) -> tuple[float, float] | None:
+def motion_span(theta: Array, time: Array) -> tuple[float, float] | None:
     """Return from when to when [s after the first row] the motor moves, where that is a short part of the record.
 
     Args:
         theta: (n,) angle of the motor [rad], without missing samples.
         time: (n,) [s].
-
-    Returns:
-        Start and end; None where the motor moves in most of the record, or never.
     """
     edges = np.linspace(0, theta.size, BLOCKS + 1).astype(int)
     travels = np.array([np.ptp(theta[a:b]) for a, b in itertools.pairwise(edges)])
@@ -111,12 +93,6 @@ def check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str
 
     Args:
         arrays: columns by name, (n,) each.
-        name: of the encoder.
-        label: what the file calls it.
-        source: file name, for the message.
-
-    Raises:
-        RecordError: it is stuck or saturated; the message says from which row on.
     """
     values = arrays[name]
     other = arrays.get("theta_l" if name == "theta_m" else "theta_m")
@@ -132,7 +108,7 @@ def check_moving(arrays: Mapping[str, Array], name: str, label: str, source: str
     if length < max(20, size // 100):
         return
     if other is None or name not in ("theta_m", "theta_l"):
-        missed = start > 0 and _leaving_speed(values, start, stop) * length > 30.0 * _resolution(values)
+        missed = start > 0 and _edge_speed(values, start, stop) * length > 30.0 * _resolution(values)
     else:
         # The load may rest while the motor crosses the gap, so only more than any gap counts.
         load, motor = arrays["theta_l"], arrays["theta_m"]
@@ -157,7 +133,7 @@ def _longest_constant(values: Array) -> tuple[int, int]:
     return int(bounds[longest]), int(bounds[longest + 1])
 
 
-def _leaving_speed(values: Array, start: int, stop: int) -> float:
+def _edge_speed(values: Array, start: int, stop: int) -> float:
     """Return the smaller of the mean speeds [units per row] over the rows just before and after a run.
 
     A machine that comes to rest, held by its friction, slows down first; an encoder that sticks does not. Speeds of a
@@ -187,9 +163,6 @@ def quantisation_step(values: Array) -> float:
 
     Args:
         values: (n,).
-
-    Returns:
-        The count.
     """
     unit = _resolution(values)
     if unit <= 0.0 or (np.unique(values).size > 0.9 * values.size and unit < 1e-6):

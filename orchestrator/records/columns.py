@@ -76,21 +76,7 @@ class Column:
 
 
 def unit_of(name: str, column: Column, written: str, label: str, source: str) -> RecordUnit | None:
-    """Return the unit of a column: the model file's, else the one ``written`` in the file; None: SI.
-
-    Args:
-        name: of ``COLUMNS``.
-        column: what the model file says.
-        written: unit in the file, or empty.
-        label: name in the file, for messages.
-        source: file name, for messages.
-
-    Returns:
-        The unit.
-
-    Raises:
-        RecordError: the unit is not known, or of a kind that the column cannot have.
-    """
+    """Return the unit of a column: the model file's, else the one ``written`` in the file; None: SI."""
     text = column.unit or written
     unit = parse_unit(text, KINDS[name])
     if unit is None and text:
@@ -107,21 +93,7 @@ def unit_of(name: str, column: Column, written: str, label: str, source: str) ->
 
 
 def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, source: str) -> float:
-    """Return the factor from the column's unit to SI.
-
-    Args:
-        name: of ``COLUMNS``.
-        column: what the model file says.
-        unit: of the column; None: SI.
-        label: name in the file, for messages.
-        source: file name, for messages.
-
-    Returns:
-        The factor.
-
-    Raises:
-        RecordError: counts, percent, amperes or volts without what they are worth.
-    """
+    """Return the factor from the column's unit to SI."""
     if unit is None:
         return 1.0
     if unit.kind == "voltage":
@@ -154,15 +126,11 @@ def scale_of(name: str, column: Column, unit: RecordUnit | None, label: str, sou
     return unit.factor * factor
 
 
-def unwrapped(values: Array, column: Column) -> Array:
+def unwrap(values: Array, column: Column) -> Array:
     """Return values that go on where the file's start again from zero after ``column.modulo``.
 
     Args:
         values: (n,), in the unit of the file.
-        column: what the model file says.
-
-    Returns:
-        Shape (n,).
     """
     if column.modulo is None:
         return values
@@ -177,12 +145,6 @@ def check_wraps(values: Array, name: str, label: str, source: str) -> None:
 
     Args:
         values: (n,), in the unit of the file.
-        name: of ``COLUMNS``.
-        label: name in the file, for messages.
-        source: file name, for messages.
-
-    Raises:
-        RecordError: it jumps by most of its range, again and again or once, while it moves slowly else.
     """
     steps = np.diff(values[np.isfinite(values)])
     span = float(np.ptp(values[np.isfinite(values)])) if steps.size else 0.0
@@ -203,20 +165,11 @@ def check_wraps(values: Array, name: str, label: str, source: str) -> None:
         )
 
 
-def unwrapped_time(values: Array, column: Column, label: str, source: str) -> Array:
+def unwrap_time(values: Array, column: Column, label: str, source: str) -> Array:
     """Return times that go on where a counter overflows, after ``column.modulo``; refuse those that seem to.
 
     Args:
         values: (n,), in the numbers of the file.
-        column: what the model file says.
-        label: name in the file, for messages.
-        source: file name, for messages.
-
-    Returns:
-        Shape (n,).
-
-    Raises:
-        RecordError: the time falls from the end of a counter's range to its start, and no ``modulo`` is given.
     """
     rows = np.flatnonzero(np.isfinite(values))
     good = values[rows]

@@ -19,7 +19,6 @@ def torque_of_voltage(voltage: Array, angle: Array, time: Array, column: Column)
         voltage: (n,) at the motor's terminals, held from row to row [V]; NaN: missing.
         angle: (n,) of the motor [rad]; NaN: missing, a straight line is taken.
         time: (n,) [s].
-        column: with ``resistance``, ``torque_constant``, and perhaps ``back_emf_constant`` and ``inductance``.
 
     Returns:
         (n,) torque [N.m]; NaN where the voltage is.
@@ -32,11 +31,11 @@ def torque_of_voltage(voltage: Array, angle: Array, time: Array, column: Column)
     speed = np.append(speed, speed[-1])
     current = (voltage - back_emf * speed) / column.resistance
     if column.inductance:
-        current = _lagged(current, float(np.nanmedian(steps)), column.inductance / column.resistance)
+        current = _lag(current, float(np.nanmedian(steps)), column.inductance / column.resistance)
     return column.torque_constant * current
 
 
-def _lagged(settled: Array, step: float, lag: float) -> Array:
+def _lag(settled: Array, step: float, lag: float) -> Array:
     """Return the current's mean over each sample, where it goes towards ``settled`` with a time constant [s]."""
     from scipy.signal import lfilter  # a second of importing that few records need
 

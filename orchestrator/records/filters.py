@@ -17,7 +17,7 @@ CUT_OFF = 0.5  # of the new rate
 LARGEST_MISSING = 0.1  # weight of missing samples in a new one, beyond which it is missing too
 
 
-def decimated(record: Record, rate: float) -> Record:
+def decimate(record: Record, rate: float) -> Record:
     """Return the record at ``rate`` samples per second, or the nearest whole fraction of its own rate above it.
 
     All columns go through the same symmetric low-pass filter, so linear dynamics between them stay as they are and
@@ -25,14 +25,7 @@ def decimated(record: Record, rate: float) -> Record:
     than a new sample are blurred.
 
     Args:
-        record: at its own rate.
         rate: [1/s].
-
-    Returns:
-        The slower record; the same one when the rate is not lower.
-
-    Raises:
-        RecordError: too few rows would be left.
     """
     factor = math.floor(1.0 / (record.step * rate) + 1e-6)
     if factor < 2:
@@ -45,7 +38,7 @@ def decimated(record: Record, rate: float) -> Record:
             f"{record.source}: `rate` must leave at least {MINIMUM_ROWS} rows, but {rate:g} Hz leaves {centres.size}"
             ": ask for a higher rate"
         )
-    held = np.convolve(_filled(record.u), taps, "same")
+    held = np.convolve(_fill(record.u), taps, "same")
     held = np.convolve(held, np.ones(factor) / factor, "full")[factor - 1 :][: record.size]
     columns = {
         name: None if values is None else _at(values, taps, centres)
@@ -79,7 +72,7 @@ def _low_pass(factor: int) -> Array:
     return np.asarray(taps / taps.sum())
 
 
-def _filled(values: Array) -> Array:
+def _fill(values: Array) -> Array:
     good = np.isfinite(values)
     if good.all() or not good.any():
         return values
@@ -89,7 +82,7 @@ def _filled(values: Array) -> Array:
 
 def _at(values: Array, taps: Array, centres: NDArray[np.int64]) -> Array:
     """Return the filtered values at ``centres``, NaN where too many of their samples are missing."""
-    out: Array = np.convolve(_filled(values), taps, "same")[centres]
+    out: Array = np.convolve(_fill(values), taps, "same")[centres]
     missing = np.isnan(values)
     if missing.any():
         weight = np.convolve(missing.astype(float), np.abs(taps) / np.abs(taps).sum(), "same")[centres]

@@ -19,14 +19,14 @@ from orchestrator.records.columns import (
     check_wraps,
     scale_of,
     unit_of,
-    unwrapped,
-    unwrapped_time,
+    unwrap,
+    unwrap_time,
 )
 from orchestrator.records.drive import torque_of_voltage
 from orchestrator.records.formats.source import RecordSource
 from orchestrator.records.names import Choice, choose
 from orchestrator.records.stamps import seconds_of
-from orchestrator.records.timing import interpolated, interpolation_cost, resampled_grid
+from orchestrator.records.timing import interpolated, interpolation_cost, resample_grid
 from orchestrator.records.units import parse_unit
 
 
@@ -63,20 +63,10 @@ def load(
 ) -> Loaded:
     """Return the columns of a record from an opened file.
 
-    Args:
-        source: the opened file.
-        path: of the file, for messages.
-        columns: what the model file says of columns.
-        further: names of other columns to keep.
-        reading: part, rate and resampling.
-
     Returns:
         Arrays (n,) in SI units by name, names in the file, and what was assumed.
-
-    Raises:
-        RecordError: a column is missing, ambiguous, in a wrong unit, or no number.
     """
-    chosen = chosen_channels(source, columns, str(path), reading.torque_needed)
+    chosen = choose_channels(source, columns, str(path), reading.torque_needed)
     extra = {name: n for n, head in enumerate(source.heads) for name in further if name in (head.name, head.full)}
     places = sorted({choice.place for choice in chosen.values()} | set(extra.values()))
     labels = {name: source.heads[c.place].full or source.heads[c.place].name for name, c in chosen.items()}
@@ -91,7 +81,7 @@ def load(
         if name in chosen:
             raw = values[chosen[name].place].astype(float)
             written = source.heads[chosen[name].place].unit
-            table[name], said = _converted(name, raw, columns.get(name, Column()), written, labels[name], path, time)
+            table[name], said = _convert(name, raw, columns.get(name, Column()), written, labels[name], path, time)
             units.append(said)
     table |= {name: values[place].astype(float) for name, place in extra.items() if name not in table}
     table, more = _same_rows(table, source, chosen, extra, path, reading)
@@ -105,7 +95,7 @@ def load(
         notes.append("torque from the voltage, the winding's resistance and the motor's speed")
     if "u" not in chosen:
         notes.append("no column looks like a torque, so the two angles alone are read; `[columns.u] name` names one")
-    table, more = _resampled(table, reading)
+    table, more = _resample(table, reading)
     return Loaded(table, labels, (*notes, *more))
 
 
@@ -134,23 +124,10 @@ def _in_part(
     return values, time, spoken
 
 
-def chosen_channels(
+def choose_channels(
     source: RecordSource, columns: Mapping[str, Column], where: str, torque_needed: bool = True
 ) -> dict[str, Choice]:
-    """Return the channel of each column; the time is one of the motor's raster, or made from a rate.
-
-    Args:
-        source: the opened file.
-        columns: names and units in the file, where the user gave them.
-        where: file name, for messages.
-        torque_needed: whether a file of two angles without a torque is refused.
-
-    Returns:
-        The channel of each column of a record.
-
-    Raises:
-        RecordError: the file has no columns, or one is not found or not the only one.
-    """
+    """Return the channel of each column; the time is one of the motor's raster, or made from a rate."""
     heads = list(source.heads)
     if not heads:
         raise RecordError(f"{where}: a record must hold columns of numbers, but there are none")
@@ -192,7 +169,7 @@ def _time(
         return seconds_of(raw, label, path), f"{label} as date and time"
     numbers = raw.astype(float)
     if whole or column.modulo is not None:
-        numbers = unwrapped_time(numbers, column, label, str(path))
+        numbers = unwrap_time(numbers, column, label, str(path))
     numbers = numbers * column.factor + column.offset
     written = source.heads[choice.place].unit
     if choice.numbered or column.rate is not None:
@@ -227,7 +204,7 @@ def _epoch(numbers: Array) -> tuple[float, str]:
     return 1.0, ""
 
 
-def _converted(
+def _convert(
     name: str, raw: Array, column: Column, written: str, label: str, path: Path, time: Array
 ) -> tuple[Array, str]:
     """Return a column in SI, and the words that say its unit."""
@@ -249,7 +226,7 @@ def _converted(
     if name != "u":
         if column.modulo is None and np.all(np.diff(time[np.isfinite(time)]) > 0.0):  # else the time is what is wrong
             check_wraps(values, name, label, where)
-        values = unwrapped(values, column)
+        values = unwrap(values, column)
     return values * scale, spoken
 
 
@@ -310,7 +287,7 @@ def _rows_of(time: Array, part: tuple[float, float], path: Path) -> slice:
     return slice(int(good[first]), int(good[first + last]) + 1)
 
 
-def _resampled(table: dict[str, Array], reading: Reading) -> tuple[dict[str, Array], list[str]]:
+def _resample(table: dict[str, Array], reading: Reading) -> tuple[dict[str, Array], list[str]]:
     """Bring all columns to a uniform grid, when told to; says what it costs."""
     if reading.resample not in ("linear", "cubic"):
         return table, []
@@ -319,7 +296,7 @@ def _resampled(table: dict[str, Array], reading: Reading) -> tuple[dict[str, Arr
     time = table["time"]
     if time.size < 8 or np.any(np.diff(time) <= 0.0):
         return table, []  # the checks of the record say what is wrong
-    grid, step = resampled_grid(time)
+    grid, step = resample_grid(time)
     if grid.size == time.size and np.allclose(grid, time, rtol=0.0, atol=1e-3 * step):
         return table, []
     if grid.size > 2 * time.size:

@@ -158,30 +158,16 @@ class _Content:
 
 
 def default_model() -> Model:
-    """Return ``Drivetrain`` with the thesis's values, no backlash, each linear parameter known to 5 %.
-
-    Returns:
-        The model.
-    """
+    """Return ``Drivetrain`` with the thesis's values, no backlash, each linear parameter known to 5 %."""
     plant = plants()[DEFAULT]
     return Model(DEFAULT, _defaults(plant, plant.spread))
 
 
 def read_model(path: Path | None) -> Model:
-    """Return the model of a TOML file, or the default model for None.
-
-    Args:
-        path: the file.
-
-    Returns:
-        The model.
-
-    Raises:
-        ScenarioError: the file is missing, not TOML, or names what does not exist; the message says where.
-    """
+    """Return the model of a TOML file, or the default model for None."""
     if path is None:
         return default_model()
-    content = _content(_decoded(path), str(path))
+    content = _content(_decode(path), str(path))
     parameters, encoders, columns = (content.entries[name] for name in _ENTRIES)
     stated = any("uncertainty" in entry or "relative_uncertainty" in entry for entry in parameters.values())
     plant = _plant(content)
@@ -201,7 +187,7 @@ def read_model(path: Path | None) -> Model:
     )
 
 
-def _decoded(path: Path) -> dict[str, Any]:
+def _decode(path: Path) -> dict[str, Any]:
     """Return the tables of a TOML file."""
     try:
         if path.stat().st_size > MAXIMUM_BYTES:

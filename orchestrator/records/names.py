@@ -30,22 +30,7 @@ def choose(
     rated: bool = False,
     torque_needed: bool = True,
 ) -> dict[str, Choice]:
-    """Return the channel of each column of a record: named, of the same name, or recognised without doubt.
-
-    Args:
-        heads: channels of the file.
-        columns: what the model file says of columns.
-        source: file name, for messages.
-        skip: columns that are not looked for.
-        rated: whether a time can be made of the rows, so that none is needed.
-        torque_needed: whether two angles without a torque are refused.
-
-    Returns:
-        The choice of each column that was found, by name.
-
-    Raises:
-        RecordError: a column is missing or ambiguous; the message says what to write in the model file.
-    """
+    """Return the channel of each column of a record: named, of the same name, or recognised without doubt."""
     found: dict[str, Choice] = {}
     names = [name for name in COLUMNS if name not in skip]
     for name in names:
@@ -61,30 +46,22 @@ def choose(
         elif wanted:
             raise RecordError(
                 f"{source}: column `{wanted}` of `[columns.{name}] name` must be there, but is not; there is "
-                f"{listed(heads)}{near(wanted, heads)}"
+                f"{list_names(heads)}{near(wanted, heads)}"
             )
     for name in names:
         if name not in found:
-            choice = _recognised(name, heads, {c.place for c in found.values()}, source)
+            choice = _recognise(name, heads, {c.place for c in found.values()}, source)
             if choice is not None:
                 found[name] = choice
             elif name not in OPTIONAL and not (name == "time" and rated) and (name != "u" or torque_needed):
-                raise RecordError(_missing(name, heads, source))
+                raise RecordError(_missing_text(name, heads, source))
     if "u" in names and "u" not in found and "theta_l" not in found:
-        raise RecordError(_missing("u", heads, source))
+        raise RecordError(_missing_text("u", heads, source))
     return found
 
 
 def find_named(heads: Sequence[Head], name: str) -> list[int]:
-    """Return the places of channels called ``name``; ``#3`` is the third.
-
-    Args:
-        heads: channels of a file.
-        name: with or without the unit in it.
-
-    Returns:
-        The places.
-    """
+    """Return the places of channels called ``name``; ``#3`` is the third."""
     if re.fullmatch(r"#\d{1,6}", name) and not any(head.name == name for head in heads):
         place = int(name[1:]) - 1
         return [place] if 0 <= place < len(heads) else []
@@ -94,24 +71,13 @@ def find_named(heads: Sequence[Head], name: str) -> list[int]:
     return exact or [n for n, head in enumerate(heads) if head.full.lower() == name.lower() != ""]
 
 
-def recognised_time(heads: Sequence[Head], source: str) -> int | None:
-    """Return the place of the time, recognised by name or unit; None: there is none, or only a sample number.
-
-    Args:
-        heads: channels of a file.
-        source: file name, for messages.
-
-    Returns:
-        The place.
-
-    Raises:
-        RecordError: two channels look like it.
-    """
-    choice = _recognised("time", heads, set(), source)
+def recognise_time(heads: Sequence[Head], source: str) -> int | None:
+    """Return the place of the time, recognised by name or unit; None: there is none, or only a sample number."""
+    choice = _recognise("time", heads, set(), source)
     return None if choice is None or choice.numbered else choice.place
 
 
-def _recognised(name: str, heads: Sequence[Head], taken: set[int], source: str) -> Choice | None:
+def _recognise(name: str, heads: Sequence[Head], taken: set[int], source: str) -> Choice | None:
     """Return the channel that looks most like a column; those in units that are not known come last."""
     free = [n for n in range(len(heads)) if n not in taken]
     for known in (True, False):
@@ -164,56 +130,43 @@ def _score(name: str, head: Head) -> int:
     return 1 if name == "theta_m" else 0
 
 
-def _time_score(found: set[str], kind: str) -> int:
-    if kind not in ("", "time") or (found & (words.ANGLE | words.TORQUE | words.SPEED | words.OTHER)):
+def _time_score(tokens: set[str], kind: str) -> int:
+    if kind not in ("", "time") or (tokens & (words.ANGLE | words.TORQUE | words.SPEED | words.OTHER)):
         return 0
-    if found & words.TIME or kind == "time":
-        return 3 if found & words.TIME else 2
-    return 1 if found and found <= words.SAMPLE else 0
+    if tokens & words.TIME or kind == "time":
+        return 3 if tokens & words.TIME else 2
+    return 1 if tokens and tokens <= words.SAMPLE else 0
 
 
-def _torque_score(found: set[str], kind: str) -> int:
-    if kind not in ("", "torque", "force", "share", "current") or found & (words.LOAD - {"l"}):
+def _torque_score(tokens: set[str], kind: str) -> int:
+    if kind not in ("", "torque", "force", "share", "current") or tokens & (words.LOAD - {"l"}):
         return 0
-    torque = bool(found & words.TORQUE) or kind in ("torque", "force") or ("m" in found and bool(found & words.ASKED))
-    current = bool(found & words.CURRENT) or kind in ("current", "share")
+    torque = (
+        bool(tokens & words.TORQUE) or kind in ("torque", "force") or ("m" in tokens and bool(tokens & words.ASKED))
+    )
+    current = bool(tokens & words.CURRENT) or kind in ("current", "share")
     if not (torque or current):
         return 0
-    if found & words.ANGLE:
+    if tokens & words.ANGLE:
         return 0
     score = 4 if torque else 1
-    return score + (3 if found & words.ASKED else -1 if found & words.FOUND else 1 if torque else 0)
+    return score + (3 if tokens & words.ASKED else -1 if tokens & words.FOUND else 1 if torque else 0)
 
 
-def listed(heads: Sequence[Head]) -> str:
-    """Return the names of channels for a message, as far as there is room.
-
-    Args:
-        heads: channels of a file.
-
-    Returns:
-        The names in backquotes.
-    """
+def list_names(heads: Sequence[Head]) -> str:
+    """Return the names of channels for a message, as far as there is room."""
     names = ",".join(head.full or head.name for head in heads)
     plain = "".join(c if c.isprintable() else "?" for c in names)
     return f"`{plain if len(plain) <= 100 else plain[:97] + '...'}`"
 
 
 def near(name: str, heads: Sequence[Head]) -> str:
-    """Return the question whether a name like this one was meant, or nothing.
-
-    Args:
-        name: that is not there.
-        heads: channels of a file.
-
-    Returns:
-        The end of a message.
-    """
+    """Return the question whether a name like this one was meant, or nothing."""
     close = difflib.get_close_matches(name, [head.full or head.name for head in heads], 1, 0.6)
     return f"; did you mean `{close[0]}`?" if close else ""
 
 
-def _missing(name: str, heads: Sequence[Head], source: str) -> str:
+def _missing_text(name: str, heads: Sequence[Head], source: str) -> str:
     if heads and all(re.fullmatch(r"#\d+", head.name) for head in heads):
         return (
             f"{source}: column `{name}` must be there, but the file has no names (the first row must hold names): say "
@@ -222,6 +175,6 @@ def _missing(name: str, heads: Sequence[Head], source: str) -> str:
         )
     rate = ", or `rate = ...` [Hz] where rows are uniform and there is none" if name == "time" else ""
     return (
-        f"{source}: column `{name}` must be there ({MEANINGS[name]}), but the file has {listed(heads)}: say "
+        f"{source}: column `{name}` must be there ({MEANINGS[name]}), but the file has {list_names(heads)}: say "
         f'`[columns.{name}] name = "..."`{rate} in the model file (`model`)'
     )

@@ -26,44 +26,29 @@ NEAR_DEGREES = 0.3  # of a logarithm: an inertia this near to 1/57 of the model'
 
 
 def check_plausible(record: Record, model: Model) -> None:
-    """Refuse a record of a ``Drivetrain`` whose units, signs or columns cannot be what the format demands.
-
-    Args:
-        record: of the machine.
-        model: of the machine.
-
-    Raises:
-        RecordError: the message names the column and what it seems to hold.
-    """
+    """Refuse a record of a ``Drivetrain`` whose units, signs or columns cannot be what the format demands."""
     if model.fmu != "Drivetrain":
         return
     record = record.filled()
     parameters = {name: entry.value for name, entry in model.parameters.items()}
-    _check_rate(record, own_frequency(model))
+    _check_rate(record, natural_frequency(model))
     if record.theta_l is not None:
         _check_slope(record, record.theta_l, parameters["i"])
     _check_inertia(record, parameters)
 
 
-def own_frequency(model: Model) -> float:
-    """Return how fast [rad/s] the shaft of a ``Drivetrain`` oscillates, its motor free to turn.
-
-    Args:
-        model: of the machine.
-
-    Returns:
-        The frequency.
-    """
+def natural_frequency(model: Model) -> float:
+    """Return how fast [rad/s] the shaft of a ``Drivetrain`` oscillates, its motor free to turn."""
     p = {name: entry.value for name, entry in model.parameters.items()}
     return math.sqrt(p["k"] * (1.0 / p["J_l"] + 1.0 / (p["J_m"] * p["i"] ** 2)))
 
 
-def _check_rate(record: Record, own: float) -> None:
+def _check_rate(record: Record, frequency: float) -> None:
     """Refuse records that are too slow for the shaft's own oscillation."""
-    if own * record.step > LONGEST_STEP:
+    if frequency * record.step > LONGEST_STEP:
         raise RecordError(
-            f"{record.source}: column `time` must step by at most {LONGEST_STEP / own:.3g} s to show a shaft that "
-            f"oscillates at {own:.3g} rad/s, but steps by {record.step:g} s: log faster, or "
+            f"{record.source}: column `time` must step by at most {LONGEST_STEP / frequency:.3g} s to show a shaft "
+            f"that oscillates at {frequency:.3g} rad/s, but steps by {record.step:g} s: log faster, or "
             "mend `k`, `J_m`, `J_l` (`model`)"
         )
 
@@ -112,25 +97,25 @@ def _check_slope(record: Record, theta_l: NDArray[np.float64], ratio: float) -> 
         )
 
 
-def smoothed(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
+def smooth(record: Record, tau: float) -> tuple[Array, Array, Array, int]:
     """Return impulse, speed and angle of the motor, smoothed over a short time.
 
     Args:
-        record: without missing samples.
+        record: with every sample of its grid, missing ones filled.
         tau: lag of the drive [s].
 
     Returns:
         Impulse of the torque [N.m.s], speed [rad/s] and angle [rad], and how many rows each is a mean of.
     """
-    width = _smoothing_width(record)
+    width = _smooth_width(record)
     kernel = np.ones(width) / width
-    impulse = np.cumsum(lagged(record.u, tau, record.step)) * record.step
+    impulse = np.cumsum(lag_torque(record.u, tau, record.step)) * record.step
     speed = np.gradient(record.theta_m, record.step)
     impulse, speed, angle = (np.convolve(v, kernel, "valid") for v in (impulse, speed, record.theta_m))
     return impulse, speed, angle, width
 
 
-def _smoothing_width(record: Record) -> int:
+def _smooth_width(record: Record) -> int:
     return max(5, round(SMOOTHING_TIME / record.step))
 
 
@@ -154,14 +139,14 @@ def momentum_balance(impulse: Array, speed: Array, angle: Array) -> tuple[float,
     return float(solution[0]), float(solution[1]), share
 
 
-def _moved_inertia(record: Record, tau: float) -> float | None:
+def _apparent_inertia(record: Record, tau: float) -> float | None:
     """Return the inertia at the motor [kg.m2] that the torque seems to move; negative where they go opposite ways.
 
     None where the record does not tell.
     """
-    if record.size < 20 * _smoothing_width(record):
+    if record.size < 20 * _smooth_width(record):
         return None
-    impulse, speed, angle, _ = smoothed(record, tau)
+    impulse, speed, angle, _ = smooth(record, tau)
     if np.ptp(angle) < 0.2:
         return None
     inertia, _, share = momentum_balance(impulse, speed, angle)
@@ -170,7 +155,7 @@ def _moved_inertia(record: Record, tau: float) -> float | None:
 
 def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
     """Compare the inertia that the torque moves with the model's; both may be what is wrong."""
-    moved = _moved_inertia(record, p["tau"])
+    moved = _apparent_inertia(record, p["tau"])
     if moved is None:
         return
     own = p["J_m"] + p["J_l"] / p["i"] ** 2
@@ -201,7 +186,7 @@ def _check_inertia(record: Record, p: Mapping[str, float]) -> None:
         )
 
 
-def lagged(u: NDArray[np.float64], tau: float, step: float) -> NDArray[np.float64]:
+def lag_torque(u: NDArray[np.float64], tau: float, step: float) -> NDArray[np.float64]:
     """Return the motor's torque [N.m] for a request held from sample to sample.
 
     Args:

@@ -18,11 +18,11 @@ from orchestrator.records.checks import (
     check_finite,
     check_moving,
     check_range,
-    moving_span,
+    motion_span,
     quantisation_step,
 )
 from orchestrator.records.columns import COLUMNS, Array, Column
-from orchestrator.records.filters import decimated
+from orchestrator.records.filters import decimate
 from orchestrator.records.formats import open_source
 from orchestrator.records.loading import Reading, load
 from orchestrator.records.timing import RESAMPLING, Grid, grid_of
@@ -36,63 +36,35 @@ def read_record(
     further: Sequence[str] = (),
     reading: Reading | None = None,
 ) -> Record:
-    """Read and check a record: CSV of any dialect, Parquet, MDF, MAT or NumPy.
-
-    Args:
-        path: the file.
-        columns: for some of ``COLUMNS``, their names and units in the file (default: recognised).
-        further: names of other columns to keep; those that are absent are left out.
-        reading: part, rate and resampling (default: the whole file as it is).
-
-    Returns:
-        The record, in SI units.
-
-    Raises:
-        RecordError: the file is missing or unreadable, or breaks a rule; the message names the place and the cure.
-    """
+    """Read and check a record: CSV of any dialect, Parquet, MDF, MAT or NumPy."""
     reading = reading or Reading()
     with open_source(path, reading.header) as source:
         loaded = load(source, path, columns or {}, further, reading)
     if "u" in loaded.table:
         check_driven(loaded.table["u"], loaded.labels["u"], path.name)
     record = record_from_columns(loaded.table, path.name, loaded.labels, reading.resample == "uniform")
-    span = moving_span(lined(record.theta_m), record.time)
+    span = motion_span(lined(record.theta_m), record.time)
     if span is not None:
         start, end = span
         note = (
-            f"the motor moves from {start:.3g} to {end:.3g} s alone and stands still in the rest of "
-            f"{record.duration:.3g} s, where later parts of a record, which decide, show nothing: keep `part` "
-            f"{start:.3g}:{end:.3g}, or log motion throughout"
+            f"the motor moves only from {start:.3g} to {end:.3g} s of {record.duration:.3g} s, the rest shows nothing: "
+            f"keep `part` {start:.3g}:{end:.3g}, or log motion throughout"
         )
         record = replace(record, notes=(*record.notes, note))
     scale = (columns or {}).get("u", Column()).relative_uncertainty
     record = replace(record, u_scale_uncertainty=scale, notes=(*loaded.notes, *record.notes))
     if reading.rate is not None:
-        record = decimated(record, reading.rate)
+        record = decimate(record, reading.rate)
     return record
 
 
 def record_from_columns(
     table: Mapping[str, Array], source: str, shown: Mapping[str, str] | None = None, trust_rows: bool = False
 ) -> Record:
-    """Check columns that are already numbers (any mapping of name to (n,) array) and return the record.
-
-    Args:
-        table: ``time``, ``u``, ``theta_m``, perhaps ``theta_l``, and further columns; NaN where a sample is missing.
-            With ``theta_l``, ``u`` may be absent.
-        source: name used in messages.
-        shown: how columns are called in messages, where that differs.
-        trust_rows: whether rows are uniform whatever their stamps say.
-
-    Returns:
-        The record.
-
-    Raises:
-        RecordError: a rule of the format is broken.
-    """
+    """Check columns that are already numbers (any mapping of name to (n,) array) and return the record."""
     arrays = {name: np.ascontiguousarray(values, dtype=float) for name, values in table.items()}
     label = {name: name for name in arrays} | dict(shown or {})
-    arrays = _stamped(arrays, label["time"], source)
+    arrays = _stamp(arrays, label["time"], source)
     size = arrays["time"].size
     if size < MINIMUM_ROWS:
         raise RecordError(
@@ -111,7 +83,7 @@ def record_from_columns(
     return _on_grid(arrays, grid, source, trust_rows)
 
 
-def _stamped(arrays: dict[str, Array], label: str, source: str) -> dict[str, Array]:
+def _stamp(arrays: dict[str, Array], label: str, source: str) -> dict[str, Array]:
     """Return the rows that have a time."""
     good = np.isfinite(arrays["time"])
     lost = int(np.count_nonzero(~good))
@@ -138,7 +110,7 @@ def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: b
             table[name] = spread
         table["time"] = np.asarray(grid.start + timing.step * np.arange(grid.size), dtype=np.float64)
     absent = np.full(table["time"].size, np.nan)
-    u, deviation = _interpolated(table["u"]) if "u" in table else (absent, None)
+    u, deviation = _interpolate(table["u"]) if "u" in table else (absent, None)
     rest = {name: lined(values) for name, values in table.items() if name not in COLUMNS}
     record = Record(table["time"], u, table["theta_m"], table.get("theta_l"), source, rest, deviation, 0.0, timing)
     if record.missing:
@@ -149,7 +121,7 @@ def _on_grid(arrays: Mapping[str, Array], grid: Grid, source: str, trust_rows: b
     return replace(record, notes=tuple(notes))
 
 
-def _interpolated(u: Array) -> tuple[Array, Array | None]:
+def _interpolate(u: Array) -> tuple[Array, Array | None]:
     """Return the torque with lines over missing samples, and how far they may be off [N.m].
 
     What a line over a gap of some length misses is measured on the record itself, at the middle of spans that long.
@@ -173,12 +145,7 @@ def _interpolated(u: Array) -> tuple[Array, Array | None]:
 
 
 def write_record(path: Path, record: Record) -> None:
-    """Write ``record`` as CSV with the columns of ``COLUMNS`` that it has; missing samples as empty cells.
-
-    Args:
-        path: the file.
-        record: in SI units.
-    """
+    """Write ``record`` as CSV with the columns of ``COLUMNS`` that it has; missing samples as empty cells."""
     names = [name for name in COLUMNS if getattr(record, name) is not None and (name != "u" or record.has_torque)]
     columns = [getattr(record, name).tolist() for name in names]
     lines = [",".join(names)]

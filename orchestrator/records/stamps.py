@@ -18,33 +18,13 @@ _NO_TIME = np.datetime64("NaT", "ns").astype(np.int64)
 
 
 def is_stamp(cell: str) -> bool:
-    """Return whether a cell is a date with a time, or a time of day.
-
-    Args:
-        cell: its text.
-
-    Returns:
-        True when it is.
-    """
+    """Return whether a cell is a date with a time, or a time of day."""
     plain = cell.strip().strip('"')
     return any(pattern.fullmatch(plain) for pattern in (_ISO, _GERMAN, _CLOCK))
 
 
 def parse_stamps(cells: Sequence[str], label: str, path: Path, before: int = 0) -> NDArray[Any]:
-    """Return the stamps as datetime64[ns], NaT for empty cells; a clock that passes midnight goes on.
-
-    Args:
-        cells: of one column.
-        label: name of the column, for messages.
-        path: of the file, for messages.
-        before: rows of the file before the first of these, for messages.
-
-    Returns:
-        Shape (n,).
-
-    Raises:
-        RecordError: a cell is no stamp; the message names its row.
-    """
+    """Return the stamps as datetime64[ns], NaT for empty cells; a clock that passes midnight goes on."""
     out = np.empty(len(cells), dtype=np.int64)
     first = next((cell for cell in cells if cell), "")
     pattern = next((p for p in (_ISO, _GERMAN, _CLOCK) if p.fullmatch(first)), _ISO)
@@ -75,14 +55,9 @@ def seconds_of(stamps: NDArray[Any], label: str, path: Path) -> NDArray[np.float
 
     Args:
         stamps: (n,) datetime64.
-        label: name of the column, for messages.
-        path: of the file, for messages.
 
     Returns:
         Shape (n,); NaN where there is no stamp.
-
-    Raises:
-        RecordError: there is none at all.
     """
     stamps = stamps.astype("datetime64[ns]")
     good = ~np.isnat(stamps)
@@ -93,14 +68,14 @@ def seconds_of(stamps: NDArray[Any], label: str, path: Path) -> NDArray[np.float
 
 
 def _nanoseconds(
-    found: re.Match[str],
+    match: re.Match[str],
     pattern: re.Pattern[str],
     days: dict[tuple[str, str, str], int],
     label: str,
     path: Path,
     row: int,
 ) -> int:
-    parts = found.groups()
+    parts = match.groups()
     date, clock, zone = 0, parts, None
     if pattern is not _CLOCK:
         key = (parts[0], parts[1], parts[2]) if pattern is _ISO else (parts[2], parts[1], parts[0])
@@ -109,7 +84,7 @@ def _nanoseconds(
                 day = np.datetime64(f"{key[0]}-{int(key[1]):02d}-{int(key[2]):02d}", "ns")
             except ValueError:
                 raise RecordError(
-                    f"{path}: row {row + 1}, column `{label}` must be a date, but is `{found[0][:40]}`"
+                    f"{path}: row {row + 1}, column `{label}` must be a date, but is `{match[0][:40]}`"
                 ) from None
             days[key] = int(day.astype(np.int64))
         date, clock = days[key], parts[3:7]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from orchestrator.errors import RecordError
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
-from orchestrator.records.names import find_named, listed, near, recognised_time
+from orchestrator.records.names import find_named, list_names, near, recognise_time
 from orchestrator.records.stamps import seconds_of
 from orchestrator.records.units import parse_unit
 from orchestrator.shared.units import KnownUnit
@@ -62,17 +62,8 @@ def read_columns(
     """Return the time and named columns of a file of any known format.
 
     Args:
-        path: the file.
-        time: the column of the time.
-        wanted: the columns.
         time_factor: seconds in the numbers of the time; 1.0: its unit says so.
         header: line of the names in a text, from 1; 0: there are none; None: found.
-
-    Returns:
-        The columns, all of one length.
-
-    Raises:
-        RecordError: the file cannot be read, lacks a column, or a unit of the time is not known.
     """
     with open_source(path, header) as source:
         places = [_place(source.heads, entry, path, time) for entry in (time, *wanted)]
@@ -98,36 +89,13 @@ def read_columns(
 
 
 def column_names(path: Path) -> list[str]:
-    """Return the names of the columns of a file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        The names, in the order of the file.
-
-    Raises:
-        RecordError: it cannot be read.
-    """
+    """Return the names of the columns of a file."""
     with open_source(path) as source:
         return [head.full or head.name for head in source.heads]
 
 
 def known_unit(text: str, wanted: Wanted, label: str, path: Path) -> KnownUnit:
-    """Return a stated unit.
-
-    Args:
-        text: as it is stated.
-        wanted: the column that is in it.
-        label: name of the column, for the message.
-        path: of the file, for the message.
-
-    Returns:
-        Dimension and conversion.
-
-    Raises:
-        RecordError: it is not known.
-    """
+    """Return a stated unit."""
     unit = parse_any_unit(text)
     if unit is None:
         raise RecordError(
@@ -141,13 +109,13 @@ def _place(heads: Sequence[Head], wanted: Wanted, path: Path, time: Wanted) -> i
     if len(places) == 1:
         return places[0]
     if not places and wanted is time and wanted.column == "time":
-        place = recognised_time(heads, str(path))
+        place = recognise_time(heads, str(path))
         if place is not None:
             return place
     count = f"{len(places)} of them: name it by number, such as `#{places[0] + 1}`" if places else "no such column"
     raise RecordError(
         f"{path}: {wanted.where} must name a column, but there is {count}: {wanted.column!r} of "
-        f"{listed(heads)}{near(wanted.column, heads)}"
+        f"{list_names(heads)}{near(wanted.column, heads)}"
     )
 
 

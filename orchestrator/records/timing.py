@@ -40,11 +40,7 @@ class Timing:
     rounded: float = 0.0
 
     def describe(self) -> str:
-        """Return the timing in words.
-
-        Returns:
-            One line, without a full stop.
-        """
+        """Return the timing in words."""
         words = f"{1.0 / self.step:.6g} Hz, no jitter"
         if self.largest_jitter > NO_JITTER * self.step:
             jitter, largest = 1e6 * self.jitter, 1e6 * self.largest_jitter
@@ -66,20 +62,7 @@ class Grid:
 
 
 def grid_of(time: Array, label: str, source: str, trust_rows: bool = False) -> Grid:
-    """Return the uniform grid of time stamps (n,) [s].
-
-    Args:
-        time: stamps in the order of the file.
-        label: name of the column, for messages.
-        source: file name, for messages.
-        trust_rows: whether the rows are uniform whatever their stamps say (``resample uniform``).
-
-    Returns:
-        The grid and the row of each stamp on it.
-
-    Raises:
-        RecordError: the stamps go back, step by what no record can, or are on no uniform grid.
-    """
+    """Return the uniform grid of time stamps (n,) [s]."""
     where = f"{source}: column `{label}`"
     _check_increasing(time, label, source)
     step = float(np.median(np.diff(time)))
@@ -196,14 +179,11 @@ def _check_grid(
     )
 
 
-def resampled_grid(time: Array) -> tuple[Array, float]:
+def resample_grid(time: Array) -> tuple[Array, float]:
     """Return the uniform grid (n,) [s] of the same mean rate that non-uniform stamps are resampled to, and its step.
 
     Args:
         time: (n,) stamps [s].
-
-    Returns:
-        The grid and its step [s], the mean one without gaps.
     """
     steps = np.diff(time)
     step = float(np.mean(steps[steps <= GAP * np.median(steps)]))
@@ -218,7 +198,6 @@ def interpolated(grid: Array, time: Array, values: Array, how: str) -> Array:
         grid: (m,) [s].
         time: (n,) stamps [s].
         values: (n,); NaN: missing.
-        how: "linear" or "cubic".
 
     Returns:
         Shape (m,); NaN within gaps.
@@ -247,7 +226,6 @@ def interpolation_cost(time: Array, values: Array, how: str) -> float:
     Args:
         time: (n,) stamps [s].
         values: (n,); NaN: missing.
-        how: "linear" or "cubic".
 
     Returns:
         The error, in the unit of ``values``; 0.0 for fewer than eight samples.

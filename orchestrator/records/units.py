@@ -54,11 +54,7 @@ def parse_unit(text: str, kinds: Sequence[str] = ()) -> RecordUnit | None:
     """Return what ``text`` means, or None where it is no known unit.
 
     Args:
-        text: as a file or a person writes it.
         kinds: keys of ``SI`` that are sought, for texts with two meanings (``nm``, ``1/min``).
-
-    Returns:
-        Kind and factor.
     """
     unit = units.parse_unit(text, frozenset(_DIMENSIONS[kind] for kind in kinds))
     if unit is None:

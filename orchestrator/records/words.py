@@ -27,14 +27,7 @@ DESCRIBING = ANGLE | MOTOR | LOAD | TORQUE | CURRENT | ASKED | FOUND | SPEED | O
 
 
 def words_of(text: str) -> list[str]:
-    """Return the words of a channel's name, in lower case.
-
-    Args:
-        text: the name.
-
-    Returns:
-        Words without digits and signs; ``thetam`` is two.
-    """
+    """Return the words of a channel's name, in lower case."""
     plain = text.translate(_GREEK)
     plain = re.sub(r"([a-zäöü])([A-Z])", r"\1 \2", plain)
     words = [word for word in re.split(r"[^A-Za-zäöüÄÖÜß]+", plain.lower()) if word]
@@ -46,12 +39,5 @@ def words_of(text: str) -> list[str]:
 
 
 def describes(text: str) -> bool:
-    """Return whether a text only says more of what a channel is, as ``(motor)``, ``(7)`` and ``(act)`` do.
-
-    Args:
-        text: part of a name.
-
-    Returns:
-        True when each of its words does.
-    """
+    """Return whether a text only says more of what a channel is, as ``(motor)``, ``(7)`` and ``(act)`` do."""
     return all(word in DESCRIBING for word in words_of(text)) and not re.search("[%°‰µΩ]|[A-Za-z][.]", text)

@@ -7,7 +7,6 @@ from orchestrator.errors import OutputError, ScenarioError
 from orchestrator.reporting.model import Report
 from orchestrator.reporting.page import render
 from orchestrator.reporting.pages import (
-    bench,
     calibrate,
     check,
     diagnose,
@@ -19,6 +18,7 @@ from orchestrator.reporting.pages import (
     thesis,
 )
 from orchestrator.reporting.source import ResultDocument, load
+from orchestrator.shared.source_tree import import_masters
 
 PAGE = "report.html"
 COMMANDS = (
@@ -34,8 +34,20 @@ COMMANDS = (
     "ssp",
     "bench",
 )
+
+
+def _bench_page(source: ResultDocument) -> Report:
+    """Return the benchmark's own page in a clone, the generic one where the package alone is installed."""
+    try:
+        page = import_masters("page")
+    except ScenarioError:
+        page = generic
+    report: Report = page.build(source)
+    return report
+
+
 _BUILDERS: dict[str, Callable[[ResultDocument], Report]] = {
-    "bench": bench.build,
+    "bench": _bench_page,
     "calibrate": calibrate.build,
     "check": check.build,
     "diagnose": diagnose.build,
@@ -49,18 +61,7 @@ _BUILDERS: dict[str, Callable[[ResultDocument], Report]] = {
 
 
 def report_from_directory(directory: Path, command: str | None = None) -> Report:
-    """Return the report of a result directory, from its ``COMMAND.json`` and the CSV files beside it.
-
-    Args:
-        directory: where a command left its results.
-        command: which command's results; needed only where there are several.
-
-    Returns:
-        The report.
-
-    Raises:
-        ScenarioError: there are no results, or several and ``command`` is not given, or they are damaged.
-    """
+    """Return the report of a result directory, from its ``COMMAND.json`` and the CSV files beside it."""
     if not directory.is_dir():
         raise ScenarioError(f"`directory` must be an existing folder, but {directory} is not", "directory")
     if command is not None and command not in COMMANDS:
@@ -78,19 +79,7 @@ def report_from_directory(directory: Path, command: str | None = None) -> Report
 
 
 def write_report(directory: Path, command: str | None = None) -> Path:
-    """Write ``report.html`` into a result directory, whole or not at all, and return its path.
-
-    Args:
-        directory: where a command left its results.
-        command: which command's results; needed only where there are several.
-
-    Returns:
-        The page's path.
-
-    Raises:
-        ScenarioError: as ``report_from_directory``.
-        OutputError: the directory cannot be written.
-    """
+    """Write ``report.html`` into a result directory, whole or not at all, and return its path."""
     page = render(report_from_directory(directory, command))
     path = directory / PAGE
     partial = directory / f".{PAGE}.partial"

@@ -14,26 +14,19 @@ from orchestrator.reporting.model import Live
 
 
 def live_data(live: Live) -> Markup:
-    """Write a live section as JSON.
-
-    Args:
-        live: the section.
-
-    Returns:
-        Text that is safe inside a script element.
-    """
+    """Write a live section as JSON. Return text that is safe inside a script element."""
     regulator = live.regulator
     return in_script(
         {
             "module": base64.b64encode(gzip.compress(live.module, mtime=0)).decode(),
-            "plan": _packed(live.plan),
+            "plan": _pack(live.plan),
             "step": live.step,
             "records": live.records,
             "runs": [
-                {"start": run.start, "steps": run.steps, "changes": run.changes, "table": _packed(run.table)}
+                {"start": run.start, "steps": run.steps, "changes": run.changes, "table": _pack(run.table)}
                 for run in live.runs
             ],
-            "recorded": [_packed(row) for row in live.recorded],
+            "recorded": [_pack(row) for row in live.recorded],
             "controls": [asdict(control) for control in live.controls],
             "plots": [[{"name": curve.name, "terms": curve.terms} for curve in plot.curves] for plot in live.plots],
             "regulator": None if regulator is None else asdict(regulator),
@@ -42,17 +35,10 @@ def live_data(live: Live) -> Markup:
 
 
 def in_script(data: Any) -> Markup:
-    """Write data as JSON.
-
-    Args:
-        data: anything that JSON knows.
-
-    Returns:
-        Text that is safe inside a script element.
-    """
+    """Write data as JSON. Return text that is safe inside a script element."""
     text = json.dumps(data, allow_nan=False, ensure_ascii=True, separators=(",", ":"))
     return Markup(text.replace("<", "\\u003c").replace("&", "\\u0026"))
 
 
-def _packed(values: Sequence[float]) -> str:
+def _pack(values: Sequence[float]) -> str:
     return base64.b64encode(np.asarray(values, dtype="<f8").tobytes()).decode()

@@ -60,7 +60,6 @@ class Series:
 
     Attributes:
         name: as in the legend.
-        x, y: same length.
         kind: "line", "steps" (each value held to the next x), "points", or "bars" from zero.
         low, high: ends of an interval around each y; both or neither.
         labels: words for each point, shown when the reader hovers over it.
@@ -157,10 +156,7 @@ class Control:
     """A slider of a live section.
 
     Attributes:
-        label: what it moves.
-        unit: of its value.
         value: where it begins: the value of the results.
-        low, high: its ends.
         places: in the plan, where its value goes; none for a weight.
         when_zero: places in the plan and what goes there while the value is zero.
         log: whether it moves by factors.
@@ -240,8 +236,6 @@ class Live:
         records: how many outputs the plan records.
         runs: one after the other.
         recorded: rows to compare with, each as long as all runs together.
-        controls: the sliders.
-        plots: what is drawn.
         regulator: None where no gains depend on the sliders.
     """
 

@@ -9,15 +9,7 @@ MISSING = "–"
 
 
 def in_words(value: Cell, digits: int = 6) -> str:
-    """Return a cell's text: numbers to ``digits`` significant digits, a dash for what is missing.
-
-    Args:
-        value: of a cell.
-        digits: significant digits of a number.
-
-    Returns:
-        The text.
-    """
+    """Return a cell's text: numbers to ``digits`` significant digits, a dash for what is missing."""
     if value is None:
         return MISSING
     if isinstance(value, bool):
@@ -44,13 +36,6 @@ def thinned(series: Series, limit: int) -> Series:
     """Return a series of at most about ``limit`` points that looks the same.
 
     A curve keeps the smallest and the largest y of each of ``limit / 2`` runs of points, a cloud every n-th point.
-
-    Args:
-        series: points of a plot.
-        limit: number of points to be left.
-
-    Returns:
-        The series; the same one when it is short enough.
     """
     count = len(series.x)
     if count <= limit:

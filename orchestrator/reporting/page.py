@@ -48,17 +48,7 @@ _KINDS = {
 
 
 def render(report: Report) -> str:
-    """Return the page. It depends on the report and the files named in ``downloads`` only, never on the date.
-
-    Args:
-        report: what the page shows.
-
-    Returns:
-        The page as HTML, with nothing outside it.
-
-    Raises:
-        OSError: a file of ``downloads``, or a picture, cannot be read.
-    """
+    """Return the page. It depends on the report and the files named in ``downloads`` only, never on the date."""
     live = any(isinstance(section, Live) for section in report.sections)
     inside: Set[Path] = {path for path in report.downloads if path.stat().st_size <= EMBED_LIMIT}
     if live:
@@ -85,7 +75,7 @@ def _that_fit(files: Set[Path], room: int) -> Set[Path]:
     """Return the smallest files that together fit into ``room`` bytes of text."""
     chosen: set[Path] = set()
     for path in sorted(files, key=lambda path: (path.stat().st_size, path.name)):
-        room -= len(_embedded(path))
+        room -= len(_embed(path))
         if room < 0:
             break
         chosen.add(path)
@@ -108,7 +98,7 @@ def _environment() -> jinja2.Environment:
         "live_plot": _live_plot,
         "sort_key": _sort_key,
         "cell_class": _cell_class,
-        "embedded": _embedded,
+        "embedded": _embed,
     }
     environment.globals["kind"] = _kind
     return environment
@@ -160,15 +150,15 @@ def _live_plot(plot: LivePlot) -> Markup:
 
 def _series_data(series: Series) -> dict[str, object]:
     data: dict[str, object] = {"name": series.name, "kind": series.kind}
-    data |= {"x": _rounded(series.x), "y": _rounded(series.y)}
+    data |= {"x": _round(series.x), "y": _round(series.y)}
     if series.low is not None and series.high is not None:
-        data |= {"low": _rounded(series.low), "high": _rounded(series.high)}
+        data |= {"low": _round(series.low), "high": _round(series.high)}
     if series.labels is not None:
         data["labels"] = list(series.labels)
     return data
 
 
-def _rounded(values: Numbers) -> list[float | None]:
+def _round(values: Numbers) -> list[float | None]:
     """Return numbers to ten significant digits: half the size of the page, and more than any zoom shows."""
     return [None if value is None else float(f"{value:.10g}") for value in values]
 
@@ -178,10 +168,10 @@ def _download(path: Path, inside: bool) -> dict[str, str]:
     size = f"{length / 1000:.1f} kB" if length < 1_000_000 else f"{length / 1e6:.1f} MB"
     if not inside:
         return {"name": path.name, "size": f"{size}, beside this page", "href": path.name}
-    return {"name": path.name, "size": size, "href": _embedded(path)}
+    return {"name": path.name, "size": size, "href": _embed(path)}
 
 
-def _embedded(path: Path) -> str:
+def _embed(path: Path) -> str:
     """Return a file as an address that holds all of it."""
     kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
     return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"

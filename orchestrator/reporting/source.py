@@ -50,15 +50,6 @@ class ResultDocument:
         """Yield the heading and then the rows of a CSV file of the directory; nothing when there is no such file.
 
         Numbers become floats, what is empty or not finite becomes ``None``.
-
-        Args:
-            name: of the CSV file.
-
-        Yields:
-            A list of cells, the heading first.
-
-        Raises:
-            ScenarioError: the file is not CSV with a heading and equally long rows.
         """
         path = self.directory / name
         if not path.is_file():
@@ -76,27 +67,13 @@ class ResultDocument:
             raise ScenarioError(f"{path} must be a CSV table, but is not: {error}") from None
 
     def columns(self, name: str) -> dict[str, list[Cell]]:
-        """Return a whole CSV file by column, empty when there is no such file; see ``rows``.
-
-        Args:
-            name: of the CSV file.
-
-        Returns:
-            The cells of each column by its heading.
-        """
+        """Return a whole CSV file by column, empty when there is no such file; see ``rows``."""
         rows = self.rows(name)
         header = next(rows, [])
         return by_column(header, rows)
 
     def origin(self, *made: tuple[str, Cell]) -> tuple[tuple[str, Cell], ...]:
-        """Return what was run and with what.
-
-        Args:
-            made: name and value of further facts; those without a value are left out.
-
-        Returns:
-            Name and value of each fact.
-        """
+        """Return what was run and with what."""
         arguments = self.document.get("arguments") or {}
         given = {n: plain(v) for n, v in arguments.items() if n != "out" and v not in (None, False, [], {})}
         head = {"command": self.command, "version": self.document.get("version"), "seed": self.document.get("seed")}
@@ -104,11 +81,7 @@ class ResultDocument:
         return (*known, *((name, value) for name, value in made if value not in (None, "")))
 
     def downloads(self) -> tuple[Path, ...]:
-        """Return the data files of the directory, by name.
-
-        Returns:
-            Their paths.
-        """
+        """Return the data files of the directory, by name."""
         return tuple(
             path
             for path in sorted(self.directory.iterdir())
@@ -117,18 +90,7 @@ class ResultDocument:
 
 
 def load(directory: Path, command: str) -> ResultDocument:
-    """Read ``COMMAND.json`` of a result directory.
-
-    Args:
-        directory: where the command left its results.
-        command: its name.
-
-    Returns:
-        The results.
-
-    Raises:
-        ScenarioError: it is not there, or not what a command of this project writes.
-    """
+    """Read ``COMMAND.json`` of a result directory."""
     path = directory / f"{command}.json"
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
@@ -142,15 +104,7 @@ def load(directory: Path, command: str) -> ResultDocument:
 
 
 def by_column(header: Sequence[Cell], rows: Iterable[Sequence[Cell]]) -> dict[str, list[Cell]]:
-    """Return rows as columns by name.
-
-    Args:
-        header: names of the columns.
-        rows: each as long as the header.
-
-    Returns:
-        The cells of each column by name.
-    """
+    """Return rows as columns by name."""
     columns: list[list[Cell]] = [[] for _ in header]
     for row in rows:
         for column, value in zip(columns, row, strict=True):
@@ -167,14 +121,7 @@ def _cell(text: str) -> Cell:
 
 
 def plain(value: Any) -> Cell:
-    """Return any JSON value as one cell.
-
-    Args:
-        value: of a JSON document.
-
-    Returns:
-        A number, a text or None.
-    """
+    """Return any JSON value as one cell."""
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, Mapping):
@@ -187,14 +134,7 @@ def _short(value: Cell) -> str:
 
 
 def words(name: str) -> str:
-    """Return an identifier as words; a symbol with an index, such as ``J_m``, and a path stay as they are.
-
-    Args:
-        name: as in the JSON document.
-
-    Returns:
-        The words.
-    """
+    """Return an identifier as words; a symbol with an index, such as ``J_m``, and a path stay as they are."""
     parts = name.split("_")
     return name if "." in name or any(len(part) < 2 for part in parts) else " ".join(parts)
 
@@ -204,31 +144,14 @@ def _with_unit(name: str) -> str:
 
 
 def numbers(values: Sequence[Any]) -> list[float | None]:
-    """Return a column's numbers, ``None`` for everything else.
-
-    Args:
-        values: cells of a column.
-
-    Returns:
-        As many entries as ``values``.
-    """
+    """Return a column's numbers, ``None`` for everything else."""
     return [float(v) if isinstance(v, (int, float)) and not isinstance(v, bool) else None for v in values]
 
 
 def table_of(
     title: str, items: Sequence[Any], *, units: Mapping[str, str] | None = None, note: str = ""
 ) -> ReportTable:
-    """Return a table of equally shaped structs or JSON objects, one column per name in order of first appearance.
-
-    Args:
-        title: of the table.
-        items: the rows.
-        units: unit by key.
-        note: a sentence under the table.
-
-    Returns:
-        The table.
-    """
+    """Return a table of equally shaped structs or JSON objects, one column per name in order of first appearance."""
     rows: list[Mapping[str, Any]] = [as_plain(item) for item in items]
     names = list(dict.fromkeys(name for row in rows for name in row))
     columns = tuple(TableColumn(words(name), (units or {}).get(name, "")) for name in names)

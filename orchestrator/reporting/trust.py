@@ -14,30 +14,14 @@ MEANINGS = {
 
 
 def trust_badge(trust: TrustFound | None, label: str, default: Badge = "neutral") -> tuple[Badge, str]:
-    """Return the badge of a result: its label in the colour of its trust, with the level's word.
-
-    Args:
-        trust: what the result file says, with ``level`` and ``reasons``; None in files of older versions.
-        label: the answer in a few words.
-        default: the colour where the file states no trust.
-
-    Returns:
-        Colour and text.
-    """
+    """Return the badge of a result: its label in the colour of its trust, with the level's word."""
     if trust is None or trust.level not in BADGES:
         return default, label
     return BADGES[trust.level], f"{trust.level}: {label}"
 
 
 def trust_section(trust: TrustFound | None) -> list[Section]:
-    """Return the section that says why a result is not green; empty where it is.
-
-    Args:
-        trust: what the result file says, with ``level`` and ``reasons``; None in files of older versions.
-
-    Returns:
-        One section or none.
-    """
+    """Return the section that says why a result is not green; empty where it is."""
     if trust is None or not trust.reasons:
         return []
     lines = tuple(text if text.endswith(".") else f"{text}." for text in trust.reasons)

@@ -15,10 +15,6 @@ class Derived:
     """A signal that follows from a recorded one: ``factor * source + offset``.
 
     Attributes:
-        name: of the signal.
-        source: ``instance.variable``, recorded.
-        factor: see above.
-        offset: see above.
         unit: of the signal; None where none is stated.
     """
 
@@ -39,7 +35,7 @@ class Scenario:
         algorithm: master algorithm with its settings.
         stop: end [s].
         start: beginning [s].
-        name: for titles.
+        name: shown in titles of tables and figures.
         origin: the file that describes it, for messages.
         derived: signals that are recorded beside those of ``record``.
     """
@@ -57,7 +53,7 @@ class Scenario:
         """Return a recording with the derived signals.
 
         Args:
-            recording: of this scenario.
+            recording: of a run of this scenario, with all its recorded signals.
 
         Returns:
             The recording, those of ``derived`` behind the others.
@@ -73,10 +69,10 @@ class Scenario:
         """Return a session that runs this scenario as often as needed; to be closed.
 
         Returns:
-            The session.
+            A session whose slaves are instantiated; to be closed by the caller.
 
         Raises:
             ScenarioError: see ``Session``.
-            ConnectionMismatchError: likewise.
+            ConnectionMismatchError: outputs and inputs that are connected do not fit.
         """
         return Session(self.system, self.record, self.algorithm, self.stop, self.start)

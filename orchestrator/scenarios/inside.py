@@ -20,21 +20,15 @@ class UnpackedRun:
     start: float
 
 
-def opened(job: UnpackedRun) -> Callable[[Any], list[Any]]:
-    """Return a handler that runs the job once for each mapping of start values.
-
-    Args:
-        job: what the parent sent.
-
-    Returns:
-        Called with start values by ``instance.variable``, it gives the recorded values and the statistics.
-    """
+def open_runs(job: UnpackedRun) -> Callable[[Any], list[Any]]:
+    """Return a handler that runs the job once for each mapping of start values."""
     session = Session(job.system, job.record, job.algorithm, job.stop, job.start)
 
     def run(start: Any) -> list[Any]:
         result = session.run(start, allow_early_end=True)
         s = result.statistics
         remarks = [[remark.instance, remark.text, remark.count] for remark in result.remarks]
-        return [result.values, s.steps, s.rejected, dict(s.do_steps), s.sweeps, s.loop, remarks]
+        events = [list(s.events.times), s.events.instants, s.events.ticks, list(s.events.late)]
+        return [result.values, s.steps, s.rejected, dict(s.do_steps), s.sweeps, s.loop, remarks, events]
 
     return run

@@ -16,10 +16,10 @@ from orchestrator.errors import ChildError, FmuError, OrchestratorError, Simulat
 from orchestrator.fmi.extraction import content_hash
 from orchestrator.fmi.instances import FmuFactory
 from orchestrator.fmi.ours import is_ours
-from orchestrator.fmi.remote import RemoteFactory
+from orchestrator.fmi.remote import RemoteFactory, without_feed
 from orchestrator.master.algorithms import step_count
 from orchestrator.master.compiled import prepare
-from orchestrator.master.result import LOOPS, Recording, Statistics, claimed_remarks
+from orchestrator.master.result import LOOPS, Recording, Statistics, claimed_events, claimed_remarks
 from orchestrator.master.system import System
 from orchestrator.scenarios.definition import Scenario
 from orchestrator.scenarios.inside import UnpackedRun
@@ -55,28 +55,13 @@ class Safety:
 
 
 def foreign_fmus(system: System) -> list[Path]:
-    """Return the FMUs of a system that are not ours, each once.
-
-    Args:
-        system: whose FMUs are in question.
-
-    Returns:
-        Their paths.
-    """
+    """Return the FMUs of a system that are not ours, each once."""
     paths = [i.create.path for i in system.instances if isinstance(i.create, FmuFactory)]
     return [path for path in dict.fromkeys(paths) if not is_ours(path)]
 
 
-def described(system: System, safety: Safety) -> WallsFound:
-    """Return what a result file says of the walls around a run of ``system``.
-
-    Args:
-        system: whose FMUs are in question.
-        safety: how far its FMUs are trusted, and the limits.
-
-    Returns:
-        The walls.
-    """
+def describe_walls(system: System, safety: Safety) -> WallsFound:
+    """Return what a result file says of the walls around a run of ``system``."""
     foreign = foreign_fmus(system)
     walls, behind = support(), bool(foreign) and not safety.trust
     return WallsFound(
@@ -89,22 +74,10 @@ def described(system: System, safety: Safety) -> WallsFound:
 
 
 def run_safely(scenario: Scenario, safety: Safety) -> Recording:
-    """Run a scenario once, in a child process when an FMU is not ours or the time is limited.
-
-    Args:
-        scenario: what to run.
-        safety: how far its FMUs are trusted, and the limits.
-
-    Returns:
-        The recorded signals.
-
-    Raises:
-        SimulationError: the run went wrong, or the child ended or broke a limit.
-        InputError: the scenario or an FMU is wrong.
-    """
+    """Run a scenario once, in a child process when an FMU is not ours or the time is limited."""
     foreign = [] if safety.trust else foreign_fmus(scenario.system)
     movable = all(isinstance(i.create, FmuFactory) for i in scenario.system.instances)
-    if movable and _one_a_process(scenario.system):
+    if movable and _needs_processes(scenario.system):
         result = _in_processes(scenario, safety, foreign)
     elif movable and (foreign or safety.time is not None):
         result = _in_child(scenario, safety, foreign)
@@ -117,11 +90,7 @@ def run_safely(scenario: Scenario, safety: Safety) -> Recording:
 
 
 def _require_finite(result: Recording) -> None:
-    """Refuse a result with NaN or infinities.
-
-    Raises:
-        SimulationError: names the first one in time.
-    """
+    """Refuse a result with NaN or infinities."""
     bad = ~np.isfinite(result.values)
     if not bad.any():
         return
@@ -132,19 +101,8 @@ def _require_finite(result: Recording) -> None:
 
 
 @contextmanager
-def unpacked(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]:
-    """Yield ``system`` with its FMUs unpacked for a child: the system, the folder, and the FMU of each subfolder.
-
-    Args:
-        system: whose FMUs are in question.
-
-    Yields:
-        The three; they are gone when the block ends.
-
-    Raises:
-        FmuError: one cannot be unpacked.
-        OutputError: there is no room for them.
-    """
+def unpack_system(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]:
+    """Yield ``system`` with its FMUs unpacked for a child: the system, the folder, and the FMU of each subfolder."""
     with Scratch("fmus") as scratch:
         origins: dict[str, str] = {}
         instances = []
@@ -162,7 +120,7 @@ def unpacked(system: System) -> Iterator[tuple[System, Scratch, dict[str, str]]]
         yield replace(system, instances=tuple(instances)), scratch, origins
 
 
-def _one_a_process(system: System) -> bool:
+def _needs_processes(system: System) -> bool:
     """Whether an FMU that may be instantiated once per process has several instances."""
     once = [f.path for f in (i.create for i in system.instances) if isinstance(f, FmuFactory) and f.description.once]
     contents = [content_hash(path) for path in once]
@@ -173,14 +131,15 @@ def _in_processes(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Re
     """Run a scenario with a process for each of its instances."""
     time = DEFAULT_TIME_LIMIT if safety.time is None else safety.time
     limits = Limits(time, safety.memory, _LARGEST_FILE, time, _MOST_FILES)
-    with unpacked(scenario.system) as (system, _, origins):
+    with unpack_system(scenario.system) as (system, _, origins):
         instances = []
         for instance in system.instances:
             factory = instance.create
             assert isinstance(factory, FmuFactory)
             walls = Path(origins[str(factory.path)]) in foreign
-            made = RemoteFactory(factory.path, factory.description, limits, walls)
-            instances.append(replace(instance, create=made))
+            description = without_feed(factory.description)
+            made = RemoteFactory(factory.path, description, limits, walls)
+            instances.append(replace(instance, model=description.model, create=made))
         try:
             with replace(scenario, system=replace(system, instances=tuple(instances))).session() as session:
                 return session.run(allow_early_end=True)
@@ -197,18 +156,18 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
     steps = step_count(scenario.start, scenario.stop, scenario.algorithm.step)
     shape = (len(scenario.record), steps + 1)
     limits = replace(limits, memory=limits.memory + 24 * shape[0] * shape[1])
-    with unpacked(scenario.system) as (system, scratch, origins):
+    with unpack_system(scenario.system) as (system, scratch, origins):
         job = UnpackedRun(system, scenario.record, scenario.algorithm, scenario.stop, scenario.start)
         names = ", ".join(map(str, foreign)) or "the scenario"
         prepare()
         try:
             with Jail(
-                "orchestrator.scenarios.inside:opened", job, read=[scratch.path], limits=limits, walls=bool(foreign)
+                "orchestrator.scenarios.inside:open_runs", job, read=[scratch.path], limits=limits, walls=bool(foreign)
             ) as jail:
                 jail.start(time)
                 answer = jail.call({}, most=8 * shape[0] * shape[1] + _SLACK)
         except ChildError as error:
-            raise SimulationError(f"{names}: {_worded(error, time)}", "time_limit") from None
+            raise SimulationError(f"{names}: {_word_error(error, time)}", "time_limit") from None
         except OrchestratorError as error:
             text = str(error)
             for folder, origin in origins.items():
@@ -217,7 +176,7 @@ def _in_child(scenario: Scenario, safety: Safety, foreign: list[Path]) -> Record
     return _result(answer, scenario, shape, names)
 
 
-def _worded(error: ChildError, time: float) -> str:
+def _word_error(error: ChildError, time: float) -> str:
     if error.reason == "time":
         return f"the run must take at most {time:g} s (`time_limit`), but takes longer"
     said = f" (it printed: {error.said})" if error.said else ""
@@ -235,13 +194,14 @@ def _result(answer: Any, scenario: Scenario, shape: tuple[int, int], names: str)
             int() as sweeps,
             str() as loop,
             list() as remarks,
+            list() as events,
         ] if _fits(values, shape) and loop in LOOPS:
             counts = {i.name: c for i in scenario.system.instances if isinstance(c := calls.get(i.name), int)}
         case _:
             raise SimulationError(f"{names}: the run must return {shape[0]} signals of {shape[1]} values, but does not")
     times = scenario.start + scenario.algorithm.step * np.arange(values.shape[1], dtype=np.float64)
     units = {name: getattr(scenario.system.unit(name), "name", None) for name in scenario.record}
-    statistics = Statistics(steps, rejected, counts, sweeps, loop)
+    statistics = Statistics(steps, rejected, counts, sweeps, loop, claimed_events(events))
     return Recording(times, values, scenario.record, units, statistics, claimed_remarks(remarks))
 
 

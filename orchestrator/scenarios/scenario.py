@@ -32,19 +32,7 @@ MAXIMUM_BYTES = 16 * 2**20
 
 
 def simulate(scenario: Scenario, safety: Safety | None = None) -> Recording:
-    """Run a scenario once; FMUs that are not ours run in a child process.
-
-    Args:
-        scenario: what to run.
-        safety: how far its FMUs are trusted (default: not at all).
-
-    Returns:
-        The recorded signals.
-
-    Raises:
-        InputError: the scenario or an FMU is wrong.
-        SimulationError: the run went wrong, or its result is not finite.
-    """
+    """Run a scenario once; FMUs that are not ours run in a child process."""
     try:
         return scenario.with_derived(run_safely(scenario, safety or Safety()))
     except FmuError as error:  # of what only comes out when an FMU is unpacked or loaded
@@ -129,6 +117,7 @@ class _Master(_Strict, frozen=True, kw_only=True):
     step: float
     algorithm: str = "gauss_seidel"
     order: list[str] = []
+    events: bool = True
     compiled: bool | None = None
     tolerance: float | None = None
     iterations: int | None = None
@@ -157,22 +146,10 @@ _SETTINGS: dict[type[Algorithm], tuple[str, ...]] = {
 
 
 def load_scenario(path: Path) -> Scenario:
-    """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be.
-
-    Args:
-        path: a TOML file.
-
-    Returns:
-        The scenario, without problems.
-
-    Raises:
-        ScenarioError: the file cannot be read or is wrong; the text names the file and every problem with its path.
-        ConnectionMismatchError: there is nothing wrong but connections.
-        FmuError: an FMU is missing or not usable.
-    """
+    """Read a scenario file. FMUs are paths relative to the file, or names of our own, which are built when need be."""
     content = _content(path)
     problems: list[Problem] = []
-    top = _converted(content, _Top, "$", problems)
+    top = _convert(content, _Top, "$", problems)
     if top is None:
         raise_problems(problems, str(path))
         raise AssertionError("a failed conversion leaves a problem")
@@ -207,7 +184,7 @@ def _content(path: Path) -> dict[str, Any]:
         raise ScenarioError(f"{path}: must be TOML, but is not: {text}") from None
 
 
-def _converted(value: Any, kind: Any, path: str, problems: list[Problem]) -> Any:
+def _convert(value: Any, kind: Any, path: str, problems: list[Problem]) -> Any:
     try:
         return msgspec.convert(value, kind)
     except (msgspec.ValidationError, RecursionError) as error:
@@ -221,11 +198,13 @@ class _Reader:
 
     def __init__(self, path: Path, problems: list[Problem]) -> None:
         self.path, self.problems = path, problems
+        self._events = True  # event mode is used where an FMU has it
 
     def master(self, top: _Top) -> tuple[Algorithm | None, tuple[str, ...]]:
-        master: _Master | None = _converted(top.master, _Master, "$.master", self.problems)
+        master: _Master | None = _convert(top.master, _Master, "$.master", self.problems)
         if master is None:
             return None, ()
+        self._events = master.events
         kind = ALGORITHMS.get(master.algorithm)
         if kind is None:
             text = f"must be one of {', '.join(ALGORITHMS)}, but is {master.algorithm!r}"
@@ -249,7 +228,7 @@ class _Reader:
         found = []
         for name, table in tables.items():
             path = f"$.instances.{name}"
-            instance: _Instance | None = _converted(table, _Instance, path, self.problems)
+            instance: _Instance | None = _convert(table, _Instance, path, self.problems)
             if instance is None:
                 continue
             start = {}
@@ -257,16 +236,17 @@ class _Reader:
                 parameter = self._parameter(value, f"{path}.parameters.{key}")
                 if parameter is not None:
                     start[key] = parameter
-            self._bounded(instance, "solver_tolerance", path, lambda x: 0.0 < x < 1.0, "above 0 and below 1")
+            self._check_bound(instance, "solver_tolerance", path, lambda x: 0.0 < x < 1.0, "above 0 and below 1")
             try:
-                found.append(fmu_instance(name, self._fmu(instance.fmu), start, instance.solver_tolerance))
+                fmu = self._fmu(instance.fmu)
+                found.append(fmu_instance(name, fmu, start, instance.solver_tolerance, self._events))
             except FmuError as error:
                 raise FmuError(one_line(f"{self.path}: {path}.fmu: {error}")) from None
         return tuple(found)
 
     def _parameter(self, value: Any, path: str) -> Value | Quantity | None:
         if isinstance(value, dict):
-            quantity: _Quantity | None = _converted(value, _Quantity, path, self.problems)
+            quantity: _Quantity | None = _convert(value, _Quantity, path, self.problems)
             return None if quantity is None else Quantity(quantity.value, quantity.unit)
         if isinstance(value, (bool, int, float, str)):
             return value
@@ -287,7 +267,7 @@ class _Reader:
     def connections(self, tables: list[Any]) -> tuple[Connection, ...]:
         found = []
         for k, table in enumerate(tables):
-            c: _Connection | None = _converted(table, _Connection, f"$.connections[{k}]", self.problems)
+            c: _Connection | None = _convert(table, _Connection, f"$.connections[{k}]", self.problems)
             if c is not None:
                 found.append(Connection(c.source, c.target, c.factor, c.offset, c.quantum, c.unit))
         return tuple(found)
@@ -299,16 +279,16 @@ class _Reader:
         system = System(instances)
         for k, table in enumerate(tables):
             path = f"$.sources[{k}]"
-            source = _converted(table, _AnySource, path, self.problems)
+            source = _convert(table, _AnySource, path, self.problems)
             if source is None:
                 continue
             variable = system.variable(source.target)
             before = len(self.problems)
             for name in ("value", "after", "time", "before", "amplitude", "frequency", "phase", "offset", "delay"):
-                self._bounded(source, name, path, math.isfinite, "finite")
-            self._bounded(source, "deviation", path, lambda x: 0.0 <= x < math.inf, "finite and not negative")
-            self._bounded(source, "seed", path, lambda x: x >= 0, "not negative")
-            self._bounded(source, "period", path, lambda x: 0.0 < x < math.inf, "finite and positive")
+                self._check_bound(source, name, path, math.isfinite, "finite")
+            self._check_bound(source, "deviation", path, lambda x: 0.0 <= x < math.inf, "finite and not negative")
+            self._check_bound(source, "seed", path, lambda x: x >= 0, "not negative")
+            self._check_bound(source, "period", path, lambda x: 0.0 < x < math.inf, "finite and positive")
             if len(self.problems) == before:
                 unit: str | None = source.unit
                 if isinstance(source, _Table):
@@ -319,7 +299,7 @@ class _Reader:
                     found.append(SignalSource(source.target, signal, unit, source.at))
         return tuple(found)
 
-    def _bounded(self, source: Any, name: str, path: str, holds: Callable[[float], bool], expected: str) -> None:
+    def _check_bound(self, source: Any, name: str, path: str, holds: Callable[[float], bool], expected: str) -> None:
         value = getattr(source, name, None)
         if isinstance(value, (int, float)) and not holds(value):
             self.problems.append(Problem(f"{path}.{name}", f"must be {expected}, but is {value!r}"))

@@ -28,16 +28,7 @@ CHECKED_CASES = 10_000
 
 
 def check_parameters(system: System, cases: DesignCases, ignored: frozenset[str] = frozenset()) -> None:
-    """Refuse names and values that the system's FMUs do not take.
-
-    Args:
-        system: whose parameters are varied.
-        cases: what a sweep visits.
-        ignored: names that are not parameters of an FMU.
-
-    Raises:
-        ScenarioError: names every parameter that is wrong, once.
-    """
+    """Refuse names and values that the system's FMUs do not take."""
     problems: dict[str, Problem] = {}
     if set(cases.names) <= ignored:
         return
@@ -51,19 +42,7 @@ def check_parameters(system: System, cases: DesignCases, ignored: frozenset[str]
 
 
 def scenario_work(scenario: Scenario, cases: DesignCases, trust: bool = False) -> Work:
-    """Return what a worker process does for each case of a sweep over ``scenario``.
-
-    Args:
-        scenario: what is run.
-        cases: what is varied.
-        trust: FMUs that are not ours run with all rights of the user.
-
-    Returns:
-        Columns, files and functions.
-
-    Raises:
-        ScenarioError: a varied parameter does not exist or cannot have a value, or nothing is recorded.
-    """
+    """Return what a worker process does for each case of a sweep over ``scenario``."""
     if not scenario.record:
         raise ScenarioError("`record` must name at least one signal, but is empty")
     check_parameters(scenario.system, cases)

@@ -17,17 +17,7 @@ def read_table(
     Two rows at one time are a jump: the value of the last one holds from that time on.
 
     Args:
-        path: the file.
-        column: name of the values' column.
-        time: name of the times' column.
-        hold: whether values are held rather than joined by lines.
         header: line of the names in a text, from 1; None: found.
-
-    Returns:
-        The signal, and the unit; empty where none is stated.
-
-    Raises:
-        ScenarioError: the file cannot be read, lacks a column, holds what is no number, or its times go back.
     """
     asked = Wanted(time, "`time`", "write the times in seconds"), Wanted(column, "`column`", 'say `unit = "..."`')
     try:

@@ -16,12 +16,6 @@ def cache_directory(name: str) -> Path:
     """Return the folder ``name`` in the user's cache (``$XDG_CACHE_HOME`` or ``~/.cache``), made if needed.
 
     Where the cache cannot be written, or is full, a temporary folder takes its place until the process ends.
-
-    Args:
-        name: of the folder.
-
-    Returns:
-        Its path.
     """
     try:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"

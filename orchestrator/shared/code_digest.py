@@ -19,13 +19,10 @@ _FIXED = ("math", "numpy")  # modules that change with their version only
 def digest_of(function: FunctionType | Dispatcher) -> str | None:
     """Return a digest of a function and of everything that it calls or reads.
 
-    Args:
-        function: that numba is to compile, or is set to with its options; it may call functions compiled by numba.
-
     Returns:
         64 hexadecimal digits, or None where it reaches something whose content is not known to stay.
 
-    Example:
+    Examples:
         >>> scale = 2.0
         >>> def scaled(x: float) -> float:
         ...     return scale * x

@@ -30,16 +30,6 @@ def spread(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
 
     Work that is spread may spread its own: what helps is counted over the whole process. After an error no item is
     begun any more.
-
-    Args:
-        function: spends its time outside the interpreter's lock.
-        items: what it is called with.
-
-    Returns:
-        The results.
-
-    Raises:
-        BaseException: the first that ``function`` has raised.
     """
     waiting = list(enumerate(items))[::-1]
     results: dict[int, R] = {}
@@ -81,18 +71,8 @@ def spread(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     return [results[place] for place in range(len(items))]
 
 
-def both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
-    """Return the results of two functions, called at once where a core is idle.
-
-    Args:
-        first, second: spend their time outside the interpreter's lock.
-
-    Returns:
-        Both results.
-
-    Raises:
-        BaseException: the first that one of them has raised.
-    """
+def run_both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
+    """Return the results of two functions, called at once where a core is idle."""
     calls: tuple[Callable[[], Any], ...] = (first, second)
     one, other = spread(lambda call: call(), calls)
     return one, other

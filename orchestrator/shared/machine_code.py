@@ -23,11 +23,7 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-Wall", "-
 
 
 def local_compiler() -> str | None:
-    """Return the path of this machine's C compiler, or ``None``.
-
-    Returns:
-        The path.
-    """
+    """Return the path of this machine's C compiler, or ``None``."""
     names = (os.environ.get("CC", ""), "cc", "gcc", "clang")
     return next((path for name in names if name and (path := shutil.which(name))), None)
 
@@ -40,24 +36,13 @@ def _command() -> tuple[str, ...] | None:
 
 
 def machine_code_folder() -> Path:
-    """Return where compiled libraries are.
-
-    Returns:
-        A folder that may be missing behind walls.
-    """
+    """Return where compiled libraries are."""
     return Path(os.environ.get(VARIABLE) or cache_directory("machine_code"))
 
 
 @cache
 def compiled_library(source: Path) -> Path | None:
-    """Return the shared library made from one C file that needs no other, or ``None`` where it cannot be made.
-
-    Args:
-        source: the C file.
-
-    Returns:
-        Its path.
-    """
+    """Return the shared library made from one C file that needs no other, or ``None`` where it cannot be made."""
     if not sys.platform.startswith(("linux", "darwin")):
         return None
     digest = hashlib.sha256(" ".join((sys.platform, platform.machine(), *FLAGS)).encode())

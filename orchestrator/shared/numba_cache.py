@@ -44,15 +44,9 @@ def kept(**options: Any) -> Callable[[Any], Any]:
     """Return a decorator like ``numba.njit`` that keeps machine code for later processes, where there is a place.
 
     A function with a closure is kept under a digest of all that it reaches; where that is not known, not at all.
-
-    Args:
-        options: of ``njit``, but for ``cache``.
-
-    Returns:
-        The decorator.
     """
 
-    def compiled(function: Any) -> Any:
+    def decorate(function: Any) -> Any:
         dispatcher = njit(**options)(function)
         # Without a folder that can be written the function is compiled in every process.
         with contextlib.suppress(RuntimeError, OSError):
@@ -62,7 +56,7 @@ def kept(**options: Any) -> Callable[[Any], Any]:
                 dispatcher._cache = _ClosureCache(function, digest)
         return dispatcher
 
-    return compiled
+    return decorate
 
 
 class _Files(IndexDataCacheFile):

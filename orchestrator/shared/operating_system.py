@@ -40,14 +40,7 @@ PLAIN_FILE = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "
 
 
 def alive(pid: int) -> bool:
-    """Return whether a process runs; one that has ended and that nothing has waited for does not.
-
-    Args:
-        pid: Number of the process.
-
-    Returns:
-        Whether it runs, as far as this user may know: a process that cannot be asked counts as running.
-    """
+    """Return whether a process runs; one that has ended and that nothing has waited for does not."""
     if sys.platform == "win32":
         return True  # there, asking is ending
     try:
@@ -64,38 +57,17 @@ def alive(pid: int) -> bool:
 
 
 def is_own(status: os.stat_result) -> bool:
-    """Return whether a file belongs to the user of this process.
-
-    Args:
-        status: of the file.
-
-    Returns:
-        Whether it does; True where files have no owners.
-    """
+    """Return whether a file belongs to the user of this process."""
     return not hasattr(os, "getuid") or status.st_uid == os.getuid()
 
 
-def occupied(status: os.stat_result) -> int:
-    """Return the bytes that a file takes on the disk.
-
-    Args:
-        status: of the file.
-
-    Returns:
-        The bytes; its length where the system does not tell.
-    """
+def disk_usage(status: os.stat_result) -> int:
+    """Return the bytes that a file takes on the disk."""
     return status.st_blocks * 512 if hasattr(status, "st_blocks") else status.st_size
 
 
 def resident_memory(pid: int) -> tuple[int, int]:
-    """Return the resident memory of a process and its number of threads.
-
-    Args:
-        pid: number of the process.
-
-    Returns:
-        Bytes and number; zeros where the system does not tell.
-    """
+    """Return the resident memory of a process and its number of threads."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2].split()
         return int(fields[21]) * mmap.PAGESIZE, int(fields[17])
@@ -103,7 +75,7 @@ def resident_memory(pid: int) -> tuple[int, int]:
         return 0, 0
 
 
-def allocated_memory() -> int:
+def memory_usage() -> int:
     """Return the private writable memory of this process.
 
     Returns:
@@ -129,11 +101,7 @@ def peak_memory() -> int:
 
 
 def set_limits(limits: Mapping[str, int]) -> None:
-    """Set limits that the kernel keeps for this process, as far as it has and allows them.
-
-    Args:
-        limits: by the names of ``setrlimit``, such as ``RLIMIT_AS``.
-    """
+    """Set limits that the kernel keeps for this process, as far as it has and allows them."""
     if _resource is None:
         return
     for name, value in limits.items():
@@ -146,9 +114,6 @@ def set_limits(limits: Mapping[str, int]) -> None:
 
 def kill_group(process: "subprocess.Popen[bytes]") -> bool:
     """Kill the process group that a child leads.
-
-    Args:
-        process: the child, started in a session of its own.
 
     Returns:
         Whether anything was in the group; False where there are no groups.
@@ -166,14 +131,10 @@ def collect(process: "subprocess.Popen[bytes]", limit: float) -> int:
     """Wait for a child to end.
 
     Args:
-        process: the child; its ``returncode`` is set.
         limit: [s].
 
     Returns:
         Its peak of resident memory in bytes; 0 where that may be another's, or the system does not tell.
-
-    Raises:
-        TimeoutExpired: it does not end.
     """
     if _resource is None or not hasattr(os, "wait4"):
         process.wait(limit)
@@ -196,14 +157,8 @@ def collect(process: "subprocess.Popen[bytes]", limit: float) -> int:
 def lock(descriptor: int) -> bool:
     """Lock an open file for this process, until it is closed.
 
-    Args:
-        descriptor: of the file.
-
     Returns:
         False when another process has locked it. Where the system has no locks, True.
-
-    Raises:
-        OSError: the file cannot be locked.
     """
     from filelock import lock_descriptor
 
@@ -216,19 +171,7 @@ def lock(descriptor: int) -> bool:
 
 
 def write_at(descriptor: int, data: bytes, offset: int) -> int:
-    """Write to a place in an open file.
-
-    Args:
-        descriptor: of the file.
-        data: what to write.
-        offset: in bytes.
-
-    Returns:
-        How many bytes were written.
-
-    Raises:
-        OSError: they cannot be written.
-    """
+    """Write to a place in an open file. Return how many bytes were written."""
     if hasattr(os, "pwrite"):
         return os.pwrite(descriptor, data, offset)
     before = os.lseek(descriptor, 0, os.SEEK_CUR)
@@ -240,15 +183,7 @@ def write_at(descriptor: int, data: bytes, offset: int) -> int:
 
 
 def close_and_remove(descriptor: int, path: Path) -> None:
-    """Close a file and remove it; where the system can remove an open file, nobody can lock it in between.
-
-    Args:
-        descriptor: of the open file.
-        path: of the file, which may be gone.
-
-    Raises:
-        OSError: it cannot be removed.
-    """
+    """Close a file and remove it; where the system can remove an open file, nobody can lock it in between."""
     if sys.platform == "win32":
         os.close(descriptor)
         path.unlink(missing_ok=True)
@@ -260,15 +195,7 @@ def close_and_remove(descriptor: int, path: Path) -> None:
 
 
 def link(path: Path, target: Path) -> None:
-    """Make a symbolic link, where the system lets users do so.
-
-    Args:
-        path: of the link; what is there already stays.
-        target: where it leads.
-
-    Raises:
-        OSError: it cannot be made.
-    """
+    """Make a symbolic link, where the system lets users do so."""
     try:
         path.symlink_to(target)
     except FileExistsError:
@@ -279,14 +206,7 @@ def link(path: Path, target: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names of a folder's new files as durable as their content, where folders can be opened.
-
-    Args:
-        folder: that holds the files.
-
-    Raises:
-        OSError: it cannot be done.
-    """
+    """Make the names of a folder's new files as durable as their content, where folders can be opened."""
     if sys.platform == "win32":
         return
     descriptor = os.open(folder, os.O_RDONLY)

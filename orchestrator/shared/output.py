@@ -22,19 +22,8 @@ DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # raised by 
 
 
 @contextmanager
-def staged(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path]:
-    """Yield a staging directory whose files are moved into ``directory`` when the block ends without error.
-
-    Args:
-        directory: where the files shall end up; made when it does not exist.
-        replaces: names of files that not every run writes: one of an earlier run goes where this one writes none.
-
-    Yields:
-        The staging directory.
-
-    Raises:
-        OutputError: ``directory`` cannot be made or written. Nothing is left behind.
-    """
+def stage_output(directory: Path, replaces: Sequence[str] = ()) -> Iterator[Path]:
+    """Yield a staging directory whose files are moved into ``directory`` when the block ends without error."""
     made: list[Path] = []
     try:
         missing = [p for p in (directory, *directory.parents) if not p.exists()]
@@ -79,7 +68,6 @@ def write_text(path: Path, text: str) -> None:
     """Write ``text`` to ``path`` so that no reader ever sees a part of it.
 
     Args:
-        path: the file.
         text: its content, written as UTF-8.
     """
     handle, part = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
@@ -121,13 +109,6 @@ def write_result(directory: Path, command: str, arguments: Mapping[str, Any], se
     """Write ``DIR/COMMAND.json``, the machine-readable result that every command leaves.
 
     Non-finite numbers become ``null``: JSON has no other way to say them.
-
-    Args:
-        directory: where to.
-        command: whose result.
-        arguments: what was asked for.
-        seed: of what is random, or None.
-        results: what was found: a struct of ``shared.results``, or a mapping by name.
 
     Returns:
         The path of the file.

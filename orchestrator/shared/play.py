@@ -26,11 +26,7 @@ class Play:
         return 2.0 * self.alpha
 
     def found(self) -> Sizes:
-        """Return half-gap and total play, at the load and at the motor, in rad and arc minutes.
-
-        Returns:
-            ``half_gap`` and ``total_play``, each by side and unit.
-        """
+        """Return half-gap and total play, at the load and at the motor, in rad and arc minutes."""
         return {
             name: {side: {"rad": value, "arcmin": value * ARCMIN} for side, value in self._sides(load).items()}
             for name, load in (("half_gap", self.alpha), ("total_play", self.total))

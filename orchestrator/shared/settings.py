@@ -21,13 +21,7 @@ def setting(why: str, ge: float | None = 0, le: float | None = None, gt: float |
     """Return what a setting means and its bounds, for ``Annotated``.
 
     Args:
-        why: what the value does and why it is what it is, in a line.
-        ge: least value; None: no bound.
-        le: largest value; None: no bound.
         gt: value that must be exceeded, in place of ``ge``.
-
-    Returns:
-        What ``Annotated`` takes beside the type.
     """
     if gt is not None:
         return msgspec.Meta(description=why, gt=gt, le=le)
@@ -35,43 +29,17 @@ def setting(why: str, ge: float | None = 0, le: float | None = None, gt: float |
 
 
 def share(why: str, le: float = 1.0) -> msgspec.Meta:
-    """Return the meaning of a setting that is a share, between zero and ``le``.
-
-    Args:
-        why: what the value does and why it is what it is, in a line.
-        le: largest value.
-
-    Returns:
-        What ``Annotated`` takes beside the type.
-    """
+    """Return the meaning of a setting that is a share, between zero and ``le``."""
     return msgspec.Meta(description=why, ge=0.0, le=le)
 
 
 def note(why: str) -> msgspec.Meta:
-    """Return the meaning of a setting that has no bounds of its own.
-
-    Args:
-        why: what the value does and why it is what it is, in a line.
-
-    Returns:
-        What ``Annotated`` takes beside the type.
-    """
+    """Return the meaning of a setting that has no bounds of its own."""
     return msgspec.Meta(description=why)
 
 
 def read_settings(path: Path, kind: type[S]) -> S:
-    """Return settings with the values of a TOML file; what it does not name keeps its default.
-
-    Args:
-        path: the file; its tables are the groups of settings.
-        kind: the settings class.
-
-    Returns:
-        All settings of that class.
-
-    Raises:
-        ScenarioError: the file cannot be read, is not TOML, or a name or value is wrong; the message says which.
-    """
+    """Return settings with the values of a TOML file; what it does not name keeps its default."""
     try:
         if path.stat().st_size > MAXIMUM_BYTES:
             raise ScenarioError(f"{path}: must be at most {MAXIMUM_BYTES >> 20} MB, but is larger")
@@ -90,14 +58,6 @@ def settings_of(content: dict[str, Any], kind: type[S], where: str = "settings")
 
     Args:
         content: group -> name -> value.
-        kind: the settings class.
-        where: the tables' origin, for messages.
-
-    Returns:
-        All settings of that class.
-
-    Raises:
-        ScenarioError: a name or value is wrong.
     """
     try:
         found = msgspec.convert(content, kind)
@@ -112,9 +72,6 @@ def settings_of(content: dict[str, Any], kind: type[S], where: str = "settings")
 def as_tables(settings: Settings) -> dict[str, Any]:
     """Return settings as nested tables of plain values, for a result file.
 
-    Args:
-        settings: of any class.
-
     Returns:
         Group -> name -> value.
     """
@@ -124,15 +81,7 @@ def as_tables(settings: Settings) -> dict[str, Any]:
 
 
 def described(kind: type[Settings], prefix: str = "") -> list[tuple[str, Any, str]]:
-    """Return (dotted name, default, why) of every setting, group by group.
-
-    Args:
-        kind: the settings class.
-        prefix: of the names, for groups within groups.
-
-    Returns:
-        One row for each setting.
-    """
+    """Return (dotted name, default, why) of every setting, group by group."""
     rows: list[tuple[str, Any, str]] = []
     for entry in msgspec.structs.fields(kind):
         if isinstance(entry.default, Settings):

@@ -45,11 +45,7 @@ class Trust:
     reasons: tuple[str, ...] = ()
 
     def found(self) -> TrustFound:
-        """Return the level's word and the reasons, as they stand in result files.
-
-        Returns:
-            ``level`` and ``reasons``.
-        """
+        """Return the level's word and the reasons, as they stand in result files."""
         return TrustFound(self.level.word, self.reasons)
 
     def __str__(self) -> str:
@@ -57,14 +53,7 @@ class Trust:
         return self.level.word if not self.reasons else f"{self.level.word}: {'; '.join(self.reasons)}"
 
 
-def trust_of(found: Iterable[Reason]) -> Trust:
-    """Return the trust that single checks leave.
-
-    Args:
-        found: what the checks found; green ones say nothing.
-
-    Returns:
-        The worst level, with the reasons of all that is not green, worst first.
-    """
-    reasons = sorted((r for r in found if r.level is not Level.GREEN), key=lambda r: -r.level)
+def trust_of(checks: Iterable[Reason]) -> Trust:
+    """Return the trust that single checks leave."""
+    reasons = sorted((r for r in checks if r.level is not Level.GREEN), key=lambda r: -r.level)
     return Trust(reasons[0].level if reasons else Level.GREEN, tuple(r.text for r in reasons))

@@ -156,8 +156,6 @@ class KnownUnit:
     """A unit: the number of it times ``factor`` plus ``offset`` is the value in SI.
 
     Attributes:
-        dimension: exponents of ``BASES``.
-        factor: to SI.
         offset: added after ``factor``; other than 0.0 for temperatures alone.
     """
 
@@ -171,9 +169,6 @@ def dimension_of(**exponents: int) -> Dimension:
 
     Args:
         exponents: by the names of ``BASES``; those left out are 0.
-
-    Returns:
-        Exponents in the order of ``BASES``.
     """
     return tuple(exponents.get(base, 0) for base in BASES)
 
@@ -183,27 +178,13 @@ def parse_unit(text: str, wanted: Collection[Dimension] = ()) -> KnownUnit | Non
     """Return what the text of a unit means, or None where it is not known or may mean two things.
 
     ``nm`` written small is a torque or a length and ``1/min`` a speed or a frequency: ``wanted`` decides.
-
-    Args:
-        text: as a file or a person writes it.
-        wanted: a frozen set of dimensions that are sought; a reading of one of them comes first.
-
-    Returns:
-        Dimension and conversion.
     """
-    found = [unit for name in _readings(text) if (unit := _valued(name)) is not None]
+    found = [unit for name in _readings(text) if (unit := _unit_value(name)) is not None]
     return next((unit for unit in found if unit.dimension in wanted), found[0] if found else None)
 
 
 def is_unit(text: str) -> bool:
-    """Return whether a text is a known unit.
-
-    Args:
-        text: as a file or a person writes it.
-
-    Returns:
-        True when it is.
-    """
+    """Return whether a text is a known unit."""
     return bool(_readings(text))
 
 
@@ -284,7 +265,7 @@ def _number(text: str) -> float:
 
 
 @lru_cache(maxsize=4096)
-def _valued(name: str) -> KnownUnit | None:
+def _unit_value(name: str) -> KnownUnit | None:
     """Return the value of an expression of known names."""
     import pint  # a quarter of a second that few commands need
 

@@ -2,7 +2,7 @@
 
 from threadpoolctl import threadpool_info
 
-from orchestrator.api.numerics import fitting
+from orchestrator.api.numerics import numeric_errors
 
 
 def _threads() -> list[int]:
@@ -11,6 +11,6 @@ def _threads() -> list[int]:
 
 def test_fits_use_one_thread_of_linear_algebra() -> None:
     before = _threads()
-    with fitting("a record"):
+    with numeric_errors("a record"):
         assert set(_threads()) == {1}
     assert _threads() == before

@@ -15,7 +15,7 @@ from orchestrator.building.archive import read_archive
 from orchestrator.building.launcher import find_toolchain
 from orchestrator.building.reference_files import DATA, FOLDER, PARAMETERS
 from orchestrator.building.reference_runs import reference_run
-from orchestrator.building.starts import default_starts, designed_starts
+from orchestrator.building.starts import default_starts, design_starts
 from tests.support.fmu_calls import OK, RawFmu
 
 NAMES = tuple(PARAMETERS)
@@ -35,7 +35,7 @@ def test_the_stored_reference_is_what_the_independent_solution_gives(name: str) 
 
 def test_stored_start_values_are_those_of_the_design() -> None:
     """Within what the Riccati solvers of two machines differ by."""
-    for name, values in designed_starts().items():
+    for name, values in design_starts().items():
         assert default_starts(name) == pytest.approx(values, rel=1e-6, abs=1e-12)
 
 

@@ -55,7 +55,7 @@ def test_a_rule_that_does_not_count_was_not_run(tmp_path: Path) -> None:
         ('fail-on = "never"', "'never'"),
         ('[[fmu]]\nignore = ["model.guid"]', "missing required field `fmu`"),
         ('[[fmu]]\nfmu = "a.fmu"\nignore = ["x"]', "`fmu[0].ignore` must name a rule"),
-        ("select = [", "must be such a file"),
+        ("select = [", "must be a valid policy file"),
         ("\xff", "must name a rule"),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from orchestrator.estimation.innovations import _discrete, affine_model
-from orchestrator.estimation.kernel import BLUR, blurred, propagate
+from orchestrator.estimation.kernel import BLUR, advance_blurred, propagate
 from pyfmu_sources.drivetrain_parameters import parameters
 
 STEP, TORQUE = 0.005, 40.0
@@ -54,7 +54,7 @@ def test_the_blurred_dead_zone_is_the_mean_over_the_twist(twist):
     wound = weights @ (np.sign(twists) * np.maximum(np.abs(twists) - 0.01, 0.0))
     touching = weights @ (np.abs(twists) > 0.01)
     h, after, total = 1e-6, x.copy(), np.empty((5, 5))
-    blurred(
+    advance_blurred(
         model.matrices, model.inputs, model.constants, model.normal, 0.01, covariance, h, TORQUE, after, total
     )  # fmt: skip
     free, tight = model.matrices[1], model.matrices[2]

@@ -50,6 +50,6 @@ def test_the_thresholds_of_the_verdict_decide(columns) -> None:
     trust = msgspec.structs.replace(DEFAULT_SETTINGS.trust, least_traversals=10_000)
     seen = oc.estimate(record, settings=EstimationSettings(trust=trust), diagnose=False)
     assert seen.visible
-    assert any("times only" in reason for reason in seen.trust.reasons)
+    assert any("traversed only" in reason for reason in seen.trust.reasons)
     usual = trust_of_estimates(seen.estimates, default_model())
     assert usual["maximum_likelihood"].level.word == "green"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.instances import make_slave
 from tests.support.box_fmu import DOMAINS, write_fmu
 from tests.support.c_fmu import have_compiler
 
@@ -10,7 +10,7 @@ pytestmark = pytest.mark.skipif(not have_compiler(), reason="no C compiler")
 
 
 def way(path):
-    slave = FmuSlave("spring", path)
+    slave = make_slave("spring", path)
     try:
         ends = []
         for mass in (2.0, 4.0):

@@ -12,9 +12,8 @@ import orchestrator.master.session as session_module
 from orchestrator.building.build import ensure_built
 from orchestrator.errors import FmuError, SlaveError
 from orchestrator.fmi.extraction import extracted
-from orchestrator.fmi.instances import fmu_instance
+from orchestrator.fmi.instances import fmu_instance, make_slave
 from orchestrator.fmi.model_description import parse_description, read_description
-from orchestrator.fmi.slave import FmuSlave
 from orchestrator.master.algorithms import Adaptive, GaussSeidel, Jacobi
 from orchestrator.master.result import Recording
 from orchestrator.master.session import Session
@@ -83,7 +82,7 @@ def test_a_refused_value_is_an_error_with_the_slaves_own_words(fmus, threshold, 
 
 
 def test_messages_go_to_the_instance_that_sent_them(fmus) -> None:
-    slaves = [FmuSlave(name, fmus["Drivetrain"]) for name in ("first", "second", "third")]
+    slaves = [make_slave(name, fmus["Drivetrain"]) for name in ("first", "second", "third")]
     with pytest.raises(SlaveError, match=r"first: .*J_m"):
         slaves[0].set({"J_m": -1.0})
     assert [len(s.messages) for s in slaves] == [1, 0, 0]
@@ -92,7 +91,7 @@ def test_messages_go_to_the_instance_that_sent_them(fmus) -> None:
 
 
 def test_values_that_a_slave_refuses_are_an_error(fmus) -> None:
-    slave = FmuSlave("plant", fmus["Drivetrain"])
+    slave = make_slave("plant", fmus["Drivetrain"])
     with pytest.raises(SlaveError, match=r"plant: fmi2SetReal of J_m .*`J_m` must be within"):
         slave.set({"J_m": -1.0})
     slave.close()
@@ -102,7 +101,7 @@ def test_values_that_a_slave_refuses_are_an_error(fmus) -> None:
 
 
 def test_a_failed_instance_is_never_called_again(fmus) -> None:
-    slave = FmuSlave("plant", fmus["Drivetrain"])
+    slave = make_slave("plant", fmus["Drivetrain"])
     with pytest.raises(SlaveError, match="fmi2DoStep must not be called before initialization"):
         slave.do_step(0.0, 1e-3)
     for call in (lambda: slave.do_step(0.0, 1e-3), slave.reset, lambda: slave.get(["J_m"]), slave.get_state):
@@ -112,7 +111,7 @@ def test_a_failed_instance_is_never_called_again(fmus) -> None:
 
 
 def test_state_goes_back_bit_for_bit_and_reset_is_as_new(fmus) -> None:
-    slave = FmuSlave("plant", fmus["Drivetrain"])
+    slave = make_slave("plant", fmus["Drivetrain"])
     values = np.zeros(3)
     receive = slave.receives(("theta_m", "theta_l", "contact"), values)
     send = slave.sends(("u",), np.array([50.0]))
@@ -142,7 +141,7 @@ def test_state_goes_back_bit_for_bit_and_reset_is_as_new(fmus) -> None:
 
 
 def test_types_travel(fmus) -> None:
-    slave = FmuSlave("plant", fmus["Drivetrain"])
+    slave = make_slave("plant", fmus["Drivetrain"])
     slave.set({"backlash_model": 3, "alpha": 0.25})
     assert slave.get(["backlash_model", "alpha"]) == [3, 0.25]
     assert slave.model.variables["contact"].type == "Integer"
@@ -182,7 +181,7 @@ def test_damaged_and_missing_archives(tmp_path: Path, fmus) -> None:
     broken = tmp_path / "broken.fmu"
     broken.write_bytes(content)
     with pytest.raises(FmuError):
-        FmuSlave("plant", broken)
+        make_slave("plant", broken)
     broken.write_bytes(content[:5000])
     with pytest.raises(FmuError, match="readable zip archive"):
         read_description(broken)
@@ -194,8 +193,11 @@ def test_damaged_and_missing_archives(tmp_path: Path, fmus) -> None:
     ("xml", "expected"),
     [
         (b"<a", "well-formed"),
-        (b"<a/>", "FMI 2.0"),
-        (b'<fmiModelDescription fmiVersion="3.0"/>', "FMI 2.0"),
+        (b"<a/>", "FMI 2.0 or 3.0"),
+        (b'<fmiModelDescription fmiVersion="1.0"/>', "FMI 2.0 or 3.0"),
+        (b'<fmiModelDescription fmiVersion="3.0-beta.1"/>', "FMI 2.0 or 3.0"),
+        (b'<fmiModelDescription fmiVersion="3.0"><ModelExchange/></fmiModelDescription>', "for model exchange alone"),
+        (b'<fmiModelDescription fmiVersion="3.0"><CoSimulation/></fmiModelDescription>', "must follow FMI 3.0"),
         (b'<fmiModelDescription fmiVersion="2.0"/>', "for co-simulation"),
         (b'<fmiModelDescription fmiVersion="2.0"><CoSimulation/></fmiModelDescription>', "must follow FMI 2.0"),
         (
@@ -215,7 +217,7 @@ def test_an_fmu_without_a_binary_for_this_platform(tmp_path: Path, fmus) -> None
     with zipfile.ZipFile(fmus["Drivetrain"]) as source:
         archive(path, {"modelDescription.xml": source.read("modelDescription.xml")})
     with pytest.raises(FmuError, match="must have a binary for"):
-        FmuSlave("plant", path)
+        make_slave("plant", path)
 
 
 def test_an_fmu_whose_binary_has_another_name_than_its_model(tmp_path: Path, fmus) -> None:
@@ -228,7 +230,7 @@ def test_an_fmu_whose_binary_has_another_name_than_its_model(tmp_path: Path, fmu
     }
     archive(path, renamed)
     with pytest.raises(FmuError, match=r"must have `binaries/.*/Drivetrain\..*modelIdentifier, but has .*other\."):
-        FmuSlave("plant", path)
+        make_slave("plant", path)
 
 
 def test_error_controlled_master_rolls_fmus_back(fmus) -> None:

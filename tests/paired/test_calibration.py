@@ -11,8 +11,8 @@ import pytest
 from orchestrator.errors import CalibrationError, ScenarioError
 from orchestrator.paired import calibration as module
 from orchestrator.paired.calibration import calibrate, estimate_gap, load_or_calibrate
-from orchestrator.paired.compiled_loop import compiled_loop
-from orchestrator.paired.experiment import Experiment, named_experiment, thesis_experiment
+from orchestrator.paired.compiled_loop import make_loop
+from orchestrator.paired.experiment import Experiment, experiment_of, thesis_experiment
 from orchestrator.paired.metric import difference_sum, error_statistics
 
 PLANTS = "orchestrator.plants.design"
@@ -22,7 +22,7 @@ NOISY = replace(Experiment(), encoder_noise=1e-4)
 
 def estimates(experiment, sizes, seed):
     calibration = load_or_calibrate(experiment)
-    loop = compiled_loop(experiment)
+    loop = make_loop(experiment)
     zero = np.zeros(experiment.steps + 1)
     twin = loop.run(0.0, (zero, zero))[:, 2]
     found = []
@@ -55,8 +55,8 @@ def test_estimates_with_noise_and_their_coverage():
 def test_the_scaled_experiment_is_the_default_one():
     small, large = Experiment(), thesis_experiment()
     zero = np.zeros(small.steps + 1)
-    a = compiled_loop(small).run(0.05, (zero, zero))[:, 2]
-    b = compiled_loop(large).run(0.05 * 48.0, (zero, zero))[:, 2]
+    a = make_loop(small).run(0.05, (zero, zero))[:, 2]
+    b = make_loop(large).run(0.05 * 48.0, (zero, zero))[:, 2]
     assert np.abs(b / 48.0 - a).max() < 1e-9
 
 
@@ -95,7 +95,7 @@ def test_the_calibration_that_comes_with_the_package_is_that_of_these_sources(ex
     monkeypatch.setattr(module, "calibrate", lambda *_: pytest.fail("run `python -m tools.calibrations`"))
     monkeypatch.setattr(module, "cache_directory", lambda name: pytest.fail("run `python -m tools.calibrations`"))
     calibration = load_or_calibrate(experiment)
-    loop = compiled_loop(experiment)
+    loop = make_loop(experiment)
     zero = (np.zeros(experiment.steps + 1),) * 2
     twin = loop.run(0.0, zero)[:, 2]
     for n in range(0, len(calibration.log_sum), 24):
@@ -130,4 +130,4 @@ def test_statistics():
 
 def test_unknown_experiment():
     with pytest.raises(ScenarioError, match="must be one of default, thesis"):
-        named_experiment("x")
+        experiment_of("x")

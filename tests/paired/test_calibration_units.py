@@ -15,7 +15,7 @@ from orchestrator.paired.calibration import (
     _digest,
     _interpolation_error,
     _require_monotone,
-    _smoothed,
+    _smooth,
     calibrate_loop,
     estimate_gap,
     load_or_calibrate,
@@ -142,8 +142,8 @@ def test_noise_may_push_a_tiny_gap_below_the_map() -> None:
 def test_smoothing_weighs_neighbours() -> None:
     spike = np.zeros(9)
     spike[4] = 9.0
-    assert _smoothed(spike).tolist() == pytest.approx([0, 0, 1, 2, 3, 2, 1, 0, 0])
-    assert _smoothed(np.full(5, 3.0)).tolist() == pytest.approx([3.0] * 5)
+    assert _smooth(spike).tolist() == pytest.approx([0, 0, 1, 2, 3, 2, 1, 0, 0])
+    assert _smooth(np.full(5, 3.0)).tolist() == pytest.approx([3.0] * 5)
 
 
 def test_the_interpolation_error_is_the_larger_of_neighbours() -> None:

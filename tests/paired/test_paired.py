@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import main
-from orchestrator.paired.compiled_loop import COLUMNS, compiled_loop
+from orchestrator.paired.compiled_loop import COLUMNS, make_loop
 from orchestrator.paired.cosimulation import LoopSession
 from orchestrator.paired.experiment import Experiment
 from orchestrator.paired.pair import run_pair
@@ -27,7 +27,7 @@ def test_the_paired_loop_matches_a_monolithic_simulation(fmus, model):
 def test_compiled_and_co_simulated_loop_agree(fmus):
     experiment = replace(Experiment(), encoder_noise=1e-4)
     errors = experiment.encoder_errors(3)
-    fast = compiled_loop(experiment).run(0.03, errors)
+    fast = make_loop(experiment).run(0.03, errors)
     with LoopSession(experiment, fmus) as session:
         for _ in range(2):
             run = session.run(0.03, errors)

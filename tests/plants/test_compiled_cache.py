@@ -11,7 +11,7 @@ from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 @pytest.mark.parametrize("damage", [b"", b"raise SystemExit\n", b"\xff\xfe"])
 def test_a_damaged_source_is_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: bytes) -> None:
     monkeypatch.setattr(module, "cache_directory", lambda _: tmp_path)
-    copied = module._copied_source.__wrapped__
+    copied = module._copy_source.__wrapped__
     path = copied("drivetrain")
     intact = path.read_bytes()
     path.write_bytes(damage)

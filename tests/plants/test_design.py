@@ -10,9 +10,9 @@ from orchestrator.plants.design import (
     LinearModel,
     design_estimator,
     design_regulator,
+    discretise,
     five_state_model,
     rank_report,
-    sampled,
     six_state_model,
 )
 
@@ -42,7 +42,7 @@ def test_a_stable_uncontrollable_mode_may_stay():
 
 def design_regulator_is_stable(model):
     regulator = design_regulator(model, np.eye(2), 1.0, 1e-2)
-    A, B = sampled(model, 1e-2)
+    A, B = discretise(model, 1e-2)
     return np.all(np.abs(np.linalg.eigvals(A - B @ np.array([regulator.gains]))) < 1.0)
 
 
@@ -110,7 +110,7 @@ def test_regulator_has_the_gains_and_poles_of_python_control():
     model = five_state_model(VALUES)
     Q, R, h = np.diag([10.0, 50.0, 1.0, 1.0, 0.01]), 2e-3, 1e-3
     regulator = design_regulator(model, Q, R, h)
-    A, B = sampled(model, h)
+    A, B = discretise(model, h)
     gains, _, poles = control.dlqr(A, B, Q * h, np.array([[R * h]]))
     assert regulator.gains == pytest.approx(tuple(np.ravel(gains)), rel=1e-12)
     assert np.sort_complex(regulator.poles) == pytest.approx(np.sort_complex(poles), rel=1e-12)

@@ -59,12 +59,14 @@ def test_a_motor_that_stands_still_in_most_of_a_record_is_said(table: Table, tmp
     still = {name: np.concatenate([values, np.full(1200, values[-1])]) for name, values in table.items()}
     still["time"] = 0.005 * np.arange(2000)
     record = read_record(_write(tmp_path / "step.csv", still))
-    said = [note for note in record.notes if "stands still in the rest of" in note]
+    said = [note for note in record.notes if "the rest shows nothing" in note]
     assert len(said) == 1
-    assert "the motor moves from 0.4 to 4 s alone" in said[0]
+    assert "the motor moves only from 0.4 to 4 s" in said[0]
     part = read_record(tmp_path / "step.csv", reading=Reading(part=(0.4, 4.0)))  # as it says
-    assert not [note for note in part.notes if "stands still" in note]
-    assert not [note for note in read_record(_write(tmp_path / "all.csv", table)).notes if "stands still" in note]
+    assert not [note for note in part.notes if "the rest shows nothing" in note]
+    assert not [
+        note for note in read_record(_write(tmp_path / "all.csv", table)).notes if "the rest shows nothing" in note
+    ]
 
 
 def test_an_empty_time_is_refused_in_words_where_its_counter_is_said_to_overflow(table: Table, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from orchestrator.errors import RecordError, ScenarioError
 from orchestrator.records.columns import Column, scale_of, unit_of
 from orchestrator.records.formats import open_source
-from orchestrator.records.formats.heads import named
+from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import Head
 from orchestrator.records.model_file import read_model
 from orchestrator.records.record import read_record
@@ -152,12 +152,12 @@ NAMES = {
 
 @pytest.mark.parametrize("name", NAMES)
 def test_names_state_units(name: str) -> None:
-    assert named(name).unit == NAMES[name]
+    assert head_of(name).unit == NAMES[name]
 
 
 def test_a_name_for_itself_keeps_its_unit() -> None:
-    assert named("pos [deg]") == Head("pos", "deg", "number", 0, "pos [deg]")
-    assert named("speed_x", "rpm").name == "speed_x"
+    assert head_of("pos [deg]") == Head("pos", "deg", "number", 0, "pos [deg]")
+    assert head_of("speed_x", "rpm").name == "speed_x"
 
 
 @pytest.mark.parametrize(

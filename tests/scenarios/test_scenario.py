@@ -9,7 +9,7 @@ import pytest
 from orchestrator.building.build import ensure_built
 from orchestrator.cli import main
 from orchestrator.errors import ConnectionMismatchError, FmuError, InputError, ScenarioError, SimulationError
-from orchestrator.fmi.slave import FmuSlave
+from orchestrator.fmi.slave2 import Fmu2Slave
 from orchestrator.scenarios.scenario import load_scenario, simulate
 
 GOOD = """
@@ -89,13 +89,13 @@ def test_units_of_parameters_are_converted(tmp_path: Path) -> None:
 
 def test_fmus_are_told_how_exactly_to_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told: dict[str, float | None] = {}
-    begin = FmuSlave.begin
+    begin = Fmu2Slave.begin
 
-    def noted(slave: FmuSlave, start: float, stop: float | None, tolerance: float | None) -> None:
+    def noted(slave: Fmu2Slave, start: float, stop: float | None, tolerance: float | None) -> None:
         told[slave.name] = tolerance
         begin(slave, start, stop, tolerance)
 
-    monkeypatch.setattr(FmuSlave, "begin", noted)
+    monkeypatch.setattr(Fmu2Slave, "begin", noted)
     line = 'fmu = "Drivetrain"\n'
     own = write(tmp_path, GOOD.replace(line, line + "solver_tolerance = 1e-8\n"))
     with load_scenario(own).session() as session:

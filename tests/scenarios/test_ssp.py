@@ -17,7 +17,7 @@ from orchestrator.master.algorithms import GaussSeidel, Jacobi
 from orchestrator.master.signals import Constant, Sine, Step
 from orchestrator.master.system import SignalSource, System
 from orchestrator.paired.experiment import Experiment
-from orchestrator.paired.scenario import paired_scenario
+from orchestrator.paired.scenario import scenario_of_pair
 from orchestrator.scenarios.scenario import Scenario, simulate
 from orchestrator.scenarios.ssp.read import opened_ssp
 from orchestrator.scenarios.ssp.write import write_ssp
@@ -30,7 +30,7 @@ def fmus() -> dict[str, Path]:
 
 @pytest.fixture(scope="module")
 def scenario(fmus) -> Scenario:
-    return replace(paired_scenario(Experiment(), fmus, 0.02, 0.5), stop=0.3)
+    return replace(scenario_of_pair(Experiment(), fmus, 0.02, 0.5), stop=0.3)
 
 
 @pytest.fixture(scope="module")

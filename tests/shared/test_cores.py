@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.shared import cores
-from orchestrator.shared.cores import both, spread
+from orchestrator.shared.cores import run_both, spread
 
 
 def test_results_come_in_order_of_their_items() -> None:
@@ -67,14 +67,14 @@ def test_a_thread_that_waits_gives_its_core_to_what_it_waits_for(monkeypatch) ->
         time.sleep(0.2)  # until the other has ended and waits
         spread(lambda n: at_once.wait(timeout=10.0), range(2))  # breaks where one thread must do both
 
-    both(ends, spreads)
-    both(spreads, ends)
+    run_both(ends, spreads)
+    run_both(spreads, ends)
     assert cores._SPARE.acquire(blocking=False)
     assert not cores._SPARE.acquire(blocking=False)
 
 
 def test_two_functions_give_two_results() -> None:
-    assert both(lambda: "one", lambda: 2) == ("one", 2)
+    assert run_both(lambda: "one", lambda: 2) == ("one", 2)
 
 
 def test_what_numpy_is_to_be_silent_about_holds_in_every_thread(monkeypatch) -> None:

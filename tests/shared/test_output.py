@@ -12,13 +12,13 @@ import pytest
 
 from orchestrator import __version__
 from orchestrator.errors import OutputError
-from orchestrator.shared.output import staged, write_result, write_text
+from orchestrator.shared.output import stage_output, write_result, write_text
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_files_appear_together_at_the_end(tmp_path):
-    with staged(tmp_path / "out") as directory:
+    with stage_output(tmp_path / "out") as directory:
         (directory / "a.txt").write_text("a")
         assert not (tmp_path / "out" / "a.txt").exists()
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["a.txt"]
@@ -26,7 +26,7 @@ def test_files_appear_together_at_the_end(tmp_path):
 
 def test_an_error_leaves_nothing(tmp_path):
     def fail():
-        with staged(tmp_path / "x" / "out") as directory:
+        with stage_output(tmp_path / "x" / "out") as directory:
             (directory / "a.txt").write_text("a")
             raise ValueError("bad")
 
@@ -37,7 +37,7 @@ def test_an_error_leaves_nothing(tmp_path):
 
 def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
     def fill():
-        with staged(tmp_path / "out") as folder, (folder / "a").open("wb", buffering=0) as stream:
+        with stage_output(tmp_path / "out") as folder, (folder / "a").open("wb", buffering=0) as stream:
             resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 12, hard))
             while True:
                 stream.write(bytes(1 << 12))
@@ -52,7 +52,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(tmp_path):
 
 
 def test_a_full_disk_elsewhere_is_not_blamed_on_the_results(tmp_path):
-    with pytest.raises(OSError, match="No space left on device"), staged(tmp_path / "out"):
+    with pytest.raises(OSError, match="No space left on device"), stage_output(tmp_path / "out"):
         raise OSError(28, "No space left on device")
     assert list(tmp_path.iterdir()) == []
 
@@ -64,7 +64,7 @@ def test_what_a_killed_process_left_is_cleared_away(tmp_path):
     )
     subprocess.run([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": str(ROOT)}, check=False)
     assert len(list(tmp_path.iterdir())) == 1
-    with staged(tmp_path) as mine, staged(tmp_path) as other:
+    with stage_output(tmp_path) as mine, stage_output(tmp_path) as other:
         assert sorted(tmp_path.iterdir()) == sorted([mine, other])
     assert list(tmp_path.iterdir()) == []
 
@@ -108,7 +108,7 @@ def test_results_are_published_with_their_folders_and_replace_old_ones(tmp_path)
     (out / "deep").mkdir(parents=True)
     (out / "deep" / "a.txt").write_text("old")
     (out / "kept.txt").write_text("kept")
-    with staged(out) as directory:
+    with stage_output(out) as directory:
         (directory / "deep" / "er").mkdir(parents=True)
         (directory / "deep" / "a.txt").write_text("new")
         (directory / "deep" / "er" / "b.txt").write_text("b")
@@ -120,22 +120,22 @@ def test_results_are_published_with_their_folders_and_replace_old_ones(tmp_path)
 
 def test_an_error_keeps_directories_that_were_there(tmp_path):
     (tmp_path / "there").mkdir()
-    with pytest.raises(KeyError), staged(tmp_path / "there" / "a" / "b"):
+    with pytest.raises(KeyError), stage_output(tmp_path / "there" / "a" / "b"):
         raise KeyError
     assert [p.name for p in tmp_path.iterdir()] == ["there"]
     assert list((tmp_path / "there").iterdir()) == []
 
 
 def test_errors_of_other_files_are_not_said_to_be_of_the_output(tmp_path):
-    with pytest.raises(FileNotFoundError), staged(tmp_path / "out"):
+    with pytest.raises(FileNotFoundError), stage_output(tmp_path / "out"):
         raise FileNotFoundError(2, "No such file or directory", "/elsewhere/x")
-    with pytest.raises(OutputError, match="cannot write to"), staged(tmp_path / "out") as directory:
+    with pytest.raises(OutputError, match="cannot write to"), stage_output(tmp_path / "out") as directory:
         (directory / "missing" / "a.txt").write_text("a")
 
 
 def test_what_cannot_be_a_directory_is_refused(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match="must be a writable directory"), staged(tmp_path / "file" / "out"):
+    with pytest.raises(OutputError, match="must be a writable directory"), stage_output(tmp_path / "file" / "out"):
         pass
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
@@ -159,7 +159,7 @@ def test_results_are_plain_json(tmp_path):
 
 def test_a_staging_directory_that_is_gone_hides_no_error(tmp_path):
     def fail():
-        with staged(tmp_path / "out") as directory:
+        with stage_output(tmp_path / "out") as directory:
             directory.rmdir()
             raise ValueError("bad")
 

@@ -6,49 +6,33 @@ import ast
 
 from orchestrator.building.translation.building_tuples import list_lines
 from orchestrator.building.translation.kinds import NOTHING, REAL, WHOLE, Items, Kind, Store, Tuple, describe, size_of
-from orchestrator.building.translation.scope import PRIMARY, UNARY, Code, Scope, address_of, converted, item_of
+from orchestrator.building.translation.scope import PRIMARY, UNARY, Code, Scope, address_of, convert, item_of
 
 # Larger tuples that are parts of fixed parameters are not copied.
 LARGEST_COPIED = 12
 _SIGNS: dict[type, str] = {ast.Add: "+=", ast.Sub: "-=", ast.Mult: "*="}
 
 
-def assigned(scope: Scope, node: ast.Assign) -> list[str]:
-    """Translate an assignment.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Statements in C.
-    """
+def translate_assignment(scope: Scope, node: ast.Assign) -> list[str]:
+    """Translate an assignment."""
     if len(node.targets) != 1:
         scope.refuse(node, "an assignment must have one target")
     target = node.targets[0]
     if isinstance(target, ast.Tuple):
-        return _unpacked(scope, node, target)
-    return _one(scope, node, target, node.value)
+        return _unpack(scope, node, target)
+    return _translate_target(scope, node, target, node.value)
 
 
-def annotated(scope: Scope, node: ast.AnnAssign) -> list[str]:
-    """Translate an assignment to a local variable of declared type.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Statements in C.
-    """
+def translate_annotated(scope: Scope, node: ast.AnnAssign) -> list[str]:
+    """Translate an assignment to a local variable of declared type."""
     if node.value is None or not isinstance(node.target, ast.Name):
         scope.refuse(node, "a declared variable must be a name and be given a value")
     kind = scope.source.annotation(node.annotation, node)
     scope.assign_kind(node, node.target.id, kind)
-    return _one(scope, node, node.target, node.value)
+    return _translate_target(scope, node, node.target, node.value)
 
 
-def _one(scope: Scope, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[str]:
+def _translate_target(scope: Scope, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[str]:
     """Assign one value to one target."""
     if isinstance(target, ast.Name):
         return _to_name(scope, node, target.id, value)
@@ -58,17 +42,17 @@ def _one(scope: Scope, node: ast.stmt, target: ast.expr, value: ast.expr) -> lis
         lines = list_lines(scope, value, place)
         if lines is None:
             lines = [f"{place.text} = {scope.expression(value, place.kind).text};"]
-        return lines + scope.checked(before)
-    return _stored(scope, node, place, scope.expression(value, place.kind), before)
+        return lines + scope.check_faults(before)
+    return _store(scope, node, place, scope.expression(value, place.kind), before)
 
 
-def _stored(scope: Scope, node: ast.AST, place: Code, code: Code, before: int) -> list[str]:
+def _store(scope: Scope, node: ast.AST, place: Code, code: Code, before: int) -> list[str]:
     """Store into what outlives the function; what was raised on the way must not get there."""
-    if scope.raised(before):
+    if scope.may_raise(before):
         name = scope.temporary("value")
         return [
             f"const {scope.program.names.c(place.kind)} {name} = {code.text};",
-            *scope.checked(before),
+            *scope.check_faults(before),
             f"{place.text} = {name};",
         ]
     cast = "(int)" if ".integer[" in place.text or "->integer[" in place.text else ""
@@ -93,7 +77,7 @@ def _to_name(scope: Scope, node: ast.stmt, name: str, value: ast.expr) -> list[s
     if isinstance(declared, Items) and name not in scope.pointers:
         whole = list_lines(scope, value, Code(scope.local(name), declared, place=True))
         if whole is not None:
-            return [*_declared(scope, node, name, declared, None), *whole, *scope.checked(before)]
+            return [*_declare(scope, node, name, declared, None), *whole, *scope.check_faults(before)]
     code = scope.expression(value, declared if isinstance(declared, Tuple) else None)
     if name in scope.once and scope.homes.get(name) is node and _is_fixed(scope, code, value):
         scope.assign_kind(node, name, code.kind)
@@ -106,13 +90,13 @@ def _to_name(scope: Scope, node: ast.stmt, name: str, value: ast.expr) -> list[s
     scope.assign_kind(node, name, code.kind)
     kind = scope.kinds[name]
     if kind != code.kind:
-        code = converted(scope, node, code, kind)
+        code = convert(scope, node, code, kind)
     if name not in scope.read and not isinstance(code.kind, Items):
-        return [f"(void){code.within(UNARY)};", *scope.checked(before)]
-    return [*_declared(scope, node, name, kind, code.text), *scope.checked(before)]
+        return [f"(void){code.within(UNARY)};", *scope.check_faults(before)]
+    return [*_declare(scope, node, name, kind, code.text), *scope.check_faults(before)]
 
 
-def _declared(scope: Scope, node: ast.AST, name: str, kind: Kind, text: str | None) -> list[str]:
+def _declare(scope: Scope, node: ast.AST, name: str, kind: Kind, text: str | None) -> list[str]:
     """Return the assignment, which declares the variable if it begins here."""
     local = scope.local(name)
     if scope.homes.get(name) is not node:
@@ -148,14 +132,14 @@ def _alias(scope: Scope, node: ast.AST, name: str, code: Code, value: ast.expr) 
     return [f"{constant}{scope.program.names.c(code.kind)} *const {scope.local(name)} = {address};"]
 
 
-def _unpacked(scope: Scope, node: ast.Assign, target: ast.Tuple) -> list[str]:
+def _unpack(scope: Scope, node: ast.Assign, target: ast.Tuple) -> list[str]:
     """``a, b = ...``."""
     used = {n.id for n in ast.walk(node.value) if isinstance(n, ast.Name)}
     stored = {n.id for n in ast.walk(target) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
     before = scope.faults
     if isinstance(node.value, ast.Tuple) and len(node.value.elts) == len(target.elts):
         codes = [scope.expression(item) for item in node.value.elts]
-        if used & stored or scope.raised(before):
+        if used & stored or scope.may_raise(before):
             codes = [scope.hoist(node, code, "value") for code in codes]
     else:
         code = scope.expression(node.value)
@@ -164,7 +148,7 @@ def _unpacked(scope: Scope, node: ast.Assign, target: ast.Tuple) -> list[str]:
         if not code.place or used & stored:
             code = scope.hoist(node, code, "result")
         codes = [item_of(code, n) for n in range(len(target.elts))]
-    lines = scope.checked(before)
+    lines = scope.check_faults(before)
     for part, code in zip(target.elts, codes, strict=True):
         lines += _part(scope, node, part, code)
     return lines
@@ -176,41 +160,33 @@ def _part(scope: Scope, node: ast.Assign, part: ast.expr, code: Code) -> list[st
         if part.id not in scope.read:
             return []
         kind = scope.kinds[part.id]
-        return _declared(scope, node, part.id, kind, converted(scope, node, code, kind).text)
+        return _declare(scope, node, part.id, kind, convert(scope, node, code, kind).text)
     place = _place(scope, part)
-    return [f"{place.text} = {converted(scope, node, code, place.kind).text};"]
+    return [f"{place.text} = {convert(scope, node, code, place.kind).text};"]
 
 
-def augmented(scope: Scope, node: ast.AugAssign) -> list[str]:
-    """``x += ...``, which rounds as ``x = x + ...``.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Statements in C.
-    """
+def translate_augmented(scope: Scope, node: ast.AugAssign) -> list[str]:
+    """``x += ...``, which rounds as ``x = x + ...``."""
     before = scope.faults
     place = _place(scope, node.target) if not isinstance(node.target, ast.Name) else scope.expression(_load(node))
     value = scope.expression(node.value)
     if scope.program.paired and place.kind == REAL and value.kind in (REAL, WHOLE):
         whole = ast.copy_location(ast.BinOp(_load(node), node.op, node.value), node)
-        return _one(scope, node, node.target, whole)
+        return _translate_target(scope, node, node.target, whole)
     if isinstance(node.op, ast.Div) and place.kind == REAL and value.kind in (REAL, WHOLE):
         quotient = Code(f"divided({place.text}, {value.text}, {scope.fault()})", REAL)
         if scope.owner is not None:
             quotient = scope.hoist(node, quotient, "value")
-        return [*scope.checked(before), f"{place.text} = {quotient.text};"]
+        return [*scope.check_faults(before), f"{place.text} = {quotient.text};"]
     if type(node.op) not in _SIGNS or place.kind not in (REAL, WHOLE) or value.kind not in (REAL, WHOLE):
         scope.refuse(node, f"`{ast.unparse(node)}` is outside the subset (+=, -=, *= and /= of numbers are in it)")
     if isinstance(node.target, ast.Name):
         scope.assign_kind(node, node.target.id, REAL if REAL in (place.kind, value.kind) else WHOLE)
     elif place.kind == WHOLE and value.kind == REAL:
         scope.refuse(node, "a float cannot be added to an int in place")
-    if scope.raised(before):
+    if scope.may_raise(before):
         value = scope.hoist(node, value, "value")
-        return [*scope.checked(before), f"{place.text} {_SIGNS[type(node.op)]} {value.text};"]
+        return [*scope.check_faults(before), f"{place.text} {_SIGNS[type(node.op)]} {value.text};"]
     return [f"{place.text} {_SIGNS[type(node.op)]} {value.text};"]
 
 

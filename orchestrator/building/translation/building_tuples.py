@@ -6,20 +6,11 @@ import ast
 
 from orchestrator.building.translation.constants import interval
 from orchestrator.building.translation.kinds import WHOLE, Items, Kind, Tuple
-from orchestrator.building.translation.scope import Code, Scope, converted, member
+from orchestrator.building.translation.scope import Code, Scope, convert, member
 
 
 def tuple_built(scope: Scope, node: ast.Call, wanted: Kind | None) -> Code:
-    """Translate ``tuple(expression for n in range(count))`` with a constant count, or a tuple of a tuple.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        wanted: kind to which the value is converted, if that is known.
-
-    Returns:
-        The tuple in C.
-    """
+    """Translate ``tuple(expression for n in range(count))`` with a constant count, or a tuple of a tuple."""
     argument = node.args[0] if len(node.args) == 1 else None
     if not isinstance(argument, ast.GeneratorExp):
         if argument is not None:
@@ -31,13 +22,13 @@ def tuple_built(scope: Scope, node: ast.Call, wanted: Kind | None) -> Code:
         scope.refuse(node, "a tuple of this kind must be given a name first, because it is needed under a condition")
     name = scope.temporary("made")
     outer, scope.before = scope.before, []
-    kind = _filled(scope, argument, name, wanted if isinstance(wanted, Tuple) else None)
+    kind = _fill(scope, argument, name, wanted if isinstance(wanted, Tuple) else None)
     body, scope.before = scope.before, outer
     scope.before += [f"{scope.program.names.c(kind)} {name};", *body]
     return Code(name, kind, place=True)
 
 
-def _filled(scope: Scope, node: ast.GeneratorExp, place: str, wanted: Tuple | None) -> Tuple:
+def _fill(scope: Scope, node: ast.GeneratorExp, place: str, wanted: Tuple | None) -> Tuple:
     """Append to ``scope.before`` the loop that fills ``place``; return the kind of what it fills."""
     variable, start, stop = constant_range(scope, node)
     item_wanted = wanted.items[0] if wanted is not None and wanted.uniform else None
@@ -49,7 +40,7 @@ def _filled(scope: Scope, node: ast.GeneratorExp, place: str, wanted: Tuple | No
         generator = inner.args[0]
         if not isinstance(generator, ast.GeneratorExp):
             scope.refuse(inner, "`tuple` must be given a generator over a constant range")
-        item: Kind = _filled(scope, generator, where, item_wanted if isinstance(item_wanted, Tuple) else None)
+        item: Kind = _fill(scope, generator, where, item_wanted if isinstance(item_wanted, Tuple) else None)
         lines = scope.before
     else:
         code = scope.expression(inner, item_wanted)
@@ -63,15 +54,7 @@ def _filled(scope: Scope, node: ast.GeneratorExp, place: str, wanted: Tuple | No
 
 
 def constant_range(scope: Scope, node: ast.GeneratorExp | ast.ListComp) -> tuple[str, int, int]:
-    """Return variable, start and stop of the one ``for ... in range(...)`` with constant ends, or refuse.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Name of the variable, first number, and the number before which it stops.
-    """
+    """Return variable, start and stop of the one ``for ... in range(...)`` with constant ends, or refuse."""
     loop = node.generators[0]
     call = loop.iter
     fits = len(node.generators) == 1 and not loop.ifs and isinstance(loop.target, ast.Name)
@@ -87,14 +70,7 @@ def constant_range(scope: Scope, node: ast.GeneratorExp | ast.ListComp) -> tuple
 
 
 def with_loop(scope: Scope, variable: str, start: int, stop: int) -> None:
-    """Make the variable of a loop known.
-
-    Args:
-        scope: the function under translation.
-        variable: its name.
-        start: first number.
-        stop: number before which the loop stops.
-    """
+    """Make the variable of a loop known."""
     if variable in scope.kinds and variable not in scope.ranges:
         scope.kinds.pop(variable)
     scope.kinds[variable] = WHOLE
@@ -102,36 +78,22 @@ def with_loop(scope: Scope, variable: str, start: int, stop: int) -> None:
 
 
 def without_loop(scope: Scope, variable: str) -> None:
-    """Forget the variable of a loop.
-
-    Args:
-        scope: the function under translation.
-        variable: its name.
-    """
+    """Forget the variable of a loop."""
     scope.kinds.pop(variable, None)
     scope.ranges.pop(variable, None)
 
 
 def list_lines(scope: Scope, node: ast.expr, place: Code) -> list[str] | None:
-    """Return the statements that fill ``place`` with a whole list, or ``None`` if ``node`` is none.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        place: the list in C.
-
-    Returns:
-        Statements in C.
-    """
+    """Return the statements that fill ``place`` with a whole list, or ``None`` if ``node`` is none."""
     kind = place.kind
     assert isinstance(kind, Items)
     base = member(place)
     if isinstance(node, ast.List):
-        return _listed(scope, node, kind, base)
+        return _translate_list(scope, node, kind, base)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult) and isinstance(node.left, ast.List):
-        return _repeated(scope, node, kind, base)
+        return _translate_repetition(scope, node, kind, base)
     if isinstance(node, ast.ListComp):
-        return _comprehended(scope, node, kind, place)
+        return _translate_comprehension(scope, node, kind, place)
     if (
         isinstance(node, ast.Call)
         and isinstance(node.func, ast.Name)
@@ -142,14 +104,14 @@ def list_lines(scope: Scope, node: ast.expr, place: Code) -> list[str] | None:
     return None
 
 
-def _listed(scope: Scope, node: ast.List, kind: Items, base: str) -> list[str]:
+def _translate_list(scope: Scope, node: ast.List, kind: Items, base: str) -> list[str]:
     if len(node.elts) > kind.capacity:
         scope.refuse(node, f"a list of at most {kind.capacity} is given {len(node.elts)} items")
     lines = [f"{base}v[{n}] = {scope.expression(item, kind.item).text};" for n, item in enumerate(node.elts)]
     return [*lines, f"{base}n = {len(node.elts)};"]
 
 
-def _repeated(scope: Scope, node: ast.BinOp, kind: Items, base: str) -> list[str]:
+def _translate_repetition(scope: Scope, node: ast.BinOp, kind: Items, base: str) -> list[str]:
     assert isinstance(node.left, ast.List)
     count = interval(scope, node.right)
     if len(node.left.elts) != 1 or count is None or count[0] != count[1] or not 0 <= count[0] <= kind.capacity:
@@ -163,7 +125,7 @@ def _repeated(scope: Scope, node: ast.BinOp, kind: Items, base: str) -> list[str
     ]
 
 
-def _comprehended(scope: Scope, node: ast.ListComp, kind: Items, place: Code) -> list[str]:
+def _translate_comprehension(scope: Scope, node: ast.ListComp, kind: Items, place: Code) -> list[str]:
     """``[list(f) for f in other]`` and ``[... for n in range(constant)]``."""
     base = member(place)
     loop = node.generators[0]
@@ -180,7 +142,7 @@ def _comprehended(scope: Scope, node: ast.ListComp, kind: Items, place: Code) ->
     item = Code(f"{base}v[{variable}{f' - {start}' if start else ''}]", kind.item, place=True)
     inner = list_lines(scope, node.elt, item) if isinstance(kind.item, Items) else None
     if inner is None:
-        inner = [f"{item.text} = {converted(scope, node, scope.expression(node.elt), kind.item).text};"]
+        inner = [f"{item.text} = {convert(scope, node, scope.expression(node.elt), kind.item).text};"]
     without_loop(scope, variable)
     head = f"for (int64_t {variable} = {start}; {variable} < {stop}; {variable}++) {{"
     return [head, *(f"    {line}" for line in inner), "}", f"{base}n = {stop - start};"]

@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from orchestrator.building.translation.building_tuples import tuple_built
-from orchestrator.building.translation.constants import known
+from orchestrator.building.translation.constants import constant_value
 from orchestrator.building.translation.definitions import Function
 from orchestrator.building.translation.kinds import REAL, TRUTH, WHOLE, Items, Kind, Tuple, describe, kind_of
 from orchestrator.building.translation.scope import (
@@ -35,16 +35,7 @@ _TESTS = ("isfinite", "isnan", "isinf")
 
 
 def call(scope: Scope, node: ast.Call, wanted: Kind | None) -> Code:
-    """Translate a call.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        wanted: kind to which the value is converted, if that is known.
-
-    Returns:
-        The call, or what stands for it, in C.
-    """
+    """Translate a call. Return the call, or what stands for it, in C."""
     if isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Name) and node.func.value.id == "self":
         return _method(scope, node, node.func.attr)
     target = _target(scope, node.func)
@@ -54,7 +45,7 @@ def call(scope: Scope, node: ast.Call, wanted: Kind | None) -> Code:
     if target is getattr(builtins, name, None):
         return _builtin(scope, node, name, wanted)
     if isinstance(target, type) and hasattr(target, "_fields"):
-        return _constructed(scope, node, target)
+        return _construct(scope, node, target)
     if callable(target) and hasattr(target, "__wrapped__"):  # a cached function returns what the function returns
         target = target.__wrapped__
     if not hasattr(target, "__code__"):
@@ -79,26 +70,17 @@ def _method(scope: Scope, node: ast.Call, name: str) -> Code:
 
 
 def invoke(scope: Scope, node: ast.Call, function: Function) -> Code:
-    """Return the call of a translated function.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        function: that is called.
-
-    Returns:
-        The call in C.
-    """
-    arguments = _ordered(scope, node, function)
+    """Return the call of a translated function."""
+    arguments = _order_arguments(scope, node, function)
     texts = ["self"] if function.owned else []
     for (name, kind), argument in zip(function.parameters, arguments, strict=True):
-        texts.append(_passed(scope, argument, kind, name in function.mutated, name in function.by_address))
+        texts.append(_pass_argument(scope, argument, kind, name in function.mutated, name in function.by_address))
     if function.faults:
         texts.append(scope.fault())
     return Code(f"{function.c}({', '.join(texts)})", function.returns)
 
 
-def _ordered(scope: Scope, node: ast.Call, function: Function) -> list[ast.expr]:
+def _order_arguments(scope: Scope, node: ast.Call, function: Function) -> list[ast.expr]:
     names = [name for name, _ in function.parameters]
     given: dict[str, ast.expr] = dict(zip(names, node.args, strict=False))
     given |= {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg}
@@ -109,7 +91,7 @@ def _ordered(scope: Scope, node: ast.Call, function: Function) -> list[ast.expr]
     return [filled[name] for name in names]
 
 
-def _passed(scope: Scope, node: ast.expr, kind: Kind, mutated: bool, by_address: bool) -> str:
+def _pass_argument(scope: Scope, node: ast.expr, kind: Kind, mutated: bool, by_address: bool) -> str:
     code = scope.expression(node, kind)
     if not isinstance(kind, Items) and not by_address:
         return code.text
@@ -155,7 +137,7 @@ def _builtin(scope: Scope, node: ast.Call, name: str, wanted: Kind | None) -> Co
         paired = scope.program.paired and codes[0].kind == REAL
         return _extreme(f"{'pair_' if paired else ''}{'lesser' if name == 'min' else 'greater'}", codes)
     if len(codes) == 1:
-        found = _of_one(scope, name, codes[0])
+        found = _call_of_one_argument(scope, name, codes[0])
         if found is not None:
             return found
     return scope.refuse(node, f"`{ast.unparse(node)}` is outside the subset")
@@ -169,7 +151,7 @@ def _extreme(function: str, codes: list[Code]) -> Code:
     return Code(text, WHOLE if whole else REAL)
 
 
-def _of_one(scope: Scope, name: str, code: Code) -> Code | None:
+def _call_of_one_argument(scope: Scope, name: str, code: Code) -> Code | None:
     if name == "len":
         return _length(scope, code)
     if name == "bool":
@@ -198,7 +180,7 @@ def _length(scope: Scope, code: Code) -> Code | None:
     return None
 
 
-def _constructed(scope: Scope, node: ast.Call, target: Any) -> Code:
+def _construct(scope: Scope, node: ast.Call, target: Any) -> Code:
     kind = kind_of(target)
     assert isinstance(kind, Tuple)
     given: dict[str, ast.expr] = dict(zip(kind.names, node.args, strict=False))
@@ -210,22 +192,14 @@ def _constructed(scope: Scope, node: ast.Call, target: Any) -> Code:
 
 
 def message(scope: Scope, node: ast.expr) -> str:
-    """Return the arguments by which the C runtime formats a text: a format, then values.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        The arguments, separated by commas.
-    """
+    """Return the arguments by which the C runtime formats a text: a format, then values."""
     parts = node.values if isinstance(node, ast.JoinedStr) else [node]
     text, values = "", []
     for part in parts:
         if isinstance(part, ast.Constant) and isinstance(part.value, str):
             text += part.value.replace("%", "%%")
         elif isinstance(part, ast.FormattedValue):
-            letter, found = _formatted(scope, part)
+            letter, found = _format_part(scope, part)
             text += letter
             values += found
         else:
@@ -234,8 +208,8 @@ def message(scope: Scope, node: ast.expr) -> str:
     return ", ".join([f'"{escaped}"', *values])
 
 
-def _formatted(scope: Scope, part: ast.FormattedValue) -> tuple[str, list[str]]:
-    value = known(scope, part.value)
+def _format_part(scope: Scope, part: ast.FormattedValue) -> tuple[str, list[str]]:
+    value = constant_value(scope, part.value)
     if isinstance(value, str):
         return value.replace("%", "%%"), []
     code = value_of(scope, scope.expression(part.value))

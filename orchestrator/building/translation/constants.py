@@ -9,40 +9,24 @@ from typing import Any
 from orchestrator.building.translation.scope import Bounds, Scope
 
 
-def known(scope: Scope, node: ast.expr) -> Any:
-    """Return the value of a global name or of an attribute of a module; ``None`` where it is neither.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        The value.
-    """
+def constant_value(scope: Scope, node: ast.expr) -> Any:
+    """Return the value of a global name or of an attribute of a module; ``None`` where it is neither."""
     if isinstance(node, ast.Name) and node.id not in scope.kinds and scope.source.has(node.id):
         return scope.source.value(node.id)
     if isinstance(node, ast.Attribute):
-        base = known(scope, node.value)
+        base = constant_value(scope, node.value)
         if isinstance(base, ModuleType):
             return getattr(base, node.attr, None)
     return None
 
 
 def interval(scope: Scope, node: ast.expr) -> Bounds | None:
-    """Return between which whole numbers a value lies, as far as constants and loops tell.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Least and largest number; None where that is not known.
-    """
+    """Return between which whole numbers a value lies, as far as constants and loops tell."""
     if isinstance(node, ast.Constant) and type(node.value) is int:
         return (node.value, node.value)
     if isinstance(node, ast.Name) and node.id in scope.ranges:
         return scope.ranges[node.id]
-    value = known(scope, node)
+    value = constant_value(scope, node)
     if type(value) is int:
         return (value, value)
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):

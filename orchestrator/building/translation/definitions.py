@@ -45,14 +45,7 @@ class Function:
 
 
 def comment_of(text: str) -> str:
-    """Return a docstring as a C comment.
-
-    Args:
-        text: the docstring.
-
-    Returns:
-        The comment with a line break; empty for no text.
-    """
+    """Return a docstring as a C comment."""
     if not text:
         return ""
     lines = text.replace("``", "`").replace("*/", "* /").replace(":func:", "").replace(":mod:", "").splitlines()

@@ -21,20 +21,9 @@ class Directional:
 
 
 def directional(plain: Program, owner: Owner) -> Directional:
-    """Translate the response of a slave: derivatives and outputs as a function of states and inputs.
-
-    Args:
-        plain: the slave's own program, in the same file.
-        owner: the slave.
-
-    Returns:
-        The translation.
-
-    Raises:
-        FmuError: the response has a parameter that is neither hidden attribute nor input, or returns something else.
-    """
+    """Translate the response of a slave: derivatives and outputs as a function of states and inputs."""
     cls = owner.cls
-    program = Program(translate, taken=frozenset({cls.__name__}), beside=plain)
+    program = Program(translate, taken=frozenset({cls.__name__}), neighbours=plain)
     function = program.function(None, None, cls.response)
     program.check_lengths()
     states, outputs = len(cls.continuous_states), cls.response_outputs
@@ -43,7 +32,9 @@ def directional(plain: Program, owner: Owner) -> Directional:
     names = [variable.name for variable in cls.table]
     first = names.index(cls.continuous_states[0][0])
     given = [_argument(program, owner, name, kind, first) for name, kind in function.parameters]
-    arguments = [_passed(function, name) for name, _ in function.parameters] + (["fault"] if function.faults else [])
+    arguments = [_pass_argument(function, name) for name, _ in function.parameters] + (
+        ["fault"] if function.faults else []
+    )
     lines = [line for part in given for line in part]
     lines += [] if function.faults else ["(void)fault;"]
     lines.append(f"const {program.names.c(function.returns)} found = {function.c}({', '.join(arguments)});")
@@ -88,5 +79,5 @@ def _argument(program: Program, owner: Owner, name: str, kind: Kind, first_state
     raise FmuError(f"`{name}` of `{cls.__name__}.response` must be of floats alone, or of none")
 
 
-def _passed(function: Function, name: str) -> str:
+def _pass_argument(function: Function, name: str) -> str:
     return f"&{name}" if name in function.by_address else name

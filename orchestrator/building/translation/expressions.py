@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from orchestrator.building.translation.calls import call
-from orchestrator.building.translation.constants import interval, known
+from orchestrator.building.translation.constants import constant_value, interval
 from orchestrator.building.translation.kinds import REAL, TRUTH, WHOLE, Items, Kind, Store, Tuple, Values, describe
 from orchestrator.building.translation.scope import (
     AND,
@@ -27,9 +27,9 @@ from orchestrator.building.translation.scope import (
     as_real,
     compound,
     constant_pair,
-    converted,
+    convert,
     item_of,
-    joined,
+    join_kinds,
     member,
     value_of,
 )
@@ -47,35 +47,16 @@ _COMPARED: dict[type, tuple[str, int]] = {
 
 
 def expression(scope: Scope, node: ast.expr, wanted: Kind | None = None) -> Code:
-    """Translate an expression; ``wanted`` is the kind to which it is converted, if that is known.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        wanted: kind to which the value is converted, if that is known.
-
-    Returns:
-        The expression in C.
-    """
+    """Translate an expression; ``wanted`` is the kind to which it is converted, if that is known."""
     handler = _HANDLERS.get(type(node))
     if handler is None:
         scope.refuse(node, f"`{ast.unparse(node)}` is outside the subset")
     code = handler(scope, node, wanted)
-    return code if wanted is None else converted(scope, node, code, wanted)
+    return code if wanted is None else convert(scope, node, code, wanted)
 
 
 def constant(scope: Scope, value: Any, node: ast.AST, name: str = "") -> Code:
-    """Return a number that Python knows already, by its name where it has one.
-
-    Args:
-        scope: the function under translation.
-        value: the number.
-        node: of the Python source.
-        name: of the constant, if it has one.
-
-    Returns:
-        The number in C.
-    """
+    """Return a number that Python knows already, by its name where it has one."""
     if isinstance(value, bool):
         return Code("true" if value else "false", TRUTH)
     if not isinstance(value, int | float) or not math.isfinite(value):
@@ -97,7 +78,7 @@ def _name(scope: Scope, node: ast.Name, wanted: Kind | None) -> Code:
         if node.id in scope.pointers:
             return Code(f"*{text}", scope.kinds[node.id], UNARY, place=True)
         return Code(text, scope.kinds[node.id], place=True)
-    value = known(scope, node)
+    value = constant_value(scope, node)
     if value is None:
         scope.refuse(node, f"`{node.id}` has no value here")
     if isinstance(value, tuple):
@@ -112,8 +93,8 @@ def _constant_tuple(scope: Scope, value: tuple[Any, ...], node: ast.AST) -> Code
 
 def _attribute(scope: Scope, node: ast.Attribute, wanted: Kind | None) -> Code:
     if isinstance(node.value, ast.Name) and node.value.id == "self" and scope.owner is not None:
-        return _own(scope, node)
-    value = known(scope, node)
+        return _attribute_of_self(scope, node)
+    value = constant_value(scope, node)
     if value is not None:
         return constant(scope, value, node, node.attr)
     base = scope.expression(node.value)
@@ -122,7 +103,7 @@ def _attribute(scope: Scope, node: ast.Attribute, wanted: Kind | None) -> Code:
     return scope.refuse(node, f"`{ast.unparse(node)}` has no value here")
 
 
-def _own(scope: Scope, node: ast.Attribute) -> Code:
+def _attribute_of_self(scope: Scope, node: ast.Attribute) -> Code:
     assert scope.owner is not None
     if node.attr in ("real", "integer"):
         return Code(f"self->{node.attr}", Store(node.attr, scope.owner.variables))
@@ -146,20 +127,20 @@ def _binary(scope: Scope, node: ast.BinOp, wanted: Kind | None) -> Code:
             scope.refuse(node, f"arithmetic must be of numbers, but one is {describe(code.kind)}")
     both_whole = left.kind == WHOLE and right.kind == WHOLE
     if scope.program.paired and not both_whole and type(node.op) in _PAIRED:
-        return _paired(type(node.op), as_real(scope, left), as_real(scope, right))
+        return _combine_pairs(type(node.op), as_real(scope, left), as_real(scope, right))
     if type(node.op) in _ARITHMETIC:
         sign, level = _ARITHMETIC[type(node.op)]
         text = f"{left.within(level)} {sign} {right.within(level + 1)}"
         return Code(text, WHOLE if both_whole else REAL, level)
     if isinstance(node.op, ast.Div):
-        return _divided(scope, node, left, right)
+        return _translate_division(scope, node, left, right)
     if isinstance(node.op, ast.FloorDiv | ast.Mod) and both_whole:
         function = "floor_divided" if isinstance(node.op, ast.FloorDiv) else "remainder_of"
         return Code(f"{function}({left.text}, {right.text}, {scope.fault()})", WHOLE)
     return scope.refuse(node, f"`{ast.unparse(node)}` is outside the subset")
 
 
-def _paired(op: type[ast.operator], left: Code, right: Code) -> Code:
+def _combine_pairs(op: type[ast.operator], left: Code, right: Code) -> Code:
     """Return a sum, difference or product of pairs; what is constant has no derivative to compute."""
     if left.plain and right.plain:
         return constant_pair(f"(({left.plain}) {_ARITHMETIC[op][0]} ({right.plain}))")
@@ -169,14 +150,14 @@ def _paired(op: type[ast.operator], left: Code, right: Code) -> Code:
     return Code(f"{_PAIRED[op]}({left.text}, {right.text})", REAL)
 
 
-def _divided(scope: Scope, node: ast.BinOp, left: Code, right: Code) -> Code:
+def _translate_division(scope: Scope, node: ast.BinOp, left: Code, right: Code) -> Code:
     if scope.program.paired:
         left, right = as_real(scope, left), as_real(scope, right)
         if left.plain and right.plain:
             return constant_pair(f"divided({left.plain}, {right.plain}, {scope.fault()})")
         function = "pair_parted" if right.plain else "pair_divided"
         return Code(f"{function}({left.text}, {right.plain or right.text}, {scope.fault()})", REAL)
-    divisor = node.right.value if isinstance(node.right, ast.Constant) else known(scope, node.right)
+    divisor = node.right.value if isinstance(node.right, ast.Constant) else constant_value(scope, node.right)
     if isinstance(divisor, int | float) and divisor:
         cast = "(double)" if left.kind == WHOLE and right.kind == WHOLE else ""
         return Code(f"{cast}{left.within(UNARY if cast else PRODUCT)} / {right.within(PRODUCT + 1)}", REAL, PRODUCT)
@@ -243,7 +224,7 @@ def _compare(scope: Scope, node: ast.Compare, wanted: Kind | None) -> Code:
 
 def _membership(scope: Scope, node: ast.Compare) -> Code:
     choices = node.comparators[0]
-    named = known(scope, choices)  # a tuple of numbers that the module holds
+    named = constant_value(scope, choices)  # a tuple of numbers that the module holds
     if isinstance(named, tuple) and named and all(type(number) is int for number in named):
         choices = ast.copy_location(ast.Tuple([ast.Constant(number) for number in named], ast.Load()), node)
     if len(node.ops) != 1 or not isinstance(choices, ast.Tuple):
@@ -265,7 +246,7 @@ def _choice(scope: Scope, node: ast.IfExp, wanted: Kind | None) -> Code:
     scope.conditional += 1
     then, other = (scope.expression(arm, wanted) for arm in (node.body, node.orelse))
     scope.conditional -= 1
-    kind = joined(scope, node, then.kind, other.kind)
+    kind = join_kinds(scope, node, then.kind, other.kind)
     if kind == REAL:
         then, other = as_real(scope, then), as_real(scope, other)
     address = ""

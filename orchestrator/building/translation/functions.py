@@ -22,18 +22,7 @@ LARGEST_BY_VALUE = 12
 def translate(
     program: Program, source: ModuleSource, node: ast.FunctionDef, c_name: str, owner: Owner | None = None
 ) -> Function:
-    """Return the function in C; what it calls is translated before.
-
-    Args:
-        program: what is translated so far.
-        source: the function's module.
-        node: its definition.
-        c_name: its name in C.
-        owner: the slave, for a method.
-
-    Returns:
-        The function.
-    """
+    """Return the function in C; what it calls is translated before."""
     function = _signature(source, node, c_name, owner)
     mutated: set[str] = set()
     function.by_address = _by_address(function, node)
@@ -166,14 +155,14 @@ def _survey(node: ast.FunctionDef, parameters: list[str]) -> _Locals:
     return seen
 
 
-def _home(node: ast.FunctionDef, found: list[tuple[tuple[int, ...], ast.stmt, bool]], first: ast.stmt) -> ast.AST:
+def _home(node: ast.FunctionDef, place: list[tuple[tuple[int, ...], ast.stmt, bool]], first: ast.stmt) -> ast.AST:
     """Return the statement that declares a variable, or the function itself."""
-    inside = min((path for path, *_ in found), key=len)
-    block_of = next(path for path, statement, _ in found if statement is first)
-    direct = isinstance(first, ast.Assign | ast.AnnAssign) and found[0][1] is first
+    inside = min((path for path, *_ in place), key=len)
+    block_of = next(path for path, statement, _ in place if statement is first)
+    direct = isinstance(first, ast.Assign | ast.AnnAssign) and place[0][1] is first
     value = first.value if isinstance(first, ast.Assign | ast.AnnAssign) else None
-    reads_itself = value is not None and any(not store and s is first for _, s, store in found)
-    covers = all(path[: len(block_of)] == block_of for path, *_ in found)
+    reads_itself = value is not None and any(not store and s is first for _, s, store in place)
+    covers = all(path[: len(block_of)] == block_of for path, *_ in place)
     return first if direct and covers and not reads_itself and len(block_of) <= len(inside) else node
 
 

@@ -70,12 +70,6 @@ def kind_of(annotation: Any) -> Kind:
 
     Args:
         annotation: such as ``float`` or ``tuple[float, float]``.
-
-    Returns:
-        The kind.
-
-    Raises:
-        KindError: it is outside the subset.
     """
     if isinstance(annotation, type | None) and annotation in _SCALARS:
         return _SCALARS[annotation]
@@ -108,28 +102,14 @@ def _with_capacity(base: Any, capacity: Any) -> Kind:
 
 
 def is_type(value: Any) -> bool:
-    """Tell whether a module's global is an alias of a tuple or list, or a NamedTuple.
-
-    Args:
-        value: of the global.
-
-    Returns:
-        True when it is.
-    """
+    """Tell whether a module's global is an alias of a tuple or list, or a NamedTuple."""
     if isinstance(value, types.GenericAlias) or get_origin(value) is Annotated:
         return True
     return isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields")
 
 
 def describe(kind: Kind) -> str:
-    """Return the kind in words, for messages.
-
-    Args:
-        kind: of a value.
-
-    Returns:
-        Words, as Python would write the type.
-    """
+    """Return the kind in words, for messages."""
     match kind:
         case Scalar():
             return kind.word
@@ -146,9 +126,6 @@ def describe(kind: Kind) -> str:
 def size_of(kind: Kind) -> int:
     """Return how many numbers a value holds.
 
-    Args:
-        kind: of a value.
-
     Returns:
         The number; 1 for what is no tuple.
     """
@@ -164,7 +141,6 @@ class KindNames:
     """The names of tuples and lists in C: those of the source's aliases, else made from the items.
 
     Args:
-        taken: names that are others'.
         paired: floats are pairs of a value and its derivative.
     """
 
@@ -175,26 +151,14 @@ class KindNames:
         self._order: list[Kind] = []
 
     def suggest(self, kind: Kind, name: str) -> None:
-        """Let ``kind`` be called ``name`` unless it has a name or the name is taken.
-
-        Args:
-            kind: of a value.
-            name: in C.
-        """
-        name = self._own(name)
+        """Let ``kind`` be called ``name`` unless it has a name or the name is taken."""
+        name = self._unique_name(name)
         free = name not in self._names.values() and name not in self._taken
         if isinstance(kind, Tuple | Items) and kind not in self._names and free:
             self._names[kind] = name
 
     def c(self, kind: Kind) -> str:
-        """Return the C type of a value of this kind, and remember that it has to be defined.
-
-        Args:
-            kind: of a value.
-
-        Returns:
-            The type.
-        """
+        """Return the C type of a value of this kind, and remember that it has to be defined."""
         match kind:
             case Scalar():
                 return PAIR if self._paired and kind == REAL else kind.c
@@ -207,13 +171,13 @@ class KindNames:
                 self.c(item)
             self._order.append(kind)
         if kind not in self._names:
-            self._names[kind] = self._own(self._made(kind))
+            self._names[kind] = self._unique_name(self._make(kind))
         return self._names[kind]
 
-    def _own(self, name: str) -> str:
+    def _unique_name(self, name: str) -> str:
         return f"{name}{PAIR}" if self._paired and PAIR not in name else name
 
-    def _made(self, kind: Tuple | Items) -> str:
+    def _make(self, kind: Tuple | Items) -> str:
         if isinstance(kind, Items):
             return f"List_of_{kind.capacity}_{self.c(kind.item)}"
         names = [self.c(item) for item in kind.items]
@@ -222,11 +186,7 @@ class KindNames:
         return "_and_".join(names)
 
     def definitions(self) -> list[str]:
-        """Return the typedefs of all that was asked for, items first.
-
-        Returns:
-            A typedef each.
-        """
+        """Return the typedefs of all that was asked for, items first."""
         return [self._definition(kind) for kind in self._order]
 
     def _definition(self, kind: Kind) -> str:
@@ -244,11 +204,7 @@ def field_name(kind: Tuple, n: int) -> str:
     """Return the name of the field ``n`` of a tuple that is not uniform.
 
     Args:
-        kind: of a value.
         n: its place, from 0.
-
-    Returns:
-        The name.
     """
     if kind.names:
         return kind.names[n]

@@ -45,17 +45,17 @@ class Program:
         translate: Translator,
         owner: Owner | None = None,
         taken: frozenset[str] = frozenset(),
-        beside: Program | None = None,
+        neighbours: Program | None = None,
     ) -> None:
         self._translate = translate
         self._taken = TAKEN | taken
-        self.paired = beside is not None
+        self.paired = neighbours is not None
         self.names = KindNames(self._taken, self.paired)
         self.owner = owner
         self.owner_name = owner.cls.__name__ if owner is not None else ""
         self._functions: dict[tuple[str, str], Function] = {}
         self._underway: list[tuple[str, str]] = []
-        self._constants: dict[str, float | int] = {} if beside is None else dict(beside._constants)
+        self._constants: dict[str, float | int] = {} if neighbours is None else dict(neighbours._constants)
         self._shared = frozenset(self._constants)
         self._sources: dict[str, ModuleSource] = {}
         self._largest_index = -1
@@ -64,26 +64,12 @@ class Program:
 
     @staticmethod
     def local_name(name: str) -> str:
-        """Return the C name of a local variable.
-
-        Args:
-            name: in Python.
-
-        Returns:
-            The name.
-        """
+        """Return the C name of a local variable."""
         return f"{name}_" if name in RESERVED else name
 
     @staticmethod
     def attribute_name(name: str) -> str:
-        """Return the C name of a slave's attribute.
-
-        Args:
-            name: in Python.
-
-        Returns:
-            The name.
-        """
+        """Return the C name of a slave's attribute."""
         plain = name.lstrip("_")
         return f"{plain}_" if plain in RESERVED else plain
 
@@ -93,19 +79,7 @@ class Program:
         return plain if plain not in taken else f"{module}_{plain}"
 
     def constant(self, source: ModuleSource, name: str, value: float | int) -> str:
-        """Return the name of a constant, which is defined once.
-
-        Args:
-            source: the module that defines it.
-            name: of the constant there.
-            value: of the constant.
-
-        Returns:
-            Its C name.
-
-        Raises:
-            FmuError: two modules use the name for different values.
-        """
+        """Return the name of a constant, which is defined once."""
         plain = name.lstrip("_")
         for candidate in (plain, f"{source.name}_{plain}"):
             known = self._constants.get(candidate)
@@ -119,53 +93,29 @@ class Program:
     # Functions ----------------------------------------------------------------------------------------------
 
     def function(self, user: ModuleSource | None, node: ast.AST | None, target: Callable[..., Any]) -> Function:
-        """Return the translation of a function of the sources.
-
-        Args:
-            user: the module that calls it, or None.
-            node: the call, for messages.
-            target: the function.
-
-        Returns:
-            The translated function.
-
-        Raises:
-            FmuError: it is not a function of a module that is translated.
-        """
+        """Return the translation of a function of the sources."""
         source = self._source(target.__module__)
         name = target.__name__
         definition = source.functions.get(name)
         if definition is None:
             raise FmuError(f"{source.path}: `{name}` must be a function of this module, but is not")
-        return self._translated(user, node, (target.__module__, name), source, definition, None)
+        return self._translate_function(user, node, (target.__module__, name), source, definition, None)
 
     def method(self, user: ModuleSource | None, node: ast.AST | None, name: str) -> Function:
-        """Return the translation of a method of the slave.
-
-        Args:
-            user: the module that calls it, or None.
-            node: the call, for messages.
-            name: of the method.
-
-        Returns:
-            The translated method.
-
-        Raises:
-            FmuError: the slave has no such method.
-        """
+        """Return the translation of a method of the slave."""
         assert self.owner is not None
         for cls in self.owner.cls.__mro__:
             if name in vars(cls) and cls.__module__ not in BASE_MODULES:
                 source = self._source(cls.__module__)
                 body = next(n for n in source.tree.body if isinstance(n, ast.ClassDef) and n.name == cls.__name__)
                 definition = next(n for n in body.body if isinstance(n, ast.FunctionDef) and n.name == name)
-                return self._translated(user, node, (cls.__qualname__, name), source, definition, self.owner)
+                return self._translate_function(user, node, (cls.__qualname__, name), source, definition, self.owner)
         message = f"`{self.owner_name}` must have a method `{name}` of its own, but has none"
         if user is not None and node is not None:
             user.refuse(node, message)
         raise FmuError(message)
 
-    def _translated(
+    def _translate_function(
         self,
         user: ModuleSource | None,
         node: ast.AST | None,
@@ -188,7 +138,7 @@ class Program:
         source = read_source(module)
         if source.name not in self._sources:
             self._sources[source.name] = source
-            for imported in source.imported():
+            for imported in source.imports():
                 self._source(imported)
             for name, kind in source.aliases():
                 self.names.suggest(kind, name)
@@ -205,38 +155,22 @@ class Program:
         self._largest_index = max(self._largest_index, index)
 
     def note_values(self, length: int) -> None:
-        """Note that a tuple of this length is handed on as one of unknown length.
-
-        Args:
-            length: of the tuple.
-        """
+        """Note that a tuple of this length is handed on as one of unknown length."""
         self._shortest = min(getattr(self, "_shortest", length), length)
 
     def check_lengths(self) -> None:
-        """Refuse a program that could read beyond a flat tuple.
-
-        Raises:
-            FmuError: the program could.
-        """
+        """Refuse a program that could read beyond a flat tuple."""
         if self._largest_index >= getattr(self, "_shortest", self._largest_index + 1):
             raise FmuError(f"item {self._largest_index} of a tuple of {self._shortest} floats must not be read, but is")
 
     # Text -----------------------------------------------------------------------------------------------------
 
     def types(self) -> str:
-        """Return the typedefs.
-
-        Returns:
-            C text.
-        """
+        """Return the typedefs."""
         return "\n\n".join(self.names.definitions())
 
     def constants(self) -> str:
-        """Return the definitions of the constants in use.
-
-        Returns:
-            C text.
-        """
+        """Return the definitions of the constants in use."""
         own = {n: v for n, v in self._constants.items() if n not in self._shared}
         wholes = {n: v for n, v in own.items() if isinstance(v, int) and abs(v) < 2**31}
         lines = [f"enum {{ {name} = {value} }};" for name, value in sorted(wholes.items(), key=_by_value)]
@@ -245,19 +179,11 @@ class Program:
         return "\n".join(lines)
 
     def prototypes(self) -> str:
-        """Return a declaration of every function.
-
-        Returns:
-            C text.
-        """
+        """Return a declaration of every function."""
         return "\n".join(f"{function.head};" for function in self._in_order())
 
     def definitions(self) -> str:
-        """Return every function, module by module.
-
-        Returns:
-            C text.
-        """
+        """Return every function, module by module."""
         parts: list[str] = []
         module = ""
         for function in self._in_order():

@@ -45,14 +45,7 @@ class Code:
     plain: str = ""
 
     def within(self, level: int) -> str:
-        """Return the text, in parentheses where the operator around it binds tighter.
-
-        Args:
-            level: of the operator around it.
-
-        Returns:
-            C text.
-        """
+        """Return the text, in parentheses where the operator around it binds tighter."""
         return self.text if self.level >= level else f"({self.text})"
 
 
@@ -86,85 +79,36 @@ class Scope:
     begun: set[str] = field(default_factory=set)
 
     def refuse(self, node: ast.AST, message: str) -> NoReturn:
-        """Raise for what is outside the subset.
-
-        Args:
-            node: of the Python source.
-            message: what it must be, and is.
-
-        Returns:
-            Never.
-        """
+        """Raise for what is outside the subset."""
         self.source.refuse(node, message)
 
     def expression(self, node: ast.expr, wanted: Kind | None = None) -> Code:
-        """Translate an expression; ``wanted`` is the kind to which it is converted, if that is known.
-
-        Args:
-            node: of the Python source.
-            wanted: kind to which the value is converted, if that is known.
-
-        Returns:
-            The expression in C.
-        """
+        """Translate an expression; ``wanted`` is the kind to which it is converted, if that is known."""
         return self.expressions(self, node, wanted)
 
     def condition(self, node: ast.expr) -> Code:
-        """Translate a condition.
-
-        Args:
-            node: of the Python source.
-
-        Returns:
-            The condition in C.
-        """
+        """Translate a condition."""
         return truth(value_of(self, self.expression(node)))
 
     def fault(self) -> str:
-        """Return the argument by which a call can raise, and remember that it can.
-
-        Returns:
-            C text.
-        """
+        """Return the argument by which a call can raise, and remember that it can."""
         self.faults += 1
         return "fault"
 
-    def raised(self, before: int) -> bool:
-        """Tell whether a slave's method can have raised since there were ``before`` faults; functions go on.
-
-        Args:
-            before: value of ``faults`` at that time.
-
-        Returns:
-            True when it can.
-        """
+    def may_raise(self, before: int) -> bool:
+        """Tell whether a slave's method can have raised since there were ``before`` faults; functions go on."""
         return self.owner is not None and self.faults > before
 
-    def checked(self, before: int) -> list[str]:
-        """Return the statement that leaves a method if it can have raised since there were ``before`` faults.
-
-        Args:
-            before: value of ``faults`` at that time.
-
-        Returns:
-            One statement or none.
-        """
-        return [self.fault_check()] if self.raised(before) else []
+    def check_faults(self, before: int) -> list[str]:
+        """Return the statement that leaves a method if it can have raised since there were ``before`` faults."""
+        return [self.fault_check()] if self.may_raise(before) else []
 
     def fault_check(self) -> str:
-        """Return the statement that leaves a function once something was raised.
+        """Return the statement that leaves a function once something was raised."""
+        return f"if (fault->kind) return{self.empty_result()};"
 
-        Returns:
-            C text.
-        """
-        return f"if (fault->kind) return{self.nothing()};"
-
-    def nothing(self) -> str:
-        """Return what a function gives back when it raises, which nobody looks at.
-
-        Returns:
-            C text, with the blank before it.
-        """
+    def empty_result(self) -> str:
+        """Return what a function gives back when it raises, which nobody looks at."""
         if self.returns == NOTHING:
             return ""
         if isinstance(self.returns, Tuple | Items):
@@ -172,22 +116,11 @@ class Scope:
         return " pair_of(0.0)" if self.program.paired and self.returns == REAL else " 0"
 
     def local(self, name: str) -> str:
-        """Return the C name of a local variable.
-
-        Args:
-            name: in Python.
-
-        Returns:
-            The name.
-        """
+        """Return the C name of a local variable."""
         return self.program.local_name(name)
 
     def note_mutation(self, node: ast.expr) -> None:
-        """Note that the list to which ``node`` leads is changed.
-
-        Args:
-            node: of the Python source.
-        """
+        """Note that the list to which ``node`` leads is changed."""
         while isinstance(node, ast.Subscript | ast.Attribute):
             node = node.value
         if isinstance(node, ast.Name):
@@ -198,14 +131,7 @@ class Scope:
                 name = self.aliases.get(name, name)
 
     def temporary(self, stem: str) -> str:
-        """Return a new name for something that has none in the source.
-
-        Args:
-            stem: what the name begins with.
-
-        Returns:
-            The name.
-        """
+        """Return a new name for something that has none in the source."""
         while True:
             self.temporaries += 1
             name = f"{stem}_{self.temporaries}"
@@ -213,16 +139,7 @@ class Scope:
                 return name
 
     def hoist(self, node: ast.AST, code: Code, stem: str) -> Code:
-        """Give a value a name before the statement in which it stands.
-
-        Args:
-            node: of the Python source.
-            code: an expression in C.
-            stem: what the name begins with.
-
-        Returns:
-            The name as an expression.
-        """
+        """Give a value a name before the statement in which it stands."""
         if self.conditional:
             self.refuse(node, "this value must be given a name first, because it is needed under a condition")
         name = self.temporary(stem)
@@ -230,13 +147,7 @@ class Scope:
         return Code(name, code.kind, place=True)
 
     def assign_kind(self, node: ast.AST, name: str, kind: Kind) -> None:
-        """Note that a local variable takes a value of ``kind``; whole numbers widen to reals.
-
-        Args:
-            node: of the Python source.
-            name: of the variable.
-            kind: type of the value.
-        """
+        """Note that a local variable takes a value of ``kind``; whole numbers widen to reals."""
         known = self.kinds.get(name)
         if known is None:
             self.kinds[name] = kind
@@ -249,18 +160,8 @@ class Scope:
                 self.changed = True
 
 
-def converted(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
-    """Return ``code`` as a value of ``kind``, or refuse.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        code: an expression in C.
-        kind: type of the value.
-
-    Returns:
-        The value in C.
-    """
+def convert(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
+    """Return ``code`` as a value of ``kind``, or refuse."""
     if code.kind == kind:
         return code
     if kind == REAL and code.kind == WHOLE:
@@ -271,53 +172,30 @@ def converted(scope: Scope, node: ast.AST, code: Code, kind: Kind) -> Code:
             code = scope.hoist(node, code, "values")
         return Code(f"{member(code)}v", kind)
     if isinstance(kind, Tuple) and isinstance(code.kind, Tuple) and code.kind.items == kind.items:
-        return code if code.kind.uniform == kind.uniform else _renamed(scope, node, code, kind)
+        return code if code.kind.uniform == kind.uniform else _rename_tuple(scope, node, code, kind)
     return scope.refuse(node, f"a value must be {describe(kind)}, but is {describe(code.kind)}")
 
 
 def as_real(scope: Scope, code: Code) -> Code:
-    """Return a number as a float; in C plain ones convert by themselves.
-
-    Args:
-        scope: the function under translation.
-        code: a number.
-
-    Returns:
-        The float.
-    """
+    """Return a number as a float; in C plain ones convert by themselves."""
     if not scope.program.paired:
         return Code(code.text, REAL, code.level) if code.kind == WHOLE else code
     return code if code.kind == REAL else constant_pair(f"(double){code.within(UNARY)}")
 
 
 def constant_pair(plain: str) -> Code:
-    """Return a number that does not depend on what is differentiated by.
-
-    Args:
-        plain: the number in C.
-
-    Returns:
-        Its pair.
-    """
+    """Return a number that does not depend on what is differentiated by."""
     return Code(f"pair_of({plain})", REAL, plain=plain)
 
 
 def value_of(scope: Scope, code: Code) -> Code:
-    """Return a number without its derivative, as conditions and messages take it.
-
-    Args:
-        scope: the function under translation.
-        code: a number.
-
-    Returns:
-        Its value.
-    """
+    """Return a number without its derivative, as conditions and messages take it."""
     if not scope.program.paired or code.kind != REAL:
         return code
     return Code(f"({code.plain})" if code.plain else f"{member(code)}v", REAL)
 
 
-def _renamed(scope: Scope, node: ast.AST, code: Code, kind: Tuple) -> Code:
+def _rename_tuple(scope: Scope, node: ast.AST, code: Code, kind: Tuple) -> Code:
     assert isinstance(code.kind, Tuple)
     if not code.place:
         code = scope.hoist(node, code, "pair")
@@ -326,16 +204,7 @@ def _renamed(scope: Scope, node: ast.AST, code: Code, kind: Tuple) -> Code:
 
 
 def compound(scope: Scope, kind: Kind, parts: str) -> Code:
-    """Return a tuple made of ``parts``.
-
-    Args:
-        scope: the function under translation.
-        kind: type of the value.
-        parts: the items in C, separated by commas.
-
-    Returns:
-        The tuple in C.
-    """
+    """Return a tuple made of ``parts``."""
     assert isinstance(kind, Tuple)
     braces = f"{{{{{parts}}}}}" if kind.uniform else f"{{{parts}}}"
     return Code(f"({scope.program.names.c(kind)}){braces}", kind)
@@ -345,11 +214,7 @@ def item_of(code: Code, n: int) -> Code:
     """Return the item ``n`` of a tuple that has a name.
 
     Args:
-        code: an expression in C.
         n: its place, from 0.
-
-    Returns:
-        The item in C.
     """
     assert isinstance(code.kind, Tuple)
     field = f"v[{n}]" if code.kind.uniform else field_name(code.kind, n)
@@ -357,59 +222,28 @@ def item_of(code: Code, n: int) -> Code:
 
 
 def member(base: Code) -> str:
-    """Return ``base.`` or, for what is behind a pointer, ``base->``.
-
-    Args:
-        base: a structure in C.
-
-    Returns:
-        C text, to which the name of a field is added.
-    """
+    """Return ``base.`` or, for what is behind a pointer, ``base->``."""
     return f"{base.text[1:]}->" if base.text.startswith("*") else f"{base.within(PRIMARY)}."
 
 
 def address_of(code: Code) -> str:
-    """Return the address of a place.
-
-    Args:
-        code: an expression in C.
-
-    Returns:
-        C text.
-    """
+    """Return the address of a place."""
     if code.address:
         return code.address
     return code.text[1:] if code.text.startswith("*") else f"&{code.within(PRIMARY)}"
 
 
-def joined(scope: Scope, node: ast.AST, one: Kind, other: Kind) -> Kind:
-    """Return the kind of a value that is of either kind.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-        one: kind of the one value.
-        other: kind of the other.
-
-    Returns:
-        The kind.
-    """
-    if one == other:
-        return one
-    if {one, other} == {REAL, WHOLE}:
+def join_kinds(scope: Scope, node: ast.AST, first: Kind, other: Kind) -> Kind:
+    """Return the kind of a value that is of either kind."""
+    if first == other:
+        return first
+    if {first, other} == {REAL, WHOLE}:
         return REAL
-    return scope.refuse(node, f"both values must be of one type, but are {describe(one)} and {describe(other)}")
+    return scope.refuse(node, f"both values must be of one type, but are {describe(first)} and {describe(other)}")
 
 
 def truth(code: Code) -> Code:
-    """Return a value as a condition, as Python takes it.
-
-    Args:
-        code: an expression in C.
-
-    Returns:
-        The condition in C.
-    """
+    """Return a value as a condition, as Python takes it."""
     if code.kind == TRUTH:
         return code
     if isinstance(code.kind, Items):

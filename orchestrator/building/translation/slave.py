@@ -50,18 +50,10 @@ class TranslatedSlave:
 
 
 def translate_slave(cls: Any, taken: frozenset[str] = frozenset(), fmi: int = 2) -> TranslatedSlave:
-    """Translate an adapter (a subclass of ``SlaveBase``) and all that it calls.
+    """Translate an adapter (a subclass of ``SlaveBase``) and all that it calls. Return the slave in C, in parts.
 
     Args:
-        cls: the class; its table holds the start values of this FMU.
-        taken: names that the C runtime uses.
         fmi: version of FMI, 2 or 3.
-
-    Returns:
-        The slave in C, in parts.
-
-    Raises:
-        FmuError: something is outside the subset; the message names file and line.
     """
     owner = Owner(cls, attributes_of(cls), len(cls.table))
     program = Program(translate, owner, taken | {cls.__name__})
@@ -93,11 +85,7 @@ def translate_slave(cls: Any, taken: frozenset[str] = frozenset(), fmi: int = 2)
 
 
 def attributes_of(cls: Any) -> dict[str, Kind]:
-    """Return the hidden state of a slave: the attributes that its class declares, with their kinds.
-
-    Returns:
-        Kinds by attribute.
-    """
+    """Return the hidden state of a slave: the attributes that its class declares, with their kinds."""
     found: dict[str, Kind] = {}
     for base in reversed(cls.__mro__):
         if base.__module__ in BASE_MODULES or not base.__module__.startswith("pyfmu_sources."):
@@ -113,11 +101,7 @@ def attributes_of(cls: Any) -> dict[str, Kind]:
 
 
 def has_states(cls: Any) -> bool:
-    """Tell whether a slave has continuous states, so that it can do model exchange.
-
-    Returns:
-        True when it has.
-    """
+    """Tell whether a slave has continuous states, so that it can do model exchange."""
     return bool(getattr(cls, "continuous_states", ()))
 
 
@@ -184,7 +168,7 @@ def _state_hook(program: Program, name: str, parameters: str, function: Function
 def _hook(program: Program, name: str, parameters: str, needed: bool) -> str:
     """Return the function by which the runtime calls a hook, whether it can raise or not."""
     head = f"static void slave_{name}({program.owner_name} *self{parameters}, Fault *fault)"
-    if not needed and not _defined(program, name):
+    if not needed and not _is_defined(program, name):
         return f"{head}\n{{\n    (void)self;\n    (void)fault;\n}}"
     function = program.method(None, None, name)
     _check(program, function, parameters)
@@ -193,7 +177,7 @@ def _hook(program: Program, name: str, parameters: str, needed: bool) -> str:
     return f"{head}\n{{\n{unused}    {function.c}({', '.join(arguments)});\n}}"
 
 
-def _defined(program: Program, name: str) -> bool:
+def _is_defined(program: Program, name: str) -> bool:
     assert program.owner is not None
     return any(name in vars(base) for base in program.owner.cls.__mro__ if base.__module__ not in BASE_MODULES)
 
@@ -218,14 +202,7 @@ def _struct(program: Program, owner: Owner) -> str:
 
 
 def variable_table(cls: Any) -> str:
-    """Return the C table of a slave's variables.
-
-    Args:
-        cls: the adapter.
-
-    Returns:
-        The definition.
-    """
+    """Return the C table of a slave's variables."""
     rows = []
     for variable in cls.table:
         low, high = variable.bounds

@@ -33,29 +33,11 @@ class ModuleSource:
     whole_lines: frozenset[int] = field(repr=False)
 
     def refuse(self, node: ast.AST, message: str) -> NoReturn:
-        """Raise for what is outside the subset, with file and line.
-
-        Args:
-            node: what is outside.
-            message: what it must be, and is.
-
-        Returns:
-            Never.
-
-        Raises:
-            FmuError: always.
-        """
+        """Raise for what is outside the subset, with file and line."""
         raise FmuError(f"{self.path}:{getattr(node, 'lineno', 1)}: {message}")
 
     def comments(self, node: ast.stmt) -> list[str]:
-        """Return the comments right above a statement and at its first line.
-
-        Args:
-            node: of the Python source.
-
-        Returns:
-            The comments, without their signs.
-        """
+        """Return the comments right above a statement and at its first line."""
         line = node.lineno - 1
         above: list[str] = []
         while line in self.whole_lines:
@@ -66,40 +48,15 @@ class ModuleSource:
         return [text for text in above if not text.startswith("noqa")]
 
     def value(self, name: str) -> Any:
-        """Return what a global name is bound to.
-
-        Args:
-            name: a global of the module.
-
-        Returns:
-            The value.
-
-        Raises:
-            KeyError: nothing.
-        """
+        """Return what a global name is bound to."""
         return vars(self.module)[name]
 
     def has(self, name: str) -> bool:
-        """Tell whether the module binds a name.
-
-        Args:
-            name: a global of the module.
-
-        Returns:
-            True when it does.
-        """
+        """Tell whether the module binds a name."""
         return name in vars(self.module)
 
     def annotation(self, node: ast.expr | None, place: ast.AST) -> Kind:
-        """Return the kind that an annotation stands for.
-
-        Args:
-            node: of the Python source.
-            place: what is annotated, for messages.
-
-        Returns:
-            The kind.
-        """
+        """Return the kind that an annotation stands for."""
         if node is None:
             self.refuse(place, "parameters and results must have type annotations")
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -112,12 +69,8 @@ class ModuleSource:
         except KindError as error:
             self.refuse(place, f"{error}")
 
-    def imported(self) -> Iterator[str]:
-        """Yield the full names of the modules beside this one that it imports from, base classes of slaves apart.
-
-        Yields:
-            Each name.
-        """
+    def imports(self) -> Iterator[str]:
+        """Yield the full names of the modules beside this one that it imports from, base classes of slaves apart."""
         package = self.module.__name__.rpartition(".")[0]
         for node in self.tree.body:
             if isinstance(node, ast.ImportFrom) and node.level == 1:
@@ -125,11 +78,7 @@ class ModuleSource:
                 yield from (f"{package}.{name}" for name in names if name not in NOT_TRANSLATED)
 
     def aliases(self) -> Iterator[tuple[str, Kind]]:
-        """Yield names of tuples and lists that this module gives, in order.
-
-        Yields:
-            Each name with its kind.
-        """
+        """Yield names of tuples and lists that this module gives, in order."""
         for node in self.tree.body:
             names = [node.name] if isinstance(node, ast.ClassDef) else []
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
@@ -144,17 +93,7 @@ class ModuleSource:
 
 @cache
 def read_source(name: str) -> ModuleSource:
-    """Return the module of this full name.
-
-    Args:
-        name: of the module, in full.
-
-    Returns:
-        The source.
-
-    Raises:
-        FmuError: it cannot be read.
-    """
+    """Return the module of this full name."""
     try:
         module = importlib.import_module(name)
         path = Path(module.__file__ or "")
@@ -164,7 +103,7 @@ def read_source(name: str) -> ModuleSource:
         raise FmuError(f"the source {name} cannot be read: {error}") from None
     functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
     remarks, whole = _remarks(content)
-    return ModuleSource(name.rpartition(".")[2], _shown(path), tree, module, functions, remarks, whole)
+    return ModuleSource(name.rpartition(".")[2], _relative_path(path), tree, module, functions, remarks, whole)
 
 
 def _remarks(content: bytes) -> tuple[dict[int, str], frozenset[int]]:
@@ -179,7 +118,7 @@ def _remarks(content: bytes) -> tuple[dict[int, str], frozenset[int]]:
     return found, frozenset(whole)
 
 
-def _shown(path: Path) -> Path:
+def _relative_path(path: Path) -> Path:
     try:
         return path.relative_to(Path.cwd())
     except ValueError:
@@ -187,13 +126,6 @@ def _shown(path: Path) -> Path:
 
 
 def docstring(node: ast.AST) -> str:
-    """Return a docstring without indentation, or nothing.
-
-    Args:
-        node: a module, a class or a function.
-
-    Returns:
-        The text.
-    """
+    """Return a docstring without indentation, or nothing."""
     assert isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module)
     return ast.get_docstring(node) or ""

@@ -6,7 +6,7 @@ import ast
 from collections.abc import Callable
 from typing import Any
 
-from orchestrator.building.translation.assignments import annotated, assigned, augmented
+from orchestrator.building.translation.assignments import translate_annotated, translate_assignment, translate_augmented
 from orchestrator.building.translation.building_tuples import with_loop
 from orchestrator.building.translation.calls import message
 from orchestrator.building.translation.constants import interval
@@ -17,15 +17,7 @@ REFUSALS = {"StepRefusedError": "STEP_REFUSED", "ValueError": "VALUE_ERROR"}
 
 
 def block(scope: Scope, statements: list[ast.stmt]) -> list[str]:
-    """Translate a block; the lines are not indented.
-
-    Args:
-        scope: the function under translation.
-        statements: of the block.
-
-    Returns:
-        Lines of C.
-    """
+    """Translate a block; the lines are not indented."""
     lines: list[str] = []
     for node in statements:
         lines += [f"/* {text} */" for text in scope.source.comments(node)]
@@ -34,15 +26,7 @@ def block(scope: Scope, statements: list[ast.stmt]) -> list[str]:
 
 
 def statement(scope: Scope, node: ast.stmt) -> list[str]:
-    """Translate one statement, with what has to be computed before it.
-
-    Args:
-        scope: the function under translation.
-        node: of the Python source.
-
-    Returns:
-        Lines of C.
-    """
+    """Translate one statement, with what has to be computed before it."""
     handler = _HANDLERS.get(type(node))
     if handler is None:
         scope.refuse(node, f"the statement `{ast.unparse(node).splitlines()[0]}` is outside the subset")
@@ -66,7 +50,7 @@ def _raise(scope: Scope, node: ast.Raise) -> list[str]:
     if name not in REFUSALS or not isinstance(call, ast.Call) or len(call.args) != 1:
         scope.refuse(node, f"`raise` must be of {' or '.join(REFUSALS)} with one message")
     text = message(scope, call.args[0])
-    return [f"raise_fault({scope.fault()}, {REFUSALS[name]}, {text});", f"return{scope.nothing()};"]
+    return [f"raise_fault({scope.fault()}, {REFUSALS[name]}, {text});", f"return{scope.empty_result()};"]
 
 
 def _expression(scope: Scope, node: ast.Expr) -> list[str]:
@@ -82,7 +66,7 @@ def _expression(scope: Scope, node: ast.Expr) -> list[str]:
     before = scope.faults
     code = scope.expression(node.value)
     lines = [f"{code.text};" if code.kind == NOTHING else f"(void){code.within(PRIMARY)};"]
-    return lines + scope.checked(before)
+    return lines + scope.check_faults(before)
 
 
 def _on_list(scope: Scope, call: ast.Call, function: ast.Attribute, target: Code) -> list[str]:
@@ -95,7 +79,7 @@ def _on_list(scope: Scope, call: ast.Call, function: ast.Attribute, target: Code
     value = scope.expression(call.args[0], target.kind.item)
     index = scope.temporary("end")
     place = f"const int64_t {index} = next_item(&{base}n, {target.kind.capacity}, {scope.fault()});"
-    return [place, f"{base}v[{index}] = {value.text};", *scope.checked(before)]
+    return [place, f"{base}v[{index}] = {value.text};", *scope.check_faults(before)]
 
 
 def _delete(scope: Scope, node: ast.Delete) -> list[str]:
@@ -115,20 +99,20 @@ def _delete(scope: Scope, node: ast.Delete) -> list[str]:
 def _if(scope: Scope, node: ast.If) -> list[str]:
     before = scope.faults
     test = scope.condition(node.test).text
-    if scope.raised(before):
+    if scope.may_raise(before):
         name = scope.temporary("test")
         scope.before += [f"const bool {name} = {test};", scope.fault_check()]
         test = name
-    lines = [f"if ({test}) {{", *_indented(block(scope, node.body))]
+    lines = [f"if ({test}) {{", *_indent(block(scope, node.body))]
     if not node.orelse:
         return [*lines, "}"]
     other = block(scope, node.orelse)
     if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If) and other[0].startswith("if ("):
         return [*lines, f"}} else {other[0]}", *other[1:]]
-    return [*lines, "} else {", *_indented(other), "}"]
+    return [*lines, "} else {", *_indent(other), "}"]
 
 
-def _indented(lines: list[str]) -> list[str]:
+def _indent(lines: list[str]) -> list[str]:
     return [f"    {line}" for line in lines]
 
 
@@ -137,7 +121,7 @@ def _while(scope: Scope, node: ast.While) -> list[str]:
     test = scope.condition(node.test)
     if scope.before or node.orelse:
         scope.refuse(node, "the condition of `while` must be simple, and `else` after a loop is outside the subset")
-    body = _indented(block(scope, node.body))
+    body = _indent(block(scope, node.body))
     stop = " && !fault->kind" if scope.faults > before else ""
     return [f"while ({test.within(PRIMARY if ' || ' in test.text and stop else 0)}{stop}) {{", *body, "}"]
 
@@ -146,11 +130,11 @@ def _for(scope: Scope, node: ast.For) -> list[str]:
     if node.orelse:
         scope.refuse(node, "`else` after a loop is outside the subset")
     if isinstance(node.iter, ast.Call) and isinstance(node.iter.func, ast.Name) and node.iter.func.id == "range":
-        return _counted(scope, node, node.iter)
+        return _translate_range(scope, node, node.iter)
     return _over_items(scope, node)
 
 
-def _counted(scope: Scope, node: ast.For, call: ast.Call) -> list[str]:
+def _translate_range(scope: Scope, node: ast.For, call: ast.Call) -> list[str]:
     if not isinstance(node.target, ast.Name):
         scope.refuse(node, "the variable of a counted loop must be a name")
     arguments = [ast.Constant(0), *call.args] if len(call.args) == 1 else list(call.args)
@@ -165,7 +149,7 @@ def _counted(scope: Scope, node: ast.For, call: ast.Call) -> list[str]:
         with_loop(scope, node.target.id, 0, 1)
         _narrow(scope, node.target.id, ends, step[0])
     before = scope.faults
-    body = _indented(block(scope, node.body))
+    body = _indent(block(scope, node.body))
     stopped = " && !fault->kind" if scope.faults > before and scope.owner is None else ""
     sign = "<" if step[0] > 0 else ">"
     change = {1: f"{variable}++", -1: f"{variable}--"}.get(step[0], f"{variable} += {step[0]}")
@@ -234,7 +218,7 @@ def _over_items(scope: Scope, node: ast.For) -> list[str]:
     stopped = " && !fault->kind" if scope.faults > before and scope.owner is None else ""
     for name in names:
         _leave(scope, name)
-    return [f"for (int64_t {index} = 0; {index} < {length}{stopped}; {index}++) {{", *_indented(body), "}"]
+    return [f"for (int64_t {index} = 0; {index} < {length}{stopped}; {index}++) {{", *_indent(body), "}"]
 
 
 def _item_lines(scope: Scope, node: ast.For, target: ast.expr, value: Code) -> list[str]:
@@ -258,9 +242,9 @@ def _simple(text: str) -> Callable[[Scope, Any], list[str]]:
 
 
 _HANDLERS: dict[type, Callable[[Scope, Any], list[str]]] = {
-    ast.Assign: assigned,
-    ast.AnnAssign: annotated,
-    ast.AugAssign: augmented,
+    ast.Assign: translate_assignment,
+    ast.AnnAssign: translate_annotated,
+    ast.AugAssign: translate_augmented,
     ast.Return: _return,
     ast.Raise: _raise,
     ast.Expr: _expression,

@@ -45,4 +45,4 @@ def odd(function: str) -> ChildError:
     Returns:
         The error, to be raised.
     """
-    return ChildError(f"the answer to {function} is none", "protocol")
+    return ChildError(f"the answer to {function} is not valid", "protocol")

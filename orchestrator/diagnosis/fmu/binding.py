@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.diagnosis.fmu.loop import AWAY, GET, SET, STEP, run_loop
+from orchestrator.diagnosis.fmu.loop import AWAY, SET, STEP, run_loop
 from orchestrator.diagnosis.fmu.wire import Array, Batch, Job, Load
 from orchestrator.errors import FmuError, OrchestratorError, SlaveError
+from orchestrator.fmi.instances import make_slave
 from orchestrator.fmi.model_description import read_description
 from orchestrator.fmi.slave import FmuSlave
-from orchestrator.master.protocol import Value
+from orchestrator.master.protocol import NativeTransfer, Value
 from orchestrator.master.result import RunRemark
 from orchestrator.master.system import split
 
-CALLS = {SET: "fmi2SetReal", STEP: "fmi2DoStep", GET: "fmi2GetReal"}
 BEYOND = 1.01
 """Stop time that an FMU is told, over the length of the run: some refuse steps beyond one of their own."""
 
@@ -32,6 +32,13 @@ def owned(name: str, members: Mapping[str, object]) -> tuple[str, str]:
         The two names.
     """
     return ("", name) if "" in members else split(name)
+
+
+def _plain(transfers: Sequence[NativeTransfer]) -> bool:
+    """Tell whether doubles are set or read in one call, as many as there are variables."""
+    return not transfers or (
+        len(transfers) == 1 and transfers[0].number == "f8" and transfers[0].count == len(transfers[0].references)
+    )
 
 
 class Member:
@@ -56,7 +63,7 @@ class Member:
         tolerance: float | None,
     ) -> None:
         self._path, self._tolerance = path, tolerance
-        self._description = read_description(path)
+        self._description = read_description(path, events=False)
         variables = self._description.model.variables
         for name in (*inputs, *tunables, *reads):
             if name not in variables or variables[name].type != "Real":
@@ -99,13 +106,26 @@ class Member:
                     slave.terminate()
                 slave.close()
         if self._slave is None:
-            self._slave = FmuSlave("box", self._path, self._description)
+            self._slave = make_slave("box", self._path, self._description)
             native = self._slave.native_calls([*self.inputs, *self.tunables], self.reads)
-            if native is None:
-                raise FmuError(f"{self._path}: its functions cannot be called")
+            if native is None or not all(map(_plain, (native.inputs, native.outputs))):
+                raise FmuError(f"{self._path}: what is set and read must be of 64 bits and no part of an array, but is")
             self.native = native
         self._used, self._broken = False, False
         return self._slave
+
+    def called(self, call: int) -> str:
+        """Return the name of the function that ``run_loop`` names by a number.
+
+        Args:
+            call: ``SET``, ``STEP`` or ``GET``.
+
+        Returns:
+            The name.
+        """
+        if call == STEP:
+            return self.native.step_name
+        return (self.native.inputs if call == SET else self.native.outputs)[0].name
 
     def _came_back(self, slave: FmuSlave) -> bool:
         """Tell whether a reset is accepted; where it is not, a new instance is made for every run."""
@@ -207,7 +227,7 @@ class Box:
         members = list(self._members.values())
         for member, (count, first, at) in zip(members, warned.tolist(), strict=True):
             if count:
-                member.slave.warned(count, CALLS[first], start + at * step)
+                member.slave.warned(count, member.called(first), start + at * step)
         if call == AWAY:
             for member in members:
                 member.done()
@@ -215,7 +235,7 @@ class Box:
                 f"efforts at ports must stay within those of the drive, but run away at {start + k * step:g} s"
             )
         if status > 1:
-            members[n].slave.failed(int(status), CALLS[call], start + k * step)
+            members[n].slave.failed(int(status), members[n].called(call), start + k * step)
         for member in members:
             member.done()
         return out
@@ -250,9 +270,12 @@ class Box:
         """Return components and functions, numbers of values and addresses of every member, for the loop."""
         calls, counts, where = [], [], []
         for (sent, read), member in zip(self._first, self._members.values(), strict=True):
-            native = member.native
-            calls.append([native.component, native.set[0], native.do_step, native.get[0]])
+            native, none = member.native, np.zeros(1, dtype=np.uint32)
+            ends = [t[0] if t else None for t in (native.inputs, native.outputs)]
+            functions = [0 if t is None else t.function for t in ends]
+            calls.append([native.component, functions[0], native.do_step, functions[1], int(native.reports)])
             counts.append([len(member.inputs) + (len(member.tunables) if tuned else 0), len(member.reads)])
             values = self._sent[sent:].ctypes.data, self._read[read:].ctypes.data
-            where.append([native.inputs[0].ctypes.data, values[0], native.outputs[0].ctypes.data, values[1]])
+            references = [(none if t is None else t.references).ctypes.data for t in ends]
+            where.append([references[0], values[0], references[1], values[1]])
         return tuple(np.array(rows, dtype=np.int64) for rows in (calls, counts, where))  # type: ignore[return-value]

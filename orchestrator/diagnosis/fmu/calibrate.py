@@ -79,10 +79,12 @@ def calibrate_fmu(
     )
     notes = [*found.notes]
     notes += [
-        f"`{name}` is hardly determined: excite what it acts on" for name, share in learned.items() if share < LEARNED
+        f"the record hardly determines `{name}`: excite what it acts on"
+        for name, share in learned.items()
+        if share < LEARNED
     ]
-    notes += [f"`{a}` and `{b}` are hardly told apart: excite them at other frequencies" for a, b in pairs]
+    notes += [f"the record hardly distinguishes `{a}` and `{b}`: excite other frequencies" for a, b in pairs]
     explained = found.verdict != "unknown" and not any(is_missed(one) for test in found.test for one in test.signals)
     if not explained:
-        notes.append("something else is missing: `diagnose` says what")
+        notes.append("the parameters do not explain the record: `diagnose` looks for what is missing")
     return FmuCalibration(found, learned, pairs, explained, tuple(notes))

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.master.native_calls import call_step, call_transfer
+from orchestrator.master.native_calls import call_reporting_step, call_sized_transfer, call_step, call_transfer
+from orchestrator.master.protocol import ENDED, LEFT_EARLY
 from orchestrator.plants.compiled import compiled
 from orchestrator.shared.numba_cache import kept
 
@@ -87,20 +88,42 @@ def _note(status, warned, n, call, k):  # type: ignore[no-untyped-def]
 
 
 @kept()
-def _step(calls, counts, where, time, step, k, warned):  # type: ignore[no-untyped-def]
+def _transfer(calls, counts, where, n, place):  # type: ignore[no-untyped-def]
+    """Set (place 0) or read (1) a member; return the status."""
+    function, references, values = calls[n, 1 + 2 * place], where[n, 2 * place], where[n, 2 * place + 1]
+    if calls[n, 4] != 0:
+        return call_sized_transfer(function, calls[n, 0], references, counts[n, place], values)
+    return call_transfer(function, calls[n, 0], references, counts[n, place], values)
+
+
+@kept()
+def _advance(calls, reports, n, time, step):  # type: ignore[no-untyped-def]
+    """Step a member; return the status."""
+    if calls[n, 4] == 0:
+        return call_step(calls[n, 2], calls[n, 0], time, step)
+    status = call_reporting_step(calls[n, 2], calls[n, 0], time, step, reports[n].ctypes.data)
+    if status > 1:
+        return status
+    if reports[n, 1] != 0:
+        return np.int32(ENDED)
+    return np.int32(LEFT_EARLY) if reports[n, 0] != 0 or reports[n, 2] != 0 else status
+
+
+@kept()
+def _step(calls, counts, where, reports, time, step, k, warned):  # type: ignore[no-untyped-def]
     """Set, step and read all FMUs; return ``(status, call, member)``."""
     for n in range(len(calls)):
         if counts[n, 0] > 0:
-            status = call_transfer(calls[n, 1], calls[n, 0], where[n, 0], counts[n, 0], where[n, 1])
+            status = _transfer(calls, counts, where, n, 0)
             if _note(status, warned, n, SET, k) > 1:
                 return status, SET, n
     for n in range(len(calls)):
-        status = call_step(calls[n, 2], calls[n, 0], time, step)
+        status = _advance(calls, reports, n, time, step)
         if _note(status, warned, n, STEP, k) > 1:
             return status, STEP, n
     for n in range(len(calls)):
         if counts[n, 1] > 0:
-            status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
+            status = _transfer(calls, counts, where, n, 1)
             if _note(status, warned, n, GET, k) > 1:
                 return status, GET, n
     return np.int32(0), GET, 0
@@ -114,7 +137,7 @@ def run_loop(  # type: ignore[no-untyped-def]
     """Run one record; return ``(status, call, step, member)``, status at most 1 when all went well.
 
     Args:
-        calls: (members, 4) component, fmi2SetReal, fmi2DoStep, fmi2GetReal.
+        calls: (members, 5) component, functions that set, step and get, whether they are of FMI 3.0.
         counts: (members, 2) number of inputs, number of variables read.
         where: (members, 4) addresses of references and values of inputs, of references and values of what is read.
         sent, read: the buffers at those addresses.
@@ -137,8 +160,9 @@ def run_loop(  # type: ignore[no-untyped-def]
     start, step, per_row = grid[0], grid[1], int(grid[2])
     last, built = np.zeros((len(ports), 2)), np.zeros(len(ports))
     fed, handed = np.zeros((len(wires), 2)), np.zeros(len(wires))
+    reports = np.zeros((len(calls), 16), dtype=np.uint8)
     for n in range(len(calls)):
-        status = call_transfer(calls[n, 3], calls[n, 0], where[n, 2], counts[n, 1], where[n, 3])
+        status = _transfer(calls, counts, where, n, 1)
         if status > 1:
             return status, GET, 0, n
     for i in range(len(outof)):
@@ -152,7 +176,7 @@ def run_loop(  # type: ignore[no-untyped-def]
         for w in range(len(wires)):
             fed[w, 1] = fed[w, 0]
             fed[w, 0] = sent[into[wires[w, 0]]]
-        status, call, n = _step(calls, counts, where, start + k * step, step, k, warned)
+        status, call, n = _step(calls, counts, where, reports, start + k * step, step, k, warned)
         if status > 1:
             return status, call, k, n
         if (k + 1) % per_row == 0:

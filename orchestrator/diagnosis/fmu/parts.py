@@ -89,7 +89,9 @@ def parts_of(problem: BoxProblem, model: BoxModel) -> tuple[Part, ...]:
     for k, c in enumerate(problem.runner.subject.connections):
         at_once = [t for t in problem.runner.through if t.wire == k]
         if len(at_once) > 1:
-            raise FmuError(f"what {c.source} hands on must depend at once on one connection at most to be delivered")
+            raise FmuError(
+                f"{c.source} must depend directly on at most one connection to be written as SSP, but depends on more"
+            )
         gain = sum(t.gain for t in at_once)
         values = {"series": SERIES.index("connection"), "q0": c.factor, "q1": c.offset, "q2": gain, "lead": 0.5}
         found.append(Part(f"connection_{k + 1}", None, values))

@@ -248,17 +248,16 @@ def _pushed(problem: BoxProblem) -> Probe:
                 f"{base[0, n]:g}: map the variable that was measured, and the inputs that move it"
             )
     size = np.maximum(np.max(np.abs(base), axis=0), 1e-300)
-    notes = ["reset is not followed: a new instance is made for every run"] if fresh else []
+    notes = ["the FMU does not return to its start by a reset: each run takes a new instance"] if fresh else []
     wanted = steps_of(problem.map.options.substeps, problem.data.factor)
     if problem.m < wanted:
         notes.append(
-            f"the FMU has a fixed step of its own, or is slow: {problem.m} communication steps in a sample instead of "
-            f"{wanted}"
+            f"the FMU has a fixed step, or is slow: a sample has {problem.m} communication steps instead of {wanted}"
         )
     if problem.short:
-        notes.append("the FMU goes by a clock of its own: communication steps are cut a little short to keep in time")
+        notes.append("the FMU has a clock of its own: communication steps are a little shorter to stay in time with it")
     if problem.late:
-        notes.append(f"the FMU takes its inputs {problem.late:.3g} s late: the record is compared as much later")
+        notes.append(f"the FMU takes its inputs {problem.late:.3g} s late: the record is delayed as much")
     sign, blind = {}, []
     plain = series_of(problem, problem.n)
     start, step = float(problem.data.time[0]), problem.step
@@ -271,18 +270,18 @@ def _pushed(problem: BoxProblem) -> Probe:
         moved = None if y is None else (y - base)[:, at]
         if moved is None or np.max(np.abs(moved)) < problem.settings.probe.moves * size[at]:
             blind.append(name)
-            notes.append(f"port {name}: `{port.input}` does not move `{port.position}`: left out")
+            notes.append(f"port {name} is left out: `{port.input}` does not move `{port.position}`")
             continue
         first = int(np.argmax(np.abs(moved) > 1e-6 * np.max(np.abs(moved))))
         early = moved[first : first + 4]
         sign[name] = 1.0 if early[np.argmax(np.abs(early))] > 0.0 else -1.0
         if sign[name] < 0.0:
-            notes.append(f"port {name}: `{port.input}` pushes against `{port.position}`: turned round")
+            notes.append(f"port {name}: `{port.input}` acts against `{port.position}`, so its sign is reversed")
     dead = _dead(problem, base, size)
-    notes += [f"parameter `{name}` changes nothing: left out" for name in dead]
+    notes += [f"parameter `{name}` is left out: it changes nothing" for name in dead]
     tunable = _tunable(problem, base)
     notes += [
-        f"parameter `{name}` is called tunable, but does not change within a run: it is not looked at for drift"
+        f"parameter `{name}` is tunable by its description, but does not act within a run: drift is not tried"
         for name in problem.map.tunable
         if name not in (*tunable, *dead)
     ]

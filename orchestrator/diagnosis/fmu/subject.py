@@ -63,7 +63,7 @@ def subject_of(path: Path) -> Subject:
         ScenarioError: the scenario is wrong, or holds what cannot be fitted; the message names it.
     """
     if path.suffix.lower() != ".toml":
-        return Subject(path, {"": path}, read_description(path).model)
+        return Subject(path, {"": path}, read_description(path, events=False).model)
     scenario = load_scenario(path)
     system = scenario.system
     members: dict[str, Path] = {}

@@ -79,8 +79,8 @@ def judge_trust(
         red.append("something is missing in the model, and no effect of the library is likely")
     if record.inertia_is_off(settings.selection.prior_deviations):
         red.append(
-            f"the record by itself asks for {record.inertia:.2g} times the inertia of the model file: an inertia, "
-            "a unit or the torque's scale may be wrong"
+            f"the record alone asks for {record.inertia:.2g} times the inertia of the model file: check the inertias, "
+            "the units and the scale of the torque"
         )
     for one in test:
         if one.is_worse(settings.report.worse, settings.report.of_noise):
@@ -98,7 +98,7 @@ def judge_trust(
     for known in uncertain:
         if known.name in parameters and _is_far(parameters[known.name], known.uncertainty):
             amber.append(
-                f"`{known.name}` lies outside the range that the model file states: its value, or a unit, may be wrong"
+                f"`{known.name}` lies outside the range that the model file states: check its value and its unit"
             )
     return trust_of([*(Reason(Level.RED, text) for text in red), *(Reason(Level.AMBER, text) for text in amber)])
 

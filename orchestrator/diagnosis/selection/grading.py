@@ -129,65 +129,68 @@ def _explains_much(effect: EffectEvidence, s: GradeSettings) -> bool:
 GRADE_RULES: tuple[GradeRule, ...] = (
     GradeRule(
         "surely better", Grade.LIKELY, lambda e, r, s: e.t >= s.grades.certain_t, "paired gain over its error",
-        "grades.certain_t", "a sure effect predicts better in nearly every block",
+        "grades.certain_t", "it does not predict better in nearly every block",
     ),
     GradeRule(
         "better", Grade.POSSIBLE, lambda e, r, s: e.t >= s.grades.likely_t or e.size_t >= s.grades.sure_size_t,
-        "paired gain over its error, or size over its error", "grades.likely_t", "a gain of few blocks may be chance",
+        "paired gain over its error, or size over its error", "grades.likely_t",
+        "its gain comes from few blocks and may be chance",
     ),
     GradeRule(
         "large share", Grade.LIKELY, lambda e, r, s: _explains_much(e, s.grades),
         "share of the missing torque, or of what is left without it",
-        "grades.certain_share", "laws are idealisations: what explains little may stand for what another leaves",
+        "grades.certain_share", "it explains little and may stand for what another law leaves",
     ),
     GradeRule(
         "enough share", Grade.POSSIBLE, lambda e, r, s: _explains_enough(e, s.grades),
         "share of the missing torque, or of what is left without it", "grades.likely_share",
-        "waves, limits, constants and what is late follow whatever another law leaves",
+        "it explains so little that it may only follow what another law leaves",
     ),
     GradeRule(
         "large gain", Grade.LIKELY, lambda e, r, s: e.gain >= s.grades.certain_gain,
-        "share of what is left without it", "grades.certain_gain", "what stays is as large as what it takes",
+        "share of what is left without it", "grades.certain_gain",
+        "the misfit that remains is as large as the misfit that it removes",
     ),
     GradeRule(
         "sure size", Grade.LIKELY, lambda e, r, s: e.size_t >= s.grades.certain_size_t, "size over its error",
-        "grades.certain_size_t", "a size that blocks dispute is no certain effect",
+        "grades.certain_size_t", "its size differs between blocks of the record",
     ),
     GradeRule(
         "size", Grade.POSSIBLE, lambda e, r, s: e.size_t >= s.grades.likely_size_t, "size over its error",
-        "grades.likely_size_t", "a size that may be zero is no likely effect",
+        "grades.likely_size_t", "its size may be zero",
     ),
     GradeRule(
         "explained", Grade.LIKELY, lambda e, r, s: r.left < s.grades.most_left, "share of the torque that is left",
-        "grades.most_left", "beside a larger unknown torque no law is certain",
+        "grades.most_left", "too much of the torque remains unexplained",
     ),
     GradeRule(
         "inertia seen", Grade.LIKELY, lambda e, r, s: r.inertia_error < s.grades.inertia_error,
         "relative error of the record's own inertia", "grades.inertia_error",
-        "a record that does not show its inertia shows torques in unknown units",
+        "the record does not determine the inertia, so the scale of its torque is unknown",
     ),
     GradeRule(
         "same machine", Grade.POSSIBLE, lambda e, r, s: not r.inertia_is_off(s.selection.prior_deviations),
-        "inertia that the record asks for", "selection.prior_deviations", "the record is of another machine",
+        "inertia that the record asks for", "selection.prior_deviations",
+        "the record asks for another inertia and may be of another machine",
     ),
     GradeRule(
         "alone of its kind", Grade.LIKELY, lambda e, r, s: not e.foreign_family, "kinds in the family", "",
-        "an effect of another kind does as well",
+        "an effect of another kind explains the record as well",
     ),
     GradeRule(
         "possible size", Grade.POSSIBLE, lambda e, r, s: e.possible, "values", "",
-        "no machine has such values, or the record does not show them",
+        "no machine has such values, or the record does not determine them",
     ),
     GradeRule(
         "timing follows", Grade.POSSIBLE, lambda e, r, s: e.kind != "timing" or r.left < s.grades.timing_left,
         "share of the torque that is left", "grades.timing_left",
-        "what does not follow the model is also better explained a little later",
+        "most of the misfit remains, and a delay then fits whatever is missing",
     ),
     GradeRule(
         "limit explains", Grade.POSSIBLE,
         lambda e, r, s: e.kind != "limit" or min(r.left_of_base, r.left / s.grades.likely_share) < s.grades.limit_left,
         "share of the misfit that is left", "grades.limit_left",
-        "a control loop that reacts to a disturbance looks like a limit",
+        "most of the misfit remains, and a control loop that reacts to a disturbance can look like a limit",
     ),
 )  # fmt: skip
 

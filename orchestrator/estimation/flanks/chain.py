@@ -20,7 +20,6 @@ def densities(left, variance, alpha, mask, out):  # type: ignore[no-untyped-def]
         variance: (n,) of its noise [rad^2].
         alpha: half-gap [rad].
         mask: (n,) whether a point counts.
-        out: filled; ones where a point does not count.
     """
     for k in range(left.size):
         if not mask[k]:
@@ -46,9 +45,6 @@ def smooth(density, change, share, steps):  # type: ignore[no-untyped-def]
         change: (3, 3) probabilities of the next state.
         share: (n, 3) filled: probability of each state, given all points.
         steps: (3, 3) filled: expected number of steps from state to state.
-
-    Returns:
-        The log likelihood.
     """
     n = density.shape[0]
     scale = np.empty(n)

@@ -32,7 +32,6 @@ class FlankFit:
         variance: of the points' noise [rad^2].
         change: (3, 3) probabilities of the next state.
         share: (n, 3) probability of each state at each point.
-        loglik: log likelihood.
         base: lateness at which the motor's angle is taken [s].
         covariance: (k, k) of ``values`` if the points' noise were white, the prior of the lateness included.
         converged: whether the likelihood had come to rest.
@@ -87,11 +86,7 @@ class FlankProblem:
         return [turns for turns in both if travel * turns > self.settings.turns_for_eccentricity * TURN]
 
     def start(self) -> FlankFit:
-        """Return the fit to start from: the flank goes with the direction of the motor.
-
-        Returns:
-            The fit.
-        """
+        """Return the fit to start from: the flank goes with the direction of the motor."""
         n = self.points.time.size
         values = np.zeros(4 + 2 * len(self._turns))
         values[RATIO] = self._slope
@@ -100,7 +95,7 @@ class FlankProblem:
         fit = FlankFit(values, 1.0, change, share, -math.inf, 0.0, np.eye(values.size), False)
         for _ in range(5):
             direction = np.sign(self._table(fit.base)[:, LATE]) * -np.sign(self._slope)
-            fit = self._moved(self._regressed(fit, direction, np.ones(n)))
+            fit = self._move(self._regress(fit, direction, np.ones(n)))
         return fit
 
     def _table(self, base: float) -> Array:
@@ -115,7 +110,7 @@ class FlankProblem:
             self._base, self._rows = base, np.column_stack(columns)
         return self._rows
 
-    def _moved(self, fit: FlankFit) -> FlankFit:
+    def _move(self, fit: FlankFit) -> FlankFit:
         """Return the fit with the motor's angle taken at the lateness that was found, where that is another."""
         late = float(np.clip(fit.late, -self.settings.latest, self.settings.latest))
         if abs(late - fit.base) < self.settings.late_step:
@@ -124,11 +119,10 @@ class FlankProblem:
         values[LATE] = 0.0
         return replace(fit, values=values, base=late)
 
-    def _regressed(self, fit: FlankFit, flank: Array, weight: Array) -> FlankFit:
+    def _regress(self, fit: FlankFit, flank: Array, weight: Array) -> FlankFit:
         """Return the fit after weighted least squares with the flanks held.
 
         Args:
-            fit: to start from.
             flank: (n,) expected flank.
             weight: (n,) of each point, over its variance in units of that of an edge.
         """
@@ -157,9 +151,6 @@ class FlankProblem:
             fit: to start from; its half-gap must be positive.
             mask: (n,) which points count (default: all).
             rounds: at most (default: as the settings have it).
-
-        Returns:
-            The maximum.
         """
         n = self.points.time.size
         mask = np.ones(n, dtype=np.bool_) if mask is None else mask
@@ -175,7 +166,7 @@ class FlankProblem:
             touching = share[:, 0] + share[:, 2]
             flank = np.divide(share[:, 2] - share[:, 0], touching, out=np.zeros(n), where=touching > 1e-12)
             weight = touching * mask * fit.variance / variance
-            fit = self._moved(self._regressed(fit, flank, weight))
+            fit = self._move(self._regress(fit, flank, weight))
             counts = steps + self.settings.prior_steps * (0.9 * np.eye(STATES) + 0.1 / STATES)
             fit = replace(
                 fit, change=counts / counts.sum(axis=1, keepdims=True), share=share.copy(), loglik=loglik,
@@ -187,26 +178,12 @@ class FlankProblem:
         return fit
 
     def twist(self, fit: FlankFit) -> Array:
-        """Return the load's distance from mid-gap at each point [rad]; at a flank it is plus or minus the half-gap.
-
-        Args:
-            fit: which gives ratio, lateness, offset and eccentricities.
-
-        Returns:
-            Shape (n,).
-        """
+        """Return the load's distance from mid-gap at each point [rad]; at a flank it is plus or minus the half-gap."""
         return np.asarray(self._table(fit.base) @ fit.values - self.points.load)
 
 
 def best_fit(problem: FlankProblem) -> FlankFit:
-    """Return the best maximum that several starts reach: by the motor's direction, and by sizes of the gap.
-
-    Args:
-        problem: of a record.
-
-    Returns:
-        The maximum.
-    """
+    """Return the best maximum that several starts reach: by the motor's direction, and by sizes of the gap."""
     first = problem.start()
     spread = math.hypot(math.sqrt(first.variance), first.alpha)
     starts = [first]
@@ -231,13 +208,6 @@ def jackknife(problem: FlankProblem, fit: FlankFit) -> tuple[Deviations, float]:
     """Return standard errors from fits that leave out one block of the record each, and their 95 % quantile.
 
     Errors within a block may be correlated as they like (Quenouille 1956; Kuensch 1989).
-
-    Args:
-        problem: of a record.
-        fit: its maximum.
-
-    Returns:
-        The errors, and the quantile of Student's distribution that goes with their number.
     """
     from scipy.stats import t
 

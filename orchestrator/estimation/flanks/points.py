@@ -36,9 +36,6 @@ class Angle:
 
         Args:
             time: (m,) [s].
-
-        Returns:
-            Shape (m,).
         """
         return np.asarray(self._curve(np.clip(time, self.time[0], self.time[-1])))
 
@@ -74,12 +71,8 @@ def points_of(record: Record, latest: float, most: int) -> Points:
     """Return the points of a record with two encoders.
 
     Args:
-        record: with ``theta_l``.
         latest: how late one channel may be [s]: so far from its ends the motor's angle must be known.
         most: points that are returned at most.
-
-    Returns:
-        The edges between counts of the load's encoder, and its rests.
     """
     assert record.theta_l is not None
     motor, load = _edges(record.time, record.theta_m), _edges(record.time, record.theta_l)

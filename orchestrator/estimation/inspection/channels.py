@@ -24,9 +24,6 @@ class Channel:
 
     Attributes:
         name: of the record's columns.
-        unit: SI unit.
-        least: smallest value.
-        most: largest value.
         count: step that the values are rounded to; 0.0: none.
         noise: standard deviation of what changes from sample to sample without motion.
         saturated: share of the samples at the very ends of the range, in runs of three or more.
@@ -54,14 +51,7 @@ class Band:
 
 
 def channels_of(record: Record) -> list[Channel]:
-    """Return the facts of torque and angles.
-
-    Args:
-        record: the record.
-
-    Returns:
-        A channel per column.
-    """
+    """Return the facts of torque and angles."""
     missing_u = 0 if record.u_deviation is None else int(np.count_nonzero(record.u_deviation))
     found = [_channel("u", "N.m", record.u, missing_u)] if record.has_torque else []
     for name in ("theta_m", "theta_l"):
@@ -82,12 +72,12 @@ def _channel(name: str, unit: str, values: Array, missing: int) -> Channel:
         float(good.max()),
         count,
         max(noise, count / math.sqrt(12.0)),
-        _saturated(good),
+        _saturation_share(good),
         missing,
     )
 
 
-def _saturated(values: Array) -> float:
+def _saturation_share(values: Array) -> float:
     """Return the share of samples that lie in runs of three or more at the largest or smallest value."""
     if float(np.ptp(values)) == 0.0:
         return 0.0
@@ -100,14 +90,7 @@ def _saturated(values: Array) -> float:
 
 
 def excitation_of(record: Record) -> list[Band]:
-    """Return the torque's power by frequency, and how much of the motor's motion follows it.
-
-    Args:
-        record: the record.
-
-    Returns:
-        The bands, rising; none without a torque.
-    """
+    """Return the torque's power by frequency, and how much of the motor's motion follows it."""
     from scipy.signal import coherence, welch
 
     if not record.has_torque:
@@ -133,12 +116,6 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     The lag at which a straight line explains one angle by the other best, between samples by a parabola, on four parts
     of the record, whose spread gives the standard error. The shaft's own compliance is part of the lag. None where
     there is one encoder, or no torque: `two_encoders` then tells the lag from the gap.
-
-    Args:
-        record: the record.
-
-    Returns:
-        The lag and its standard error.
     """
     if record.theta_l is None or not record.has_torque:
         return None
@@ -148,7 +125,7 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     lags = []
     for rows in np.array_split(np.arange(filled.size), PARTS):
         motor, load = filled.theta_m[rows[reach:-reach]], filled.theta_l[rows]
-        left = [_unexplained(motor, load[reach + n : reach + n + motor.size]) for n in range(-reach, reach + 1)]
+        left = [_residual_variance(motor, load[reach + n : reach + n + motor.size]) for n in range(-reach, reach + 1)]
         best = int(np.argmin(left))
         bend = 0.0
         if 0 < best < 2 * reach:
@@ -158,21 +135,14 @@ def delay_between(record: Record) -> tuple[float, float] | None:
     return float(np.mean(lags)), float(np.std(lags, ddof=1)) / math.sqrt(PARTS)
 
 
-def _unexplained(motor: Array, load: Array) -> float:
+def _residual_variance(motor: Array, load: Array) -> float:
     """Return the variance of ``load`` that a straight line in ``motor`` leaves."""
     a, b = motor - motor.mean(), load - load.mean()
     return float(b @ b - (a @ b) ** 2 / max(float(a @ a), 1e-300))
 
 
 def reversals_of(record: Record) -> tuple[int | None, int]:
-    """Return how often the torque and the motor's speed change sign, small wiggles apart.
-
-    Args:
-        record: the record.
-
-    Returns:
-        Both numbers; None for a torque that there is not.
-    """
+    """Return how often the torque and the motor's speed change sign, small wiggles apart."""
     filled = record.filled()
     width = max(1, round(0.02 / record.step))
     speed = np.convolve(np.gradient(filled.theta_m, filled.step), np.ones(width) / width, "same")

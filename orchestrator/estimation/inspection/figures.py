@@ -13,13 +13,7 @@ MOST_POINTS = 4000
 
 
 def draw_record(path: Path, record: Record, bands: list[Band]) -> None:
-    """Draw the channels over time, what is missing left blank, and the excitation by frequency.
-
-    Args:
-        path: a PNG, SVG or PDF file.
-        record: the record.
-        bands: of its excitation.
-    """
+    """Draw the channels over time, what is missing left blank, and the excitation by frequency."""
     signals = [("u", "torque [N.m]", record.u)] if record.has_torque else []
     signals.append(("theta_m", "motor [rad]", record.theta_m))
     if record.theta_l is not None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
 from orchestrator.records.model_file import Model, ModelParameter
-from orchestrator.records.plausibility import check_plausible, momentum_balance, smoothed
+from orchestrator.records.plausibility import check_plausible, momentum_balance, smooth
 from orchestrator.records.record import Record
 from orchestrator.shared.inference.inverse import pseudo_inverse
 
@@ -34,15 +34,7 @@ class RoughMachine:
 
 
 def is_of(record: Record, model: Model) -> bool:
-    """Return whether a record looks like one of this machine: gear ratio and inertia are the model's.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        Whether it does.
-    """
+    """Return whether a record looks like one of this machine: gear ratio and inertia are the model's."""
     try:
         check_plausible(record, model)
     except RecordError:
@@ -50,20 +42,13 @@ def is_of(record: Record, model: Model) -> bool:
     p = {name: entry.value for name, entry in model.parameters.items()}
     record = record.filled()
     same = record.theta_l is None or abs(_ratio(record)[0] / p["i"] - 1.0) < SAME_RATIO
-    inertia, _, _ = momentum_balance(*smoothed(record, p["tau"])[:3])
+    inertia, _, _ = momentum_balance(*smooth(record, p["tau"])[:3])
     relative = inertia / (p["J_m"] + p["J_l"] / p["i"] ** 2)
     return same and 1.0 / SAME_INERTIA < relative < SAME_INERTIA
 
 
 def rough_machine(record: Record) -> RoughMachine:
-    """Return a machine that could have made the record; what the record does not show is assumed and called that.
-
-    Args:
-        record: the record.
-
-    Returns:
-        Values by parameter, and where each is from; without a torque the gear ratio alone.
-    """
+    """Return a machine that could have made the record; what the record does not show is assumed and called that."""
     record = record.filled()
     ratio, said = _ratio(record)
     values, origin = {"i": ratio}, {"i": said}
@@ -103,15 +88,7 @@ def _ratio(record: Record) -> tuple[float, str]:
 
 
 def as_model(rough: RoughMachine, base: Model) -> Model:
-    """Return ``base`` with the rough values and wide uncertainties.
-
-    Args:
-        rough: the rough values.
-        base: the model to start from.
-
-    Returns:
-        The model.
-    """
+    """Return ``base`` with the rough values and wide uncertainties."""
     parameters: dict[str, ModelParameter] = dict(base.parameters)
     for name, value in rough.values.items():
         old = parameters[name]
@@ -122,8 +99,8 @@ def as_model(rough: RoughMachine, base: Model) -> Model:
 
 def _balance(record: Record) -> tuple[float, float, float, float]:
     """Return lag [s], inertia [kg.m2] and viscous friction at the motor, and the share of the impulse they explain."""
-    tried = ((tau, *momentum_balance(*smoothed(record, tau)[:3])) for tau in LAGS)
-    tau, inertia, friction, share = max(tried, key=lambda found: found[3])
+    tried = ((tau, *momentum_balance(*smooth(record, tau)[:3])) for tau in LAGS)
+    tau, inertia, friction, share = max(tried, key=lambda fit: fit[3])
     return tau, abs(inertia) or 1.0, abs(friction), share
 
 
@@ -148,19 +125,12 @@ def visible_effects(record: Record, model: Model) -> list[tuple[str, float, str]
 
     The balance of impulses over windows of a tenth of a second is fitted with inertia, viscous friction and a constant
     torque; what it leaves is the noise that an effect must stand out of.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        Name, size and unit of each.
     """
     record = record.filled()
     if not record.has_torque:
         return []
     p = {name: entry.value for name, entry in model.parameters.items()}
-    impulse, speed, angle, width = smoothed(record, max(p["tau"], LEAST_LAG))
+    impulse, speed, angle, width = smooth(record, max(p["tau"], LEAST_LAG))
     h = record.step
     load = angle / p.get("i", 1.0)
     shapes = {

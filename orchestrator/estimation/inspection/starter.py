@@ -8,7 +8,7 @@ from orchestrator.estimation.inspection.machine import ROUGH
 from orchestrator.records.columns import COLUMNS, KINDS, Column
 from orchestrator.records.formats import open_source
 from orchestrator.records.formats.source import Head
-from orchestrator.records.loading import chosen_channels
+from orchestrator.records.loading import choose_channels
 from orchestrator.records.model_file import Model
 from orchestrator.records.units import parse_unit
 
@@ -30,24 +30,12 @@ MEANING = {
 }
 
 
-def assumed_columns(
+def assume_columns(
     path: Path, columns: Mapping[str, Column], header: int | None = None
 ) -> tuple[dict[str, Column], tuple[str, ...]]:
-    """Return the columns with what their units still need, and a sentence on each assumption.
-
-    Args:
-        path: of the record.
-        columns: what the model file says of columns.
-        header: line of the names in a text; None: found.
-
-    Returns:
-        Both.
-
-    Raises:
-        RecordError: the file cannot be read, or a column is missing or ambiguous.
-    """
+    """Return the columns with what their units still need, and a sentence on each assumption."""
     with open_source(path, header) as source:
-        chosen = chosen_channels(source, columns, str(path), torque_needed=False)
+        chosen = choose_channels(source, columns, str(path), torque_needed=False)
     filled, said = dict(columns), []
     for name, choice in chosen.items():
         column = filled.get(name, Column())
@@ -72,31 +60,20 @@ def assumed_columns(
         if choice.numbered and column.rate is None and source.rate is None:
             changed = replace(changed, rate=1000.0)
             said.append("1000 samples per second")
-        filled[name] = replace(changed, name=column.name or _called(head, choice.place))
+        filled[name] = replace(changed, name=column.name or _column_title(head, choice.place))
         if not column.unit and head.unit and name != "time":
             filled[name] = replace(filled[name], unit=head.unit)
     return filled, tuple(said)
 
 
-def _called(head: Head, place: int) -> str:
+def _column_title(head: Head, place: int) -> str:
     return head.full or head.name or f"#{place + 1}"
 
 
 def starter(
     model: Model, columns: Mapping[str, Column], origin: Mapping[str, str], assumed: Sequence[str], record: str
 ) -> str:
-    """Return the text of a model file.
-
-    Args:
-        model: values and uncertainties.
-        columns: where each column comes from.
-        origin: of each parameter that is written, a sentence on where its value is from.
-        assumed: what was assumed of the columns' units.
-        record: the file's name.
-
-    Returns:
-        The text, which ``read_model`` takes.
-    """
+    """Return the text of a model file."""
     lines = [f"# A model of the machine that made {record}: look at every line that says ASSUMED or ROUGH.", ""]
     lines += [f'fmu = "{model.fmu}"']
     if model.header is not None:
@@ -145,4 +122,4 @@ def _further(model: Model, written: Mapping[str, str]) -> list[str]:
     return lines
 
 
-__all__ = ["ROUGH", "assumed_columns", "starter"]
+__all__ = ["ROUGH", "assume_columns", "starter"]

@@ -12,7 +12,7 @@ from orchestrator.estimation.innovations import affine_model, simulate
 from orchestrator.estimation.problem import measurement_noise
 from orchestrator.estimation.settings import DEFAULT_SETTINGS
 from orchestrator.records.model_file import Model
-from orchestrator.records.plausibility import check_plausible, smoothed
+from orchestrator.records.plausibility import check_plausible, smooth
 from orchestrator.records.record import Record
 from pyfmu_sources.drivetrain_parameters import P_ALPHA, P_I
 
@@ -47,11 +47,7 @@ class Sufficiency:
     why: str = ""
 
     def ranges(self) -> list[tuple[float, float]]:
-        """Return the smallest and the largest size of each run of sizes that are seen [rad].
-
-        Returns:
-            The runs, rising; the first begins where the bound meets its share, between two sizes.
-        """
+        """Return the smallest and the largest size of each run of sizes that are seen [rad]."""
         runs: list[list[float]] = []
         seen = False
         for size, bound in self.bounds:
@@ -66,10 +62,6 @@ class Sufficiency:
 
 def sufficiency(record: Record, model: Model) -> Sufficiency:
     """Return what a record shows of gaps if the machine is as the model says.
-
-    Args:
-        record: the record.
-        model: of the machine.
 
     Returns:
         Bounds by size, the smallest size that is seen [rad], and the torque that would do better.
@@ -131,7 +123,7 @@ def _other_sign(record: Record, model: Model) -> float:
     """
     record = record.filled()
     p = {name: entry.value for name, entry in model.parameters.items()}
-    impulse, speed, angle, width = smoothed(record, p["tau"])
+    impulse, speed, angle, width = smooth(record, p["tau"])
     rows = np.arange(0, speed.size, width)
     if rows.size < 8:
         return 1.0

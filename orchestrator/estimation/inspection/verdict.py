@@ -9,18 +9,13 @@ MANY_REVERSALS = 4  # of the speed, in which a torque that drives them changes i
 MUCH_BETTER = 0.9  # share of the record's bound below which another experiment is worth a word
 
 
-def verdict_of(found: Sufficiency, reversals: tuple[int | None, int], two_angles: Estimate | None) -> list[str]:
+def verdict_of(results: Sufficiency, reversals: tuple[int | None, int], two_angles: Estimate | None) -> list[str]:
     """Return whether a record suffices to see a gap, what it lacks, and what would do better.
 
     Args:
-        found: what the record shows of gaps.
-        reversals: sign changes of torque, None without one, and of motor speed.
         two_angles: the half-gap from the two angles alone, where that was looked for.
-
-    Returns:
-        A sentence each.
     """
-    said = [_of_angles(two_angles)] if two_angles is not None else [_of_sizes(found)]
+    said = [_of_angles(two_angles)] if two_angles is not None else [_of_sizes(results)]
     torque, speed = reversals
     if torque == 0 and speed >= MANY_REVERSALS:
         said.append(
@@ -28,8 +23,8 @@ def verdict_of(found: Sufficiency, reversals: tuple[int | None, int], two_angles
             "drives the machine, or the log has lost the sign (a magnitude, or a sign in a bit of its own: servos "
             "whose load counts from 0 to 2047 mean the other direction from 1024 on). Write signed values into the log."
         )
-    if not found.why:
-        said.append(_of_experiments(found))
+    if not results.why:
+        said.append(_of_experiments(results))
     return said
 
 
@@ -43,10 +38,10 @@ def _of_angles(estimate: Estimate) -> str:
     )
 
 
-def _of_sizes(found: Sufficiency) -> str:
-    if found.why:
-        return f"The record shows no gap of any size: {found.why}."
-    runs = found.ranges()
+def _of_sizes(results: Sufficiency) -> str:
+    if results.why:
+        return f"The record shows no gap of any size: {results.why}."
+    runs = results.ranges()
     if not runs:
         return "The record shows no gap of any size that was tried: its torque does not move the teeth through one."
     words = []
@@ -60,12 +55,12 @@ def _of_sizes(found: Sufficiency) -> str:
     return f"The record shows half-gaps of {', and of '.join(words)}{smaller} (bound below {SEEN:g} of the size)."
 
 
-def _of_experiments(found: Sufficiency) -> str:
-    best = found.better[0] if found.better else None
-    if best is None or not best.bound < MUCH_BETTER * found.own:
+def _of_experiments(results: Sufficiency) -> str:
+    best = results.better[0] if results.better else None
+    if best is None or not best.bound < MUCH_BETTER * results.own:
         return "No simple excitation of the same length, torque and speed would show the gap clearly better."
-    own = f"instead of {found.own:.2g} " if math.isfinite(found.own) else ""
+    own = f"instead of {results.own:.2g} " if math.isfinite(results.own) else ""
     return (
         f"Better, of the same length and within the same torque and speed: {best.name}, bound {best.bound:.2g} {own}"
-        f"rad for a half-gap of {found.design_size:g} rad; `estimate` with `design` searches further."
+        f"rad for a half-gap of {results.design_size:g} rad; `estimate` with `design` searches further."
     )

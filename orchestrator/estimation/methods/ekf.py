@@ -56,11 +56,6 @@ def _runner() -> Callable[..., None]:
 def trace(record: Record, model: Model, settings: NoiseSettings | None = None) -> OnlineTrace:
     """Return the online estimate over a record; ``settings`` default to what the record and the model say.
 
-    Args:
-        record: the record.
-        model: of the machine.
-        settings: of the filter.
-
     Returns:
         Half-gap [rad], its standard deviation and contact at each sample.
     """
@@ -79,15 +74,7 @@ def trace(record: Record, model: Model, settings: NoiseSettings | None = None) -
 
 
 def default_settings(record: Record, model: Model) -> NoiseSettings:
-    """Return the settings for a record: encoder noise as measured, stiffness as uncertain as the model says.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        The settings.
-    """
+    """Return the settings for a record: encoder noise as measured, stiffness as uncertain as the model says."""
     noise_m = measurement_noise(record, model, "theta_m")
     noise_l = UNMEASURED if record.theta_l is None else measurement_noise(record, model, "theta_l")
     stiffness = model.parameters["k"]
@@ -104,15 +91,8 @@ def default_settings(record: Record, model: Model) -> NoiseSettings:
 def estimate(record: Record, model: Model) -> Estimate:
     """Return the online estimate at the end of the record.
 
-    Args:
-        record: the measured record.
-        model: of the plant `Drivetrain`.
-
     Returns:
         The estimate [rad] with its deviation, and its course in ``curves``.
-
-    Raises:
-        NotApplicableError: the model has no gap, or the filter diverged.
     """
     if model.fmu != "Drivetrain":
         raise NotApplicableError("the online estimator needs the model `Drivetrain`")

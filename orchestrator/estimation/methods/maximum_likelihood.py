@@ -67,20 +67,7 @@ def estimate(
     """Return the maximum-likelihood half-gap with its profile-likelihood interval.
 
     Args:
-        record: the record.
-        model: what it is compared with.
-        threads: that share the work.
-        more: further records of the same machine, which share everything but their start and the encoders' zeros.
         time_limit: [s], after which the fit is given up.
-        report: called with each stage that begins, and the share of the work that is behind.
-        settings: thresholds.
-
-    Returns:
-        The estimate.
-
-    Raises:
-        ConvergenceError: no start led to a finite likelihood.
-        TimeLimitError: there was no time to find it.
     """
     records = (record, *more)
     deadline = time.monotonic() + time_limit
@@ -90,7 +77,7 @@ def estimate(
         # What a long record says first of all, its beginning says too, in a fraction of the time.
         shorts = [one.part(0, min(one.size, settings.fit.short_record // len(records))) for one in records]
         report("fitting the beginning", 0.0)
-        fit = _refined(likelihood, _likelihood(shorts, model, threads, deadline, settings), report)
+        fit = _refine(likelihood, _likelihood(shorts, model, threads, deadline, settings), report)
     if fit is None:
         fit = fit_record(likelihood, report)
     report("finding the interval", BEFORE_INTERVAL)
@@ -107,7 +94,7 @@ def _likelihood(
     return Likelihood(first, threads, settings, deadline)
 
 
-def _refined(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit | None:
+def _refine(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFit | None:
     """Return the fit that starts from that of the beginning; None where the beginning does not show the gap."""
     first = fit_record(short)
     short = first.likelihood
@@ -126,15 +113,7 @@ def _refined(likelihood: Likelihood, short: Likelihood, report: Report) -> GapFi
 
 
 def fit_record(likelihood: Likelihood, report: Report = _quiet) -> GapFit:
-    """Return the fit of all unknowns, by grid and continuation in the torque noise.
-
-    Args:
-        likelihood: of the record.
-        report: called with each stage that begins, and the share of the work that is behind.
-
-    Returns:
-        The fit.
-    """
+    """Return the fit of all unknowns, by grid and continuation in the torque noise."""
     problem = likelihood.problem
     torque, others = _split(likelihood)
     report("trying sizes", 0.0)

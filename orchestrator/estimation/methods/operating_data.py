@@ -18,18 +18,7 @@ LEAST_REVERSALS = 4
 
 
 def estimate(record: Record, model: Model) -> Estimate:
-    """Return the half width of the twist's hysteresis.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        The estimate.
-
-    Raises:
-        NotApplicableError: the drive reverses less than four times, or there is no load encoder.
-    """
+    """Return the half width of the twist's hysteresis."""
     shaft = shaft_signals(record, model)
     limit = max(4.0 * shaft.noise, 0.2 * float(np.sqrt(np.mean(shaft.torque**2))))
     side = np.where(shaft.torque > limit, 1, np.where(shaft.torque < -limit, -1, 0))

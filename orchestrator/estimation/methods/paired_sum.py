@@ -29,18 +29,7 @@ SIZES = (0.0, *(3e-4 * 1.25**n for n in range(34)))  # to half a radian
 
 
 def estimate(record: Record, model: Model) -> Estimate:
-    """Return the half-gap at which the twin with a gap differs from the twin without one as much as the record does.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        The estimate.
-
-    Raises:
-        NotApplicableError: there is no load encoder.
-    """
+    """Return the half-gap at which the twin with a gap differs from the twin without one as much as the record does."""
     if record.theta_l is None:
         raise NotApplicableError("this method needs the load's angle `theta_l`")
     start = {"theta_m_start": float(record.theta_m[0]), "theta_l_start": float(record.theta_l[0])}
@@ -66,19 +55,7 @@ def estimate(record: Record, model: Model) -> Estimate:
 
 
 def twin(record: Record, model: Model, start: Mapping[str, float]) -> Array:
-    """Return the load angle (n,) [rad] of the ``Drivetrain`` FMU without a gap, fed with the record's torque.
-
-    Args:
-        record: gives the torque, held from row to row.
-        model: gives the FMU's parameters.
-        start: initial state, by name of the FMU's start parameter.
-
-    Returns:
-        The angle.
-
-    Raises:
-        SlaveError: the FMU fails on these values.
-    """
+    """Return the load angle (n,) [rad] of the ``Drivetrain`` FMU without a gap, fed with the record's torque."""
     nominal = {entry.name: entry.default for entry in PARAMETERS if entry.name not in ("alpha", "backlash_model")}
     named = {name: model.parameters[name].value for name in nominal if model.parameters[name].value != nominal[name]}
     fmu = fmu_instance("twin", ensure_built(["Drivetrain"])["Drivetrain"], {**named, **start})

@@ -19,18 +19,7 @@ LEAST_SHARE = 0.05  # of the torque's effective value
 
 
 def estimate(record: Record, model: Model) -> Estimate:
-    """Return the median half-gap over all traversals.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        The estimate.
-
-    Raises:
-        NotApplicableError: the gap is traversed less than three times, or there is no load encoder.
-    """
+    """Return the median half-gap over all traversals."""
     shaft = shaft_signals(record, model)
     stiffness = model.parameters["k"].value
     limit = max(THRESHOLD * shaft.noise, LEAST_SHARE * float(np.sqrt(np.mean(shaft.torque**2))))

@@ -18,18 +18,7 @@ SLOW = 0.25  # change of torque over the shaft's own time, over its effective va
 
 
 def estimate(record: Record, model: Model) -> Estimate:
-    """Return half the distance between the two lines of twist over torque.
-
-    Args:
-        record: the record.
-        model: of the machine.
-
-    Returns:
-        The estimate.
-
-    Raises:
-        NotApplicableError: too few samples are quasi-stationary on either flank, or there is no load encoder.
-    """
+    """Return half the distance between the two lines of twist over torque."""
     shaft = shaft_signals(record, model)
     p = {name: entry.value for name, entry in model.parameters.items()}
     own_time = 1.0 / np.sqrt(p["k"] * (1.0 / p["J_l"] + 1.0 / (p["J_m"] * p["i"] ** 2)))

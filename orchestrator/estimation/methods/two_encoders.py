@@ -23,19 +23,7 @@ WOUND_UP = "without a torque, what the shaft winds up when its torque changes si
 
 
 def estimate(record: Record, model: Model, settings: FlankSettings = DEFAULT_SETTINGS.flanks) -> Estimate:
-    """Return half the distance between the two flanks in the load's angle against the motor's.
-
-    Args:
-        record: with both encoders; its torque is not looked at.
-        model: whose gear ratio the fitted one is shown beside.
-        settings: thresholds.
-
-    Returns:
-        The estimate; not visible, without a number, where no two flanks are told apart.
-
-    Raises:
-        NotApplicableError: there is no load encoder, or hardly anything moves.
-    """
+    """Return half the distance between the two flanks in the load's angle against the motor's."""
     if record.theta_l is None:
         raise NotApplicableError("the load's angle `theta_l` must be in the record")
     points = points_of(record, settings.latest, settings.most_points)

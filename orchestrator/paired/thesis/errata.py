@@ -4,7 +4,7 @@ import control
 import numpy as np
 
 from orchestrator.errors import DesignError
-from orchestrator.paired.compiled_loop import compiled_loop
+from orchestrator.paired.compiled_loop import make_loop
 from orchestrator.paired.experiment import thesis_experiment
 from orchestrator.paired.thesis import published
 from orchestrator.paired.thesis.recompute import (
@@ -26,25 +26,21 @@ from orchestrator.shared.results.thesis import Erratum
 
 
 def errata() -> list[Erratum]:
-    """Return all errata, computed afresh.
-
-    Returns:
-        The errata, in the order of the thesis.
-    """
+    """Return all errata, computed afresh."""
     return [
-        _damping_entry(),
+        _erratum_of_damping(),
         _controllability(),
         _dual_gain(),
         _input_sign(),
         _gear_ratio(),
-        _told_the_answer(),
+        _erratum_of_known_gap(),
         _mean_square(),
         _noise_inverse(),
-        _delayed_line(),
+        _erratum_of_delay(),
     ]
 
 
-def _damping_entry() -> Erratum:
+def _erratum_of_damping() -> Erratum:
     v = DrivetrainValues()
     from_parameters = -(v.c / v.i**2 + v.b_m) / v.J_m
     true_model = observer_gain(six_state_model(v).A, C, 1.0, published.R)
@@ -126,7 +122,7 @@ def _gear_ratio() -> Erratum:
     )
 
 
-def _told_the_answer() -> Erratum:
+def _erratum_of_known_gap() -> Erratum:
     return Erratum(
         6,
         "V_d = alpha I6, Figs. 3.7 and 3.8",
@@ -164,9 +160,9 @@ def _noise_inverse() -> Erratum:
     )
 
 
-def _delayed_line() -> Erratum:
+def _erratum_of_delay() -> Erratum:
     experiment = thesis_experiment()
-    loop = compiled_loop(experiment)
+    loop = make_loop(experiment)
     zero = (np.zeros(experiment.steps + 1), np.zeros(experiment.steps + 1))
     level = 0.05 * experiment.amplitude
     with_gap, without = (loop.run(alpha, zero)[:, 1] for alpha in (published.TABLE_4_1[-1].alpha, 0.0))

@@ -39,22 +39,13 @@ def observer_gain(A: Array, output: Array, V_d: float, V_n: float) -> Array:
     Args:
         A: (6, 6) of the model.
         output: (1, 6) row of the measured angle.
-        V_d: intensity of the process noise.
-        V_n: variance of the measurement.
-
-    Returns:
-        The gain.
     """
     gain, _, _ = control.lqr(A.T, output.T, V_d * np.eye(6), np.array([[V_n]]))
     return np.asarray(gain).ravel()
 
 
 def gain_comparisons() -> list[Comparison]:
-    """Return model rows and gains, printed beside recomputed.
-
-    Returns:
-        A comparison per row or gain.
-    """
+    """Return model rows and gains, printed beside recomputed."""
     A = six_state_model(DrivetrainValues()).A
     used = model_behind_the_gains()
     return [
@@ -81,11 +72,7 @@ def gain_comparisons() -> list[Comparison]:
 
 
 def size_hidden_in_the_filter() -> float:
-    """Return the V_d [rad] that reproduces the printed K_fl best: the actual size, told to the estimator.
-
-    Returns:
-        The intensity.
-    """
+    """Return the V_d [rad] that reproduces the printed K_fl best: the actual size, told to the estimator."""
     A = model_behind_the_gains()
     printed = np.asarray(published.K_FL)
 
@@ -97,11 +84,7 @@ def size_hidden_in_the_filter() -> float:
 
 
 def table_comparison() -> TableComparison:
-    """Return the recomputed columns of Table 4.1; errors and MSE from the printed estimates.
-
-    Returns:
-        The columns.
-    """
+    """Return the recomputed columns of Table 4.1; errors and MSE from the printed estimates."""
     rows = published.TABLE_4_1
     s = 1000.0 * np.array([row.S for row in rows])
     actual = np.array([row.alpha for row in rows])

@@ -10,11 +10,7 @@ from orchestrator.plants.description import Plant
 
 @cache
 def plants() -> Mapping[str, Plant]:
-    """Return every known plant by the name of its FMU.
-
-    Returns:
-        Descriptions, by name.
-    """
+    """Return every known plant by the name of its FMU."""
     modules = (importlib.import_module(f"{__name__}.{entry.name}") for entry in pkgutil.iter_modules(__path__))
     found: list[Plant] = [module.PLANT for module in modules]
     return {plant.name: plant for plant in found}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, built_up
+from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant, Resonance, Shaft
 from orchestrator.plants.measurement import EARLY_TORQUE, LATE_LOAD, LEAD, SHIFT
 from pyfmu_sources import drivetrain_parameters as dt
@@ -27,15 +27,8 @@ SELDOM = (
 """How names of parameters begin that few models need, and that take as long as all others together."""
 
 
-def refused(values: Mapping[str, float]) -> str:
-    """Return why a drivetrain's backlash model cannot be diagnosed: the analysis is elastic.
-
-    Args:
-        values: of the plant's parameters, by name.
-
-    Returns:
-        The reason; empty where it can be diagnosed.
-    """
+def refusal(values: Mapping[str, float]) -> str:
+    """Return why a drivetrain's backlash model cannot be diagnosed: the analysis is elastic."""
     chosen = MODELS[int(values["backlash_model"])]
     if chosen.predicted:
         return ""
@@ -81,13 +74,13 @@ def _dry() -> tuple[Any, Any]:
         return friction_m(full, shaft * lever_arm(full, p), p), friction_l(full, shaft, p)
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def rest(p: Any) -> Any:
+    def rest_levels(p: Any) -> Any:
         at_motor, at_load = rest_m(p), rest_l(p)
         levels = (at_motor if at_motor > 0.0 else abs(p[wavy[0]]), at_load if at_load > 0.0 else abs(p[wavy[1]]))
         varies = (p[loaded[0]] != 0.0 or p[wavy[0]] != 0.0, p[loaded[1]] != 0.0 or p[wavy[1]] != 0.0)
         return levels, varies
 
-    return friction, rest
+    return friction, rest_levels
 
 
 def _flanks() -> tuple[Any, Any]:
@@ -95,7 +88,7 @@ def _flanks() -> tuple[Any, Any]:
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
-    from orchestrator.plants.sample import reached
+    from orchestrator.plants.sample import travel_bound
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED
 
     source, whole = compiled("equations"), _whole()
@@ -108,7 +101,7 @@ def _flanks() -> tuple[Any, Any]:
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
-        way = reached(x[3], rate[3], h)
+        way = travel_bound(x[3], rate[3], h)
         if abs(x[2] - p[stops[0]]) < way or abs(x[2] - p[stops[1]]) < way:
             return True
         if p[alpha_at] == 0.0:
@@ -116,7 +109,7 @@ def _flanks() -> tuple[Any, Any]:
         full = whole(x, 0.0)
         slope = twist_slope(full, p)
         depth = abs(twist(full, p)) - p[alpha_at]
-        way = reached(x[1] * slope - x[3], rate[1] * slope - rate[3], h)
+        way = travel_bound(x[1] * slope - x[3], rate[1] * slope - rate[3], h)
         return -way < depth < way + SETTING_IN * math.exp(p[onset_at])
 
     return flanks, meets
@@ -136,7 +129,7 @@ def _stage() -> CompiledEquations:
     friction, rest = _dry()
 
     @kept(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
+    def smooth_stage(x: Any, signs: Any, p: Any, u: float) -> Any:
         full = whole(x, u)
         angle = twist(full, p)
         contact = contact_of(angle, p[alpha_at]) if p[alpha_at] > 0.0 else 1
@@ -149,7 +142,7 @@ def _stage() -> CompiledEquations:
         lag = (u - x[4]) / p[lag_at]
         return (r[0], r[1] + motor, r[2], r[3] - load, lag, r[5], r[6], r[10])
 
-    return CompiledEquations(friction, smoothed, (end, end + 1), rest, *_flanks())
+    return CompiledEquations(friction, smooth_stage, (end, end + 1), rest, *_flanks())
 
 
 @cache
@@ -181,14 +174,11 @@ def _runner() -> Any:
     return run
 
 
-def realised(p: Array) -> Array:
+def fmu_parameters(p: Array) -> Array:
     """Return the FMU's own parameters of a model (n,): fitted distances of friction and contact included.
 
     Args:
         p: the parameters of the analysis, (n,).
-
-    Returns:
-        The parameters, in the order of the FMU's table.
     """
     own = np.array(p[: dt.COUNT], dtype=float)
     motor = own[dt.P_COULOMB_M] + own[dt.P_STRIBECK_M] + own[dt.P_BREAKAWAY_M]
@@ -197,7 +187,7 @@ def realised(p: Array) -> Array:
     places = (dt.P_PRESLIDING_M, dt.P_PRESLIDING_L, dt.P_ONSET)
     for place, on, fitted in zip(places, (motor, load, gap), p[dt.COUNT : dt.COUNT + len(places)], strict=True):
         if on > 0.0:
-            own[place] = built_up(own[place], float(fitted))
+            own[place] = build_up_distance(own[place], float(fitted))
     return own
 
 
@@ -229,7 +219,7 @@ PLANT = Plant(
     bank=(*DRIVETRAIN_BANK, EARLY_TORQUE, LATE_LOAD),
     stage=_stage,
     runner=_runner,
-    refused=refused,
-    realised=realised,
+    refused=refusal,
+    realised=fmu_parameters,
     seldom=tuple(entry.name for entry in dt.PARAMETERS if entry.name.startswith(SELDOM)),
 )

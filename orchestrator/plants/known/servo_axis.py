@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, built_up
+from orchestrator.plants.bank import DRIVETRAIN_BANK, PRESLIDING, build_up_distance
 from orchestrator.plants.description import Body, CompiledEquations, Drive, Plant
 from orchestrator.plants.measurement import EARLY_TORQUE, LEAD
 from pyfmu_sources import servo_axis_parameters as ap
@@ -25,15 +25,11 @@ SERVO_AXIS_BANK = tuple(effect for effect in DRIVETRAIN_BANK if effect.label in 
 
 @cache
 def stage() -> CompiledEquations:
-    """Return the compiled equations.
-
-    Returns:
-        Friction, rates and places of friction's build-up distances.
-    """
+    """Return the compiled equations."""
     from numba import njit
 
     from orchestrator.plants.compiled import compiled
-    from orchestrator.plants.sample import reached
+    from orchestrator.plants.sample import travel_bound
     from orchestrator.shared.numba_cache import ALGEBRA, UNCOUNTED, kept
 
     source = compiled("servo_axis")
@@ -45,7 +41,7 @@ def stage() -> CompiledEquations:
         return level((x[0], x[1], x[4], 0.0, 0.0), p), 0.0
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def rest(p: Any) -> Any:
+    def rest_levels(p: Any) -> Any:
         at_rest = breakaway(p)
         return (at_rest if at_rest > 0.0 else abs(p[wavy]), 0.0), (p[wavy] != 0.0, False)
 
@@ -55,24 +51,20 @@ def stage() -> CompiledEquations:
 
     @njit(error_model="numpy", **ALGEBRA, **UNCOUNTED)
     def meets(x: Any, rate: Any, p: Any, h: float) -> Any:
-        way = reached(x[1], rate[1], h)
+        way = travel_bound(x[1], rate[1], h)
         return abs(x[0] - p[stops[0]]) < way or abs(x[0] - p[stops[1]]) < way
 
     @kept(error_model="numpy", **ALGEBRA, **UNCOUNTED)
-    def smoothed(x: Any, signs: Any, p: Any, u: float) -> Any:
+    def smooth_stage(x: Any, signs: Any, p: Any, u: float) -> Any:
         speed, acceleration, lag, _, _ = rates((x[0], x[1], x[4], 0.0, u), signs[0], p, u, 0.0)
         return (speed, acceleration, 0.0, 0.0, lag, 0.0, 0.0, 0.0)
 
-    return CompiledEquations(friction, smoothed, (end, end), rest, flanks, meets)
+    return CompiledEquations(friction, smooth_stage, (end, end), rest_levels, flanks, meets)
 
 
 @cache
 def runner() -> Any:
-    """Return the compiled, event-located simulation.
-
-    Returns:
-        A function, see ``Plant.runner``.
-    """
+    """Return the compiled, event-located simulation."""
     from orchestrator.plants.compiled import compiled
     from orchestrator.shared.numba_cache import kept
 
@@ -93,11 +85,11 @@ def runner() -> Any:
     return run
 
 
-def _realised(p: Array) -> Array:
+def _fmu_parameters(p: Array) -> Array:
     """Return the FMU's own parameters of a model (n,): the fitted distance of friction included."""
     own = np.array(p[: ap.COUNT], dtype=float)
     if own[ap.P_COULOMB] + own[ap.P_STRIBECK] + own[ap.P_BREAKAWAY] > 0.0:
-        own[ap.P_PRESLIDING] = built_up(own[ap.P_PRESLIDING], float(p[ap.COUNT]))
+        own[ap.P_PRESLIDING] = build_up_distance(own[ap.P_PRESLIDING], float(p[ap.COUNT]))
     return own
 
 
@@ -121,5 +113,5 @@ PLANT = Plant(
     bank=(*SERVO_AXIS_BANK, EARLY_TORQUE),
     stage=stage,
     runner=runner,
-    realised=_realised,
+    realised=_fmu_parameters,
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orchestrator.errors import RecordError
 from orchestrator.records.formats import numpy_file, text
-from orchestrator.records.formats.apart import opened_apart
+from orchestrator.records.formats.apart import open_apart
 from orchestrator.records.formats.source import MAXIMUM_BYTES, RecordSource
 
 # First bytes of a file (and where they stand) and the module that reads it.
@@ -43,15 +43,10 @@ def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]
     """Open a file for a ``with`` statement; its first bytes decide on the reader, not its name.
 
     Args:
-        path: the file.
         header: line of the names in a text, from 1; 0: it has none; None: found.
 
     Yields:
         Its channels, read when they are asked for.
-
-    Raises:
-        RecordError: the file is missing, too large, broken, of an unknown format, or its reader is not installed; or
-            ``header`` is given for what is no text.
     """
     head = _first_bytes(path)
     if not head:
@@ -69,7 +64,7 @@ def open_source(path: Path, header: int | None = None) -> Iterator[RecordSource]
     elif module == "numpy_file":
         yield numpy_file.open_file(path)
     else:
-        with opened_apart(module, path) as source:
+        with open_apart(module, path) as source:
             yield source
 
 

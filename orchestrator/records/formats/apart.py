@@ -27,44 +27,21 @@ _Opened = tuple[list[tuple[str, str, str, int, str]], str, float | None]
 
 
 def reader(argument: tuple[str, str]) -> Callable[[list[int] | None], Any]:
-    """Open a file, in the child.
-
-    Args:
-        argument: module of this room that reads the format, and the file.
-
-    Returns:
-        What answers None with the channels, and places with their values.
-
-    Raises:
-        RecordError: the file cannot be read.
-    """
+    """Open a file, in the child. Return what answers None with the channels, and places with their values."""
     module, path = argument
     source: RecordSource = import_module(f"orchestrator.records.formats.{module}").open_file(Path(path))
 
     def answer(places: list[int] | None) -> Any:
         if places is None:
             return [[[h.name, h.unit, h.kind, h.raster, h.full] for h in source.heads], source.dialect, source.rate]
-        return [_sent(values) for values in source.load(places)]
+        return [_send(values) for values in source.load(places)]
 
     return answer
 
 
 @contextmanager
-def opened_apart(module: str, path: Path) -> Iterator[RecordSource]:
-    """Open a file in a child process, which ends with the ``with`` statement.
-
-    Args:
-        module: of this room, which reads the format.
-        path: the file.
-
-    Yields:
-        The opened file.
-
-    Raises:
-        RecordError: the file cannot be read, or its reader crashed, took too long or said what is no record.
-        SimulationError: no process can be started.
-        OutputError: the temporary directory cannot be written.
-    """
+def open_apart(module: str, path: Path) -> Iterator[RecordSource]:
+    """Open a file in a child process, which ends with the ``with`` statement."""
     file = path.resolve()
     with Jail(f"{__name__}:reader", (module, str(file)), read=[file], limits=_LIMITS) as jail:
         yield _Apart(jail, NAMES[module], file, path)
@@ -75,40 +52,40 @@ class _Apart(RecordSource):
 
     def __init__(self, jail: Jail, kind: str, file: Path, shown: Path) -> None:
         self._jail, self._kind, self._file, self._shown = jail, kind, file, shown
-        heads, self.dialect, self.rate = self._asked(None, _Opened)
+        heads, self.dialect, self.rate = self._ask(None, _Opened)
         if len(heads) > MAXIMUM_CHANNELS:
-            raise self._failed(f"it has {len(heads)} channels")
+            raise self._failure(f"it has {len(heads)} channels")
         self.heads: Sequence[Head] = [Head(*head) for head in heads]
 
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """Return the values of some channels."""
-        found = self._asked(list(places), list[tuple[str, Any]])
+        found = self._ask(list(places), list[tuple[str, Any]])
         if len(found) != len(places):
-            raise self._failed("another number of channels came back")
-        return [self._received(kind, values) for kind, values in found]
+            raise self._failure("another number of channels came back")
+        return [self._receive(kind, values) for kind, values in found]
 
-    def _asked(self, places: list[int] | None, kind: Any) -> Any:
+    def _ask(self, places: list[int] | None, kind: Any) -> Any:
         try:
             return msgspec.convert(self._jail.call(places, most=2 * MAXIMUM_BYTES), kind)
         except RecordError as error:
             raise RecordError(str(error).replace(str(self._file), str(self._shown))) from None
         except (ChildError, msgspec.ValidationError) as error:
-            raise self._failed(str(error)) from None
+            raise self._failure(str(error)) from None
 
-    def _received(self, kind: str, values: Any) -> NDArray[Any]:
+    def _receive(self, kind: str, values: Any) -> NDArray[Any]:
         if isinstance(values, np.ndarray) and values.ndim == 1:
             if kind == "number" and values.dtype == np.float64:
                 return values
             if kind == "stamp" and values.dtype == np.int64:
                 return values.view("datetime64[ns]")
-        raise self._failed("what came back is no column")
+        raise self._failure("what came back is no column")
 
-    def _failed(self, why: str) -> RecordError:
+    def _failure(self, why: str) -> RecordError:
         cure = "export it again, or as CSV"
         return RecordError(f"{self._shown}: must be a whole {self._kind} file, but cannot be read: {why}; {cure}")
 
 
-def _sent(values: NDArray[Any]) -> tuple[str, NDArray[Any]]:
+def _send(values: NDArray[Any]) -> tuple[str, NDArray[Any]]:
     if values.dtype.kind == "M":
         return "stamp", np.ascontiguousarray(values.astype("datetime64[ns]")).view(np.int64)
     return "number", np.ascontiguousarray(values, dtype=float)

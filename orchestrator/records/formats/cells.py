@@ -11,15 +11,7 @@ _COMMA = re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infin
 
 
 def cells_of(line: str, separator: str) -> list[str]:
-    """Return the stripped cells of a line; quotes are taken off.
-
-    Args:
-        line: of the file.
-        separator: between cells; a blank stands for any run of blanks.
-
-    Returns:
-        The cells.
-    """
+    """Return the stripped cells of a line; quotes are taken off."""
     if separator == " ":
         return line.split()
     if '"' in line:
@@ -31,38 +23,15 @@ def cells_of(line: str, separator: str) -> list[str]:
 
 
 def is_number(cell: str, decimal: str) -> bool:
-    """Return whether a cell is a number with this decimal sign.
-
-    Args:
-        cell: its text.
-        decimal: "." or ",".
-
-    Returns:
-        True when it is.
-    """
+    """Return whether a cell is a number with this decimal sign."""
     return (_COMMA if decimal == "," else _POINT).fullmatch(cell.strip()) is not None
 
 
 def is_value(cell: str, decimal: str) -> bool:
-    """Return whether a cell is a number, a truth value or a time.
-
-    Args:
-        cell: its text.
-        decimal: "." or ",".
-
-    Returns:
-        True when it is.
-    """
+    """Return whether a cell is a number, a truth value or a time."""
     return is_number(cell, decimal) or cell.lower() in TRUTHS or is_stamp(cell)
 
 
 def is_word(cell: str) -> bool:
-    """Return whether a cell is neither empty nor a number.
-
-    Args:
-        cell: its text.
-
-    Returns:
-        True when it is.
-    """
+    """Return whether a cell is neither empty nor a number."""
     return bool(cell) and not is_number(cell, ".") and not is_number(cell, ",")

@@ -7,7 +7,7 @@ from pathlib import Path
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.cells import cells_of, is_value
 from orchestrator.records.formats.heading import UNIT_KEYS, Heading
-from orchestrator.records.formats.heads import named
+from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import MAXIMUM_CHANNELS, Head
 from orchestrator.records.stamps import is_stamp
 
@@ -24,7 +24,6 @@ class Dialect:
     Attributes:
         separator: between cells; a blank stands for any run of blanks.
         decimal: sign before the fraction.
-        heads: the columns.
         width: cells of a row.
         start: where in the text the first row begins.
         preamble: lines before the names.
@@ -42,14 +41,7 @@ class Dialect:
     named: bool
 
     def describe(self, encoding: str) -> str:
-        """Return the dialect in words.
-
-        Args:
-            encoding: Python's name of it.
-
-        Returns:
-            A few words, separated by commas.
-        """
+        """Return the dialect in words."""
         words = ["CSV", f"separator {SPOKEN[self.separator]}", f"decimal {'comma' if self.decimal == ',' else 'point'}"]
         words += [{"utf-8-sig": "UTF-8 with BOM", "cp1252": "Windows-1252"}.get(encoding, encoding.upper())]
         filled = sum(bool(line.strip()) for line in self.preamble)
@@ -72,15 +64,7 @@ def detect(text: str, path: Path, header: int | None = None) -> Dialect:
     """Return the dialect of a text: the names are the last line before the longest run of rows of numbers.
 
     Args:
-        text: of the whole file.
-        path: of the file, for messages.
         header: line of the names, from 1; 0: there are none; None: found.
-
-    Returns:
-        The dialect.
-
-    Raises:
-        RecordError: no separator makes it a table of numbers, or the line of the names cannot hold them.
     """
     skipped = _start_of(text, header or 0, path)
     below = text[skipped:]
@@ -103,9 +87,9 @@ def detect(text: str, path: Path, header: int | None = None) -> Dialect:
     head = Heading(separator, decimal, width, path)
     if header:
         above = [text[:skipped].rstrip("\n").rsplit("\n", 1)[-1], *above]
-        names, units, preamble = head.stated(above, header)
+        names, units, preamble = head.read_stated(above, header)
     else:
-        names, units, preamble = (None, [""] * width, above) if header == 0 else head.found(above)
+        names, units, preamble = (None, [""] * width, above) if header == 0 else head.read_names(above)
     kinds = ["stamp" if _is_stamp_column(rows, place) else "number" for place in range(width)]
     if names is None:
         heads = [Head(f"#{n + 1}", "", kind) for n, kind in enumerate(kinds)]
@@ -147,11 +131,7 @@ def _block(lines: list[str], separator: str, decimal: str) -> tuple[int, int, in
 
 
 def _first_row(lines: list[str], first: int, separator: str, decimal: str, width: int, path: Path) -> int:
-    """Return the first row of the table: rows above its longest run belong to it where no names stand between them.
-
-    Raises:
-        RecordError: there are names between rows of numbers, so that a part of them would be lost.
-    """
+    """Return the first row of the table: rows above its longest run belong to it where no names stand between them."""
     stray: list[int] = []
     for n in range(first - 1, -1, -1):
         cells = cells_of(lines[n], separator)
@@ -195,7 +175,7 @@ def _head(text: str, unit: str, kind: str) -> Head:
     plain = " ".join(text.split())
     if unit:
         return Head(plain, unit, kind, 0, plain)
-    return named(plain, "", kind)
+    return head_of(plain, "", kind)
 
 
 def _no_table(text: str, path: Path) -> RecordError:

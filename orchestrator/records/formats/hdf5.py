@@ -8,27 +8,17 @@ import numpy as np
 from orchestrator.errors import RecordError
 from orchestrator.records.formats.nested import DEEPEST, PassedOver, vectors_of
 from orchestrator.records.formats.numpy_file import ArraySource
-from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, in_a_line, missing_extra
+from orchestrator.records.formats.source import MAXIMUM_BYTES, MAXIMUM_CHANNELS, extra_error, in_a_line
 
 _NUMBERS = frozenset(b"double single logical int8 int16 int32 int64 uint8 uint16 uint32 uint64".split())
 
 
 def open_file(path: Path) -> ArraySource:
-    """Return the opened file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its vectors.
-
-    Raises:
-        RecordError: h5py is not installed, or the file is broken, too large, or holds no vector.
-    """
+    """Return the opened file."""
     try:
         import h5py
     except ImportError:
-        raise missing_extra(path, "a MAT 7.3 or HDF5 file", "h5py", "hdf5") from None
+        raise extra_error(path, "a MAT 7.3 or HDF5 file", "h5py", "hdf5") from None
     try:
         with h5py.File(path, "r") as file:
             found = vectors_of(_Reader(path, file).group(file, 0))
@@ -77,7 +67,7 @@ class _Reader:
         if self._room < 0:
             raise RecordError(f"{self._path}: must unpack to at most {MAXIMUM_BYTES // 10**6} MB, but would to more")
         if item.dtype == h5py.ref_dtype:
-            return self._referred(item, depth)
+            return self._follow_references(item, depth)
         values = np.squeeze(item[()]) if item.shape is not None else np.zeros(0)
         if kind == b"char":
             return "".join(map(chr, np.ravel(values).tolist())) if values.dtype.kind in "ui" else ""
@@ -86,7 +76,7 @@ class _Reader:
         unit = next((_text(value) for key, value in item.attrs.items() if key.lower() in ("unit", "units")), "")
         return {"values": values, "unit": unit} if unit else values
 
-    def _referred(self, item: Any, depth: int) -> Any:
+    def _follow_references(self, item: Any, depth: int) -> Any:
         """Return what a dataset of references points to: a field of each structure of an array."""
         if depth >= DEEPEST or item.size > MAXIMUM_CHANNELS:
             return PassedOver("cell")

@@ -23,23 +23,13 @@ class Heading:
     width: int
     path: Path
 
-    def found(self, lines: list[str]) -> Named:
-        """Return names (None: there are none), units (empty where not in a row of their own) and the lines before.
-
-        Args:
-            lines: above the table.
-
-        Returns:
-            The three.
-
-        Raises:
-            RecordError: the last line has another number of cells than the rows.
-        """
+    def read_names(self, lines: list[str]) -> Named:
+        """Return names (None: there are none), units (empty where not in a row of their own) and the lines before."""
         filled = [n for n, line in enumerate(lines) if line.strip()]
         self._refuse_decimal_commas([lines[n] for n in filled])
         if not filled:
             return None, [""] * self.width, []
-        last = self._fitting(lines[filled[-1]])
+        last = self._fit_cells(lines[filled[-1]])
         if last is None:
             cells = cells_of(lines[filled[-1]], self.separator)
             if len(filled) == 1 or len(cells) > 1:
@@ -50,32 +40,21 @@ class Heading:
         units = self._units(last)
         if units is not None:
             for place in reversed(filled[:-1]):  # the nearest line of different words holds the names
-                above = self._fitting(lines[place])
+                above = self._fit_cells(lines[place])
                 words = [] if above is None else [cell for cell in above if is_word(cell)]
                 if above is not None and 2 * len(words) > len(above) and len(set(words)) > max(1, len(words) // 2):
                     return above, units, lines[:place] + lines[place + 1 : filled[-1]]
-        return last, self._keyed_units(lines[: filled[-1]]), lines[: filled[-1]]
+        return last, self._units_by_key(lines[: filled[-1]]), lines[: filled[-1]]
 
-    def stated(self, lines: list[str], header: int) -> Named:
-        """Return names, units and the lines in between, where the first line holds the names.
-
-        Args:
-            lines: from the names on.
-            header: number of the first of them in the file.
-
-        Returns:
-            The three.
-
-        Raises:
-            RecordError: that line has another number of cells than the rows.
-        """
-        names = self._fitting(lines[0])
+    def read_stated(self, lines: list[str], header: int) -> Named:
+        """Return names, units and the lines in between, where the first line holds the names."""
+        names = self._fit_cells(lines[0])
         if names is None:
             raise self._misfit(lines[0], f"line {header}, which `header` names,")
         between = [line for line in lines[1:] if line.strip()]
-        last = self._fitting(between[-1]) if between else None
+        last = self._fit_cells(between[-1]) if between else None
         units = None if last is None else self._units(last)
-        return names, self._keyed_units(between) if units is None else units, between
+        return names, self._units_by_key(between) if units is None else units, between
 
     def _misfit(self, line: str, what: str = "the header") -> RecordError:
         count = len(cells_of(line, self.separator))
@@ -94,7 +73,7 @@ class Heading:
                     "with decimal points"
                 )
 
-    def _fitting(self, line: str) -> list[str] | None:
+    def _fit_cells(self, line: str) -> list[str] | None:
         """Return the cells of a line that has as many as the rows, give or take empty ones and comments at its end."""
         cells = cells_of(line.lstrip("#%") if self.separator == " " else line, self.separator)
         if cells and cells[0].startswith("#"):
@@ -113,10 +92,10 @@ class Heading:
         plain = [re.sub(r"^[\[({]\s*(.*?)\s*[\])}]$", r"\1", cell) for cell in cells]
         return ["", *plain[1:]] if keyed else plain
 
-    def _keyed_units(self, lines: list[str]) -> list[str]:
+    def _units_by_key(self, lines: list[str]) -> list[str]:
         """Return the units of a line that begins with a key such as `Unit`, else empty ones."""
         for line in lines:
-            cells = self._fitting(line)
+            cells = self._fit_cells(line)
             if cells is not None and cells[0].lower() in UNIT_KEYS and any(cells[1:]):
                 return ["", *cells[1:]]
         return [""] * self.width

@@ -22,20 +22,11 @@ _FORCES = frozenset(("n", "mn", "kn", "lb", "lbs", "lbf", "oz", "ozf", "kgf"))
 _LENGTHS = frozenset(("m", "cm", "mm", "in", "ft"))
 
 
-def named(text: str, unit: str = "", kind: str = "number", raster: int = 0) -> Head:
+def head_of(text: str, unit: str = "", kind: str = "number", raster: int = 0) -> Head:
     """Return a channel whose unit may be part of its name.
 
     What stands in brackets or behind a line is a unit, known or not, unless it only describes the channel, as in
     ``load (7)`` and ``angle (motor)``. At the end of a name only known units are.
-
-    Args:
-        text: the written name.
-        unit: the written unit, where it stands apart.
-        kind: "number" or "stamp".
-        raster: number of the raster that it is sampled in.
-
-    Returns:
-        The channel, with name and unit apart.
     """
     name, written = (text, unit) if unit else _split(text)
     return Head(name, written, kind, raster, text)
@@ -54,7 +45,7 @@ def _split(text: str) -> tuple[str, str]:
     if fraction is not None and is_unit(fraction[2]) and not is_unit(fraction[1]) and not fraction[1].endswith(" 1"):
         return fraction[1], fraction[2]
     for name, ending in _endings(text):
-        for written in _written(name, ending):
+        for written in _unit_texts(name, ending):
             if is_unit(written):
                 return name, written
     return text, ""
@@ -79,7 +70,7 @@ def _endings(text: str) -> Iterator[tuple[str, str]]:
                 yield (text[:start] + text[stop:]).strip(), text[end:stop]
 
 
-def _written(name: str, ending: str) -> Iterator[str]:
+def _unit_texts(name: str, ending: str) -> Iterator[str]:
     """Yield the texts of units that an ending may be: ``rad_s`` is ``rad/s``, ``lb_in`` is ``lb.in``."""
     plain = ending.strip("_ .")
     if plain.lower() in _WORDS or (re.match(r"[^A-Za-z%°µ0]", plain) and plain != "1/min"):

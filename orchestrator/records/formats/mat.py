@@ -27,17 +27,7 @@ _CLASSES = {1: "cell", 3: "object", 4: "text", 5: "sparse", 16: "function", 17: 
 
 
 def open_file(path: Path) -> ArraySource:
-    """Return the opened file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its vectors.
-
-    Raises:
-        RecordError: the file is broken, unpacks to too much, or holds no vector.
-    """
+    """Return the opened file."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

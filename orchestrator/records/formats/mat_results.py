@@ -17,29 +17,12 @@ _UNIT = re.compile(r".*\[\s*([^\]|:#]+)[^\]]*\]\s*")
 
 
 def is_result(content: Mapping[str, Any]) -> bool:
-    """Return whether the matrices of a file are those of a result.
-
-    Args:
-        content: matrices by name.
-
-    Returns:
-        True when they are.
-    """
+    """Return whether the matrices of a file are those of a result."""
     return {"name", "dataInfo", "data_2"} <= set(content)
 
 
 def result_vectors(content: Mapping[str, Any]) -> Vectors:
-    """Return what changes in a result, the time first.
-
-    Args:
-        content: matrices by name, texts as arrays of characters.
-
-    Returns:
-        Vectors by the names of the variables, units from their descriptions.
-
-    Raises:
-        ValueError: the matrices do not belong together.
-    """
+    """Return what changes in a result, the time first."""
     normal = any("binNormal" in text for text in _texts(content.get("Aclass"), False))
     names = _texts(content["name"], not normal)
     said = _texts(content.get("description"), not normal)

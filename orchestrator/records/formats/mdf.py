@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.heads import named
+from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
     MAXIMUM_CHANNELS,
     Head,
     RecordSource,
     as_numbers,
+    extra_error,
     in_a_line,
-    missing_extra,
 )
 
 FORMULA_4, FORMULA_3 = 3, 10  # conversion types of the two versions
@@ -41,7 +41,7 @@ class MdfSource(RecordSource):
                 if index == master:
                     continue
                 unit = channel.unit or getattr(channel.conversion, "unit", "") or ""
-                heads.append(named(channel.name, unit if isinstance(unit, str) else "", "number", number))
+                heads.append(head_of(channel.name, unit if isinstance(unit, str) else "", "number", number))
                 self._at.append((number, index))
         self.heads: Sequence[Head] = heads
         self.dialect = f"MDF {file.version}, {len(file.groups)} groups, {len(heads) - len(file.groups)} channels"
@@ -64,7 +64,7 @@ class MdfSource(RecordSource):
             except RecordError:
                 raise
             except Exception as error:  # asammdf raises whatever a broken file makes it meet
-                raise _broken(self._path, error) from None
+                raise _damage_error(self._path, error) from None
             numbers = as_numbers(values, self.heads[place].name, self._path)
             if invalid is not None and np.any(invalid):  # samples that the file marks, each at its own row
                 numbers[np.asarray(invalid, dtype=bool)] = np.nan if numbers.dtype.kind == "f" else np.datetime64("NaT")
@@ -83,17 +83,7 @@ class MdfSource(RecordSource):
 
 
 def open_file(path: Path) -> MdfSource:
-    """Return the opened file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its channels, read when they are asked for.
-
-    Raises:
-        RecordError: asammdf is not installed, or the file is broken or too large.
-    """
+    """Return the opened file."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -101,7 +91,7 @@ def open_file(path: Path) -> MdfSource:
 
         logging.getLogger("asammdf").setLevel(logging.CRITICAL)
     except ImportError:
-        raise missing_extra(path, "an MDF file", "asammdf", "mdf") from None
+        raise extra_error(path, "an MDF file", "asammdf", "mdf") from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -109,7 +99,7 @@ def open_file(path: Path) -> MdfSource:
             rows = sum(int(group.channel_group.cycles_nr) for group in file.groups)
             channels = sum(len(group.channels) for group in file.groups)
     except Exception as error:  # asammdf raises whatever a broken file makes it meet
-        told = _broken(path, error)
+        told = _damage_error(path, error)
         _drop_silently(error)
         raise told from None
     if rows * 8 > MAXIMUM_BYTES or channels > MAXIMUM_CHANNELS:
@@ -127,5 +117,5 @@ def _drop_silently(error: Exception) -> None:
         sys.unraisablehook = hook
 
 
-def _broken(path: Path, error: BaseException) -> RecordError:
+def _damage_error(path: Path, error: BaseException) -> RecordError:
     return RecordError(f"{path}: must be a whole MDF file, but is not: {in_a_line(error)}")

@@ -32,14 +32,7 @@ class Vectors:
     passed_over: list[str] = field(default_factory=list)
 
     def describe(self, kind: str) -> str:
-        """Return what was read in one line.
-
-        Args:
-            kind: what the file is.
-
-        Returns:
-            The number of vectors, and the names of what was passed over.
-        """
+        """Return what was read in one line."""
         words = f"{kind}, {len(self.arrays)} vectors"
         if not self.passed_over:
             return words
@@ -54,13 +47,6 @@ def vectors_of(variables: Mapping[str, Any]) -> Vectors:
     A field that is called ``values`` or ``data`` has the name of its structure, or of the field ``label`` or ``name``
     beside it; other fields have their own names where that is unique. Of an array of structures each one counts, and
     numbers that each of them has are a vector.
-
-    Args:
-        variables: by name: arrays, texts, mappings (structures), sequences of mappings (arrays of structures), and
-            ``PassedOver``.
-
-    Returns:
-        The vectors.
     """
     found = Vectors()
     for name, value in variables.items():
@@ -68,40 +54,40 @@ def vectors_of(variables: Mapping[str, Any]) -> Vectors:
     return found
 
 
-def _collect(name: str, value: Any, place: str, found: Vectors, depth: int) -> None:
+def _collect(name: str, value: Any, place: str, channels: Vectors, depth: int) -> None:
     if isinstance(value, PassedOver):
-        found.passed_over.append(f"`{name}` ({value.kind})")
+        channels.passed_over.append(f"`{name}` ({value.kind})")
     elif isinstance(value, Mapping):
-        _collect_structure(name, value, found, depth)
+        _collect_structure(name, value, channels, depth)
     elif isinstance(value, Sequence) and not isinstance(value, str):
         for number, entry in enumerate(_columns(value), start=1):
-            _collect_structure(f"{name}({number})", entry, found, depth)
+            _collect_structure(f"{name}({number})", entry, channels, depth)
     elif isinstance(value, np.ndarray) and (value.dtype.names or value.dtype.kind in "fiub"):
-        key = name if name not in found.arrays else f"{place}.{name}"
-        found.arrays |= {k: v for k, v in columns_of(key, value).items() if k not in found.arrays}
+        key = name if name not in channels.arrays else f"{place}.{name}"
+        channels.arrays |= {k: v for k, v in columns_of(key, value).items() if k not in channels.arrays}
 
 
-def _collect_structure(name: str, fields: Mapping[str, Any], found: Vectors, depth: int) -> None:
+def _collect_structure(name: str, fields: Mapping[str, Any], channels: Vectors, depth: int) -> None:
     lists = {key: value for key, value in fields.items() if isinstance(value, list)}
     if len(lists) > 1 and len(lists) == len(fields) and len({len(value) for value in lists.values()}) == 1:
         # MAT 7.3 writes an array of structures as a structure of arrays.
         entries = [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
-        _collect(name, entries, "", found, depth)
+        _collect(name, entries, "", channels, depth)
         return
     if depth >= DEEPEST:
-        found.passed_over.append(f"`{name}` (structure)")
+        channels.passed_over.append(f"`{name}` (structure)")
         return
     texts = {key.lower(): value for key, value in fields.items() if isinstance(value, str) and value}
     label = next((texts[key] for key in _LABELS if key in texts), "")
     unit = next((texts[key] for key in _UNITS if key in texts), "")
     for key, value in fields.items():
         if key.lower() in _DATA and isinstance(value, np.ndarray):
-            before = set(found.arrays)
-            _collect(label or name, value, name, found, depth + 1)
+            before = set(channels.arrays)
+            _collect(label or name, value, name, channels, depth + 1)
             if unit:
-                found.units |= dict.fromkeys(set(found.arrays) - before, unit)
+                channels.units |= dict.fromkeys(set(channels.arrays) - before, unit)
         elif not isinstance(value, str):
-            _collect(key, value, name, found, depth + 1)
+            _collect(key, value, name, channels, depth + 1)
 
 
 def _columns(entries: Sequence[Any]) -> list[Any]:

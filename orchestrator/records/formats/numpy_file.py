@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.heads import named
+from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
     MAXIMUM_CHANNELS,
@@ -43,7 +43,7 @@ class ArraySource(RecordSource):
 
 def _head(name: str, unit: str, values: NDArray[Any], raster: int) -> Head:
     kind = "stamp" if values.dtype.kind == "M" else "number"
-    head = named(name, unit)
+    head = head_of(name, unit)
     return Head(head.name, head.unit, kind, raster, head.full)
 
 
@@ -51,11 +51,7 @@ def columns_of(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
     """Return the columns of an array: itself, its named fields, or the columns of a table, numbered from 1.
 
     Args:
-        name: of the array.
         array: of any shape.
-
-    Returns:
-        Vectors by name; empty where there are no numbers.
     """
     if array.dtype.names:
         return {field: array[field] for field in array.dtype.names if array[field].dtype.kind in "fiubM"}
@@ -71,17 +67,7 @@ def columns_of(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
 
 
 def open_file(path: Path) -> ArraySource:
-    """Return the opened file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its vectors.
-
-    Raises:
-        RecordError: it holds objects, is broken, or unpacks to too much.
-    """
+    """Return the opened file."""
     try:
         with path.open("rb") as file:
             if file.read(4) == b"PK\x03\x04":

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from orchestrator.errors import RecordError
-from orchestrator.records.formats.heads import named
+from orchestrator.records.formats.heads import head_of
 from orchestrator.records.formats.source import (
     MAXIMUM_BYTES,
     MAXIMUM_CHANNELS,
     Head,
     RecordSource,
+    extra_error,
     in_a_line,
-    missing_extra,
 )
 
 
@@ -40,21 +40,11 @@ class ParquetSource(RecordSource):
 
 
 def open_file(path: Path) -> ParquetSource:
-    """Return the opened file.
-
-    Args:
-        path: the file.
-
-    Returns:
-        Its columns, read when they are asked for.
-
-    Raises:
-        RecordError: pyarrow is not installed, or the file is broken or too large.
-    """
+    """Return the opened file."""
     try:
         import pyarrow.parquet
     except ImportError:
-        raise missing_extra(path, "a Parquet file", "pyarrow", "parquet") from None
+        raise extra_error(path, "a Parquet file", "pyarrow", "parquet") from None
     try:
         # Memory for decoding is bounded: a small file may claim to hold much.
         file = pyarrow.parquet.ParquetFile(
@@ -78,7 +68,7 @@ def _head(field: Any) -> Head:
     unit = next((meta[key].decode("utf-8", "replace") for key in (b"unit", b"units") if key in meta), "")
     stamp = pyarrow.types.is_timestamp(field.type)
     number = stamp or pyarrow.types.is_integer(field.type) or pyarrow.types.is_floating(field.type)
-    head = named(field.name, unit)
+    head = head_of(field.name, unit)
     return Head(head.name, head.unit, "stamp" if stamp else "number" if number else "text", 0, head.full)
 
 

@@ -36,7 +36,6 @@ class RecordSource(Protocol):
     """An opened file.
 
     Attributes:
-        heads: its channels.
         dialect: what was detected, in one line.
         rate: samples per second where the file states it outside its channels, or None.
     """
@@ -48,40 +47,16 @@ class RecordSource(Protocol):
     def load(self, places: Sequence[int]) -> list[NDArray[Any]]:
         """Return the values of the channels at ``places``, float64 or datetime64; NaN or NaT where one is missing.
 
-        Args:
-            places: of the channels in ``heads``.
-
         Returns:
             An array (n,) per place; those of one raster have the same length.
-
-        Raises:
-            RecordError: a value is not a number; the message names row and column.
         """
 
     def times(self, place: int) -> NDArray[Any]:
-        """Return a channel as ``load`` does, with NaN or NaT where a text has no value.
-
-        Args:
-            place: of the channel.
-
-        Returns:
-            Shape (n,).
-
-        Raises:
-            RecordError: as ``load``.
-        """
+        """Return a channel as ``load`` does, with NaN or NaT where a text has no value."""
         return self.load([place])[0]
 
     def within(self, rows: slice, raster: int) -> "RecordSource":
-        """Return the same file with some rows of one raster alone.
-
-        Args:
-            rows: to keep.
-            raster: whose rows they are.
-
-        Returns:
-            The part of the file.
-        """
+        """Return the same file with some rows of one raster alone."""
         return _Within(self, rows, raster)
 
 
@@ -101,19 +76,7 @@ class _Within(RecordSource):
 
 
 def as_numbers(values: NDArray[Any], name: str, path: Path) -> NDArray[Any]:
-    """Return a channel's values as float64, dates and times as datetime64[ns].
-
-    Args:
-        values: as the file's reader gives them.
-        name: of the channel, for messages.
-        path: of the file, for messages.
-
-    Returns:
-        Shape (n,).
-
-    Raises:
-        RecordError: they are no vector of numbers.
-    """
+    """Return a channel's values as float64, dates and times as datetime64[ns]."""
     if values.ndim == 1 and values.dtype.kind in "fiub":
         return values.astype(float)
     if values.ndim == 1 and values.dtype.kind == "M":
@@ -124,27 +87,14 @@ def as_numbers(values: NDArray[Any], name: str, path: Path) -> NDArray[Any]:
 def in_a_line(error: BaseException) -> str:
     """Return what a library says of a broken file, short enough for a message.
 
-    Args:
-        error: raised by the library.
-
     Returns:
         At most 120 characters without line breaks.
     """
     return " ".join(str(error).split())[:120]
 
 
-def missing_extra(path: Path, kind: str, package: str, extra: str) -> RecordError:
-    """Return the error that says which extra reads a format.
-
-    Args:
-        path: the file.
-        kind: what the file is, with an article.
-        package: that reads it.
-        extra: of this distribution, which installs the package.
-
-    Returns:
-        The error.
-    """
+def extra_error(path: Path, kind: str, package: str, extra: str) -> RecordError:
+    """Return the error that says which extra reads a format."""
     return RecordError(
         f"{path}: is {kind}, which needs `{package}`: pip install 'backlash-cosim[{extra}]', or save the record as CSV"
     )

@@ -30,7 +30,7 @@ class TextSource(RecordSource):
         self.heads: Sequence[Head] = dialect.heads
         self.dialect = dialect.describe(encoding)
         found = _RATE.search("\n".join(dialect.preamble))
-        self.rate = None if found is None else _stated_rate(found)
+        self.rate = None if found is None else _rate_of_header(found)
         self._encoding, self._before = encoding, 0
 
     def times(self, place: int) -> NDArray[Any]:
@@ -138,20 +138,13 @@ def open_file(path: Path, header: int | None = None) -> TextSource:
     """Return the opened file, its dialect detected.
 
     Args:
-        path: the file.
         header: line of the names, from 1; 0: there are none; None: found.
-
-    Returns:
-        Its columns, read when they are asked for.
-
-    Raises:
-        RecordError: it is no text, or no table of numbers.
     """
-    text, encoding = _decoded(path)
+    text, encoding = _decode(path)
     return TextSource(path, text, encoding, detect(text, path, header))
 
 
-def _decoded(path: Path) -> tuple[str, str]:
+def _decode(path: Path) -> tuple[str, str]:
     """Return the file's text with plain line ends, and its encoding."""
     try:
         raw = path.read_bytes()
@@ -185,16 +178,16 @@ def _without_bom(head: bytes) -> str:
     return "utf-8"
 
 
-def _stated_rate(found: re.Match[str]) -> float | None:
-    if not is_number(found[1], "."):
+def _rate_of_header(match: re.Match[str]) -> float | None:
+    if not is_number(match[1], "."):
         return None
-    return float(found[1]) * (1e3 if found[2].lower().startswith("k") else 1.0)
+    return float(match[1]) * (1e3 if match[2].lower().startswith("k") else 1.0)
 
 
-def _width_hint(found: int, width: int, separator: str) -> str:
-    if separator == "," and found in (2 * width, 2 * width - 1):
+def _width_hint(match: int, width: int, separator: str) -> str:
+    if separator == "," and match in (2 * width, 2 * width - 1):
         return ": decimal commas cannot be told from separating commas; export with `;` or decimal points"
-    return "" if found > width else ": the row is cut off; delete it"
+    return "" if match > width else ": the row is cut off; delete it"
 
 
 def _number_hint(cell: str) -> str:
@@ -204,15 +197,7 @@ def _number_hint(cell: str) -> str:
 
 
 def short(text: str, length: int = 60) -> str:
-    """Return printable text of at most ``length`` characters.
-
-    Args:
-        text: of any origin.
-        length: the most characters.
-
-    Returns:
-        The text.
-    """
+    """Return printable text of at most ``length`` characters."""
     plain = "".join(c if c.isprintable() else "?" for c in text)
     return plain if len(plain) <= length else plain[: length - 3] + "..."
 

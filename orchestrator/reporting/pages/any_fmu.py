@@ -22,17 +22,7 @@ KNOWN = frozenset(FmuDiagnosisFound.__struct_fields__)
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `diagnose` for any FMU.
-
-    Returns:
-        The report.
-
-    Raises:
-        ValueError: the results are not those of `diagnose` for any FMU.
-    """
+    """Return the page."""
     found = read(source.results, FmuDiagnosisFound)
     badge, label = VERDICTS.get(found.verdict, ("neutral", found.verdict))
     sentence = found.summary[0].partition(". ")[2] if found.summary else f"{label[:1].upper()}{label[1:]}."
@@ -43,9 +33,9 @@ def build(source: ResultDocument) -> Report:
         badge=trust_badge(found.trust, label, badge),
         sections=(
             *trust_section(found.trust),
-            *_said(found),
+            *_effect_sections(found),
             *_misfit(found, source),
-            *_searched(found),
+            *_search_sections(found),
             *sections_of("More", {k: v for k, v in source.results.items() if k not in KNOWN}),
         ),
         origin=source.origin(*made),
@@ -53,13 +43,13 @@ def build(source: ResultDocument) -> Report:
     )
 
 
-def _said(found: FmuDiagnosisFound) -> list[Section]:
+def _effect_sections(results: FmuDiagnosisFound) -> list[Section]:
     """Return the effects, and what is said in sentences."""
     sections: list[Section] = []
-    if found.effects:
-        sections.append(table_of("What is missing", [row for effect in found.effects for row in _rows(effect)]))
-    reasons = () if found.trust is None else found.trust.reasons
-    for title, texts in (("In words", found.summary[1:]), ("Take note", found.notes)):
+    if results.effects:
+        sections.append(table_of("What is missing", [row for effect in results.effects for row in _rows(effect)]))
+    reasons = () if results.trust is None else results.trust.reasons
+    for title, texts in (("In words", results.summary[1:]), ("Take note", results.notes)):
         lines = tuple(text for text in texts if text not in reasons)
         if lines:
             sections.append(Text(title, lines))
@@ -82,11 +72,11 @@ def _rows(effect: EffectFound) -> list[dict[str, object]]:
     ]
 
 
-def _misfit(found: FmuDiagnosisFound, source: ResultDocument) -> list[Section]:
+def _misfit(results: FmuDiagnosisFound, source: ResultDocument) -> list[Section]:
     """Return the misfit as a table and as a picture."""
     rows = [
         {"record": test.source, "output": name, **msgspec.structs.asdict(values)}
-        for test in (*found.test, *([found.validation] if found.validation else []))
+        for test in (*results.test, *([results.validation] if results.validation else []))
         for name, values in test.misfit.items()
     ]
     sections: list[Section] = [table_of("Misfit of runs on data that nothing was fitted to", rows)] if rows else []
@@ -96,10 +86,10 @@ def _misfit(found: FmuDiagnosisFound, source: ResultDocument) -> list[Section]:
     return sections
 
 
-def _searched(found: FmuDiagnosisFound) -> list[Section]:
+def _search_sections(results: FmuDiagnosisFound) -> list[Section]:
     """Return parameters, candidates, what is left, and the corrected system."""
     sections: list[Section] = []
-    parameters = [{"parameter": name, **msgspec.structs.asdict(p)} for name, p in found.parameters.items()]
+    parameters = [{"parameter": name, **msgspec.structs.asdict(p)} for name, p in results.parameters.items()]
     if parameters:
         sections.append(table_of("Parameters", parameters))
     tried = [
@@ -109,15 +99,15 @@ def _searched(found: FmuDiagnosisFound) -> list[Section]:
             "gain": c.gain,
             "over its error": c.t,
         }
-        for step in found.candidates
+        for step in results.candidates
         for c in step.tried[:5]
     ]
     if tried:
         sections.append(table_of("Candidates", tried))
-    return [*sections, *_left(found.remaining), *_delivered(found.delivery)]
+    return [*sections, *_remaining_sections(results.remaining), *_delivery_sections(results.delivery)]
 
 
-def _left(remaining: FmuRemainingFound) -> list[Section]:
+def _remaining_sections(remaining: FmuRemainingFound) -> list[Section]:
     """Return what the final model leaves of each output, and what that follows."""
     facts: list[tuple[str, Cell]] = [
         (f"share of the power of {name} [%]", None if share is None else 100.0 * share)
@@ -130,7 +120,7 @@ def _left(remaining: FmuRemainingFound) -> list[Section]:
     return [Facts("What is left", tuple(facts))] if facts else []
 
 
-def _delivered(files: tuple[DeliveredFound, ...]) -> list[Section]:
+def _delivery_sections(files: tuple[DeliveredFound, ...]) -> list[Section]:
     """Return the corrected system, or why there is none."""
     rows = [
         {

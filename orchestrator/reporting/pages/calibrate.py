@@ -8,17 +8,7 @@ from orchestrator.shared.results.any_fmu import FmuCalibrationFound
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `calibrate`.
-
-    Returns:
-        The report.
-
-    Raises:
-        ValueError: the results are not those of `calibrate`.
-    """
+    """Return the page."""
     found = read(source.results, FmuCalibrationFound)
     label = "the parameters explain the record"
     summary = "With these parameters the FMU explains the record to its noise."
@@ -36,7 +26,7 @@ def build(source: ResultDocument) -> Report:
     return Report("Calibration of an FMU", summary, tuple(sections), badge, origin, source.downloads())
 
 
-def _parameters(found: FmuCalibrationFound) -> ReportTable:
+def _parameters(results: FmuCalibrationFound) -> ReportTable:
     columns = (
         TableColumn("parameter"),
         TableColumn("nominal", "", 6),
@@ -57,17 +47,17 @@ def _parameters(found: FmuCalibrationFound) -> ReportTable:
             p.unit,
             None if p.learned is None else 100.0 * p.learned,
         )
-        for name, p in found.parameters.items()
+        for name, p in results.parameters.items()
     )
     note = "Lower and upper: ends of the 95 % interval. Learned: how much of its stated uncertainty the record removes."
     return ReportTable("Parameters", columns, rows, note)
 
 
-def _misfit(found: FmuCalibrationFound) -> ReportTable:
+def _misfit(results: FmuCalibrationFound) -> ReportTable:
     columns = tuple(TableColumn(head) for head in ("record", "output", "nominal", "calibrated", "noise", "unit"))
     rows = tuple(
         (test.source, name, m.nominal, m.final, m.noise, m.unit)
-        for test in found.test
+        for test in results.test
         for name, m in test.misfit.items()
     )
     note = "Nominal and calibrated: root mean square that runs miss on test data, to which nothing was fitted."

@@ -6,14 +6,7 @@ from orchestrator.shared.results import CheckedFmu, CheckFound, FindingFound, re
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `check`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     results = read(source.results, CheckFound)
     fmus, counts = results.fmus, results.counts
     good = sum(fmu.ok for fmu in fmus)

@@ -58,14 +58,7 @@ TEST = "Root mean square of free runs minus measured, on data that nothing was f
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `diagnose`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     if source.results.get("kind") == "fmu":
         return any_fmu.build(source)
     results = read(source.results, DiagnoseFound)
@@ -76,20 +69,20 @@ def build(source: ResultDocument) -> Report:
     if results.notes:
         sections.append(Text("Take note", tuple(_sentence(note) for note in results.notes)))
     for test in results.test:
-        sections += [*_shrinking(test), _test_table(f"Misfit on test data of {test.source}", test)]
+        sections += [*_misfit_sections(test), _test_table(f"Misfit on test data of {test.source}", test)]
     if results.validation is not None:
         sections.append(_test_table(f"Misfit on the other record, {results.validation.source}", results.validation))
     sections += _torque_left([*results.test, *([results.validation] if results.validation else [])])
     sections += _figure(source, "missing_torque", "Missing torque", MISSING)
     sections += _figure(source, "blocks", "Sizes block by block", BLOCKS)
-    sections += [*_remaining(results.remaining), *_learned(source, results.learned_law)]
+    sections += [*_remaining_sections(results.remaining), *_law_sections(source, results.learned_law)]
     sections += record_plots(source, "diagnose.csv", live.rows if live else ())
     sections += plant_section(source, "diagnose.csv", live)
     sections += [_parameter_table(results.parameters), *_candidate_table(results.candidates), *_analysis(results)]
     sections += sections_of("More", {n: v for n, v in source.results.items() if n not in KNOWN and n != "kind"})
     return Report(
         title="Diagnosis",
-        summary=" ".join(filter(None, [sentence, _named(results.effects), _closed(results.test)])),
+        summary=" ".join(filter(None, [sentence, _effect_names(results.effects), _closed_loop_note(results.test)])),
         badge=trust_badge(results.trust, label, badge),
         sections=tuple(sections),
         origin=source.origin(("corrected model", results.model), ("time taken [s]", results.seconds)),
@@ -121,13 +114,13 @@ def _place_words(name: str, site: str) -> str:
     return f"{name} {SITES.get(site, site)}"
 
 
-def _named(effects: Sequence[EffectFound]) -> str:
+def _effect_names(effects: Sequence[EffectFound]) -> str:
     named = [f"{_place_words(e.name, e.site)} ({e.grade})" for e in effects if e.grade != "possible"]
     listed = " and ".join(filter(None, [", ".join(named[:-1]), *named[-1:]]))
     return f"The model lacks {listed}." if named else ""
 
 
-def _closed(tests: Sequence[TestFound]) -> str:
+def _closed_loop_note(tests: Sequence[TestFound]) -> str:
     parts = []
     for test in tests[:1]:
         for signal, g in test.misfit.items():
@@ -193,7 +186,7 @@ def _quantity(p: ValueFound) -> str:
     return f"{p.value:.5g}{error}{unit}"
 
 
-def _shrinking(test: TestFound) -> list[Section]:
+def _misfit_sections(test: TestFound) -> list[Section]:
     """Return bars of the misfit from model to model, as multiples of the noise."""
     made: list[Section] = []
     for signal, g in test.misfit.items():
@@ -229,7 +222,7 @@ def _figure(source: ResultDocument, name: str, title: str, note: str) -> list[Se
     return [Picture(title, path, note)] if path.is_file() else []
 
 
-def _remaining(remaining: RemainingFound) -> list[Section]:
+def _remaining_sections(remaining: RemainingFound) -> list[Section]:
     """Return what no effect explains, and which signals it follows."""
     facts = tuple((f"torque's power at the {site} [%]", _percent(share)) for site, share in remaining.torque.items())
     made: list[Section] = [Facts("What is left", facts)] if facts else []
@@ -243,7 +236,7 @@ def _remaining(remaining: RemainingFound) -> list[Section]:
     return made
 
 
-def _learned(source: ResultDocument, law: LearnedFound | None) -> list[Section]:
+def _law_sections(source: ResultDocument, law: LearnedFound | None) -> list[Section]:
     """Return the law that was learned from what no effect explains: sentence, curve and knots."""
     figure = _figure(source, "learned_law", "The strongest curve of what is left", "")
     if law is None:

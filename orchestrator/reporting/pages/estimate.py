@@ -36,18 +36,11 @@ ERRORS = {"one_step_error_m": "motor encoder", "one_step_error_l": "load encoder
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `estimate`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     results = read(source.results, EstimateFound)
     found = {name: e for name, e in results.estimates.items() if e.not_applicable is None}
     sections: list[Section] = trust_section(results.trust)
-    sections += [*_missing(results), *_repeats(results)]
+    sections += [*_diagnosis_sections(results), *_repeats(results)]
     if results.estimates:
         sections += [_methods(found), *_remarks(results.estimates), *_comparison(found)]
     limit = (results.diagnostics or {}).get("profile_limit") or CHI_SQUARE_95
@@ -68,7 +61,7 @@ def build(source: ResultDocument) -> Report:
     return Report("Backlash estimate", summary, tuple(sections), badge, source.origin(), source.downloads())
 
 
-def _missing(results: EstimateFound) -> list[Section]:
+def _diagnosis_sections(results: EstimateFound) -> list[Section]:
     """Return what the model lacks, or why no diagnosis tells, where it does not explain the records."""
     diagnosis, why = results.diagnosis, results.undiagnosed
     if diagnosis is None:
@@ -121,7 +114,7 @@ def _number(value: float | None) -> str:
     return "any size" if value is None else f"{value:.6g}"
 
 
-def _methods(found: Methods) -> ReportTable:
+def _methods(results: Methods) -> ReportTable:
     columns = (
         TableColumn("method"),
         TableColumn("half-gap", "rad", 6),
@@ -132,7 +125,7 @@ def _methods(found: Methods) -> ReportTable:
         TableColumn("Cramér-Rao", "rad", 3),
     )
     rows = []
-    for name, e in found.items():
+    for name, e in results.items():
         level = None if e.trust is None else e.trust.level
         low, high = e.interval or (None, None)
         sizes = (e.alpha, level, low, high) if e.visible else (None, level, None, high)
@@ -156,16 +149,16 @@ def _remarks(estimates: Methods) -> list[Section]:
     return [Text("Remarks", tuple(text[:1].upper() + text[1:] for text in said))] if said else []
 
 
-def _comparison(found: Methods) -> list[Section]:
-    found = {name: e for name, e in found.items() if e.visible}
-    if len(found) < 2:
+def _comparison(results: Methods) -> list[Section]:
+    results = {name: e for name, e in results.items() if e.visible}
+    if len(results) < 2:
         return []
-    alpha = [e.alpha or 0.0 for e in found.values()]
-    low, high = zip(*(e.interval or (None, None) for e in found.values()), strict=True)
-    series = Series("half-gap", list(range(len(found))), alpha, "points", low, high)
+    alpha = [e.alpha or 0.0 for e in results.values()]
+    low, high = zip(*(e.interval or (None, None) for e in results.values()), strict=True)
+    series = Series("half-gap", list(range(len(results))), alpha, "points", low, high)
     positive = [v for v in alpha if v > 0.0]
     wide = bool(positive) and max(positive) > 5.0 * min(positive)
-    names = tuple(words(name) for name in found)
+    names = tuple(words(name) for name in results)
     return [Plot("Estimates by method", "method", "half-gap [rad]", (series,), log_y=wide, categories=names)]
 
 
@@ -256,9 +249,9 @@ def _design(source: ResultDocument, candidates: Sequence[ExcitationFound]) -> li
     return made
 
 
-def _diagnostics(found: Methods) -> list[Section]:
+def _diagnostics(results: Methods) -> list[Section]:
     made: list[Section] = []
-    for name, estimate in found.items():
+    for name, estimate in results.items():
         given = {k: v for k, v in (estimate.diagnostics or {}).items() if k != "parameters"}
         facts = [s for s in sections_of(f"Diagnostics of {words(name)}", given) if isinstance(s, Facts)]
         made += facts[:1]

@@ -8,14 +8,7 @@ from orchestrator.reporting.source import ResultDocument, plain, table_of, words
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of any command.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     return Report(
         title=source.command.capitalize(),
         summary=f"Results of `{source.command}`.",
@@ -29,13 +22,6 @@ def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
     """Return an object's plain values as facts, its lists of objects as tables, its objects as further sections.
 
     What is absent (null) is left out.
-
-    Args:
-        title: of the section with the plain values.
-        value: a JSON object.
-
-    Returns:
-        The sections.
     """
     facts: list[tuple[str, Any]] = []
     further: list[Section] = []
@@ -53,14 +39,7 @@ def sections_of(title: str, value: Mapping[str, Any]) -> list[Section]:
 
 
 def sentence(text: str) -> str:
-    """Return text with a capital first letter, the rest as it is.
-
-    Args:
-        text: words.
-
-    Returns:
-        The text.
-    """
+    """Return text with a capital first letter, the rest as it is."""
     return text[:1].upper() + text[1:]
 
 

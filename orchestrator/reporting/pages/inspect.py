@@ -11,14 +11,7 @@ PICTURE = "inspect_record.png"
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `inspect`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     results = read(source.results, InspectFound)
     sections: list[Section] = [Text("What the record would show", results.verdict)]
     if results.assumed:

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from orchestrator.building.live_module import live_module
-from orchestrator.building.live_system import LiveInstance, LiveSystem, held
+from orchestrator.building.live_system import LiveInstance, LiveSystem, hold_row
 from orchestrator.errors import FmuError
 from orchestrator.paired.cosimulation import MACHINE, RECORDED, TWIN
 from orchestrator.paired.experiment import Experiment
@@ -53,15 +53,7 @@ ANGLES = {"theta_m": "Motor angle", "theta_l": "Load angle"}
 
 
 def pair_section(source: ResultDocument, results: PairFound) -> list[Section]:
-    """Return the paired loops, live.
-
-    Args:
-        source: the result directory.
-        results: of the document.
-
-    Returns:
-        One section; none for results that do not hold what it takes.
-    """
+    """Return the paired loops, live."""
     if not results.experiment or results.alpha is None:
         return []
     known = {name: results.experiment[name] for name in Experiment.__dataclass_fields__ if name in results.experiment}
@@ -73,7 +65,7 @@ def pair_section(source: ResultDocument, results: PairFound) -> list[Section]:
     module = _module(system.models, regulator=True)
     if not isinstance(module, bytes):
         return [module]
-    system = _shortened(system)
+    system = _shorten(system)
     plan, places = system.plan()
     plan[places["plant.alpha"]] = results.alpha
     table = source.columns("simulate.csv")
@@ -111,7 +103,7 @@ def _module(names: Sequence[str], regulator: bool = False) -> bytes | Text:
     return Text(TITLE, (NEEDS_ZIG,)) if module is None else module
 
 
-def _shortened(system: LiveSystem) -> LiveSystem:
+def _shorten(system: LiveSystem) -> LiveSystem:
     """Return the beginning of a system's run that a page has room for."""
     columns = len(COMPARED) + len({id(values) for values in system.signals.values()})
     steps = min(system.steps, round(LONGEST / system.step), MOST_NUMBERS // columns)
@@ -119,8 +111,8 @@ def _shortened(system: LiveSystem) -> LiveSystem:
     return dataclasses.replace(system, steps=steps, signals=signals)
 
 
-def _experiment(found: Mapping[str, Any]) -> Experiment:
-    return msgspec.convert(found, Experiment)
+def _experiment(data: Mapping[str, Any]) -> Experiment:
+    return msgspec.convert(data, Experiment)
 
 
 # Effects that the paired plant can be given, and how large, as parts of the torque limit at the motor.
@@ -176,46 +168,40 @@ def _pair_plots(names: Sequence[str]) -> Sequence[LivePlot]:
 
 
 def plant_section(
-    source: ResultDocument, name: str, found: LiveFound | None, offered: Sequence[str] = ()
+    source: ResultDocument, name: str, data: LiveFound | None, offered: Sequence[str] = ()
 ) -> list[Section]:
     """Return a model beside its record, live.
 
     Args:
-        source: the result directory.
-        name: the CSV file of the record: ``time``, ``u`` and measured angles.
-        found: what the result says of it, or None.
         offered: effects [N.m] that get a slider although the model has none of them.
-
-    Returns:
-        One section; none where the results or the file do not hold what it takes.
     """
-    if found is None:
+    if data is None:
         return []
-    own = {entry.name for entry in plants()[found.fmu].table}
-    found = replace(found, values={name: 0.0 for name in ("alpha", *offered) if name in own} | found.values)
+    own = {entry.name for entry in plants()[data.fmu].table}
+    data = replace(data, values={name: 0.0 for name in ("alpha", *offered) if name in own} | data.values)
     table = source.columns(name)
     u = numbers(table.get("u", ()))
     signals = [signal for signal in ANGLES if signal in table]
-    if len(u) < 2 or not found.rows or not signals or None in u:
+    if len(u) < 2 or not data.rows or not signals or None in u:
         return []
-    module = _module((found.fmu,))
+    module = _module((data.fmu,))
     if not isinstance(module, bytes):
         return [module]
     largest = max(abs(value) for value in u if value is not None)
-    runs = _spans(found, min(len(u), MOST_NUMBERS // (1 + len(signals))))
+    runs = _spans(data, min(len(u), MOST_NUMBERS // (1 + len(signals))))
     begun, ended = runs[0][0], runs[-1][1]
-    values = {**dict.fromkeys(found.starts[0], 0.0), **found.values}
+    values = {**dict.fromkeys(data.starts[0], 0.0), **data.values}
     outputs = tuple(f"plant.{signal}" for signal in signals)
-    plant = LiveInstance("plant", found.fmu, values)
+    plant = LiveInstance("plant", data.fmu, values)
     request = np.array([float(value or 0.0) for value in u])
-    system = LiveSystem((plant,), (), {"plant.u": request}, outputs, found.step, len(u) - 1)
+    system = LiveSystem((plant,), (), {"plant.u": request}, outputs, data.step, len(u) - 1)
     plan, places = system.plan()
     made = tuple(
         LiveRun(
             float(numbers(table["time"])[first] or 0.0),
             last - first - 1,
             tuple((places[f"plant.{k}"], v) for k, v in start.items()),
-            held(request[first:last]).tolist(),
+            hold_row(request[first:last]).tolist(),
         )
         for first, last, start in runs
     )
@@ -228,28 +214,28 @@ def plant_section(
             note,
             module,
             tuple(plan),
-            found.step,
+            data.step,
             len(outputs),
             made,
             recorded,
-            tuple(_plant_controls(found, places, largest)),
+            tuple(_plant_controls(data, places, largest)),
             tuple(_plant_plots(signals)),
         )
     ]
 
 
-def _spans(found: LiveFound, size: int) -> list[tuple[int, int, Mapping[str, float]]]:
+def _spans(data: LiveFound, size: int) -> list[tuple[int, int, Mapping[str, float]]]:
     """Return first row, row behind the last, and starts of each run, as far as the page simulates."""
-    most = min(size, found.rows[0] + math.ceil(LONGEST / found.step) + 1)
-    ends = [*found.rows[1:], most]
-    spans = zip(found.rows, ends, found.starts, strict=True)
+    most = min(size, data.rows[0] + math.ceil(LONGEST / data.step) + 1)
+    ends = [*data.rows[1:], most]
+    spans = zip(data.rows, ends, data.starts, strict=True)
     return [(first, min(end, most), start) for first, end, start in spans if min(end, most) - first > 1]
 
 
-def _plant_controls(found: LiveFound, places: Mapping[str, int], largest: float) -> Sequence[Control]:
+def _plant_controls(data: LiveFound, places: Mapping[str, int], largest: float) -> Sequence[Control]:
     controls: list[Control] = []
-    table = {entry.name: entry for entry in plants()[found.fmu].table}
-    for name, value in found.values.items():
+    table = {entry.name: entry for entry in plants()[data.fmu].table}
+    for name, value in data.values.items():
         entry = table.get(name)
         place = (places[f"plant.{name}"],)
         if name == "alpha":

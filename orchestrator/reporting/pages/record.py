@@ -25,14 +25,6 @@ def record_plots(source: ResultDocument, name: str, restarts: Sequence[int] = ()
 
     For each signal with simulated columns a plot of simulated minus measured comes first. Empty where there is no
     such file, or no column ``time``.
-
-    Args:
-        source: results of a command.
-        name: of the CSV file.
-        restarts: rows at which simulated signals start anew from measured ones.
-
-    Returns:
-        The plots.
     """
     table = source.columns(name)
     return list(_plots(table, restarts)) if "time" in table else []

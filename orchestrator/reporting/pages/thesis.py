@@ -9,14 +9,7 @@ from orchestrator.shared.results.thesis import TableRow, ThesisFound
 
 
 def build(source: ResultDocument) -> Report:
-    """Return the page.
-
-    Args:
-        source: results of `thesis`.
-
-    Returns:
-        The report.
-    """
+    """Return the page."""
     results = read(source.results, ThesisFound)
     agree, compared = sum(one.agrees for one in results.gains), len(results.gains)
     table = results.table

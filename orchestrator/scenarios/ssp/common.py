@@ -39,28 +39,13 @@ MAXIMUM_XML = 64 * 2**20
 
 
 def tag(space: str, name: str) -> str:
-    """Return an element's name with its namespace, as lxml writes it.
-
-    Args:
-        space: prefix of the namespace, a key of ``SPACES``.
-        name: of the element.
-
-    Returns:
-        The name with its namespace in braces.
-    """
+    """Return an element's name with its namespace, as lxml writes it."""
     return f"{{{SPACES[space]}}}{name}"
 
 
 @cache
 def schema(kind: str) -> etree.XMLSchema:
-    """Return the XML schema of ``ssd``, ``ssv`` or ``ssm`` files.
-
-    Args:
-        kind: "ssd", "ssv" or "ssm".
-
-    Returns:
-        The schema that FMPy ships.
-    """
+    """Return the XML schema of ``ssd``, ``ssv`` or ``ssm`` files."""
     import fmpy.ssp
 
     folder = Path(fmpy.ssp.__file__).parent / "schema"
@@ -68,19 +53,7 @@ def schema(kind: str) -> etree.XMLSchema:
 
 
 def parse(content: bytes, kind: str, origin: str) -> etree._Element:
-    """Parse and validate an SSP file.
-
-    Args:
-        content: the XML.
-        kind: "ssd", "ssv" or "ssm".
-        origin: what to call the file in messages.
-
-    Returns:
-        The root element.
-
-    Raises:
-        ScenarioError: it is too large, not well-formed or does not follow its schema.
-    """
+    """Parse and validate an SSP file."""
     if len(content) > MAXIMUM_XML:
         raise ScenarioError(f"{origin}: must be at most {MAXIMUM_XML >> 20} MB, but is larger")
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
@@ -93,16 +66,7 @@ def parse(content: bytes, kind: str, origin: str) -> etree._Element:
 
 
 def require_valid(root: etree._Element, kind: str, origin: str) -> None:
-    """Raise a ScenarioError unless ``root`` follows the schema of its kind.
-
-    Args:
-        root: of the document.
-        kind: which schema.
-        origin: file name, for the message.
-
-    Raises:
-        ScenarioError: it does not follow the schema; the message says where first.
-    """
+    """Raise a ScenarioError unless ``root`` follows the schema of its kind."""
     rules = schema(kind)
     if not rules.validate(root):
         first = rules.error_log[0]
@@ -113,9 +77,7 @@ def add_master(system: etree._Element, step: float, solver_tolerance: float | No
     """Say of a system that it is co-simulated, how it steps, and how exactly its FMUs solve, as OMSimulator reads it.
 
     Args:
-        system: the outermost system; the annotation becomes its last child.
         step: communication step [s].
-        solver_tolerance: relative, for the FMUs' own solvers; None: their defaults.
     """
     annotations = etree.SubElement(system, tag("ssd", "Annotations"))
     annotation = etree.SubElement(annotations, tag("ssc", "Annotation"), type=OMS)
@@ -131,7 +93,6 @@ def add_experiment(root: etree._Element, start: float, stop: float, step: float)
     """Say when a system runs, and its communication step where libcosim reads it.
 
     Args:
-        root: of the structure; the experiment becomes its last child.
         start: [s].
         stop: [s].
         step: communication step [s].
@@ -145,32 +106,22 @@ def add_experiment(root: etree._Element, start: float, stop: float, step: float)
 
 
 def solver_tolerance(system: etree._Element) -> float | None:
-    """Return the relative tolerance for the FMUs' own solvers that a system states where OMSimulator looks for it.
-
-    Args:
-        system: the outermost system.
-
-    Returns:
-        The tolerance; None where there is none, or OMSimulator's default.
-    """
-    stated = _stated(system, "*", "relativeTolerance")
+    """Return the relative tolerance for the FMUs' own solvers that a system states where OMSimulator looks for it."""
+    stated = _numbers_of(system, "*", "relativeTolerance")
     return next((value for value in stated if 0.0 < value < 1.0 and value != OMS_TOLERANCE), None)
 
 
 def oms_step(system: etree._Element) -> float | None:
     """Return the communication step that a system states where OMSimulator looks for it.
 
-    Args:
-        system: the outermost system.
-
     Returns:
         The step [s]; None where there is none.
     """
-    stated = _stated(system, tag("oms", "FixedStepMaster"), "stepSize")
+    stated = _numbers_of(system, tag("oms", "FixedStepMaster"), "stepSize")
     return next((value for value in stated if 0.0 < value < float("inf")), None)
 
 
-def _stated(system: etree._Element, element: str, attribute: str) -> Iterator[float]:
+def _numbers_of(system: etree._Element, element: str, attribute: str) -> Iterator[float]:
     """Yield the numbers in an attribute of elements of OMSimulator's SimulationInformation."""
     for annotation in system.findall(f"{tag('ssd', 'Annotations')}/{tag('ssc', 'Annotation')}[@type='{OMS}']"):
         for found in annotation.findall(f".//{tag('oms', 'SimulationInformation')}/{element}[@{attribute}]"):
@@ -180,16 +131,8 @@ def _stated(system: etree._Element, element: str, attribute: str) -> Iterator[fl
                 continue
 
 
-def archived(folder: Path, source: str) -> Path | None:
-    """Return the file of an archive that a URI names, such as ``resources/My%20Part.fmu``.
-
-    Args:
-        folder: of the unpacked archive.
-        source: relative to it.
-
-    Returns:
-        The file; None where there is none, or it lies outside.
-    """
+def file_of_uri(folder: Path, source: str) -> Path | None:
+    """Return the file of an archive that a URI names, such as ``resources/My%20Part.fmu``."""
     for text in (unquote(source), source):
         file = (folder / text).resolve()
         if "\0" not in text and file.is_relative_to(folder.resolve()) and os.path.isfile(file):

@@ -23,7 +23,6 @@ class Structure:
     Attributes:
         folder: of the unpacked archive.
         units: that the file declares.
-        problems: what is wrong.
         components: file of each component.
         kinds: kind of each connector.
         connector_units: of those that state one.
@@ -51,14 +50,7 @@ class _Value:
 
 
 def instance_names(components: Mapping[str, Path]) -> dict[str, str]:
-    """Return what components are called in signals, where a dot ends the name of an instance.
-
-    Args:
-        components: by path.
-
-    Returns:
-        Names without dots, each once, by path.
-    """
+    """Return what components are called in signals, where a dot ends the name of an instance."""
     found: dict[str, str] = {}
     for path in sorted(components, key=lambda text: "." in text):
         name = path.replace(".", "_")
@@ -72,8 +64,6 @@ class Flow:
     """Follows values through a package.
 
     Args:
-        structure: the package.
-        models: interface of each component.
         names: of the instances that components become.
     """
 
@@ -81,25 +71,18 @@ class Flow:
         self._structure, self._models, self._names = structure, models, names
 
     def connections(self, inputs: Mapping[str, Signal]) -> tuple[list[Connection], list[SignalSource]]:
-        """Return what feeds the inputs of components.
-
-        Args:
-            inputs: signals for the input connectors of the outermost system.
-
-        Returns:
-            Connections between instances, and signals.
-        """
+        """Return what feeds the inputs of components."""
         connections, sources = [], []
         for target, root in self._ends():
             name = self._address(target)
             if root[0] in self._models:
-                value = self._carried(root, target, self._starting_at(root))
+                value = self._carry(root, target, self._start_at(root))
                 source, own = self._own_unit(root), self._own_unit(target)
                 ratio = units.conversion(source, own) or (1.0, 0.0)  # what the master converts by itself
                 factor = value.factor / ratio[0]
                 connections.append(Connection(self._address(root), name, factor, value.offset - factor * ratio[1]))
             elif root[0] == "" and root[1] in inputs:
-                value = self._carried(root, target, self._starting_at(root))
+                value = self._carry(root, target, self._start_at(root))
                 # As other tools do: what is set at a communication point holds over the step from there.
                 sources.append(SignalSource(name, Scaled(inputs[root[1]], value.factor, value.offset), at="start"))
         for name in inputs:
@@ -109,14 +92,7 @@ class Flow:
         return connections, sources
 
     def starts(self, inputs: Mapping[str, Signal]) -> dict[Node, Given]:
-        """Return the values that bindings give to connectors of systems, where they reach components.
-
-        Args:
-            inputs: signals for the input connectors of the outermost system, which stand over bindings.
-
-        Returns:
-            Value by connector of a component, in its own unit.
-        """
+        """Return the values that bindings give to connectors of systems, where they reach components."""
         found = {}
         for target, root in self._ends():
             given = self._structure.given.get(root)
@@ -127,26 +103,19 @@ class Flow:
                 continue
             unit = None if given.unit is None else units.resolve(given.unit, {**self._structure.units, **given.units})
             number = given.factor * float(given.text) + given.offset
-            value = self._carried(root, target, self._step(_Value(1.0, 0.0, unit), self._connector_unit(root), root))
+            value = self._carry(root, target, self._step(_Value(1.0, 0.0, unit), self._connector_unit(root), root))
             number = value.factor * number + value.offset
             text = f"{number:.0f}" if number.is_integer() and abs(number) < 1e15 else repr(number)
             found[target] = Given(given.type, text, None, {})
         return found
 
     def outputs(self, record: tuple[str, ...]) -> Iterator[Derived]:
-        """Yield the output connectors of the outermost system that show recorded signals.
-
-        Args:
-            record: names of the recorded signals.
-
-        Yields:
-            Each connector with its source and conversion.
-        """
+        """Yield the output connectors of the outermost system that show recorded signals."""
         for node, kind in self._structure.kinds.items():
             if node[0] == "" and kind == "output" and node in self._structure.drivers:
                 root = self._root(node)
                 if root[0] in self._models and self._address(root) in record:
-                    value = self._carried(root, node, self._starting_at(root))
+                    value = self._carry(root, node, self._start_at(root))
                     unit = None if value.unit is None else value.unit.name
                     yield Derived(node[1], self._address(root), value.factor, value.offset, unit)
 
@@ -171,7 +140,7 @@ class Flow:
             seen.add(node)
         return node
 
-    def _carried(self, root: Node, target: Node, value: _Value) -> _Value:
+    def _carry(self, root: Node, target: Node, value: _Value) -> _Value:
         """Return a value that has gone from ``root`` to ``target``."""
         path: list[Node] = []
         node = target
@@ -186,7 +155,7 @@ class Flow:
                 value = _Value(factor * value.factor, factor * value.offset + offset, unit)
         return self._step(value, self._own_unit(target), target)
 
-    def _starting_at(self, root: Node) -> _Value:
+    def _start_at(self, root: Node) -> _Value:
         return self._step(_Value(1.0, 0.0, self._own_unit(root)), self._connector_unit(root), root)
 
     def _step(self, value: _Value, unit: Unit | None, node: Node) -> _Value:

@@ -12,7 +12,7 @@ from orchestrator.master import units
 from orchestrator.master.problems import Problem
 from orchestrator.master.protocol import ModelInterface, Unit, Value
 from orchestrator.master.values import nearest
-from orchestrator.scenarios.ssp.common import EXPONENTS, archived, parse, tag
+from orchestrator.scenarios.ssp.common import EXPONENTS, file_of_uri, parse, tag
 
 TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 
@@ -23,11 +23,8 @@ class Given:
 
     Attributes:
         type: ``Real``, ``Integer``, ``Boolean``, ``String`` or ``Enumeration``.
-        text: the value.
         unit: its unit, if it has one.
         units: units declared beside it.
-        factor: of the mapping.
-        offset: of the mapping.
     """
 
     type: str
@@ -39,15 +36,7 @@ class Given:
 
 
 def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
-    """Return the units that a file declares.
-
-    Args:
-        root: of the file.
-        space: prefix of the namespace in which units are declared.
-
-    Returns:
-        Units by name.
-    """
+    """Return the units that a file declares."""
     found = {}
     for element in root.findall(f"{tag(space, 'Units')}/{tag('ssc', 'Unit')}"):
         name, base = str(element.get("name")), element.find(tag("ssc", "BaseUnit"))
@@ -58,17 +47,7 @@ def read_units(root: etree._Element, space: str) -> dict[str, Unit]:
 
 
 def bound_values(element: etree._Element, place: str, folder: Path, problems: list[Problem]) -> list[tuple[str, Given]]:
-    """Return names, prefix included, and values of an element's parameter bindings, in their order.
-
-    Args:
-        element: a component or a system.
-        place: path of the element, for messages.
-        folder: of the unpacked archive.
-        problems: what is wrong is appended.
-
-    Returns:
-        Names and values.
-    """
+    """Return names, prefix included, and values of an element's parameter bindings, in their order."""
     found: list[tuple[str, Given]] = []
     bindings = element.findall(f"{tag('ssd', 'ParameterBindings')}/{tag('ssd', 'ParameterBinding')}")
     for k, binding in enumerate(bindings):
@@ -81,7 +60,7 @@ def bound_values(element: etree._Element, place: str, folder: Path, problems: li
         mapping = binding.find(tag("ssd", "ParameterMapping"))
         if mapping is not None:
             rules = _content(mapping, "ParameterMapping", "ssm", path, folder, problems)
-            named = [] if rules is None else _mapped(named, rules)
+            named = [] if rules is None else _map_values(named, rules)
         found += [(prefix + name, given) for name, given in named]
     return found
 
@@ -103,7 +82,7 @@ def _content(
     source = element.get("source")
     if source is None:
         return element.find(tag(space, name))
-    file = archived(folder, source)
+    file = file_of_uri(folder, source)
     if file is None:
         problems.append(Problem(f"{path}.source", f"must be a file of the archive, but is {source!r}"))
         return None
@@ -126,7 +105,7 @@ def _values(values: etree._Element) -> list[tuple[str, Given]]:
     return found
 
 
-def _mapped(values: list[tuple[str, Given]], rules: etree._Element) -> list[tuple[str, Given]]:
+def _map_values(values: list[tuple[str, Given]], rules: etree._Element) -> list[tuple[str, Given]]:
     by_name = dict(values)
     found = []
     for entry in rules.findall(tag("ssm", "MappingEntry")):
@@ -144,19 +123,7 @@ def _mapped(values: list[tuple[str, Given]], rules: etree._Element) -> list[tupl
 def own_value(
     model: ModelInterface, name: str, given: Given, declared: Mapping[str, Unit], place: str, problems: list[Problem]
 ) -> Value | None:
-    """Return a value as the model's variable takes it, or ``None`` after adding what is wrong to ``problems``.
-
-    Args:
-        model: interface of the component.
-        name: of the variable.
-        given: what the file gives, perhaps with a unit.
-        declared: units that the file declares.
-        place: path of the binding, for messages.
-        problems: what is wrong is appended.
-
-    Returns:
-        The value.
-    """
+    """Return a value as the model's variable takes it, or ``None`` after adding what is wrong to ``problems``."""
     variable = model.variables.get(name)
     path = f"{place}.{name}"
     if variable is None:
@@ -164,13 +131,13 @@ def own_value(
         problems.append(Problem(path, text))
         return None
     try:
-        return _typed(variable.type, given) if variable.type != "Real" else _real(model, name, given, declared)
+        return _as_type(variable.type, given) if variable.type != "Real" else _real(model, name, given, declared)
     except ValueError as error:
         problems.append(Problem(path, f"must be a {variable.type}, but is {given.text!r}{error}"))
         return None
 
 
-def _typed(kind: str, given: Given) -> Value:
+def _as_type(kind: str, given: Given) -> Value:
     text = given.text.strip()
     if kind == "String":
         return given.text

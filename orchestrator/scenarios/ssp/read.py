@@ -17,7 +17,16 @@ from orchestrator.master.signals import Signal
 from orchestrator.master.system import Instance, System
 from orchestrator.master.units import resolve
 from orchestrator.scenarios.scenario import Scenario
-from orchestrator.scenarios.ssp.common import OSP, SPACES, STRUCTURE, archived, oms_step, parse, solver_tolerance, tag
+from orchestrator.scenarios.ssp.common import (
+    OSP,
+    SPACES,
+    STRUCTURE,
+    file_of_uri,
+    oms_step,
+    parse,
+    solver_tolerance,
+    tag,
+)
 from orchestrator.scenarios.ssp.flow import Flow, Node, Structure, instance_names
 from orchestrator.scenarios.ssp.parameters import Given, bound_values, own_value, read_units
 from orchestrator.shared.isolation.archives import unpack
@@ -37,18 +46,7 @@ def opened_ssp(
     All outputs are recorded. Components of nested systems are called ``system/component``.
 
     Args:
-        path: the archive.
-        inputs: signals for the input connectors of the outermost system, by name.
         step: communication step [s]; default: the file's own annotation, else a thousandth of the stop time.
-        simultaneous: run side by side (Jacobi) rather than one after the other (Gauss-Seidel).
-
-    Yields:
-        The scenario.
-
-    Raises:
-        ScenarioError: the archive or its structure is wrong; all problems in one message.
-        ConnectionMismatchError: its connections are.
-        FmuError: one of its FMUs is.
     """
     if os.path.isdir(path):
         raise ScenarioError(f"`ssp` must be an archive, but {path} is a directory; zip what is in it")
@@ -122,7 +120,7 @@ def _connectors(element: etree._Element, path: str, structure: Structure) -> Non
 
 def _component(element: etree._Element, name: str, structure: Structure) -> None:
     source, kind = str(element.get("source")), element.get("type", FMU_TYPE)
-    file = archived(structure.folder, source)
+    file = file_of_uri(structure.folder, source)
     if kind != FMU_TYPE:
         structure.problems.append(Problem(f"$.{name}.type", f"must be {FMU_TYPE}, but is {kind!r}"))
     elif element.get("implementation") == "ModelExchange":

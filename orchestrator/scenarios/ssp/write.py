@@ -33,15 +33,6 @@ def write_ssp(path: Path, scenario: Scenario) -> None:
     """Write a scenario of FMUs as an SSP archive, whole or not at all.
 
     Sources that are constant become start values; SSP has no way to say others.
-
-    Args:
-        path: the archive.
-        scenario: of FMUs alone.
-
-    Raises:
-        ScenarioError: the scenario holds what SSP 1.0 cannot express, or instances that are no FMUs.
-        ConnectionMismatchError: its connections are wrong.
-        OutputError: ``path`` cannot be written.
     """
     scenario.system.check()
     members = {STRUCTURE: _structure(scenario)}

@@ -18,7 +18,6 @@ class Linearised(Generic[T]):
     Attributes:
         hessian: (k, k) of the cost, Gauss-Newton's.
         gradient: (k,) of the cost.
-        cost: at the point.
         moved: (k,) step -> the point there and its cost, which may be infinite or NaN.
         exact: the derivatives are those of this point; where they are not, a step that fails says nothing of damping.
     """
@@ -57,10 +56,6 @@ def damped_fit(
     """Return the point at which damped steps end, and the last Hessian (None: not even one was made).
 
     Args:
-        start: the first point.
-        linearise: the cost near a point; None ends the fit there.
-        damping: how steps are damped.
-        iterations: most steps.
         converged: (gain of the step, cost after it) -> True when the fit may end; a failed step gains nothing.
 
     Returns:

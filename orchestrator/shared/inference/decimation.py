@@ -17,13 +17,7 @@ def content_band(values: Array, step: float, noise: float, shows: float, most_ab
     Args:
         values: (n,) samples of a position, or of another quantity with a speed.
         step: sample time [s].
-        noise: standard deviation of its measurement.
-        shows: power over that of the noise from which motion shows.
-        most_above: share of the squared speed that may lie above the band, and below where noise is looked for.
         pane: samples of a spectrum's pane at most.
-
-    Returns:
-        The frequency; 0.0 where nothing moves.
     """
     from scipy.signal import welch
 
@@ -43,13 +37,11 @@ def content_band(values: Array, step: float, noise: float, shows: float, most_ab
     return float(frequency[1:][min(int(np.searchsorted(share, 1.0 - most_above)), last)])
 
 
-def sampled(values: Array, factor: int, cut_off: float) -> Array:
+def decimate_samples(values: Array, factor: int, cut_off: float) -> Array:
     """Return every ``factor``-th sample behind the filter.
 
     Args:
         values: (n,) samples.
-        factor: rows for one that is kept.
-        cut_off: of the filter, as a share of half the lower rate.
 
     Returns:
         Shape ((n - 1) // factor,).
@@ -57,18 +49,16 @@ def sampled(values: Array, factor: int, cut_off: float) -> Array:
     return _smooth(values, factor, _kernel(factor, cut_off))[::factor]
 
 
-def averaged(values: Array, factor: int, cut_off: float) -> Array:
+def decimate_means(values: Array, factor: int, cut_off: float) -> Array:
     """Return means over ``factor`` rows each behind the filter: what is held over a row keeps its impulse.
 
     Args:
         values: (n,) efforts, each held over its row.
-        factor: rows for one that is kept.
-        cut_off: of the filter, as a share of half the lower rate.
 
     Returns:
         Shape ((n - 1) // factor,).
     """
-    smooth = _smooth(values, factor, _made_up_for(_kernel(factor, cut_off), factor))
+    smooth = _smooth(values, factor, _restore_gain(_kernel(factor, cut_off), factor))
     return np.asarray(smooth.reshape(-1, factor).mean(axis=1))
 
 
@@ -88,7 +78,7 @@ def _smooth(values: Array, factor: int, kernel: Array) -> Array:
     return np.asarray(fftconvolve(mirrored, kernel, "valid"))[: (values.size - 1) // factor * factor]
 
 
-def _made_up_for(kernel: Array, factor: int) -> Array:
+def _restore_gain(kernel: Array, factor: int) -> Array:
     """Return a filter's kernel with the gain that a torque loses where it is averaged over ``factor`` rows and held.
 
     Both take a sinc of the frequency from it, beside that of the hold over a row which the machine has seen.

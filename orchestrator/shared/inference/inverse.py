@@ -15,15 +15,8 @@ def pseudo_inverse(matrix: Array, **how: Any) -> Array:
 
     Args:
         matrix: (n, m).
-        how: options of ``numpy.linalg.pinv``.
 
-    Returns:
-        (m, n).
-
-    Raises:
-        numpy.linalg.LinAlgError: the matrix is not finite.
-
-    Example:
+    Examples:
         >>> pseudo_inverse(np.diag([2.0, 0.0])).tolist()
         [[0.5, 0.0], [0.0, 0.0]]
     """

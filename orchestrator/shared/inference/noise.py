@@ -17,9 +17,6 @@ def residual_noise(values: Array, count: float, window: int = 9) -> float:
         values: (n,) samples of a smooth motion.
         count: the unit that they are rounded to; its error, ``count / sqrt(12)``, is the least result.
         window: samples of the cubic.
-
-    Returns:
-        The standard deviation, in the unit of ``values``.
     """
     basis, _ = np.linalg.qr(np.vander(np.arange(window) - (window - 1) / 2, 4))
     panes = np.lib.stride_tricks.sliding_window_view(values, window)
@@ -36,9 +33,6 @@ def robust_noise(values: Array) -> float:
 
     Args:
         values: (n,) samples; NaN: missing.
-
-    Returns:
-        The standard deviation, in the unit of ``values``.
     """
     return MAD_TO_DEVIATION * float(np.nanmedian(np.abs(np.diff(values, 3)))) / math.sqrt(20.0)
 
@@ -48,23 +42,17 @@ def rms(values: Array) -> float:
 
     Args:
         values: of any shape.
-
-    Returns:
-        The root mean square, in their unit.
     """
     return float(np.sqrt(np.mean(values**2)))
 
 
-def lagged_rms(u: Array, h: float, tau: float) -> float:
+def rms_behind_lag(u: Array, h: float, tau: float) -> float:
     """Return the rms [N.m] of ``u`` behind a lag of ``tau`` [s].
 
     Args:
         u: (n,) requested torque [N.m].
         h: sample time [s].
         tau: [s].
-
-    Returns:
-        The rms, positive.
     """
     from scipy.signal import lfilter
 

@@ -19,7 +19,6 @@ class ArchiveLimits:
 
     Attributes:
         total: bytes of all files unpacked.
-        files: number of entries.
         ratio: unpacked over packed size of a file larger than 1 MiB.
     """
 
@@ -29,17 +28,7 @@ class ArchiveLimits:
 
 
 def unpack(path: Path, target: Path, limits: ArchiveLimits | None = None) -> None:
-    """Unpack a zip archive into ``target``, whole or not at all. Links and paths that lead out of it are refused.
-
-    Args:
-        path: the archive.
-        target: a folder that does not exist yet.
-        limits: what it may hold.
-
-    Raises:
-        FmuError: it is no zip archive, is damaged, or holds what no FMU may hold.
-        OutputError: there is no room for it, or ``target`` cannot be written.
-    """
+    """Unpack a zip archive into ``target``, whole or not at all. Links and paths that lead out of it are refused."""
     limits = limits or ArchiveLimits()
     part = target.with_name(target.name + ".part")
     try:
@@ -61,16 +50,7 @@ def unpack(path: Path, target: Path, limits: ArchiveLimits | None = None) -> Non
 
 
 def require_fit(members: list[zipfile.ZipInfo], path: Path, limits: ArchiveLimits) -> None:
-    """Refuse an archive by its directory alone, before anything is unpacked.
-
-    Args:
-        members: of the archive.
-        path: of the archive, for messages.
-        limits: the most members and bytes.
-
-    Raises:
-        FmuError: it has too many members, or one too large.
-    """
+    """Refuse an archive by its directory alone, before anything is unpacked."""
     if len(members) > limits.files:
         raise FmuError(f"{path}: must have at most {limits.files} members, but has {len(members)}")
     total = sum(m.file_size for m in members)

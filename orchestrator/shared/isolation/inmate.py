@@ -60,7 +60,7 @@ def _serve(link: socket.socket, setup: Setup, walls: list[Any] | None) -> None:
         nonce, body = frame[:NONCE], frame[NONCE:]
         try:
             if handler is None:
-                handler, value = _opened(setup), walls
+                handler, value = _open(setup), walls
             else:
                 value = handler(pickle.loads(body))
             message = wire.encode([nonce, ANSWER, value])
@@ -71,7 +71,7 @@ def _serve(link: socket.socket, setup: Setup, walls: list[Any] | None) -> None:
             return
 
 
-def _opened(setup: Setup) -> Any:
+def _open(setup: Setup) -> Any:
     module, _, function = setup.entry.partition(":")
     entry = import_module(module)
     return getattr(entry, function)(pickle.loads(setup.argument))

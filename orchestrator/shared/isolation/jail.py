@@ -61,10 +61,8 @@ class Jail:
 
     Args:
         entry: ``module:function`` that the child calls with ``argument``.
-        argument: anything that can be pickled.
         read: further files and folders that the child may read, such as unpacked FMUs.
         write: further folders that it may change.
-        limits: what it may use.
         walls: whether the kernel's walls are wanted; without them limits, time and cleaning up remain.
         packages: further top-level packages that the child may import.
         adopt: without a filter of system calls, find processes that leave the child's group, too: this process then
@@ -73,10 +71,6 @@ class Jail:
     Attributes:
         walls: what the kernel enforces, once the child has started; ``None`` when it was not wanted.
         scratch: the child's only writable folder.
-
-    Raises:
-        OutputError: the temporary directory cannot be written.
-        SimulationError: no process can be started.
     """
 
     def __init__(
@@ -118,7 +112,7 @@ class Jail:
                 pickle.dumps(argument), self.limits, tuple(map(str, allowed)),
                 (str(self.scratch), "/dev/null", *map(str, write)), walls,
             )  # fmt: skip
-            self._guarded(wire.send, pickle.dumps(setup), time.monotonic() + START_LIMIT)
+            self._guard(wire.send, pickle.dumps(setup), time.monotonic() + START_LIMIT)
         except OSError as error:
             self.close()
             raise SimulationError(f"a child process cannot be started: {error.strerror}") from None
@@ -137,9 +131,6 @@ class Jail:
 
         Args:
             time_limit: [s].
-
-        Raises:
-            As ``call`` does.
         """
         if not self.started:
             found = self._exchange(b"", time_limit, 1 << 20)
@@ -151,16 +142,7 @@ class Jail:
         """Return the handler's answer to ``request``.
 
         Args:
-            request: anything that can be pickled.
             time: seconds until the child is killed (default: the limit's).
-            most: bytes that the answer may have.
-
-        Returns:
-            The answer.
-
-        Raises:
-            ChildError: the child ended, broke a limit or said what is no answer; it is gone.
-            OrchestratorError: raised by the handler, whatever its class; the child is well.
         """
         self.start()
         return self._exchange(pickle.dumps(request), self.limits.time if time is None else time, most)
@@ -172,27 +154,15 @@ class Jail:
         return self._process.pid
 
     def resident(self) -> int:
-        """Return the child's resident memory in bytes; 0 where the system does not tell.
-
-        Returns:
-            The bytes.
-        """
+        """Return the child's resident memory in bytes; 0 where the system does not tell."""
         return resident_memory(self.pid)[0]
 
     def printed_bytes(self) -> int:
-        """Return how much the child has printed.
-
-        Returns:
-            The bytes.
-        """
+        """Return how much the child has printed."""
         return os.fstat(self._log.fileno()).st_size
 
     def finish(self) -> bool:
-        """Let the child end by itself, then kill what is left of it; return whether processes of its own were left.
-
-        Returns:
-            True when there were.
-        """
+        """Let the child end by itself, then kill what is left of it; return whether processes of its own were left."""
         process = self._process
         if process is None:
             return False
@@ -225,16 +195,16 @@ class Jail:
     def _exchange(self, body: bytes, limit: float, most: int) -> Any:
         if self._process is None or self._process.returncode is not None:
             raise ChildError("the process has ended before", "exit")
-        if wire.pending(self._link):
-            raise self._forged("it spoke without being asked")
+        if wire.is_pending(self._link):
+            raise self._forgery_error("it spoke without being asked")
         deadline = min(time.monotonic() + limit, self._born + self.limits.total)
         nonce = secrets.token_bytes(NONCE)
-        self._guarded(wire.send, nonce + body, deadline)
-        data = self._guarded(lambda link, d, t: wire.receive(link, most, d, t), deadline)
+        self._guard(wire.send, nonce + body, deadline)
+        data = self._guard(lambda link, d, t: wire.receive(link, most, d, t), deadline)
         try:
             message = wire.decode(data)
         except wire.WireError as error:
-            raise self._forged(str(error)) from None
+            raise self._forgery_error(str(error)) from None
         match message:
             case [bytes() as echo, int() as kind, value] if secrets.compare_digest(echo, nonce):
                 if kind == ANSWER:
@@ -242,9 +212,9 @@ class Jail:
                 if kind == REFUSAL and isinstance(value, list) and len(value) == 2 and all(map(_is_text, value)):
                     known = _NAMES.get(value[0])
                     raise known(value[1]) if known else SimulationError(f"{value[0]}: {value[1]}".rstrip(": "))
-        raise self._forged("its answer belongs to no request")
+        raise self._forgery_error("its answer belongs to no request")
 
-    def _guarded(self, action: Any, *arguments: Any) -> Any:
+    def _guard(self, action: Any, *arguments: Any) -> Any:
         """Send or receive; whatever goes wrong there ends the child and becomes an error that says why."""
         try:
             return action(self._link, *arguments, self._tick)
@@ -252,9 +222,9 @@ class Jail:
             self._kill()
             raise ChildError("the process took too long", "time") from None
         except wire.ClosedError:
-            raise self._ended() from None
+            raise self._end_error() from None
         except wire.WireError as error:
-            raise self._forged(str(error)) from None
+            raise self._forgery_error(str(error)) from None
         except BaseException:
             self._kill()
             raise
@@ -277,19 +247,19 @@ class Jail:
                 self._kill()
                 raise ChildError(f"the process wrote more than {self.limits.disk >> 20} MiB of files", "disk")
 
-    def _forged(self, text: str) -> ChildError:
+    def _forgery_error(self, text: str) -> ChildError:
         self._kill()
         return ChildError(f"the process broke the protocol: {text}", "protocol")
 
-    def _ended(self) -> ChildError:
+    def _end_error(self) -> ChildError:
         """Collect the process and say how it ended."""
         assert self._process is not None
         try:
             peak = collect(self._process, _LAST_MOMENTS)
         except subprocess.TimeoutExpired:
-            return self._forged("it hung up")
+            return self._forgery_error("it hung up")
         code = self._process.returncode
-        said = self._printed()
+        said = self._read_printed()
         if code == -getattr(signal, "SIGXCPU", 0):
             return ChildError("the process took too much processor time", "time")
         if code < 0 and peak > self.limits.memory:
@@ -299,7 +269,7 @@ class Jail:
                 return ChildError(f"the process was ended by {signal.Signals(-code).name}", "signal", -code, said)
         return ChildError(f"the process ended with exit code {code}", "exit", abs(code), said)
 
-    def _printed(self) -> str:
+    def _read_printed(self) -> str:
         try:
             self._log.seek(0, os.SEEK_END)
             self._log.seek(max(0, self._log.tell() - 4096))

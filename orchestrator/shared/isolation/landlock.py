@@ -24,11 +24,7 @@ _RIGHTS = ((1, (1 << 13) - 1), (2, 1 << 13), (3, _TRUNCATE), (5, _IOCTL))
 
 
 def version() -> int:
-    """Return the version of Landlock's interface that the kernel offers; 0 for none.
-
-    Returns:
-        The version.
-    """
+    """Return the version of Landlock's interface that the kernel offers; 0 for none."""
     if not sys.platform.startswith("linux"):
         return 0
     found = int(_library().syscall(_CREATE, None, ctypes.c_size_t(0), _VERSION_FLAG))
@@ -38,15 +34,8 @@ def version() -> int:
 def restrict(read: Iterable[str], write: Iterable[str]) -> int:
     """Refuse this thread, for good, every file outside ``read`` and ``write``, TCP, and signals to other processes.
 
-    Args:
-        read: files and folders that may be read, and from which libraries may be loaded; missing ones are left out.
-        write: folders in which anything may be done with files, save for making devices.
-
     Returns:
         The version in use; 0 when there is none, and then nothing is refused.
-
-    Raises:
-        OSError: the kernel refused the rules.
     """
     found = version()
     if not found:
@@ -56,13 +45,13 @@ def restrict(read: Iterable[str], write: Iterable[str]) -> int:
     size = 8 * (1 if found < _TCP_SINCE else 2 if found < _SCOPES_SINCE else 3)
     attributes = (ctypes.c_uint64 * 3)(*words)
     library = _library()
-    ruleset = _checked(library.syscall(_CREATE, attributes, ctypes.c_size_t(size), 0))
+    ruleset = _check(library.syscall(_CREATE, attributes, ctypes.c_size_t(size), 0))
     try:
         for path in read:
             _allow(library, ruleset, path, rights & _READ)
         for path in write:
             _allow(library, ruleset, path, rights)
-        _checked(library.syscall(_RESTRICT, ruleset, 0))
+        _check(library.syscall(_RESTRICT, ruleset, 0))
     finally:
         os.close(ruleset)
     return found
@@ -81,7 +70,7 @@ def _allow(library: ctypes.CDLL, ruleset: int, path: str, rights: int) -> None:
     try:
         folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
         rule = _Beneath(rights if folder else rights & _OF_FILES, descriptor)
-        _checked(library.syscall(_ADD_RULE, ruleset, _PATH_BENEATH, ctypes.byref(rule), 0))
+        _check(library.syscall(_ADD_RULE, ruleset, _PATH_BENEATH, ctypes.byref(rule), 0))
     finally:
         os.close(descriptor)
 
@@ -90,7 +79,7 @@ def _library() -> ctypes.CDLL:
     return ctypes.CDLL(None, use_errno=True)
 
 
-def _checked(result: int) -> int:
+def _check(result: int) -> int:
     if result < 0:
         number = ctypes.get_errno()
         raise OSError(number, os.strerror(number))

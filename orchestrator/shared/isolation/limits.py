@@ -11,13 +11,10 @@ class Limits:
 
     Attributes:
         time: seconds that one answer may take.
-        memory: resident bytes.
         output: bytes of any one file, and of the printed text.
-        total: seconds in all.
+        total: time that all calls may take together [s].
         disk: bytes of all files in the scratch folder.
         entries: number of files and folders in the scratch folder.
-        threads: number of threads.
-        open_files: number of descriptors.
     """
 
     time: float = 20.0
@@ -38,7 +35,6 @@ class Setup:
         parent: process that owns the child.
         path: ``sys.path`` of the child.
         entry: ``module:function`` to be called with the unpickled ``argument``.
-        argument: pickled.
         limits: what the child may use.
         read, write: files and folders that it may read and run libraries from, and those that it may write too.
         walls: whether the kernel shall enforce ``read``, ``write``, no network and no further processes.

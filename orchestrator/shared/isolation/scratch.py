@@ -10,18 +10,14 @@ import tempfile
 from pathlib import Path
 
 from orchestrator.errors import OutputError
-from orchestrator.shared.operating_system import alive, is_own, occupied
+from orchestrator.shared.operating_system import alive, disk_usage, is_own
 
 PREFIX = "backlash-cosim-"
 _swept: set[str] = set()
 
 
 class Scratch:
-    """A private folder of this process; use as a context manager, or call ``close``.
-
-    Raises:
-        OutputError: the temporary directory cannot be written.
-    """
+    """A private folder of this process; use as a context manager, or call ``close``."""
 
     def __init__(self, purpose: str = "run") -> None:
         place = tempfile.gettempdir()
@@ -43,17 +39,7 @@ class Scratch:
         self.close()
 
     def folder(self, name: str) -> Path:
-        """Return the folder ``name`` in it, made when need be.
-
-        Args:
-            name: of the folder.
-
-        Returns:
-            Its path.
-
-        Raises:
-            OutputError: it cannot be made.
-        """
+        """Return the folder ``name`` in it, made when need be."""
         path = self.path / name
         try:
             path.mkdir(parents=True, exist_ok=True)
@@ -78,11 +64,7 @@ def _remove_abandoned(place: Path) -> None:
 
 
 def remove(folder: Path) -> None:
-    """Remove a folder whatever is in it: depth beyond what recursion takes, folders without rights, odd names.
-
-    Args:
-        folder: that may be missing.
-    """
+    """Remove a folder whatever is in it: depth beyond what recursion takes, folders without rights, odd names."""
     with contextlib.suppress(OSError, RecursionError):
         shutil.rmtree(folder)
         return
@@ -106,14 +88,14 @@ def _empty(top: bytes) -> None:
             os.chmod(path, 0o700)
             target = path
             if current != top:
-                target = _moved(path, top, count)
+                target = _move(path, top, count)
                 count += 1
             waiting.append(target)
         if current != top:
             os.rmdir(current)
 
 
-def _moved(path: bytes, top: bytes, count: int) -> bytes:
+def _move(path: bytes, top: bytes, count: int) -> bytes:
     while True:
         target = os.path.join(top, b"~%d" % count)
         try:
@@ -129,13 +111,6 @@ def usage(folder: Path, most_entries: int) -> tuple[int, int]:
     """Return bytes and number of the entries below ``folder``; counting stops beyond ``most_entries``.
 
     What cannot be looked at (a folder without rights, or too deep for a path) counts as too many.
-
-    Args:
-        folder: to look into.
-        most_entries: number of entries at which counting stops.
-
-    Returns:
-        Bytes and number.
     """
     total, count, waiting = 0, 0, [os.fspath(folder)]
     while waiting and count <= most_entries:
@@ -149,7 +124,7 @@ def usage(folder: Path, most_entries: int) -> tuple[int, int]:
         count += len(found)
         for entry in found:
             with contextlib.suppress(OSError):
-                total += occupied(entry.stat(follow_symlinks=False))
+                total += disk_usage(entry.stat(follow_symlinks=False))
                 if entry.is_dir(follow_symlinks=False):
                     waiting.append(entry.path)
     return total, count

@@ -75,11 +75,7 @@ class _Argument:
 
 
 def available() -> bool:
-    """Return whether the kernel takes filters, and their numbers are known for this machine.
-
-    Returns:
-        True when filters can be used.
-    """
+    """Return whether the kernel takes filters, and their numbers are known for this machine."""
     if not sys.platform.startswith("linux") or platform.machine() not in _MACHINES or sys.maxsize < 2**32:
         return False
     number = {"x86_64": 317, "aarch64": 277}[platform.machine()]
@@ -88,24 +84,13 @@ def available() -> bool:
 
 
 def forbid_privileges() -> None:
-    """Give up, for good, to gain rights by running a program; what Landlock and the filter ask for first.
-
-    Raises:
-        OSError: the kernel refused.
-    """
+    """Give up, for good, to gain rights by running a program; what Landlock and the filter ask for first."""
     if ctypes.CDLL(None, use_errno=True).prctl(_PRCTL_NO_NEW_PRIVILEGES, 1, 0, 0, 0):
         raise OSError(ctypes.get_errno(), "no_new_privs")
 
 
 def restrict() -> bool:
-    """Refuse this process, for good, the calls above; return whether the kernel does.
-
-    Returns:
-        True when it does.
-
-    Raises:
-        OSError: the kernel refused the filter.
-    """
+    """Refuse this process, for good, the calls above; return whether the kernel does."""
     if not available():
         return False
     program = _filter_program(platform.machine(), os.getpid())
@@ -127,12 +112,7 @@ class _Program(ctypes.Structure):
 
 
 def _filter_program(machine: str, pid: int) -> list[_Instruction]:
-    """Return the filter as instructions ``(code, jump if true, jump if false, constant)``.
-
-    Args:
-        machine: a key of the tables above.
-        pid: of the process that is bounded: to itself it may send signals.
-    """
+    """Return the filter as instructions ``(code, jump if true, jump if false, constant)``."""
     architecture, old = _MACHINES[machine]
     conditions = {
         "clone": _Argument(0, _ANY_BIT, (_CLONE_THREAD,)),

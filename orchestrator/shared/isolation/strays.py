@@ -34,15 +34,11 @@ class Strays:
             self.mark = {_NAME: secrets.token_hex(16)}
 
     def kill(self) -> bool:
-        """Kill the orphans that have come to this process, once the child has ended; return whether there were any.
-
-        Returns:
-            True when there were.
-        """
+        """Kill the orphans that have come to this process, once the child has ended; return whether there were any."""
         if not self.mark:
             return False
         found, end = False, time.monotonic() + _PATIENCE
-        while strays := self._adopted():
+        while strays := self._adopted_children():
             found = True
             for pid in strays:
                 with contextlib.suppress(OSError):
@@ -52,7 +48,7 @@ class Strays:
                 break
         return found
 
-    def _adopted(self) -> list[int]:
+    def _adopted_children(self) -> list[int]:
         """Children of this process that carry the mark, save for those that have ended."""
         mark = f"{_NAME}={self.mark[_NAME]}".encode()
         found = []

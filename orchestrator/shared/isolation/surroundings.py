@@ -30,17 +30,7 @@ _SYSTEM = (
 
 
 def launch(theirs: socket.socket, log: Any, folder: Path, environment: dict[str, str]) -> "subprocess.Popen[bytes]":
-    """Start the child with its end of the socket pair, in a session of its own.
-
-    Args:
-        theirs: the child's end of the socket pair.
-        log: file that the child prints to.
-        folder: in which it starts.
-        environment: its environment variables.
-
-    Returns:
-        The process.
-    """
+    """Start the child with its end of the socket pair, in a session of its own."""
     root = str(Path(errors.__file__).resolve().parents[1])
     command = [sys.executable, "-I", "-B", "-c", _PYTHON, str(theirs.fileno()), root]
     options: dict[str, Any] = {"stdout": log, "stderr": log, "cwd": folder, "env": environment}
@@ -55,15 +45,7 @@ def launch(theirs: socket.socket, log: Any, folder: Path, environment: dict[str,
 
 
 def environment(temporary: Path, walls: bool) -> dict[str, str]:
-    """The child's environment: one thread per library, its own temporary folder; behind walls no secrets, no home.
-
-    Args:
-        temporary: the child's temporary folder.
-        walls: whether it is to live behind walls.
-
-    Returns:
-        Environment variables.
-    """
+    """The child's environment: one thread per library, its own temporary folder; behind walls no secrets, no home."""
     own = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(temporary))
     if not walls:
         return dict.fromkeys(_ONE_THREAD, "1") | dict(os.environ) | own
@@ -74,11 +56,7 @@ def environment(temporary: Path, walls: bool) -> dict[str, str]:
 
 
 def system_folders() -> set[Path]:
-    """Libraries of the system, and all of the interpreter that runs this.
-
-    Returns:
-        Folders that a child may read.
-    """
+    """Libraries of the system, and all of the interpreter that runs this. Return folders that a child may read."""
     found = {Path(p) for p in _SYSTEM}
     # A prefix that is no folder of its own, as `/` of some containers, would open everything.
     prefixes = {sys.prefix, sys.base_prefix, sys.exec_prefix, sys.base_exec_prefix}
@@ -91,10 +69,6 @@ def system_folders() -> set[Path]:
 
 def code_folders(shadow: Path, packages: Sequence[str]) -> list[Path]:
     """Link the packages from ``shadow`` and return where they are, so that nothing beside them has to be readable.
-
-    Args:
-        shadow: folder for the links.
-        packages: further top-level packages that the child may import.
 
     Returns:
         Where the packages really are.

@@ -47,20 +47,12 @@ class Walls:
 
 
 def support() -> Walls:
-    """Return what the kernel of this machine would enforce.
-
-    Returns:
-        Version of Landlock and whether there are filters of system calls.
-    """
+    """Return what the kernel of this machine would enforce."""
     return Walls(landlock.version(), seccomp.available())
 
 
 def follow_parent(parent: int) -> None:
-    """End with the process ``parent`` (Linux; to be exact, with the thread of it that started this process).
-
-    Args:
-        parent: its process id.
-    """
+    """End with the process ``parent`` (Linux; to be exact, with the thread of it that started this process)."""
     if sys.platform.startswith("linux"):
         ctypes.CDLL(None).prctl(_SET_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
         if os.getppid() != parent:  # it was gone before the line above
@@ -86,18 +78,7 @@ def bound(limits: Limits) -> None:
 
 
 def enclose(read: tuple[str, ...], write: tuple[str, ...]) -> Walls:
-    """Put up every wall that this kernel has, for good.
-
-    Args:
-        read: files and folders that may be read.
-        write: folders that may be written.
-
-    Returns:
-        The walls that stand.
-
-    Raises:
-        OSError: the kernel has the walls but refused to put them up; nothing foreign must be loaded then.
-    """
+    """Put up every wall that this kernel has, for good."""
     if not sys.platform.startswith("linux"):
         return Walls(0, seccomp=False)
     seccomp.forbid_privileges()

@@ -38,39 +38,19 @@ class LateError(WireError):
 
 
 def encode(value: Any) -> bytes:
-    """Return plain data as bytes; arrays of float64, int64 and bool keep their shape.
-
-    Args:
-        value: numbers, texts, bytes, lists, dictionaries, arrays.
-
-    Returns:
-        The bytes.
-
-    Raises:
-        TypeError: ``value`` holds something else.
-    """
-    return msgspec.msgpack.encode(value, enc_hook=_packed)
+    """Return plain data as bytes; arrays of float64, int64 and bool keep their shape."""
+    return msgspec.msgpack.encode(value, enc_hook=_pack)
 
 
 def decode(data: bytes) -> Any:
-    """Return what ``encode`` was given; tuples come back as lists.
-
-    Args:
-        data: from anybody.
-
-    Returns:
-        The data.
-
-    Raises:
-        WireError: the bytes are no such data.
-    """
+    """Return what ``encode`` was given; tuples come back as lists."""
     try:
-        return msgspec.msgpack.decode(data, ext_hook=_unpacked)
+        return msgspec.msgpack.decode(data, ext_hook=_unpack)
     except (msgspec.DecodeError, ValueError, RecursionError, OverflowError, struct.error) as error:
         raise WireError(f"a message must be plain data, but is not: {error}") from None
 
 
-def _packed(value: Any) -> Any:
+def _pack(value: Any) -> Any:
     np = sys.modules.get("numpy")  # where it was never imported, nothing is an array
     if np is None:
         raise TypeError(f"a message must be plain data, but has a {type(value).__name__}")
@@ -83,7 +63,7 @@ def _packed(value: Any) -> Any:
     raise TypeError(f"a message must be plain data, but has a {type(value).__name__}")
 
 
-def _unpacked(code: int, data: memoryview) -> Any:
+def _unpack(code: int, data: memoryview) -> Any:
     if code != _ARRAY or len(data) < 2:
         raise ValueError("an unknown extension")
     kind, axes = struct.unpack_from(">cB", data)
@@ -102,14 +82,7 @@ def send(link: socket.socket, data: bytes, deadline: float = math.inf, tick: Tic
     """Send one frame.
 
     Args:
-        link: the socket.
-        data: the frame.
-        deadline: of ``time.monotonic``.
         tick: called every ``SLICE`` seconds while waiting.
-
-    Raises:
-        ClosedError: the other end has hung up.
-        LateError: it does not take the frame in time.
     """
     rest = memoryview(_LENGTH.pack(len(data)) + data)
     link.settimeout(None if deadline == math.inf else SLICE)
@@ -126,16 +99,7 @@ def receive(link: socket.socket, most: int, deadline: float = math.inf, tick: Ti
     """Return one frame of at most ``most`` bytes; arguments and errors as those of ``send``.
 
     Args:
-        link: a socket.
-        most: bytes that the frame may have.
         deadline: on the monotonic clock [s].
-        tick: called while nothing comes.
-
-    Returns:
-        The frame's content.
-
-    Raises:
-        WireError: the frame is larger.
     """
     (length,) = _LENGTH.unpack(_exactly(link, _LENGTH.size, deadline, tick))
     if length > most:
@@ -169,15 +133,8 @@ def _wait(deadline: float, tick: Tick) -> None:
         raise LateError("too late")
 
 
-def pending(link: socket.socket) -> bool:
-    """Return whether bytes lie there that nobody has asked for.
-
-    Args:
-        link: a socket.
-
-    Returns:
-        True when there are.
-    """
+def is_pending(link: socket.socket) -> bool:
+    """Return whether bytes lie there that nobody has asked for."""
     link.settimeout(0.0)
     try:
         return bool(link.recv(1, socket.MSG_PEEK))

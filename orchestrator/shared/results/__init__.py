@@ -18,15 +18,11 @@ Sizes = dict[str, dict[str, dict[str, float | None]]]
 
 
 def first_version() -> int:
-    """Return the first version of a result; a default that is made is never left out of a file.
-
-    Returns:
-        1.
-    """
+    """Return the first version of a result; a default that is made is never left out of a file."""
     return 1
 
 
-class Found(msgspec.Struct, frozen=True, kw_only=True):
+class ResultData(msgspec.Struct, frozen=True, kw_only=True):
     """Base: what one command found."""
 
     schema_version: int = msgspec.field(default_factory=first_version)
@@ -47,14 +43,14 @@ class GapFound(msgspec.Struct, frozen=True):
     upper: float | None
 
 
-class BuildFound(Found, frozen=True, kw_only=True):
+class BuildFound(ResultData, frozen=True, kw_only=True):
     """``build``: path by name, and what this machine cannot give an FMU."""
 
     fmus: dict[str, str]
     remark: str | None = None
 
 
-class PairFound(Found, frozen=True, kw_only=True):
+class PairFound(ResultData, frozen=True, kw_only=True):
     """``simulate``: both loops. ``alpha`` and ``S`` in rad; ``experiment`` as the class of that name."""
 
     alpha: float
@@ -109,11 +105,21 @@ class RemarkFound(msgspec.Struct, frozen=True):
     count: int = 1
 
 
-class SignalsFound(Found, frozen=True, kw_only=True):
-    """``simulate`` of a scenario and ``ssp run``: recorded signals, steps, remarks, and the walls around the run."""
+class EventsFound(msgspec.Struct, frozen=True):
+    """Events of slaves: their times [s], instants and ticks of clocks, and by how much late ones were late [s]."""
+
+    times: list[float] = []
+    instants: int = 0
+    ticks: int = 0
+    late: list[float] = []
+
+
+class SignalsFound(ResultData, frozen=True, kw_only=True):
+    """``simulate`` of a scenario and ``ssp run``: recorded signals, steps, events, remarks, and the walls around it."""
 
     signals: list[SignalFound] = []
     steps: int | None = None
+    events: EventsFound | None = None
     remarks: list[RemarkFound] = []
     isolation: WallsFound | None = None
 
@@ -158,7 +164,7 @@ class SweptScenario(msgspec.Struct, frozen=True):
     stop: float | None = None
 
 
-class SweepFound(Found, frozen=True, kw_only=True):
+class SweepFound(ResultData, frozen=True, kw_only=True):
     """``sweep``: counts and columns always; of the pair the errors and their origin, of a scenario its name.
 
     ``remarked``: cases with a text in the column ``remarks``; ``first_remark`` is the first of them.
@@ -213,7 +219,7 @@ class CheckedFmu(msgspec.Struct, frozen=True):
     rules: list[RuleFound] = []
 
 
-class CheckFound(Found, frozen=True, kw_only=True):
+class CheckFound(ResultData, frozen=True, kw_only=True):
     """``check``: whether no FMU has an error, counts by severity, and each FMU."""
 
     ok: bool
@@ -221,16 +227,9 @@ class CheckFound(Found, frozen=True, kw_only=True):
     fmus: list[CheckedFmu] = []
 
 
-def as_plain(found: Any) -> Any:
-    """Turn results into what JSON knows.
-
-    Args:
-        found: a struct or a dataclass, or a mapping already.
-
-    Returns:
-        Nested dictionaries, lists, numbers and texts.
-    """
-    return found if isinstance(found, Mapping) else msgspec.to_builtins(found, enc_hook=_otherwise)
+def as_plain(data: Any) -> Any:
+    """Turn results into what JSON knows. Return nested dictionaries, lists, numbers and texts."""
+    return data if isinstance(data, Mapping) else msgspec.to_builtins(data, enc_hook=_otherwise)
 
 
 def _otherwise(value: Any) -> Any:
@@ -238,18 +237,7 @@ def _otherwise(value: Any) -> Any:
 
 
 def read(results: Any, kind: type[F]) -> F:
-    """Read results from a file's content.
-
-    Args:
-        results: nested dictionaries, as the file has them.
-        kind: the struct.
-
-    Returns:
-        The results.
-
-    Raises:
-        ValueError: a field is missing or of another type; the text says where.
-    """
+    """Read results from a file's content."""
     try:
         return msgspec.convert(results, kind)
     except msgspec.ValidationError as error:

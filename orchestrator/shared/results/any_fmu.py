@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from orchestrator.shared.results import Found, TrustFound
+from orchestrator.shared.results import ResultData, TrustFound
 from orchestrator.shared.results.diagnose import DependenceFound, EffectFound, ParameterFound, StepFound, TestFound
 
 
@@ -32,7 +32,7 @@ class DeliveredFound(msgspec.Struct, frozen=True):
     note: str = ""
 
 
-class FmuDiagnosisFound(Found, frozen=True, kw_only=True):
+class FmuDiagnosisFound(ResultData, frozen=True, kw_only=True):
     """``diagnose`` of any FMU: graded effects, misfit on test data, what was delivered, and how it was found."""
 
     schema_version: int = 3
@@ -62,7 +62,7 @@ class LearnedParameterFound(ParameterFound, frozen=True):
     learned: float | None = None
 
 
-class FmuCalibrationFound(Found, frozen=True, kw_only=True):
+class FmuCalibrationFound(ResultData, frozen=True, kw_only=True):
     """``calibrate``: parameters, what the records do not tell apart, and the misfit on test data."""
 
     schema_version: int = 3

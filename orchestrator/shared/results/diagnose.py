@@ -4,7 +4,7 @@ from typing import Any
 
 import msgspec
 
-from orchestrator.shared.results import Found, Interval, LiveFound, Sizes, TrustFound
+from orchestrator.shared.results import Interval, LiveFound, ResultData, Sizes, TrustFound
 
 
 class ValueFound(msgspec.Struct, frozen=True):
@@ -177,7 +177,7 @@ class DifferenceFound(msgspec.Struct, frozen=True):
     unit: str = ""
 
 
-class DiagnoseFound(Found, frozen=True, kw_only=True):
+class DiagnoseFound(ResultData, frozen=True, kw_only=True):
     """``diagnose``: graded effects, the corrected model, what is left, and how it was found."""
 
     schema_version: int = 3

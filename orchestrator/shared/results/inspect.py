@@ -2,7 +2,7 @@
 
 import msgspec
 
-from orchestrator.shared.results import Found
+from orchestrator.shared.results import ResultData
 from orchestrator.shared.results.estimate import ExcitationFound, MethodFound, RecordFound
 
 
@@ -59,7 +59,7 @@ class EffectShown(msgspec.Struct, frozen=True):
     unit: str
 
 
-class InspectFound(Found, frozen=True, kw_only=True):
+class InspectFound(ResultData, frozen=True, kw_only=True):
     """``inspect``: the record, what it would show, what was assumed, and the verdict in sentences."""
 
     record: RecordFound

@@ -2,7 +2,7 @@
 
 import msgspec
 
-from orchestrator.shared.results import Found
+from orchestrator.shared.results import ResultData
 
 
 class Comparison(msgspec.Struct, frozen=True):
@@ -65,7 +65,7 @@ class OtherResult(msgspec.Struct, frozen=True):
     figure: str
 
 
-class ThesisFound(Found, frozen=True, kw_only=True):
+class ThesisFound(ResultData, frozen=True, kw_only=True):
     """``thesis``: models and gains, Table 4.1, errata, and what others found."""
 
     gains: tuple[Comparison, ...]

@@ -150,7 +150,7 @@ def test_a_calibration_of_what_misses_an_effect_is_red_and_its_file_is_of_its_ty
     assert not found.explained
     assert found.trust.level == "red"
     assert found.settings["fit"]["blocks"] == 10
-    assert any("`diagnose` says what" in text for text in found.notes)
+    assert any("`diagnose` looks for what is missing" in text for text in found.notes)
 
 
 def test_a_drafted_map_can_be_used_as_it_is(made, tmp_path):
@@ -270,7 +270,7 @@ def test_an_fmu_with_a_step_of_its_own_is_stepped_by_it(made):
     found = diagnose(*files)
     found.close()
     assert found.diagnosis.workings.problem.m == 1
-    assert any("step of its own" in note for note in found.notes)
+    assert any("has a fixed step" in note for note in found.notes)
 
 
 @pytest.mark.parametrize("domain", [SPRING, TANKS], ids=lambda d: d.name)

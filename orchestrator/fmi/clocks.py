@@ -1,0 +1,109 @@
+"""Clocks of FMI 3.0, from a model description: ticked by the master, timed by the FMU, or ticked by nobody."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from lxml import etree
+
+from orchestrator.fmi.variables3 import Variables3
+from orchestrator.master.protocol import PeriodicClock
+
+
+class UnusableError(Exception):
+    """An FMU that follows the standard, but needs what no master here does."""
+
+
+@dataclass(frozen=True)
+class EventFeatures:
+    """What an FMU has for event mode, beside its variables.
+
+    Attributes:
+        inside: names of the inputs that may be set in intermediate updates.
+        clocked: value references of the clocks that a variable belongs to, by its name.
+        timed: input clocks whose next tick the FMU says while it runs: value reference and kind by name.
+        told: periodic clocks whose interval the FMU is told, by name.
+        triggered: value references of output clocks.
+    """
+
+    inside: frozenset[str] = frozenset()
+    clocked: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    timed: Mapping[str, tuple[int, str]] = field(default_factory=dict)
+    told: tuple[str, ...] = ()
+    triggered: frozenset[int] = frozenset()
+
+
+def read_clocks(variables: Variables3) -> tuple[dict[str, PeriodicClock], EventFeatures, list[str]]:
+    """Return the clocks of an FMU.
+
+    Args:
+        variables: of its model description.
+
+    Returns:
+        The clocks that the master ticks, what else there is for event mode, and names of clocks that are left out.
+
+    Raises:
+        KeyError: an attribute is missing.
+        UnusableError: nobody would tick a clock.
+        ValueError: a clock is wrong.
+    """
+    periodic: dict[str, PeriodicClock] = {}
+    timed: dict[str, tuple[int, str]] = {}
+    told, left_out, triggered = [], [], set()
+    for name, clock in variables.clocks.items():
+        reference, kind = int(clock.attrib["valueReference"]), clock.attrib["intervalVariability"]
+        causality = clock.get("causality", "local")
+        if causality == "output":
+            triggered.add(reference)
+        elif causality != "input":
+            left_out.append(name)
+        elif kind == "triggered":
+            text = "must have times of its own, but is to be triggered by another clock, which nothing here would do"
+            raise UnusableError(f"the input clock {name!r} {text}")
+        elif kind in {"constant", "fixed", "tunable"} and (interval := _interval(clock)) is not None:
+            members = [v for v, clocks in variables.clocked.items() if reference in clocks]
+            periodic[name] = PeriodicClock(interval, _shift(clock), tuple(members), reference)
+            told += [] if kind == "constant" else [name]
+        elif kind in {"fixed", "tunable", "changing", "countdown"}:
+            timed[name] = (reference, kind)
+        else:
+            raise ValueError(f"its clock {name!r} has the intervalVariability {kind!r}, but no interval")
+    features = EventFeatures(
+        frozenset(variables.inside), dict(variables.clocked), timed, tuple(told), frozenset(triggered)
+    )
+    return periodic, features, left_out
+
+
+def _interval(clock: etree._Element) -> Fraction | None:
+    """Return a clock's interval in seconds, where it is declared."""
+    interval = _seconds(clock, "interval")
+    if interval is not None and interval <= 0:
+        raise ValueError(f"its clock {clock.get('name')!r} has an interval of {float(interval):g} s")
+    return interval
+
+
+def _shift(clock: etree._Element) -> Fraction:
+    shift = _seconds(clock, "shift") or Fraction(0)
+    if shift < 0:
+        raise ValueError(f"its clock {clock.get('name')!r} has a shift of {float(shift):g} s")
+    return shift
+
+
+def _seconds(clock: etree._Element, what: str) -> Fraction | None:
+    """Return a time of a clock: the exact one, where there is one."""
+    counter, resolution, decimal = clock.get(f"{what}Counter"), clock.get("resolution"), clock.get(f"{what}Decimal")
+    if counter is not None and resolution is not None:
+        return Fraction(int(counter), int(resolution))
+    return None if decimal is None else Fraction(decimal)
+
+
+def clock_names(names: Sequence[str]) -> str:
+    """Return names as a sentence lists them.
+
+    Args:
+        names: of clocks.
+
+    Returns:
+        The first ones.
+    """
+    return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")

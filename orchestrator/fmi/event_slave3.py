@@ -1,0 +1,284 @@
+"""Instances of FMI 3.0 for co-simulation in event mode: events, early return, clocks, inputs inside steps."""
+
+import ctypes
+import math
+from collections.abc import Callable, Sequence
+from ctypes import c_bool, c_double, c_size_t
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from orchestrator.errors import SlaveError
+from orchestrator.fmi.clocked import ClockedTransfers
+from orchestrator.fmi.intermediate import IntermediateUpdates
+from orchestrator.fmi.messages import ERROR
+from orchestrator.fmi.model_description import FmuDescription
+from orchestrator.fmi.shorter_steps import SMALLEST
+from orchestrator.fmi.slave3 import Fmu3Slave
+from orchestrator.fmi.timed_clocks import TimedClocks
+from orchestrator.master.protocol import (
+    EventSlave,
+    EventUpdate,
+    RunEndedError,
+    Signals,
+    StepDiscardedError,
+    StepOutcome,
+    Transfer,
+)
+from orchestrator.master.result import RunRemark
+
+MOST_EVENTS = 100
+"""Events and instants in a row without any time between them that ``do_step`` takes."""
+
+
+class _State(NamedTuple):
+    """A saved state of the FMU, and what is known here of the time it was saved at."""
+
+    handle: Any
+    next_event: float
+    ticks: dict[int, object]
+    reached: float | None
+
+
+class EventFmuSlave(Fmu3Slave, EventSlave):
+    """See ``FmuSlave`` and ``EventSlave``. Early return is always allowed: without it an FMU passes over its events."""
+
+    def __init__(self, name: str, path: Path, description: FmuDescription) -> None:
+        self._updates = IntermediateUpdates(name)
+        super().__init__(name, path, description)
+        events = description.events
+        self._timed = TimedClocks(events.timed, self._call)
+        self._clocked = ClockedTransfers(events.clocked, self._is_active)
+        self._in_event_mode, self._initialising = False, True
+        self._next_event = math.inf
+        self._active: set[int] = set()
+        self._halves = False
+        self._halved: tuple[float, int] = (math.nan, 0)  # s, count
+
+    def _needed(self) -> list[str]:
+        needed = [*super()._needed(), "EnterEventMode", "EnterStepMode", "UpdateDiscreteStates"]
+        if self.model.clocks or self._description.events.timed:
+            needed.append("SetClock")
+        return needed
+
+    def _intermediate(self) -> tuple[Any, Any]:
+        if not self.model.inputs_inside_steps:
+            return super()._intermediate()
+        references = sorted({self._description.access[name].reference for name in self._description.events.inside})
+        return (ctypes.c_uint * len(references))(*references), self._updates.callback
+
+    # A run ---------------------------------------------------------------------------------------------------
+
+    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
+        super().begin(start, stop, tolerance)
+        for name in self._description.events.told:
+            clock = self.model.clocks[name]
+            for function, seconds in (("SetIntervalDecimal", clock.interval), ("SetShiftDecimal", clock.shift)):
+                if seconds:
+                    value = (c_double * 1)(float(seconds))
+                    self._call(function, (ctypes.c_uint * 1)(clock.reference), c_size_t(1), value)
+
+    def start(self) -> None:
+        """Exit initialisation mode, into event mode."""
+        self._timed.begin(self._reached or 0.0)
+        super().start()
+        self._in_event_mode, self._initialising = True, False
+        self._next_event = math.inf
+        self._tick_due()
+
+    def reset(self) -> None:
+        super().reset()
+        self._in_event_mode, self._initialising = False, True
+        self._next_event = math.inf
+        self._active.clear()
+
+    def step(self, time: float, step: float) -> StepOutcome:
+        """Advance from ``time`` by at most ``step`` [s]; stop at the first event."""
+        if self._worst >= ERROR:
+            self._alive("fmi3DoStep")
+        length = step
+        while True:
+            try:
+                return self._stepped(time, length)
+            except RunEndedError:
+                raise
+            except StepDiscardedError:
+                if not self._halves or length < SMALLEST * step:
+                    raise
+                length *= 0.5
+                first, count = self._halved
+                self._halved = (time if not count else first, count + 1)
+
+    def _stepped(self, time: float, step: float) -> StepOutcome:
+        status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
+        self._reached = time
+        failure = self._updates.take_failure()
+        if failure is not None:
+            self._worst = ERROR
+            raise failure
+        if status:
+            self._check(status, "fmi3DoStep")
+        event, ends, early = self._flags
+        if ends:
+            self._refuse_end(True, time)
+        end = time + step
+        reached = self._last.value if early else end
+        near = 1e-9 * step
+        if not time - near <= reached <= end + near:
+            self._worst = ERROR
+            text = f"must return within the step from {time:g} s to {end:g} s, but says {reached:g} s"
+            raise SlaveError(f"{self.name}: fmi3DoStep {text}")
+        self._reached = min(max(reached, time), end)
+        return StepOutcome(self._reached, event)
+
+    def shorten_steps(self) -> bool:
+        """Do steps that the FMU discards in shorter ones, from the next run on."""
+        new, self._halves = not self._halves and self.model.can_vary_step, self.model.can_vary_step
+        return new
+
+    def take_remarks(self) -> list[RunRemark]:
+        (first, count), self._halved = self._halved, (math.nan, 0)
+        text = f"fmi3DoStep at t = {first:g} s returned Discard: shorter steps were tried"
+        return [*super().take_remarks(), *([RunRemark(self.name, text, count)] if count else [])]
+
+    def do_step(self, time: float, step: float) -> None:
+        """Advance from ``time`` to ``time + step`` [s]; events on the way are taken, by this slave alone."""
+        if self.model.clocks:
+            names = ", ".join(self.model.clocks)
+            raise SlaveError(f"{self.name}: its clocks ({names}) must be ticked, but this run knows no events")
+        end, now, standing = time + step, time, 0
+        near = 1e-12 * max(1.0, abs(end))
+        if self._in_event_mode:
+            self._settle(now)
+        while True:
+            due = min(self._next_event, self._timed.next_time())
+            event = due <= now + near
+            if not event and end - now > near:
+                before = now
+                now, event = (outcome := self.step(now, min(due, end) - now)).reached, outcome.event
+                event = event or due <= now + near
+                standing = 0 if now - before > near else standing
+            if event:
+                standing += 1
+                if standing > MOST_EVENTS:
+                    raise SlaveError(f"{self.name}: events at t = {now:g} s must come to an end, but do not")
+                self.enter_event_mode()
+                self._settle(now)
+            elif end - now <= near:
+                return
+
+    def _settle(self, time: float) -> None:
+        for _ in range(MOST_EVENTS):
+            update = self.update_discrete_states()
+            if update.ends_run:
+                raise RunEndedError(f"{self.name}: an event at t = {time:g} s", self.name, time, at_event=True)
+            if not update.again:
+                self.leave_event_mode()
+                return
+        raise SlaveError(f"{self.name}: instants at t = {time:g} s must come to an end, but do not")
+
+    # Event mode ------------------------------------------------------------------------------------------------
+
+    def enter_event_mode(self) -> None:
+        """Take an event at the present time."""
+        self._call("EnterEventMode")
+        self._in_event_mode = True
+        self._tick_due()
+
+    def tick(self, clocks: Sequence[str]) -> None:
+        """Activate input clocks for this instant, in event mode."""
+        self._activate([self.model.clocks[name].reference for name in clocks])
+
+    def _tick_due(self) -> None:
+        """Activate the clocks that the FMU times itself, where their time has come."""
+        self._activate(self._timed.take(self._reached or 0.0))
+
+    def _activate(self, references: Sequence[int]) -> None:
+        count = len(references)
+        if count:
+            active = (c_bool * count)(*[True] * count)
+            self._call("SetClock", (ctypes.c_uint * count)(*references), c_size_t(count), active)
+            self._active.update(references)
+
+    def _is_active(self, clocks: Sequence[int]) -> bool:
+        """Tell whether one of some clocks is active; before the run variables can always be reached."""
+        if self._initialising or not self._active.isdisjoint(clocks):
+            return True
+        outputs = [c for c in clocks if c in self._description.events.triggered] if self._in_event_mode else []
+        if not outputs:
+            return False
+        active = (c_bool * len(outputs))()
+        self._call("GetClock", (ctypes.c_uint * len(outputs))(*outputs), c_size_t(len(outputs)), active)
+        return any(active)
+
+    def update_discrete_states(self) -> EventUpdate:
+        """End an instant in event mode."""
+        flags, next_event = (c_bool * 5)(), c_double()  # again, end, nominals, values, next event
+        first = ctypes.addressof(flags)
+        self._call("UpdateDiscreteStates", *(ctypes.c_void_p(first + k) for k in range(5)), ctypes.byref(next_event))
+        ticked, now = sorted(self._active), self._reached or 0.0
+        self._active.clear()
+        self._next_event = next_event.value if flags[4] else math.inf
+        self._timed.ask(now, ticked)
+        self._tick_due()
+        coming = min(self._next_event, self._timed.next_time())
+        return EventUpdate(
+            again=flags[0] or bool(self._active),
+            next_event=coming if math.isfinite(coming) else None,
+            ends_run=flags[1],
+        )
+
+    def leave_event_mode(self) -> None:
+        """Go on in time."""
+        self._active.clear()
+        self._call("EnterStepMode")
+        self._in_event_mode = False
+
+    # Values ------------------------------------------------------------------------------------------------------
+
+    def sends(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that sets ``names`` from ``buffer``; those of clocks only while one of these is active."""
+        return self._clocked.sends(names, buffer, super().sends)
+
+    def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
+        """Return a call that reads ``names`` into ``buffer``; those of clocks keep their values between ticks."""
+        return self._clocked.receives(names, buffer, super().receives)
+
+    def feed(self, names: Sequence[str], values: Callable[[float], Sequence[float]] | None) -> None:
+        """Say what continuous inputs are inside steps, from now on."""
+        for name in names:
+            if name not in self._description.events.inside:
+                raise SlaveError(f"{self.name}: {name} must be an input that may be set inside steps, but is not")
+        self._updates.feed(self._functions, self._accesses(names), values)
+
+    def output_rates(self, names: Sequence[str], order: int = 1) -> list[float]:
+        """Return derivatives of outputs with respect to time at the end of the last step."""
+        accesses = self._accesses(names)
+        firsts: dict[int, int] = {}
+        total = 0
+        for access in accesses:
+            if access.reference not in firsts:
+                firsts[access.reference] = total
+                total += access.size
+        count, values = len(firsts), (c_double * total)()
+        self._call(
+            "GetOutputDerivatives",
+            (ctypes.c_uint * count)(*firsts),
+            c_size_t(count),
+            (ctypes.c_int32 * count)(*[order] * count),
+            values,
+            c_size_t(total),
+        )
+        return [values[firsts[access.reference] + access.element] for access in accesses]
+
+    # Saved states --------------------------------------------------------------------------------------------------
+
+    def get_state(self) -> Any:
+        return _State(super().get_state(), self._next_event, self._timed.saved(), self._reached)
+
+    def set_state(self, state: Any) -> None:
+        super().set_state(state.handle)
+        self._next_event, self._reached = state.next_event, state.reached
+        self._timed.restore(state.ticks)
+
+    def free_state(self, state: Any) -> None:
+        super().free_state(state.handle)

@@ -1,0 +1,35 @@
+"""Shared libraries of FMUs, loaded and released."""
+
+import _ctypes
+import contextlib
+import ctypes
+import sys
+from pathlib import Path
+from typing import Any
+
+
+def load_library(path: Path, python: bool) -> Any:
+    """Return a shared library.
+
+    Args:
+        path: of it. Libraries beside it are found where the system looks in the current directory.
+        python: it runs Python: call it with the interpreter's lock held, which it would take back at once.
+
+    Returns:
+        The library.
+
+    Raises:
+        OSError: it cannot be loaded.
+    """
+    with contextlib.chdir(path.parent):
+        return (ctypes.PyDLL if python else ctypes.CDLL)(str(path))
+
+
+def free_library(library: Any) -> None:
+    """Release a library that nobody calls any more.
+
+    Args:
+        library: what ``load_library`` returned.
+    """
+    release = getattr(_ctypes, "FreeLibrary" if sys.platform == "win32" else "dlclose")
+    release(library._handle)

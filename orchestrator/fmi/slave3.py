@@ -1,0 +1,146 @@
+"""Instances of FMI 3.0 for co-simulation, without event mode."""
+
+import ctypes
+import math
+from ctypes import c_bool, c_double, c_size_t, c_void_p
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import FmuError, SlaveError
+from orchestrator.fmi.extraction import extracted, library_of
+from orchestrator.fmi.farewell import ends_cleanly
+from orchestrator.fmi.libraries import free_library, load_library
+from orchestrator.fmi.messages import log_message_callback
+from orchestrator.fmi.model_description import FmuDescription
+from orchestrator.fmi.slave import FmuSlave
+from orchestrator.master.protocol import ENDED, RunEndedError
+
+_ALWAYS = [
+    "InstantiateCoSimulation",
+    "FreeInstance",
+    "EnterInitializationMode",
+    "ExitInitializationMode",
+    "DoStep",
+    "Terminate",
+    "Reset",
+]
+
+
+class Fmu3Slave(FmuSlave):
+    """See ``FmuSlave``."""
+
+    PREFIX = "fmi3"
+    STATE = "FMUState"
+
+    def __init__(self, name: str, path: Path, description: FmuDescription | None = None) -> None:
+        super().__init__(name, path, description)
+        self._rolls_back = False
+        self._flags = (c_bool * 3)()  # event, end of the run, early return
+        self._last = c_double()
+        addresses = [ctypes.addressof(self._flags) + k for k in range(3)]
+        self._said_by_step = (*map(c_void_p, addresses), c_void_p(ctypes.addressof(self._last)))
+        self._step = self._library.fmi3DoStep
+        self._step.argtypes = [c_void_p, c_double, c_double, c_bool, *[c_void_p] * 4]
+        self._step.restype = ctypes.c_int
+
+    def _needed(self) -> list[str]:
+        """Return the functions without which the FMU cannot be run, without their prefix."""
+        kinds = sorted({access.kind for access in self._description.access.values()})
+        transfers = [f"{direction}{kind}" for direction in ("Set", "Get") for kind in kinds]
+        states = [f"{what}{self.STATE}" for what in ("Get", "Set", "Free")] if self.model.can_save_state else []
+        return [*_ALWAYS, *transfers, *states]
+
+    def _instantiate(self) -> tuple[Any, c_void_p]:
+        folder, description = extracted(self.path), self._description
+        path = library_of(self.name, self.path, folder, description.identifier, description.version)
+        try:
+            library = load_library(path, description.python)
+            if description.python:
+                ends_cleanly(path.parent)
+        except OSError as error:
+            raise FmuError(f"{self.name}: the binary of {self.path} cannot be loaded: {error}") from None
+        lacking = [name for name in self._needed() if not hasattr(library, f"fmi3{name}")]
+        if lacking:
+            raise FmuError(f"{self.name}: the binary of {self.path} must have fmi3{lacking[0]}, but has not")
+        library.fmi3InstantiateCoSimulation.restype = c_void_p
+        library.fmi3FreeInstance.restype = None
+        environment, log = log_message_callback(self._inbox)
+        references, update = self._intermediate()
+        resources = folder / "resources"
+        component = library.fmi3InstantiateCoSimulation(
+            self.name.encode(),
+            description.guid.encode(),
+            f"{resources}/".encode() if resources.is_dir() else None,
+            c_bool(False),
+            c_bool(True),
+            c_bool(self.model.has_events),
+            c_bool(self.model.has_events),
+            references,
+            c_size_t(len(references)),
+            c_void_p(environment),
+            log,
+            update,
+        )
+        if not component:
+            hint = " (`events = false` runs it without event mode)" if self.model.has_events else ""
+            raise FmuError(f"{self.name}: {self.path} cannot be instantiated{self._said()}{hint}")
+        return library, c_void_p(component)
+
+    def _intermediate(self) -> tuple[Any, Any]:
+        """Return the variables that intermediate updates set, and the function that does it, if any."""
+        return (ctypes.c_uint * 0)(), None
+
+    def _free(self) -> None:
+        self._library.fmi3FreeInstance(self._component)
+        if not self._description.python:
+            free_library(self._library)
+
+    def last_successful_time(self) -> float | None:
+        """Return where the FMU is after a step that it discarded: where it was, for FMI 3.0 discards all of it."""
+        return self._reached
+
+    def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
+        """Enter initialisation mode."""
+        self.messages.clear()
+        self._call(
+            "EnterInitializationMode",
+            c_bool(tolerance is not None),
+            c_double(tolerance or 0.0),
+            c_double(start),
+            c_bool(stop is not None),
+            c_double(stop or 0.0),
+        )
+        self._reached = start
+
+    def try_step(self, time: float, step: float) -> None:
+        status = self._step(self._component, time, step, not self._rolls_back, *self._said_by_step)
+        self._reached = time
+        if status:
+            self._check(status, "fmi3DoStep")
+        if any(self._flags):
+            self._refuse_end(self._flags[1], time)
+        self._reached = time + step
+
+    def _refuse_end(self, ends: bool, time: float) -> None:
+        """Raise for a step that did not end as asked, though all was well."""
+        if ends:
+            text = f"{self.name}: fmi3DoStep at t = {time:g} s asked for the end of the run{self._said()}"
+            raise RunEndedError(text, self.name, time)
+        text = "must do whole steps where no events are taken, but returned early or with an event"
+        reached = f" at {self._last.value:g} s" if math.isfinite(self._last.value) else ""
+        self._worst = max(self._worst, 3)
+        raise SlaveError(f"{self.name}: fmi3DoStep at t = {time:g} s {text}{reached}")
+
+    def get_state(self) -> Any:
+        self._rolls_back = True
+        return super().get_state()
+
+    def reset(self) -> None:
+        super().reset()
+        self._rolls_back = False
+
+    def failed(self, status: int, function: str, time: float) -> None:
+        if status >= ENDED:
+            self._reached = time
+            self._refuse_end(status == ENDED, time)
+        super().failed(status, function, time)

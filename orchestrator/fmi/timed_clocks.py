@@ -1,0 +1,127 @@
+"""Input clocks of FMI 3.0 whose next tick the FMU says itself: countdowns, and intervals that it works out."""
+
+import ctypes
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+NOT_YET_KNOWN, UNCHANGED, CHANGED = range(3)  # fmi3IntervalQualifier
+
+
+class Call(Protocol):
+    """Calls a function of the FMU, named without its prefix, and raises where it fails."""
+
+    def __call__(self, function: str, *arguments: object) -> None: ...
+
+
+@dataclass(frozen=True)
+class _Tick:
+    """When a clock ticks next: ``origin + count * interval`` [s]; an infinite interval is none."""
+
+    origin: float
+    interval: float = math.inf
+    count: int = 0
+
+    @property
+    def time(self) -> float:
+        return self.origin if self.count == 0 else self.origin + self.count * self.interval
+
+
+class TimedClocks:
+    """The clocks of one instance that it times itself.
+
+    Args:
+        clocks: value reference and kind (``fixed``, ``tunable``, ``changing`` or ``countdown``) by name.
+        call: see ``Call``.
+    """
+
+    def __init__(self, clocks: Mapping[str, tuple[int, str]], call: Call) -> None:
+        self._kinds = dict(clocks.values())
+        self._call = call
+        self._ticks: dict[int, _Tick] = {}
+
+    def begin(self, start: float) -> None:
+        """Ask for the first ticks, at the end of initialisation.
+
+        Args:
+            start: of the run [s].
+        """
+        self._ticks = {}
+        for reference, kind in self._kinds.items():
+            interval, qualifier = self._interval(reference)
+            if kind in {"fixed", "tunable"}:
+                self._ticks[reference] = _Tick(start + self._shift(reference), interval)
+            elif qualifier != NOT_YET_KNOWN:
+                self._ticks[reference] = _Tick(start + interval, interval)
+
+    def next_time(self) -> float:
+        """Return when the next clock ticks [s]; infinity for none.
+
+        Returns:
+            The time.
+        """
+        return min((tick.time for tick in self._ticks.values()), default=math.inf)
+
+    def take(self, time: float) -> list[int]:
+        """Return the clocks that tick now, and forget that they do.
+
+        Args:
+            time: [s].
+
+        Returns:
+            Value references.
+        """
+        near = time + 1e-12 * max(1.0, abs(time))
+        due = [reference for reference, tick in self._ticks.items() if tick.time <= near]
+        for reference in due:
+            tick = self._ticks[reference]
+            if self._kinds[reference] in {"fixed", "tunable"}:
+                self._ticks[reference] = replace(tick, count=tick.count + 1)
+            elif self._kinds[reference] == "changing":  # as before, unless the FMU says another interval
+                self._ticks[reference] = _Tick(time + tick.interval, tick.interval)
+            else:
+                del self._ticks[reference]
+        return due
+
+    def ask(self, time: float, ticked: Sequence[int]) -> None:
+        """Ask for intervals that may be others now, in event mode.
+
+        Args:
+            time: [s].
+            ticked: value references of the clocks that were active in the instant that has just ended.
+        """
+        for reference, kind in self._kinds.items():
+            if kind == "countdown" or (kind == "changing" and reference in ticked):
+                interval, qualifier = self._interval(reference)
+                if qualifier == CHANGED:
+                    self._ticks[reference] = _Tick(time + interval, interval)
+
+    def saved(self) -> dict[int, object]:
+        """Return what belongs to a saved state.
+
+        Returns:
+            It, to be handed to ``restore``.
+        """
+        return dict(self._ticks)
+
+    def restore(self, saved: Mapping[int, object]) -> None:
+        """Return to a saved state.
+
+        Args:
+            saved: what ``saved`` returned.
+        """
+        self._ticks = {reference: tick for reference, tick in saved.items() if isinstance(tick, _Tick)}
+
+    def _interval(self, reference: int) -> tuple[float, int]:
+        interval, qualifier = ctypes.c_double(math.inf), ctypes.c_int(NOT_YET_KNOWN)
+        self._ask("GetIntervalDecimal", reference, ctypes.byref(interval), ctypes.byref(qualifier))
+        return interval.value, qualifier.value
+
+    def _shift(self, reference: int) -> float:
+        shift = ctypes.c_double()
+        self._ask("GetShiftDecimal", reference, ctypes.byref(shift))
+        return shift.value
+
+    def _ask(self, function: str, reference: int, *results: object) -> None:
+        self._call(function, (ctypes.c_uint * 1)(reference), ctypes.c_size_t(1), *results)

@@ -1,0 +1,209 @@
+"""Variables of FMI 3.0, from a model description: arrays become scalars, what nobody can use is left out."""
+
+import itertools
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from lxml import etree
+
+from orchestrator.fmi.access import Access, whole_range
+from orchestrator.fmi.starts import number, start_value
+from orchestrator.master.protocol import Variable
+
+TYPES = {
+    **dict.fromkeys(("Float64", "Float32"), "Real"),
+    **{f"{sign}Int{bits}": "Integer" for sign in ("", "U") for bits in (8, 16, 32, 64)},
+    "Boolean": "Boolean",
+    "String": "String",
+    "Enumeration": "Enumeration",
+}
+"""The type that a master knows, by the element of FMI 3.0."""
+MOST_ELEMENTS = 1_000_000
+"""Elements beyond which the arrays of an FMU are refused."""
+
+
+@dataclass(frozen=True)
+class Variables3:
+    """The variables of an FMU.
+
+    Attributes:
+        scalars: all but clocks and binaries, arrays by their elements.
+        accesses: where their values are.
+        names: names of the scalars at a value reference, those of aliases left out.
+        clocks: the elements of the clocks, by name.
+        clocked: the value references of the clocks that a scalar belongs to, by its name.
+        inside: names of the inputs that may be set in intermediate updates.
+        binaries: names of the variables of type Binary.
+    """
+
+    scalars: list[Variable] = field(default_factory=list)
+    accesses: list[Access] = field(default_factory=list)
+    names: dict[int, list[str]] = field(default_factory=dict)
+    clocks: dict[str, etree._Element] = field(default_factory=dict)
+    clocked: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    inside: list[str] = field(default_factory=list)
+    binaries: list[str] = field(default_factory=list)
+
+
+def read_variables(root: etree._Element) -> Variables3:
+    """Return the variables of a model description.
+
+    Args:
+        root: the model description.
+
+    Returns:
+        The variables, in the order of declaration.
+
+    Raises:
+        KeyError: an attribute is missing.
+        ValueError: a variable is wrong.
+    """
+    elements = [e for e in root.iterfind("ModelVariables/*") if isinstance(e.tag, str)]
+    types = {t.attrib["name"]: t for t in root.iterfind("TypeDefinitions/*") if isinstance(t.tag, str)}
+    lengths = {
+        e.attrib["valueReference"]: e.attrib["start"]
+        for e in elements
+        if e.get("causality") == "structuralParameter" and "start" in e.attrib
+    }
+    found = Variables3()
+    for element in elements:
+        name = element.attrib["name"]
+        if element.tag == "Clock":
+            found.clocks[name] = element
+        elif element.tag == "Binary":
+            found.binaries.append(name)
+        elif element.tag in TYPES:
+            _add(found, element, types.get(element.get("declaredType", "")), _shape(element, lengths))
+        else:
+            raise ValueError(f"the variable {name!r} has the type {element.tag}, which FMI 3.0 does not have")
+        if len(found.scalars) > MOST_ELEMENTS:
+            raise ValueError(f"its arrays have more than {MOST_ELEMENTS} elements")
+    return found
+
+
+def _shape(element: etree._Element, lengths: Mapping[str, str]) -> tuple[int, ...]:
+    """Return the sizes of a variable's dimensions, none for a scalar."""
+    shape = []
+    for dimension in element.iterfind("Dimension"):
+        of = dimension.get("valueReference")
+        size = int(dimension.attrib["start"] if of is None else lengths[of])
+        if not 0 < size <= MOST_ELEMENTS:
+            raise ValueError(f"the variable {element.get('name')!r} has a dimension of size {size}")
+        shape.append(size)
+    return tuple(shape)
+
+
+def _add(found: Variables3, element: etree._Element, declared: etree._Element | None, shape: tuple[int, ...]) -> None:
+    """Add a variable by its elements, and its aliases, which can only be read."""
+    reference, name = int(element.attrib["valueReference"]), element.attrib["name"]
+    kind = str(element.tag)
+    count = 1
+    for size in shape:
+        count *= size
+        if count > MOST_ELEMENTS:
+            raise ValueError(f"the variable {name!r} has more than {MOST_ELEMENTS} elements")
+    make = _maker(element, declared)
+    starts = _starts(element, count)
+    clocks = tuple(int(clock) for clock in element.get("clocks", "").split())
+    aliases = [(a.attrib["name"], a.get("description")) for a in element.iterfind("Alias")]
+    for number_, index in enumerate(itertools.product(*(range(1, size + 1) for size in shape))):
+        place = f"[{','.join(map(str, index))}]" if index else ""
+        access = Access("Int64" if kind == "Enumeration" else kind, reference, number_, count)
+        scalar = make(f"{name}{place}", starts[number_])
+        found.scalars.append(scalar)
+        found.accesses.append(access)
+        found.names.setdefault(reference, []).append(scalar.name)
+        if clocks:
+            found.clocked[scalar.name] = clocks
+        if element.get("intermediateUpdate") in {"true", "1"} and scalar.causality == "input" and kind == "Float64":
+            found.inside.append(scalar.name)
+        for alias, text in aliases:
+            found.scalars.append(_alias(scalar, f"{alias}{place}", text))
+            found.accesses.append(access)
+
+
+def _alias(scalar: Variable, name: str, description: str | None) -> Variable:
+    return Variable(
+        name,
+        "local",
+        scalar.type,
+        scalar.unit,
+        scalar.variability,
+        items=scalar.items,
+        description=description or scalar.description,
+        reference=scalar.reference,
+    )
+
+
+def _maker(element: etree._Element, declared: etree._Element | None) -> Callable[[str, str | None], Variable]:
+    """Return what makes a scalar of a variable, given its name and start value."""
+    kind = str(element.tag)
+    inherited = None if declared is None or declared.tag != f"{kind}Type" else declared
+
+    def attribute(key: str) -> str | None:
+        own = element.get(key)
+        return own if own is not None or inherited is None else inherited.get(key)
+
+    causality = element.get("causality", "local")
+    fixed = causality in {"parameter", "calculatedParameter", "structuralParameter"}
+    usual = "fixed" if fixed else "continuous" if TYPES[kind] == "Real" else "discrete"
+    variability = element.get("variability", usual)
+    if causality == "structuralParameter":  # the arrays have been counted: its start value is final
+        causality, variability = "calculatedParameter", "constant"
+    widest = whole_range(kind) or (None, None)
+    low, high = number(attribute("min")), number(attribute("max"))
+    items = [] if inherited is None else inherited.findall("Item")
+    literals = tuple((item.attrib["name"], int(item.attrib["value"])) for item in items)
+    unit, text = attribute("unit") or None, element.get("description", "")
+    reference = int(element.attrib["valueReference"])
+
+    def make(name: str, start: str | None) -> Variable:
+        return Variable(
+            name=name,
+            causality=causality,
+            type=TYPES[kind],
+            unit=unit,
+            variability=variability,
+            start=start_value(TYPES[kind], start, name),
+            minimum=widest[0] if low is None else low,
+            maximum=widest[1] if high is None else high,
+            items=literals,
+            description=text,
+            reference=reference,
+        )
+
+    return make
+
+
+def _starts(element: etree._Element, count: int) -> list[str | None]:
+    """Return the start values of a variable's elements; a single one is that of all."""
+    if element.tag == "String":
+        texts: list[str] = [s.get("value", "") for s in element.iterfind("Start")]
+    else:
+        texts = element.get("start", "").split()
+    if len(texts) == 1:
+        return [texts[0]] * count
+    if texts and len(texts) != count:
+        raise ValueError(f"the variable {element.get('name')!r} has {len(texts)} start values for {count} elements")
+    return list(texts) if texts else [None] * count
+
+
+def read_feedthrough(root: etree._Element, variables: Variables3) -> dict[str, frozenset[str]]:
+    """Return for each output whose dependencies are declared the inputs on which it depends at once.
+
+    Args:
+        root: the model description.
+        variables: of it.
+
+    Returns:
+        Names of inputs by that of the output.
+    """
+    inputs = {v.name for v in variables.scalars if v.causality == "input"}
+    direct = {}
+    for output in root.iterfind("ModelStructure/Output"):
+        listed = output.get("dependencies")
+        if listed is not None:
+            known = [name for r in listed.split() for name in variables.names.get(int(r), ())]
+            for name in variables.names.get(int(output.attrib["valueReference"]), ()):
+                direct[name] = frozenset(inputs.intersection(known))
+    return direct

@@ -1,0 +1,257 @@
+"""Continuous loops with events to a tolerance: windows that end at events, with rollback and error control.
+
+The error of a window is estimated as in ``adaptive``, by sweeping it as a whole and then its two halves, which are
+kept. Slaves say themselves where their events are, so that nothing is bisected: a window ends there, all slaves go
+through the event together, and the next window begins with what they show then.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from orchestrator.errors import ConvergenceError, SlaveError
+from orchestrator.master.adaptive import GROW, ORDER, SAFETY, SHRINK, check_adaptive, window_end
+from orchestrator.master.algorithms import Adaptive
+from orchestrator.master.event_stage import slack
+from orchestrator.master.event_sweeps import BRIEF, Sweeper, Swept, UnsettledError
+from orchestrator.master.events import EventIteration
+from orchestrator.master.protocol import RunEndedError, StepDiscardedError
+from orchestrator.master.result import Statistics
+from orchestrator.master.rollback import rollback
+from orchestrator.master.signals import GRID_SLACK, Signal
+from orchestrator.master.tracks import JoinedTracks, Track
+from orchestrator.master.wiring import Stage, gather
+
+Array = NDArray[np.float64]
+Slots = NDArray[np.int64]
+
+CUBIC_GAIN = 16.0
+"""How much better cubics are between nodes over half the length."""
+
+QUARTIC_SHARE = 0.03
+"""Largest error of a polynomial between five nodes as a share of the differences of the next order."""
+
+
+@dataclass(frozen=True)
+class _Window:
+    """A window that was tried.
+
+    Attributes:
+        parts: what the signals do in it, part by part.
+        end: where the slaves are [s]; ``None``: at its begin, for it was undone.
+        error: as a multiple of the tolerance.
+        length: that was tried [s].
+        event: a slave has an event at its end.
+        rates: derivatives at its end.
+    """
+
+    parts: tuple[Track, ...]
+    end: float | None
+    error: float
+    length: float
+    event: bool = False
+    rates: Array | None = None
+
+
+class EventWindows:
+    """A run of a system with events under ``adaptive``.
+
+    Args:
+        events: the slaves and their event mode; they are after their first instants.
+        signals: signals in place of those of ``System.sources``, by index.
+        start: [s].
+        stop: [s].
+        settings: tolerance and bounds of the step.
+
+    Raises:
+        ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.
+    """
+
+    def __init__(
+        self, events: EventIteration, signals: Mapping[int, Signal], start: float, stop: float, settings: Adaptive
+    ) -> None:
+        self.events, self.wiring, self.settings = events, events.wiring, settings
+        self.start, self.stop = start, stop
+        layout = self.wiring.layout
+        check_adaptive(layout)
+        self.signals = [signals.get(k, source.signal) for k, source in enumerate(layout.system.sources)]
+        self.breaks = sorted({t for s in self.signals for t in s.breaks(start, stop)} | {stop})
+        self.sweeper = Sweeper(events, self._sources, self._difference)
+        outputs = [k for stage in events.stages for k in range(stage.outputs.start, stage.outputs.stop)]
+        self.outputs = np.array([k for k in outputs if not self.sweeper.held[k]], dtype=np.int64)
+        self.accepted = self.rejected = 0
+
+    def run(self, rows: Array, record: Slots) -> Statistics:
+        """Run; a row holds the values after the events at its time.
+
+        Args:
+            rows: results, shape (grid points, recorded); row 0 is already there.
+            record: recorded slots, shape (recorded,).
+
+        Returns:
+            Windows taken and refused, calls of slaves, events.
+
+        Raises:
+            ConvergenceError: the tolerance cannot be met with the smallest step allowed, or events have no end.
+            SlaveError: a slave wants the run to end, or cannot do a step of any length.
+        """
+        time, length, row = self.start, min(self.settings.first, self.settings.largest), 1
+        guess: Track | None = None
+        rates, longest = self.events.rates(), self.settings.largest / GROW
+        while time < self.stop - slack(self.stop):
+            jump = next(t for t in self.breaks if t > time + slack(time))
+            target = min(jump, self.events.next_time())
+            window = self._attempt(time, window_end(time, length, target), rates, guess, record)
+            if window.end is not None:
+                assert window.rates is not None
+                self.accepted += 1
+                time, rates = window.end, window.rates
+                guess = window.parts[-1] if window.parts else guess
+                row = self._write(window.parts, rows, record, row)
+            else:
+                self.rejected += 1
+            length = self._next_length(window)
+            if self._take_events(time, window, jump):
+                guess, rates, length = None, self.events.rates(), min(length, longest)
+                if row and abs(self._grid(row - 1) - time) <= slack(time):
+                    np.take(self.wiring.values, record, out=rows[row - 1], mode="clip")
+            elif window.end is None and length < self.settings.smallest:
+                raise ConvergenceError(
+                    f"t = {time:.9g} s: a tolerance of {self.settings.tolerance:g} would take a step below "
+                    f"{self.settings.smallest:g} s; use a larger tolerance, or another algorithm"
+                )
+        calls = {stage.name: stage.steps for stage in self.events.stages}
+        return Statistics(self.accepted, self.rejected, calls, self.sweeper.sweeps, events=self.events.statistics())
+
+    def _grid(self, row: int) -> float:
+        return self.start + row * self.settings.step
+
+    def _take_events(self, time: float, window: _Window, jump: float) -> bool:
+        """Take what is due at ``time`` [s]; return whether there was anything."""
+        if window.end is None:
+            return False
+
+        column = np.array(
+            [
+                sum((f * s.sample(np.array([time]))[0] + o for s, f, o in self._of(parts)), 0.0)
+                for parts in self.wiring.layout.signals
+            ]
+        ).reshape(-1, 1)
+
+        def fill(stage: Stage) -> None:
+            gather(stage, self.wiring.view, column, 0)
+
+        jumps = jump - time <= slack(time) and jump < self.stop
+        if jumps and not window.event:
+            self.events.jump(time, fill)
+        return self.events.catch_up(time, fill, window.event) or jumps
+
+    def _of(self, parts: tuple[tuple[int, float, float, bool], ...]) -> list[tuple[Signal, float, float]]:
+        return [(self.signals[index], factor, offset) for index, factor, offset, _ in parts]
+
+    def _sources(self, times: Array) -> Array:
+        """Return what the sources add at the nodes, shape (rows, nodes): left limits where one jumps at the end."""
+        inside = times.copy()
+        if min(abs(t - times[-1]) for t in self.breaks) <= slack(times[-1]):
+            inside[-1] -= max(1e-6 * (times[-1] - times[0]), 4.0 * GRID_SLACK * max(1.0, abs(self.stop)))
+        table = np.zeros((len(self.wiring.layout.signals), len(times)))
+        for k, parts in enumerate(self.wiring.layout.signals):
+            for signal, factor, offset in self._of(parts):
+                table[k] += factor * signal.sample(inside) + offset
+        return table
+
+    def _difference(self, one: Array, other: Array) -> float:
+        """Return the largest difference of outputs as a multiple of the tolerance; shape (..., slots) each."""
+        a, b = one[..., self.outputs], other[..., self.outputs]
+        scale = self.settings.tolerance * np.maximum(1.0, np.abs(b))
+        error = float(np.max(np.abs(a - b) / scale, initial=0.0))
+        return error if math.isfinite(error) else math.inf
+
+    def _attempt(self, begin: float, end: float, rates: Array, guess: Track | None, record: Slots) -> _Window:
+        """Try a window; leave the slaves at its end when its error is within the tolerance, else at its begin."""
+        length = end - begin
+        with rollback(self.wiring) as restore:
+            try:
+                return self._doubled(begin, end, rates, guess, record, restore)
+            except RunEndedError as error:
+                raise SlaveError(f"{error}: it wants the run to end, which `adaptive` does not do") from None
+            except (UnsettledError, StepDiscardedError) as error:
+                restore()
+                if isinstance(error, StepDiscardedError) and length < self.settings.smallest:
+                    raise SlaveError(str(error)) from None
+                return _Window((), None, math.inf, length)
+            except _RefusedError as refused:
+                restore()
+                return _Window((), None, refused.error, length)
+
+    def _doubled(
+        self, begin: float, end: float, rates: Array, guess: Track | None, record: Slots, restore: Callable[[], None]
+    ) -> _Window:
+        whole = self.sweeper.sweep(begin, end, rates, guess)
+        track, length = whole.track, whole.end - begin
+        if length <= 1.01 * BRIEF * slack(begin):
+            parts: tuple[Track, ...] = (track,) if length > 0.0 else ()
+            return _Window(parts, whole.end, 0.0, end - begin, whole.event, whole.rates)
+        restore()
+        middle = 0.5 * (begin + whole.end)
+        first = self.sweeper.sweep(begin, middle, rates, track)
+        error, halves = self._compare(track, first), [first]
+        if not first.event and first.end == middle:
+            halves.append(self.sweeper.sweep(middle, whole.end, first.rates, track))
+            error = max(error, self._compare(track, halves[1]), self._between(track, halves, record))
+        if error > 1.0:
+            raise _RefusedError(error)
+        last = halves[-1]
+        parts = tuple(half.track for half in halves if half.end > half.track.start)
+        return _Window(parts, last.end, error, length, last.event, last.rates)
+
+    def _compare(self, track: Track, half: Swept) -> float:
+        """Return how far a half is from the whole at its end."""
+        if half.end == half.track.start:
+            return 0.0
+        return self._difference(track.at(np.array([half.end]))[0], half.track.values[2])
+
+    def _between(self, track: Track, halves: Sequence[Swept], record: Slots) -> float:
+        """Return the error of recorded points between nodes as a multiple of the tolerance."""
+        step = self.settings.step
+        if math.floor((track.end - self.start) / step) <= math.floor((track.start - self.start) / step):
+            return 0.0
+        rated, held = self.sweeper.rated[record], self.sweeper.held[record]
+        rough = JoinedTracks(tuple(half.track for half in halves)).roughness()[record]
+        worst = 0.0
+        for half in halves:
+            time, values = 0.5 * (half.track.start + half.track.end), half.track.values[1, record]
+            cubic = np.abs(track.at(np.array([time]))[0, record] - values) / CUBIC_GAIN
+            error = np.where(rated, cubic, QUARTIC_SHARE * rough)
+            scale = self.settings.tolerance * np.maximum(1.0, np.abs(values))
+            worst = max(worst, float(np.max((error / scale)[~held], initial=0.0)))
+        return worst
+
+    def _next_length(self, window: _Window) -> float:
+        excess = max(window.error, 1e-12)
+        factor = SAFETY * excess ** (-1.0 / ORDER) if math.isfinite(excess) else SHRINK
+        return min(window.length * min(max(factor, SHRINK), GROW), self.settings.largest)
+
+    def _write(self, parts: tuple[Track, ...], rows: Array, record: Slots, row: int) -> int:
+        """Fill in the recorded points up to the end of the window; return the next one's number."""
+        first = row
+        end = parts[-1].end if parts else -math.inf
+        while row < len(rows) and self._grid(row) <= end + slack(end):
+            row += 1
+        if row > first:
+            tracks = JoinedTracks(parts)
+            times = np.minimum(self._grid(0) + self.settings.step * np.arange(first, row), end)
+            held = self.sweeper.held
+            rows[first:row] = np.where(held, tracks.held_at(times), tracks.at(times))[:, record]
+        return row
+
+
+class _RefusedError(Exception):
+    """A window's error is too large."""
+
+    def __init__(self, error: float) -> None:
+        super().__init__()
+        self.error = error

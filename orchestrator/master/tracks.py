@@ -1,0 +1,151 @@
+"""What signals do over a window: values and derivatives at its begin, middle and end, and polynomials between."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Track:
+    """Signals over a window of two cells of equal length.
+
+    A signal with derivatives is a cubic in each cell (Hermite), any other one parabola over both.
+
+    Attributes:
+        start: of the window [s].
+        end: of the window [s].
+        values: at begin, middle and end, shape (3, signals).
+        rates: derivatives there [1/s], shape (3, signals).
+        rated: which signals have derivatives, shape (signals,).
+        coefficients: of both cells, by powers of the passed share of the cell, shape (2, 4, signals).
+    """
+
+    start: float
+    end: float
+    values: Array
+    rates: Array
+    rated: NDArray[np.bool_]
+    coefficients: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.coefficients = cell_coefficients(self.values, self.rates, self.rated, 0.5 * (self.end - self.start))
+
+    def _shares(self, times: Array) -> tuple[NDArray[np.int64], Array]:
+        cell = 0.5 * (self.end - self.start)
+        passed = (times - self.start) / cell
+        number = (passed >= 1.0).astype(np.int64)
+        return number, passed - number
+
+    def at(self, times: Array) -> Array:
+        """Return the signals.
+
+        Args:
+            times: [s], shape (n,); the polynomials go on beyond the window.
+
+        Returns:
+            Shape (n, signals).
+        """
+        number, share = self._shares(times)
+        powers = np.vander(share, 4, increasing=True)
+        found: Array = np.einsum("np,nps->ns", powers, self.coefficients[number])
+        return found
+
+    def rates_at(self, times: Array) -> Array:
+        """Return the derivatives [1/s]; arguments and shape as for ``at``.
+
+        Args:
+            times: [s], shape (n,).
+
+        Returns:
+            Shape (n, signals).
+        """
+        number, share = self._shares(times)
+        powers = np.vander(share, 3, increasing=True) * np.array([1.0, 2.0, 3.0])
+        found: Array = np.einsum("np,nps->ns", powers, self.coefficients[number][:, 1:])
+        return found / (0.5 * (self.end - self.start))
+
+
+def cell_coefficients(values: Array, rates: Array, rated: NDArray[np.bool_], cell: float) -> Array:
+    """Return the polynomials of both cells of a window, see ``Track``.
+
+    Args:
+        values: at begin, middle and end, shape (3, signals).
+        rates: derivatives there, shape (3, signals).
+        rated: which signals have derivatives.
+        cell: length of a cell [s].
+
+    Returns:
+        Shape (2, 4, signals).
+    """
+    found = np.zeros((2, 4, values.shape[1]))
+    slope = 0.5 * (values[2] - values[0])
+    bend = 0.5 * (values[0] - 2.0 * values[1] + values[2])
+    for k in range(2):
+        y, y_end, r, r_end = values[k], values[k + 1], cell * rates[k], cell * rates[k + 1]
+        found[k, 0] = y
+        found[k, 1] = np.where(rated, r, slope + (2.0 * k - 2.0) * bend)
+        found[k, 2] = np.where(rated, 3.0 * (y_end - y) - 2.0 * r - r_end, bend)
+        found[k, 3] = np.where(rated, 2.0 * (y - y_end) + r + r_end, 0.0)
+    return found
+
+
+class JoinedTracks:
+    """Signals over neighbouring windows; those without derivatives are one polynomial through all nodes.
+
+    Args:
+        tracks: one or two.
+    """
+
+    def __init__(self, tracks: tuple[Track, ...]) -> None:
+        self._tracks, self._rated = tracks, tracks[0].rated
+        nodes = [track.start + 0.5 * (track.end - track.start) * np.arange(3.0) for track in tracks]
+        self._nodes = np.concatenate([nodes[0], *(found[1:] for found in nodes[1:])])
+        self._values = np.concatenate([tracks[0].values, *(track.values[1:] for track in tracks[1:])])
+
+    def at(self, times: Array) -> Array:
+        """Return the signals.
+
+        Args:
+            times: [s] within the windows, shape (n,).
+
+        Returns:
+            Shape (n, signals).
+        """
+        found = np.empty((len(times), self._values.shape[1]))
+        for track in self._tracks:
+            inside = times >= track.start
+            found[inside] = track.at(times[inside])
+        scaled = (times - self._nodes[0]) / (self._nodes[-1] - self._nodes[0])
+        places = (self._nodes - self._nodes[0]) / (self._nodes[-1] - self._nodes[0])
+        weights = np.empty((len(times), len(places)))
+        for k, place in enumerate(places):
+            others = np.delete(places, k)
+            weights[:, k] = np.prod((scaled[:, None] - others) / (place - others), axis=1)
+        found[:, ~self._rated] = weights @ self._values[:, ~self._rated]
+        return found
+
+    def held_at(self, times: Array) -> Array:
+        """Return the values at the last node before each time: of signals that jump at nodes.
+
+        Args:
+            times: [s] within the windows, shape (n,).
+
+        Returns:
+            Shape (n, signals).
+        """
+        node = np.searchsorted(self._nodes, times + 1e-9 * (self._nodes[1] - self._nodes[0]), side="right") - 1
+        held: Array = self._values[np.maximum(node, 0)]
+        return held
+
+    def roughness(self) -> Array:
+        """Return the fourth differences of five nodes, zero for fewer.
+
+        Returns:
+            Shape (signals,).
+        """
+        weights = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+        found: Array = np.abs(weights @ self._values) if len(self._nodes) == 5 else np.zeros(self._values.shape[1])
+        return found

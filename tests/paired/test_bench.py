@@ -1,0 +1,88 @@
+"""The benchmark command: its rows, its floor, and what it says of tools that are not there."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+from benchmarks.masters import alone
+from benchmarks.masters.job import BenchJob, read_job
+from benchmarks.masters.measure import compare
+from benchmarks.masters.of_scenario import job_of
+from benchmarks.masters.reference import SCHEMES, reference_ends
+from orchestrator.building.build import ensure_built
+from orchestrator.cli import main
+from orchestrator.master import session
+from orchestrator.paired.experiment import Experiment
+from orchestrator.paired.scenario import scenario_of_pair
+
+
+@pytest.fixture(scope="module")
+def job() -> BenchJob:
+    return job_of(scenario_of_pair(Experiment(), ensure_built(), 0.02, 0.5), ["plant.theta_l"])
+
+
+def test_job_is_plain_data(job, tmp_path: Path) -> None:
+    job.write(tmp_path / "job.json")
+    assert read_job(tmp_path / "job.json") == job
+    assert list(job.fmus)[:3] == ["plant", "estimator", "controller"]
+    assert job.steps == 2000
+    assert ["controller", "reference", "Real", 0.5] in job.starts
+
+
+def test_command(tmp_path: Path, capsys) -> None:
+    words = ["bench", "--rounds", "1", "--tools", "ours,floor,fmpy,pyfmi", "--out", str(tmp_path)]
+    assert main(words) == 0
+    rows = {row["tool"]: row for row in json.loads((tmp_path / "bench.json").read_text())["results"]["rows"]}
+    assert all(rows[name]["runs"] == 3 and rows[name]["cpu"] > 0.0 for name in ("ours", "floor", "fmpy"))
+    assert all(rows[name]["deviation"] <= 1e-12 for name in ("ours", "floor", "fmpy"))  # the same work
+    if importlib.util.find_spec("pyfmi") is None:
+        assert rows["pyfmi"]["note"] == "not installed"
+    assert rows["ours"]["cpu"] < 0.7 * rows["fmpy"]["cpu"]
+    assert "floor" in capsys.readouterr().out
+
+
+def test_bad_arguments(tmp_path: Path, capsys) -> None:
+    assert main(["bench", "--tools", "ours,magic", "--out", str(tmp_path / "x")]) == 2
+    assert main(["bench", "--rounds", "0", "--out", str(tmp_path / "x")]) == 2
+    assert main(["bench", "--python", "pyfmi", "--out", str(tmp_path / "x")]) == 2
+    assert main(["bench", "--python", "pyfmi=/no/such/python", "--out", str(tmp_path / "x")]) == 2
+    assert capsys.readouterr().err.count("\n") == 4
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(("name", "package"), [("ecos", "ecospy"), ("libcosim", "libcosimpy")])
+def test_other_masters_did_the_work_that_they_are_timed_for(job, name: str, package: str) -> None:
+    if importlib.util.find_spec(package) is None:
+        pytest.skip(f"{package} is not installed (`pip install .[hosts]`)")
+    (row,) = compare(job, [name], 1)
+    if "cannot open shared object file" in row.note:
+        pytest.skip(row.note)
+    assert row.note == ""
+    assert row.deviation is not None
+    assert row.deviation <= 1e-12
+
+
+def test_deviation_shows_another_order_of_exchange(job) -> None:
+    """What ends where Gauss-Seidel ends did not run side by side: the check tells schemes apart."""
+    ends = {scheme: reference_ends(job, scheme)["plant.theta_l"] for scheme in SCHEMES}
+    assert len({round(end, 6) for end in ends.values()}) == len(SCHEMES)
+
+
+def test_growth_is_measured(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(alone, "CASE_STEPS", 10)
+    monkeypatch.setattr(alone, "RECORD_STEPS", 2000)
+    monkeypatch.setattr(session, "COMPILED_FROM", session.COMPILED_FROM)
+    found = []
+    for what, count in (("sweep", 4), ("record", 3)):
+        assert alone.main([what, str(count), str(tmp_path / "point.json")]) == 0
+        found.append(json.loads((tmp_path / "point.json").read_text()))
+    assert alone.SweepCost(**found[0]).per_case > 0.0
+    assert alone.RecordCost(**found[1]).expected == pytest.approx(4 * 8 * 2001 / 2**20)
+
+
+def test_an_installed_package_says_that_the_benchmark_needs_a_clone(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.setattr("orchestrator.shared.source_tree.ROOT", tmp_path)
+    assert main(["bench", "--tools", "ours", "--rounds", "1", "--out", str(tmp_path / "x")]) == 2
+    assert "must run in a clone" in capsys.readouterr().err

@@ -1,0 +1,132 @@
+"""The pages that people read: short sentences, short pages, links that lead somewhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.support.prose import count_words, sentences
+from tools import messages_page
+
+ROOT = Path(__file__).resolve().parents[1]
+GENERATED = {"docs/settings.md", "docs/rules.md", "docs/messages.md", "fmus/README.md"}
+CHANGES = "CHANGELOG.md"
+PAGES = sorted(
+    path.relative_to(ROOT).as_posix()
+    for pattern in ("*.md", "docs/**/*.md", "fmus/**/*.md", "tools/**/*.md")
+    for path in ROOT.glob(pattern)
+)
+MOST_LINES = 250
+MOST_LINES_OF_A_VERSION = 80
+MOST_WORDS = 40
+MOST_WORDS_ON_AVERAGE = 25
+
+
+def text_of(page):
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+def test_pages_are_found():
+    assert {"README.md", CHANGES, "docs/method.md", "docs/api/functions.md", *GENERATED} <= set(PAGES)
+
+
+SENTENCES = """# A title
+
+One `x + y` here. Two,
+three 0.5 mm!
+
+- four
+- five $a + b$
+
+| a | b |
+|---|---|
+| c | d |
+
+```sh
+six
+```
+
+    seven
+
+![eight](a.png)
+"""
+
+
+def test_what_counts_as_a_sentence():
+    assert [count_words(sentence) for sentence in sentences(SENTENCES)] == [3, 4, 1, 2]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_sentences_are_short(page):
+    lengths = {sentence: count_words(sentence) for sentence in sentences(text_of(page))}
+    assert not [sentence for sentence, words in lengths.items() if words > MOST_WORDS]
+    assert not lengths or sum(lengths.values()) <= MOST_WORDS_ON_AVERAGE * len(lengths)
+
+
+@pytest.mark.parametrize("page", sorted({*PAGES} - GENERATED))
+def test_pages_are_short(page):
+    assert len(text_of(page).splitlines()) <= MOST_LINES
+
+
+def test_versions_of_the_changelog_are_short():
+    versions = re.split(r"^## ", text_of(CHANGES), flags=re.MULTILINE)[1:]
+    assert len(versions) >= 2
+    assert not [version.split()[0] for version in versions if len(version.splitlines()) > MOST_LINES_OF_A_VERSION]
+
+
+def test_links_lead_somewhere():
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#]+)", text_of(page)):
+            if "://" not in target:
+                assert (ROOT / page).parent.joinpath(target).exists(), f"{page}: {target}"
+
+
+def test_the_glossary_has_each_term_once_and_stays_short():
+    rows = text_of("docs/naming.md").partition("## Glossary")[2]
+    terms = re.findall(r"^\| ([^|]+) \|", rows, re.MULTILINE)[1:]
+    assert 40 <= len(set(terms)) == len(terms) <= 80
+
+
+def test_the_page_of_messages_is_what_the_source_says():
+    assert text_of("docs/messages.md") == messages_page.page(), "write it anew: python -m tools.messages_page"
+
+
+MESSAGES = """
+class RecordError(Exception):
+    pass
+
+
+def read(path, size):
+    text = f"`size` must be positive, but is {size}"
+    if size < 0:
+        raise RecordError(text if path else "`path` must be given, but is not")
+    notes = [f"the record has {size} rows" for _ in range(size)]
+    notes.append(explain(size) + ": record it again")
+
+
+def explain(size):
+    return f"only {size} rows move"
+
+
+class DerivedError(RecordError):
+    pass
+
+
+def fail():
+    raise DerivedError("the file " "is damaged")
+"""
+
+
+def test_messages_are_collected_from_errors_and_notes(tmp_path, monkeypatch):
+    monkeypatch.setattr(messages_page, "ROOT", tmp_path)
+    place = tmp_path / "orchestrator" / "records" / "reading.py"
+    place.parent.mkdir(parents=True)
+    place.write_text(MESSAGES, encoding="utf-8")
+    found = messages_page.collect([place])
+    assert {title: sorted({text for text, _ in rows}) for title, rows in found.items() if rows} == {
+        "Errors: records": [
+            "`path` must be given, but is not", "`size` must be positive, but is …", "the file is damaged"
+        ],
+        messages_page.NOTES: ["only … rows move", "the record has … rows", "…: record it again"],
+    }  # fmt: skip
+    assert {room for rows in found.values() for _, room in rows} == {"records"}
