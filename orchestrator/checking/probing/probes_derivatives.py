@@ -83,7 +83,11 @@ def _outputs(context: Context, outputs: list[ProbedVariable]) -> None:
         off = [_off(x[i], s, r) for x, s, r in zip(found[1:], slopes, slopes[1:], strict=False)]
         largest = max(map(abs, slopes), default=0.0)
         far = sum(not x <= _TOLERANCE * largest for x in off)
-        if far > len(off) / 2:
+        absent = sum(not math.isfinite(x[i]) for x in found)
+        if absent:
+            message = f"the first derivative of `{v.name}` must be finite, but {absent} of {len(found)} are not"
+            context.report("derivative.value", message, v.name)
+        elif far > len(off) / 2:
             text = f"is off by more than {_TOLERANCE:.0%} of its largest slope at {far} of {len(off)} points"
             message = f"the first derivative of `{v.name}` must be that of the output, but {text}"
             context.report("derivative.value", message, v.name)
