@@ -20,15 +20,7 @@ _MATCHED_BY_NAME = ("plug", "bus")
 
 
 def check_companions(d: Description, files: FmuFiles) -> Iterator[Finding]:
-    """Findings about both files and about what they name.
-
-    Args:
-        d: the model description.
-        files: of the FMU.
-
-    Yields:
-        Each finding.
-    """
+    """Findings about both files and about what they name."""
     names = set(files.names())
     root, findings = _read(files, names, TERMINALS, "fmiTerminalsAndIcons")
     yield from findings
@@ -128,15 +120,7 @@ def _icons(files: FmuFiles, names: set[str]) -> Iterator[Finding]:
 
 
 def check_icon(files: FmuFiles, path: str) -> Iterator[Finding]:
-    """Findings about an icon.
-
-    Args:
-        files: of the FMU.
-        path: of the icon in it.
-
-    Yields:
-        A finding where it is no PNG image.
-    """
+    """Findings about an icon."""
     if files.read(path, _LARGEST_ICON)[: len(_PNG)] != _PNG:
         yield Finding("file.icon", path, "the icon must be a PNG image, but is not")
 

@@ -57,14 +57,7 @@ class DescribedVariable:
     aliases: tuple[etree._Element, ...] = ()
 
     def number(self, attribute: str) -> float | int | None:
-        """A numeric attribute, or None when it is absent or no number.
-
-        Args:
-            attribute: its name in the XML.
-
-        Returns:
-            The value, in the variable's unit.
-        """
+        """A numeric attribute, or None when it is absent or no number."""
         return number(self.attributes.get(attribute), self.kind)
 
     @property
@@ -78,23 +71,13 @@ class DescribedVariable:
         return "Integer" if self.kind == "Enumeration" else self.kind
 
     def flag(self, name: str) -> bool:
-        """A flag among its attributes; absent means false.
-
-        Args:
-            name: of the attribute.
-
-        Returns:
-            True when it is set.
-        """
+        """A flag among its attributes; absent means false."""
         return self.attributes.get(name) in ("true", "1")
 
     def path(self, attribute: str = "") -> str:
         """XPath of the variable; attributes of the type element are looked for there.
 
         Put together here, for lxml counts all siblings each time: too slow for 100,000 variables.
-
-        Args:
-            attribute: of the variable or of its type element; empty for the element.
 
         Returns:
             The path, after the file's name and a colon.
@@ -118,14 +101,7 @@ class StructureEntry:
     kinds: tuple[str, ...] | None
 
     def path(self, attribute: str) -> str:
-        """XPath of an attribute.
-
-        Args:
-            attribute: its name in the XML.
-
-        Returns:
-            The path, after the file's name and a colon.
-        """
+        """XPath of an attribute. Return the path, after the file's name and a colon."""
         return f"{self.place}/@{attribute}"
 
 
@@ -143,14 +119,7 @@ class Interface:
         return str(self.element.tag)
 
     def flag(self, name: str) -> bool:
-        """A capability flag; absent means false.
-
-        Args:
-            name: of the capability, such as "canGetAndSetFMUstate".
-
-        Returns:
-            True when it is set.
-        """
+        """A capability flag; absent means false."""
         return self.element.get(name) in ("true", "1")
 
 
@@ -172,21 +141,11 @@ class Description:
     event_indicators: tuple[StructureEntry, ...]
 
     def interface(self, kind: str) -> Interface | None:
-        """An interface of the FMU.
-
-        Args:
-            kind: "CoSimulation", "ModelExchange" or "ScheduledExecution".
-
-        Returns:
-            The interface, or None when the FMU has it not.
-        """
+        """An interface of the FMU."""
         return next((i for i in self.interfaces if i.kind == kind), None)
 
     def identity(self, v: DescribedVariable) -> int | None:
         """The number by which ModelStructure names a variable.
-
-        Args:
-            v: the variable.
 
         Returns:
             Its index, counted from 1, or its value reference.
@@ -194,21 +153,11 @@ class Description:
         return v.index if self.dialect is FMI2 else v.reference
 
     def variable(self, number: int | None) -> DescribedVariable | None:
-        """The variable with a number of ModelStructure, or None when there is none.
-
-        Args:
-            number: see ``identity``.
-
-        Returns:
-            The variable.
-        """
+        """The variable with a number of ModelStructure, or None when there is none."""
         return None if number is None else self.numbered.get(number)
 
     def size(self, v: DescribedVariable) -> int | None:
         """Number of values of a variable at its initial dimensions.
-
-        Args:
-            v: the variable.
 
         Returns:
             The number, or None when it cannot be told.
@@ -218,14 +167,7 @@ class Description:
         return prod(known) if len(known) == len(sizes) else None
 
     def extent(self, dimension: Dimension) -> int | None:
-        """Initial size of a dimension.
-
-        Args:
-            dimension: of an array.
-
-        Returns:
-            The size, or None when it cannot be told.
-        """
+        """Initial size of a dimension. Return the size, or None when it cannot be told."""
         if dimension.size is not None or dimension.reference is None:
             return dimension.size
         holder = self.variable(dimension.reference)
@@ -233,9 +175,6 @@ class Description:
 
     def experiment(self, name: str) -> float | None:
         """A number of DefaultExperiment.
-
-        Args:
-            name: "startTime", "stopTime", "stepSize" or "tolerance".
 
         Returns:
             The number [s] (a tolerance without unit), or None when it is absent.
@@ -246,15 +185,7 @@ class Description:
 
 
 def number(text: str | None, kind: str) -> float | int | None:
-    """Read a number as the XML schema types it; None when ``text`` is absent or not one.
-
-    Args:
-        text: as the XML has it.
-        kind: "Real", "Int32" and so on, as the XML names the type.
-
-    Returns:
-        The number.
-    """
+    """Read a number as the XML schema types it; None when ``text`` is absent or not one."""
     if text is None:
         return None
     try:
@@ -264,14 +195,7 @@ def number(text: str | None, kind: str) -> float | int | None:
 
 
 def integer(text: str | None) -> int | None:
-    """Read a whole number.
-
-    Args:
-        text: as the XML has it.
-
-    Returns:
-        The number; None when ``text`` is absent or not one.
-    """
+    """Read a whole number."""
     try:
         return None if text is None else int(text)
     except ValueError:

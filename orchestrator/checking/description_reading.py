@@ -24,14 +24,7 @@ _FILE = "modelDescription.xml:/fmiModelDescription"
 
 
 def read_description(root: etree._Element) -> Description:
-    """Read what the rules need; never fails on a document that is merely wrong.
-
-    Args:
-        root: of modelDescription.xml.
-
-    Returns:
-        The description; what is missing or wrong is None or empty.
-    """
+    """Read what the rules need; never fails on a document that is merely wrong."""
     dialect = FMI2 if root.get("fmiVersion") == "2.0" else FMI3
     types = tuple(_simple_types(root, dialect))
     by_name = {t.name: t for t in types}

@@ -55,15 +55,7 @@ _MOST_FINDINGS = 10_000
 
 
 def obstacle(d: Description, files: FmuFiles) -> str:
-    """Why an FMU cannot be executed here; empty when one of its interfaces can.
-
-    Args:
-        d: the model description.
-        files: of the FMU.
-
-    Returns:
-        The reason, in words.
-    """
+    """Why an FMU cannot be executed here; empty when one of its interfaces can."""
     reasons = [_obstacle(d, interface, files) for interface in d.interfaces]
     return "it has no interface" if not reasons else "" if "" in reasons else reasons[0]
 
@@ -85,17 +77,8 @@ def check_dynamic(
 
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
 
-    Args:
-        d, files: of an FMU without an ``obstacle``.
-        references: reference results; each is simulated, by the first interface that is run.
-        limits: of a child process.
-        walls: whether the kernel shall keep the FMU from files, network and other processes.
-
     Returns:
         What it did wrong, and which probes were carried out.
-
-    Raises:
-        OutputError: there is no room to unpack the FMU.
     """
     findings: list[Finding] = []
     executions: list[Execution] = []

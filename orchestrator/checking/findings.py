@@ -19,7 +19,6 @@ class Finding:
     """One violated rule at one place.
 
     Attributes:
-        rule: key of ``RULES``.
         path: file inside the FMU, and an XPath after a colon where there is one.
         message: what was expected and what was found, one sentence.
     """
@@ -51,7 +50,6 @@ class RuleOutcome:
     """What became of one rule on one FMU.
 
     Attributes:
-        rule: key of ``RULES``.
         outcome: "failed" with a finding of the rule, "passed" when its stage was carried out without one.
         reason: why it was not run; empty otherwise.
     """
@@ -126,14 +124,7 @@ class FmuFindings:
         return RuleOutcome(rule, "not run", reasons[0] if reasons else self.not_executed)
 
     def count(self, severity: str) -> int:
-        """Number of findings of one severity.
-
-        Args:
-            severity: one of ``SEVERITIES``.
-
-        Returns:
-            Their number.
-        """
+        """Number of findings of one severity."""
         return sum(f.severity == severity for f in self.findings)
 
     @property
@@ -143,24 +134,13 @@ class FmuFindings:
 
 
 def listed(names: Sequence[str], most: int = 12) -> str:
-    """Names for a message, not too many of them.
-
-    Args:
-        names: in the order wanted.
-        most: number of names that are shown.
-
-    Returns:
-        The names, and how many more there are.
-    """
+    """Names for a message, not too many of them."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 
 
 def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Errors first, each kept in the order found, equal ones as one, at most ``MOST_PER_RULE`` of one rule.
-
-    Args:
-        findings: in any order.
 
     Returns:
         The findings that a report shows.
@@ -189,12 +169,5 @@ def _grouped(findings: Iterable[Finding]) -> Iterator[Finding]:
 
 
 def has_errors(findings: Iterable[Finding]) -> bool:
-    """Whether any finding is an error.
-
-    Args:
-        findings: in any order.
-
-    Returns:
-        True when one is.
-    """
+    """Whether any finding is an error."""
     return any(f.severity == "error" for f in findings)

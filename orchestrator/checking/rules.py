@@ -124,9 +124,6 @@ class Rule:
     def link(self, version: Version) -> str:
         """Where the standard's text says so.
 
-        Args:
-            version: one of ``versions``.
-
         Returns:
             An address, at the section's heading where the text has names for them; empty for a rule of our own.
         """

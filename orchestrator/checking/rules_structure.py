@@ -13,14 +13,7 @@ _OF_INITIALISATION = ("dependent", "constant")
 
 
 def check_structure(d: Description) -> Iterator[Finding]:
-    """Findings about ModelStructure.
-
-    Args:
-        d: the model description.
-
-    Yields:
-        Each finding.
-    """
+    """Findings about ModelStructure."""
     if d.root.find("ModelStructure") is None:
         return
     valid = True
@@ -55,14 +48,7 @@ def check_structure(d: Description) -> Iterator[Finding]:
 
 
 def required_initial_unknowns(d: Description) -> list[DescribedVariable]:
-    """The variables that the list of initial unknowns must have.
-
-    Args:
-        d: the model description.
-
-    Returns:
-        The variables; one may be there twice.
-    """
+    """The variables that the list of initial unknowns must have."""
     expected = [v for v in d.variables if v.causality == "output" and v.initial in _FREE and not v.clocks]
     expected += [v for v in d.variables if v.causality == "calculatedParameter"]
     for u in d.derivatives:

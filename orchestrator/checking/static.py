@@ -43,10 +43,6 @@ class StaticResult:
 def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
     """Check one FMU (file or unpacked folder) without executing anything of it.
 
-    Args:
-        path: the FMU's file or folder.
-        limits: the most bytes and files that are unpacked.
-
     Returns:
         Findings, and what the probes need: files, description, reference results, facts.
     """

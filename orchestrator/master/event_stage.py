@@ -19,22 +19,12 @@ def slack(time: float) -> float:
 
     Args:
         time: [s].
-
-    Returns:
-        The distance.
     """
     return 1e-12 * max(1.0, abs(time))
 
 
 def is_discrete(variable: Variable) -> bool:
-    """Return whether a variable changes at events alone.
-
-    Args:
-        variable: any.
-
-    Returns:
-        True for types that are not Real and for the variability ``discrete``.
-    """
+    """Return whether a variable changes at events alone."""
     return variable.type != "Real" or variable.variability == "discrete"
 
 
@@ -45,22 +35,13 @@ def _is_smooth(variable: Variable) -> bool:
 class EventStage:
     """One instance of a system with events; its slave may have none.
 
-    Args:
-        stage: the instance.
-        values: the slots.
-
     Attributes:
         steps: calls that asked the slave for a step.
         can_go_back: it can be taken back to a saved state, and step to any time from there.
         names: of the inputs that it takes at steps: the continuous ones; of a slave without events all.
-        feeds: of these.
-        inputs: their slots.
         inside: those that it can be told inside a step.
         places: of these among ``names``.
-        send: moves them.
-        outputs: its output slots.
         rated: outputs whose derivatives it knows.
-        rate_slots: their slots.
         follows: outputs that depend on an input of ``names`` at once.
         next_event: [s], as the slave said last; infinity where it knows of none.
     """
@@ -114,26 +95,16 @@ class EventStage:
         self.follows = {name for name in outputs if not model.depends_on(name).isdisjoint(names)}
 
     def read_rates(self, rates: Signals) -> None:
-        """Read the derivatives of the outputs where the slave is.
-
-        Args:
-            rates: by slot; those of ``rate_slots`` are written.
-        """
+        """Read the derivatives of the outputs where the slave is."""
         if self.rated:
             rates[self.rate_slots] = self.events.output_rates(self.rated)
 
     def step(self, begin: float, end: float) -> StepOutcome:
-        """Step towards ``end`` [s].
+        """Step towards ``end`` [s]. Return where it ended; ``end`` itself, where that is missed by rounding.
 
         Args:
             begin: where the slave is [s].
             end: [s].
-
-        Returns:
-            Where it ended; ``end`` itself, where that is missed by rounding.
-
-        Raises:
-            SlaveError: the slave went back.
         """
         self.steps += 1
         if not self.has_events:
@@ -145,12 +116,7 @@ class EventStage:
         return StepOutcome(end, found.event) if found.reached >= end - slack(end) else found
 
     def exchange(self, gather: Gather, clocks: Sequence[str]) -> None:
-        """Take inputs and show outputs, in event mode.
-
-        Args:
-            gather: fills the input slots.
-            clocks: that are active.
-        """
+        """Take inputs and show outputs, in event mode."""
         gather(self.stage)
         self.send()
         self._send_discrete()
@@ -162,30 +128,17 @@ class EventStage:
         self._sent = self._values[self._discrete]
 
     def takes_discrete_news(self, gather: Gather) -> bool:
-        """Return whether a discrete input has another value than the slave has, which it takes at events alone.
-
-        Args:
-            gather: fills the input slots.
-
-        Returns:
-            True when one has.
-        """
+        """Return whether a discrete input has another value than the slave has, which it takes at events alone."""
         if not len(self._discrete):
             return False
         gather(self.stage)
         return not np.array_equal(self._values[self._discrete], self._sent, equal_nan=True)
 
     def update(self, time: float) -> bool:
-        """End an instant.
+        """End an instant. Return whether the slave needs another.
 
         Args:
             time: [s].
-
-        Returns:
-            Whether the slave needs another.
-
-        Raises:
-            RunEndedError: it wants the run to end.
         """
         found = self.events.update_discrete_states()
         self.next_event = math.inf if found.next_event is None else found.next_event

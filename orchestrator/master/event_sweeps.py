@@ -44,7 +44,6 @@ class Swept:
         track: all signals, up to ``end``; of no use where that is the begin of the window.
         end: of the window, or an event before it [s].
         event: a slave has an event there.
-        rates: derivatives there.
     """
 
     track: Track
@@ -57,7 +56,6 @@ class Sweeper:
     """Sweeps the slaves of a wiring.
 
     Args:
-        events: the slaves.
         sources: what sources add to inputs at three nodes, shape (rows, 3), from their times [s].
         difference: of two sets of outputs, as a multiple of the tolerance.
 
@@ -86,14 +84,6 @@ class Sweeper:
         Args:
             begin: where they are [s].
             end: [s].
-            rates: derivatives at the begin.
-            guess: signals in an earlier window, or in this one.
-
-        Returns:
-            What the signals do.
-
-        Raises:
-            UnsettledError: the window is too long.
         """
         with rollback(self.wiring) as restore:
             track = self._guessed(begin, end, rates, guess)

@@ -65,9 +65,6 @@ class EventWindows:
         start: [s].
         stop: [s].
         settings: tolerance and bounds of the step.
-
-    Raises:
-        ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.
     """
 
     def __init__(
@@ -93,10 +90,6 @@ class EventWindows:
 
         Returns:
             Windows taken and refused, calls of slaves, events.
-
-        Raises:
-            ConvergenceError: the tolerance cannot be met with the smallest step allowed, or events have no end.
-            SlaveError: a slave wants the run to end, or cannot do a step of any length.
         """
         time, length, row = self.start, min(self.settings.first, self.settings.largest), 1
         guess: Track | None = None

@@ -43,13 +43,9 @@ def _chattering(time: float, names: Sequence[str]) -> ChatteringError:
 class EventIteration:
     """Takes all slaves of a wiring through their events.
 
-    Args:
-        wiring: bound slaves.
-
     Attributes:
         stages: all instances, in execution order.
         rated: signals whose derivatives are known; those of outputs that follow inputs at once would lack the inputs'.
-        late: see ``EventStatistics``.
         late_for: an instance that could not be taken back to events, for which they were late.
     """
 
@@ -95,30 +91,18 @@ class EventIteration:
             stage.next_event, stage.steps = math.inf, 0
 
     def statistics(self) -> EventStatistics:
-        """Return what happened.
-
-        Returns:
-            The events of the run so far.
-        """
+        """Return what happened."""
         return EventStatistics(tuple(self._times), self._instants, self._ticks, tuple(self.late[:MOST_TIMES]))
 
     def remarks(self) -> list[RunRemark]:
-        """Return what is to be known of events that were late.
-
-        Returns:
-            A remark, or none.
-        """
+        """Return what is to be known of events that were late."""
         if not self.late:
             return []
         text = "cannot be taken back to an event: such events reach the others at the communication point only"
         return [RunRemark(self.late_for, f"{text}, up to {max(self.late):g} s late", len(self.late))]
 
     def next_time(self) -> float:
-        """Return the next time [s] at which an event is due, as far as is known before any step.
-
-        Returns:
-            The time; infinity for none.
-        """
+        """Return the next time [s] at which an event is due, as far as is known before any step."""
         return min(self._clocks.next_time(), min((s.next_event for s in self._taking), default=math.inf))
 
     def begin(self, time: float, gather: Gather) -> None:
@@ -126,7 +110,6 @@ class EventIteration:
 
         Args:
             time: start of the run [s].
-            gather: fills the input slots of a stage.
         """
         self._forget(time)
         for stage in self.stages:
@@ -136,20 +119,7 @@ class EventIteration:
         self.catch_up(time, gather)
 
     def catch_up(self, time: float, gather: Gather, event: bool = False) -> bool:
-        """Take what is due at ``time`` [s]: events, ticks, and changes of discrete inputs.
-
-        Args:
-            time: where all slaves are.
-            gather: fills the input slots of a stage.
-            event: a slave has reported one.
-
-        Returns:
-            Whether there was anything.
-
-        Raises:
-            ChatteringError: there is no end of events at this time.
-            RunEndedError: a slave wants the run to end.
-        """
+        """Take what is due at ``time`` [s]: events, ticks, and changes of discrete inputs."""
         found = False
         while event or self._is_due(time) or any(s.takes_discrete_news(gather) for s in self._taking):
             if event or min(s.next_event for s in self._taking) <= time + slack(time):
@@ -169,11 +139,7 @@ class EventIteration:
         """Take one slave through an event with inputs as they are; others do not see it.
 
         Args:
-            stage: whose slave.
             time: where it is [s].
-
-        Raises:
-            ChatteringError: there is no end of instants.
         """
         self._note(time)
         stage.events.enter_event_mode()
@@ -185,12 +151,7 @@ class EventIteration:
         raise _chattering(time, [stage.name])
 
     def jump(self, time: float, gather: Gather) -> None:
-        """Take all slaves through an instant because a source jumps at ``time`` [s].
-
-        Args:
-            time: where all slaves are.
-            gather: fills the input slots of a stage.
-        """
+        """Take all slaves through an instant because a source jumps at ``time`` [s]."""
         self.enter()
         self._settle(time, gather)
         self.catch_up(time, gather)

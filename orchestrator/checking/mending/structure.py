@@ -21,10 +21,6 @@ def mend_structure(root: etree._Element, findings: Iterable[Finding]) -> list[st
 
     Args:
         root: of modelDescription.xml; it is changed.
-        findings: of the static checks.
-
-    Returns:
-        What was mended.
     """
     if root.find("ModelStructure") is None or not any(finding.rule in _LISTS for finding in findings):
         return []

@@ -56,21 +56,10 @@ class FmiProcess(Protocol):
     """A child process that does FMI calls."""
 
     def call(self, request: Any) -> Any:
-        """Return what ``checking.host.Host`` returns.
-
-        Args:
-            request: name of a method of ``checking.host.Host`` and its arguments.
-
-        Returns:
-            What the method returns.
-        """
+        """Return what ``checking.host.Host`` returns."""
 
     def resident(self) -> int:
-        """Resident memory of the child in bytes; 0 where the system does not tell.
-
-        Returns:
-            The bytes.
-        """
+        """Resident memory of the child in bytes; 0 where the system does not tell."""
 
     def renew(self) -> None:
         """End the child and start another one."""
@@ -101,9 +90,6 @@ class Library:
     def load(self, path: str) -> str:
         """Load the library at ``path``; return why that fails, or nothing.
 
-        Args:
-            path: of the shared library.
-
         Returns:
             The reason, empty when it is loaded.
         """
@@ -131,31 +117,13 @@ class Library:
         return answer
 
     def text(self, function: str) -> str:
-        """Call a function that returns a text.
-
-        Args:
-            function: its name without prefix.
-
-        Returns:
-            What it returned; "null" for a null pointer.
-        """
+        """Call a function that returns a text. Return what it returned; "null" for a null pointer."""
         name = self.names.prefix + function
         value = self._ask(name, "text", name)
         return "null" if value is None else str(value)
 
     def make(self, function: str, *request: Any) -> int | None:
-        """Make an instance; None when the FMU returns null.
-
-        Args:
-            function: that makes it, with prefix.
-            request: to the host.
-
-        Returns:
-            The instance's number, or None.
-
-        Raises:
-            ChildError: the answer of the child is none that the function can have.
-        """
+        """Make an instance; None when the FMU returns null. Return the instance's number, or None."""
         match self._ask(function, *request):
             case [number, messages]:
                 self.messages = self._texts(messages)
@@ -163,28 +131,12 @@ class Library:
         raise odd(function)
 
     def free(self, number: int) -> None:
-        """Free an instance.
-
-        Args:
-            number: of the instance.
-        """
+        """Free an instance."""
         name = f"{self.names.prefix}FreeInstance"
         self._ask(name, "free", number, name)
 
     def raw(self, number: int, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
-        """Call a function of an instance; return its status and what its output arguments hold.
-
-        Args:
-            number: of the instance.
-            function: name of an FMI function.
-            arguments: kind and value of each.
-
-        Returns:
-            Status and values.
-
-        Raises:
-            ChildError: the answer of the child is none that the function can have.
-        """
+        """Call a function of an instance; return its status and what its output arguments hold."""
         answer = self._ask(function, "call", number, function, [list(a) for a in arguments])
         return self._checked(answer, function, arguments)
 
@@ -202,15 +154,8 @@ class Library:
     ) -> list[tuple[int, list[Any]]]:
         """Call functions of an instance in one go, up to the first that fails.
 
-        Args:
-            number: of the instance.
-            requests: function and arguments of each.
-
         Returns:
             Status and values of each that was called.
-
-        Raises:
-            ChildError: the answer of the child is none that the functions can have.
         """
         doing = ", ".join(dict.fromkeys(function for function, _ in requests))
         answers = self._ask(doing, "calls", number, [[f, [list(a) for a in arguments]] for f, arguments in requests])
@@ -227,33 +172,19 @@ class Library:
         """Say what the host does in intermediate updates; see there.
 
         Args:
-            number: of the instance.
-            reads, writes: value references.
-            values: to be written.
             early: at which update an early return is asked for; -1 for never.
         """
         self._ask("", "plan", number, reads, writes, values, early)
 
     def updates(self) -> tuple[list[list[Any]], int]:
-        """The intermediate updates since the last call, and locks of preemption that are open; see the host.
-
-        Returns:
-            Rows, and a number.
-
-        Raises:
-            ChildError: the answer of the child is none that it can have.
-        """
+        """The intermediate updates since the last call, and locks of preemption that are open; see the host."""
         match self._ask("", "updates"):
             case [list() as rows, int() as locks] if all(isinstance(r, list) and len(r) == 8 for r in rows):
                 return rows, locks
         raise odd("an intermediate update")
 
     def resident(self) -> int:
-        """Resident memory of the child in bytes, as the system tells; 0 where it does not.
-
-        Returns:
-            The bytes.
-        """
+        """Resident memory of the child in bytes, as the system tells; 0 where it does not."""
         return self._host.resident()
 
     def _texts(self, messages: Any) -> list[str]:

@@ -126,7 +126,6 @@ def enter_initialisation_3(driver: Any, start: float, stop: float | None) -> Non
     """Into initialisation mode of FMI 3.0.
 
     Args:
-        driver: of an instance.
         start, stop: of the experiment [s].
     """
     tolerance = driver.job.tolerance

@@ -24,19 +24,7 @@ _FLAGS = (
 def make_job(
     d: Description, interface: Interface, fmu: Path, library: str, reference: ReferenceResult | None, limits: Limits
 ) -> ProbeJob:
-    """What is to be run of an interface.
-
-    Args:
-        d: the model description.
-        interface: the one that is run.
-        fmu: the folder of the unpacked FMU.
-        library: path of the shared library in it.
-        reference: the result to be reproduced, or None.
-        limits: of the child process.
-
-    Returns:
-        The job; what the description has wrong is replaced by what makes sense.
-    """
+    """What is to be run of an interface."""
     start = _or(d.experiment("startTime"), 0.0)
     stop = d.experiment("stopTime")
     if stop is not None and not start < stop < math.inf:

@@ -71,9 +71,6 @@ class EventDriver(Driver):
         """Ask for the intervals that the description has; what differs from it.
 
         An FMU that refuses to tell is left alone; it must not be called any further then.
-
-        Returns:
-            Sentences.
         """
         wrong = []
         for clock in self.job.clocks:
@@ -115,9 +112,6 @@ class EventDriver(Driver):
 
         Args:
             t: time [s].
-
-        Returns:
-            Clocks, the most urgent first.
         """
         ticks = self.memory.get("ticks", {})
         slack = _SMALL * max(abs(t), self.job.step)
@@ -129,15 +123,6 @@ class EventDriver(Driver):
 
         Args:
             t: time [s].
-            when: words for the message of an error.
-            triggered: further input clocks that tick.
-
-        Returns:
-            What each update said.
-
-        Raises:
-            StatusError: a call is refused, or there is no end.
-            TerminatedError: the FMU ends the simulation.
         """
         ticking = [*self.due(t), *triggered]
         outcomes: list[EventOutcome] = []
@@ -209,13 +194,6 @@ class EventDriver(Driver):
 
         Args:
             t: time [s].
-            when: words for the message of an error.
-
-        Returns:
-            What it said.
-
-        Raises:
-            StatusError: a call is refused, or the next event is not later than ``t``.
         """
         if self.job.version == "2.0":
             ((again, terminate, nominals, states, defined, time),) = self.call(

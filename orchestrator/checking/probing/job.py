@@ -86,21 +86,13 @@ class ProbeJob:
         return bool(self.flags & {"canSerializeFMUstate", "canSerializeFMUState"})
 
     def outputs(self) -> list[ProbedVariable]:
-        """What a run records: the outputs, or all local variables when there are none; clocks are left out.
-
-        Returns:
-            Variables, in the order of the description.
-        """
+        """What a run records: the outputs, or all local variables when there are none; clocks are left out."""
         open_ = [v for v in self.variables if v.base != "Clock"]
         chosen = [v for v in open_ if v.causality == "output"]
         return chosen or [v for v in open_ if v.causality == "local" and not v.clocks]
 
     def labels(self) -> list[str]:
-        """Names of the recorded values.
-
-        Returns:
-            One for each value.
-        """
+        """Names of the recorded values."""
         return [label for v in self.outputs() for label in v.labels]
 
     def inputs(self) -> list[ProbedVariable]:
@@ -113,22 +105,11 @@ class ProbeJob:
         return [v for v in found if v.variability == "continuous" or self.interface != "ModelExchange"]
 
     def watched(self) -> list[ProbedVariable]:
-        """What an event can change, as far as it can be read: outputs and local variables without clocks.
-
-        Returns:
-            Variables, in the order of the description.
-        """
+        """What an event can change, as far as it can be read: outputs and local variables without clocks."""
         kinds = ("output", "local")
         return [v for v in self.variables if v.causality in kinds and not v.clocks and v.base != "Clock"]
 
 
 def references(variables: Sequence[ProbedVariable]) -> list[int]:
-    """Value references.
-
-    Args:
-        variables: of any type.
-
-    Returns:
-        One for each.
-    """
+    """Value references."""
     return [v.reference for v in variables]

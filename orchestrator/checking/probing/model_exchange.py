@@ -120,7 +120,6 @@ class ModelExchange(EventDriver):
         Args:
             t, x: time [s] and states.
             h: size of the step [s].
-            when: words for the message of an error.
 
         Returns:
             States, time, the size of the next step, and the signs of the event indicators.

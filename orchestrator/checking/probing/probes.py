@@ -50,22 +50,11 @@ class Context:
 
         Args:
             expected: the one run, [step][output].
-            found: the other.
-
-        Returns:
-            The first difference.
         """
         return compare(expected, found, self.names)
 
     def report_difference(self, rule: str, wanted: str, difference: Difference, allowed: float = _SMALL) -> None:
-        """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only.
-
-        Args:
-            rule: for a difference that matters.
-            wanted: what the standard asks for, in words.
-            difference: what was found.
-            allowed: for the milder one, relative to the range of the signal.
-        """
+        """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only."""
         if difference.relative > allowed:
             self.report(rule, f"{wanted}, but {difference}")
         else:
@@ -80,16 +69,7 @@ class SkippedError(Exception):
 
 
 def carry_out(probe: Probe, context: Context) -> None:
-    """Carry out a probe, and again with a saved state before each step where that helps against discarded ones.
-
-    Args:
-        probe: the probe.
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-        DiscardedError: a step could not be done.
-    """
+    """Carry out a probe, and again with a saved state before each step where that helps against discarded ones."""
     try:
         probe(context)
     except DiscardedError as error:
@@ -103,12 +83,7 @@ NOT_COMPARABLE = "two equal runs of this FMU differ"
 
 
 def load(library: Library, report: Callable[..., None]) -> None:
-    """Version and platform of the library.
-
-    Args:
-        library: of the FMU.
-        report: called with rule, message and path.
-    """
+    """Version and platform of the library."""
     names = library.names
     version = library.text("GetVersion")
     wanted = names.version
@@ -121,15 +96,7 @@ def load(library: Library, report: Callable[..., None]) -> None:
 
 
 def life_cycle(context: Context) -> None:
-    """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        StatusError: a call is refused, or the first step is discarded at any size.
-        DiscardedError: a step was discarded that may be possible in shorter ones.
-    """
+    """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value."""
     bench, job = context.bench, context.bench.job
     outputs = job.outputs()
     with bench.instance(initialised=False) as driver:
@@ -223,11 +190,7 @@ def _look(context: Context, outputs: list[ProbedVariable], values: list[Any], wh
 
 
 def inputs(context: Context) -> None:
-    """Run with moving inputs; what is recorded is what the later probes compare with.
-
-    Args:
-        context: the FMU, its job and where findings go.
-    """
+    """Run with moving inputs; what is recorded is what the later probes compare with."""
     bench = context.bench
     refused = None
     with bench.instance() as driver:
@@ -256,9 +219,6 @@ def setting(context: Context) -> None:
     """Set everything that can be set to its start value: accepted, and without effect.
 
     Inputs are set in initialisation mode: before it, FMI 2.0 allows that for variables with ``initial`` only.
-
-    Args:
-        context: the FMU, its job and where findings go.
     """
     bench, job = context.bench, context.bench.job
     settable = [v for v in job.variables if _settable(v)]
@@ -292,14 +252,7 @@ def _settable(v: ProbedVariable) -> bool:
 
 
 def memory(context: Context) -> None:
-    """Resident memory over instances and over steps.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Resident memory over instances and over steps."""
     bench, job = context.bench, context.bench.job
     resident = bench.library.resident
     if not resident():

@@ -13,14 +13,7 @@ _LEAVING = {"CoSimulation": "EnterStepMode", "ModelExchange": "EnterContinuousTi
 
 
 def early_return(context: Context) -> None:
-    """Without earlyReturnAllowed, and without event mode where it can be: no step ends early, no event is announced.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Without earlyReturnAllowed, and without event mode where it can be: no step ends early, no event is announced."""
     bench, job = context.bench, context.bench.job
     if job.interface != "CoSimulation":
         raise SkippedError("the interface has no steps")
@@ -29,14 +22,7 @@ def early_return(context: Context) -> None:
 
 
 def intermediate(context: Context) -> None:
-    """Intermediate updates: only in steps, none before a finished one, with values that can be read and then set.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Intermediate updates: only in steps, none before a finished one, with values that can be read and then set."""
     bench, job = context.bench, context.bench.job
     if job.interface != "CoSimulation":
         raise SkippedError("the interface has no intermediate updates")
@@ -111,14 +97,7 @@ def _asked_to_return(context: Context) -> None:
 
 
 def clocks(context: Context) -> None:
-    """The intervals are those of the description, and event mode without a tick leaves clocked outputs as they are.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """The intervals are those of the description, and event mode without a tick leaves clocked outputs as they are."""
     bench, job = context.bench, context.bench.job
     if not job.clocks:
         raise SkippedError("the FMU has no clocks")
@@ -164,14 +143,7 @@ def _triggered(context: Context) -> None:
 
 
 def structure(context: Context) -> None:
-    """Structural parameters can be set in configuration mode, and arrays then have the size that follows.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Structural parameters can be set in configuration mode, and arrays then have the size that follows."""
     bench, job = context.bench, context.bench.job
     chosen = [v for v in job.variables if v.causality == "structuralParameter" and v.base == "UInt64"]
     if not chosen:

@@ -14,11 +14,7 @@ _SMALL, _MOST_INEXACT = 1e-3, 1e-2
 
 
 def determinism(context: Context) -> None:
-    """A second fresh instance must give the same run.
-
-    Args:
-        context: the FMU, its job and where findings go.
-    """
+    """A second fresh instance must give the same run."""
     with context.bench.instance() as driver:
         difference = context.compare(context.trace or [], context.bench.run(driver))
     if difference is not None:
@@ -28,14 +24,7 @@ def determinism(context: Context) -> None:
 
 
 def instances(context: Context) -> None:
-    """Two instances at once: the one under test must not notice the other.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Two instances at once: the one under test must not notice the other."""
     bench, job = context.bench, context.bench.job
     if context.trace is None:
         raise SkippedError(NOT_COMPARABLE)
@@ -65,14 +54,7 @@ def instances(context: Context) -> None:
 
 
 def reset(context: Context) -> None:
-    """A reset instance must run as a fresh one does, from mid-run and from the end.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """A reset instance must run as a fresh one does, from mid-run and from the end."""
     bench = context.bench
     if context.trace is None:
         raise SkippedError(NOT_COMPARABLE)
@@ -93,14 +75,7 @@ def reset(context: Context) -> None:
 
 
 def state(context: Context) -> None:
-    """Save in mid-run, go on, restore, go on: the rest of the run must be the same.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Save in mid-run, go on, restore, go on: the rest of the run must be the same."""
     bench, job = context.bench, context.bench.job
     if context.trace is None:
         raise SkippedError(NOT_COMPARABLE)
@@ -165,12 +140,6 @@ def variable_steps(context: Context) -> None:
     """Uneven communication steps must hardly change what comes out at common times.
 
     The inputs stay at their start values, for what a slave does between two values of an input is its own.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
     """
     job = context.bench.job
     if not job.varies:

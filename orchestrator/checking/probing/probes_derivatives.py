@@ -24,14 +24,7 @@ Matrix = list[list[float]]
 
 
 def derivatives(context: Context) -> None:
-    """Derivatives that the flags promise: accepted, and right.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Derivatives that the flags promise: accepted, and right."""
     job = context.bench.job
     directional = bool(job.flags & {"providesDirectionalDerivative", "providesDirectionalDerivatives"})
     adjoint = "providesAdjointDerivatives" in job.flags

@@ -34,7 +34,6 @@ class Tube:
         """Look at the values of one row.
 
         Args:
-            values: of the FMU's variables, in the order of the columns.
             row: time [s] and the reference's values.
         """
         off = [abs(float(x) - row[i]) / w for x, (i, _), w in zip(values, self.columns, self.half_widths, strict=True)]
@@ -48,14 +47,7 @@ class Tube:
 
 
 def reference(context: Context) -> None:
-    """Simulate what the reference result shows and compare.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Simulate what the reference result shows and compare."""
     job = context.bench.job
     if job.reference is None:
         raise SkippedError("the FMU has no reference result")

@@ -37,12 +37,5 @@ class DiscardedError(Exception):
 
 
 def odd(function: str) -> ChildError:
-    """The error of an answer that a function cannot have.
-
-    Args:
-        function: what was called.
-
-    Returns:
-        The error, to be raised.
-    """
+    """The error of an answer that a function cannot have."""
     return ChildError(f"the answer to {function} is not valid", "protocol")

@@ -35,14 +35,7 @@ class ProbedVariable:
     extents: tuple[int, ...] = ()
 
     def resized(self, sizes: Mapping[int, int]) -> "ProbedVariable":
-        """The variable after structural parameters have changed.
-
-        Args:
-            sizes: by value reference of the structural parameter.
-
-        Returns:
-            The variable with its new size.
-        """
+        """The variable after structural parameters have changed."""
         lengths = (e if e >= 0 else sizes.get(-1 - e, 1) for e in self.extents)
         return replace(self, size=math.prod(lengths))
 
@@ -63,12 +56,5 @@ class ProbedVariable:
 
 
 def finite(value: Any) -> bool:
-    """Whether a value is no NaN and no infinity.
-
-    Args:
-        value: of any type.
-
-    Returns:
-        True for a finite number and for what is no float.
-    """
+    """Whether a value is no NaN and no infinity."""
     return not isinstance(value, float) or math.isfinite(value)
