@@ -54,14 +54,7 @@ class AttachedEffect(Fmi2Slave):
         self._fed = (0.0, 0.0)
 
     def to_xml(self, model_options: Mapping[str, str] | None = None) -> Element:
-        """Return the model description: what arrives is computed over a step and follows no input at once.
-
-        Args:
-            model_options: of PythonFMU.
-
-        Returns:
-            Its root.
-        """
+        """Return the model description: what arrives is computed over a step and follows no input at once."""
         root = super().to_xml({} if model_options is None else model_options)
         for unknown in root.iterfind("ModelStructure/Outputs/Unknown"):
             unknown.set("dependencies", "")
@@ -79,9 +72,6 @@ class AttachedEffect(Fmi2Slave):
         Args:
             time: beginning of the step [s].
             step: its length [s].
-
-        Returns:
-            True: done.
         """
         kind = FEEDBACK if self.series < 0 else SERIES[self.series]
         if kind == FEEDBACK and cuts(self.law):

@@ -78,10 +78,6 @@ def start(position: float, speed: float, drive: float, p: Parameters) -> State:
         position: [rad].
         speed: [rad/s].
         drive: torque of the drive [N.m].
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The state.
     """
     x = (position, speed, drive, 0.0, UNASKED)
     if speed == 0.0 or not builds_up(p):
@@ -90,15 +86,7 @@ def start(position: float, speed: float, drive: float, p: Parameters) -> State:
 
 
 def friction(x: State, p: Parameters) -> float:
-    """Return the magnitude of dry friction [N.m] at the axis's speed and position.
-
-    Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The magnitude.
-    """
+    """Return the magnitude of dry friction [N.m] at the axis's speed and position."""
     level = sliding_friction(x[1], p[P_COULOMB], p[P_STRIBECK], p[P_BREAKAWAY], p[P_STRIBECK_SPEED])
     if p[P_WAVY] == 0.0:
         return level
@@ -106,14 +94,7 @@ def friction(x: State, p: Parameters) -> float:
 
 
 def filtered(p: Parameters) -> bool:
-    """Tell whether the request is filtered or limited in rate.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when it is.
-    """
+    """Tell whether the request is filtered or limited in rate."""
     return p[P_FILTER] > 0.0 or p[P_RATE] < BIG
 
 
@@ -121,12 +102,7 @@ def drive_torque(x: State, p: Parameters, u: float) -> float:
     """Return the drive's torque [N.m]: the state behind the lag, or the (filtered) request itself without one.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
-
-    Returns:
-        The torque.
     """
     if p[P_TAU] > 0.0:
         return x[2]
@@ -137,13 +113,8 @@ def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
     """Return the torque on the axis [N.m] of all but dry friction.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The torque.
     """
     torque = drive_torque(x, p, u) + torque_ripple(x[0], p[P_RIPPLE], p[P_RIPPLE_N], p[P_RIPPLE_PHASE])
     if p[P_RIPPLE_2] != 0.0 or p[P_RIPPLE_3] != 0.0:
@@ -162,15 +133,7 @@ def sliding_torque(x: State, p: Parameters, u: float, T_l: float) -> float:
 
 
 def inertia(x: State, p: Parameters) -> float:
-    """Return the inertia [kg.m2] at a position; a wave larger than it leaves a thousandth of it.
-
-    Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The inertia.
-    """
+    """Return the inertia [kg.m2] at a position; a wave larger than it leaves a thousandth of it."""
     if p[P_J_WAVE] == 0.0:
         return p[P_J]
     return max(1e-3 * p[P_J], p[P_J] + periodic(x[0], p[P_J_WAVE], p[P_J_WAVE_N], p[P_J_WAVE_PHASE]))
@@ -180,14 +143,9 @@ def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
     """Return the time derivative of ``x``, the bristle apart.
 
     Args:
-        x: state.
         sign: direction of dry friction, -1 to 1; a smooth approximation passes ``tanh(speed/width)``.
-        p: parameters in the order of ``PARAMETERS``.
         u: requested torque [N.m], delayed and saturated already, held.
         T_l: external load torque [N.m], held.
-
-    Returns:
-        The derivative.
     """
     asked = u
     follows = 0.0
@@ -200,78 +158,34 @@ def rates(x: State, sign: float, p: Parameters, u: float, T_l: float) -> State:
 
 
 def rest(p: Parameters) -> float:
-    """Return the breakaway torque [N.m] without what depends on the position.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
-    """
+    """Return the breakaway torque [N.m] without what depends on the position."""
     return p[P_COULOMB] + max(p[P_STRIBECK], p[P_BREAKAWAY])
 
 
 def capacity(x: State, p: Parameters) -> float:
-    """Return the breakaway torque [N.m] below which an axis that stands still keeps standing.
-
-    Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
-    """
+    """Return the breakaway torque [N.m] below which an axis that stands still keeps standing."""
     if p[P_WAVY] == 0.0:
         return rest(p)
     return dependent_friction(rest(p), 0.0, 0.0, x[0], p[P_WAVY], p[P_WAVY_N], p[P_WAVY_PHASE])
 
 
 def builds_up(p: Parameters) -> bool:
-    """Tell whether friction builds up over a distance.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when it does.
-    """
+    """Tell whether friction builds up over a distance."""
     return p[P_PRESLIDING] > 0.0 and rest(p) > 0.0
 
 
 def reach(x: State, p: Parameters) -> float:
-    """Return the bending [rad] at which the bristle slides at its speed.
-
-    Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The bending.
-    """
+    """Return the bending [rad] at which the bristle slides at its speed."""
     return p[P_PRESLIDING] * friction(x, p) / rest(p)
 
 
 def falls(p: Parameters) -> bool:
-    """Tell whether friction depends on the speed.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when it does.
-    """
+    """Tell whether friction depends on the speed."""
     return p[P_STRIBECK] != p[P_BREAKAWAY]
 
 
 def leaves_sliding(p: Parameters) -> float:
-    """Return the speed [rad/s] below which the bristle of an axis that slides must be followed.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The speed; 0.0 where there is no bristle.
-    """
+    """Return the speed [rad/s] below which the bristle of an axis that slides must be followed."""
     return leaving_speed(p[P_PRESLIDING], falls(p), p[P_STRIBECK_SPEED]) if builds_up(p) else 0.0
 
 
@@ -279,14 +193,9 @@ def mode_rates(x: State, mode: int, p: Parameters, u: float, T_l: float) -> Stat
     """Return the derivative of ``x``; an axis in mode 0 bends its bristle, or sticks where it has none.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The derivative.
     """
     if mode != 0:
         return rates(x, float(mode), p, u, T_l)
@@ -303,8 +212,6 @@ def slip_at_rest(x: State, p: Parameters, u: float, T_l: float) -> int:
     """Return the direction in which an axis at rest starts to slide, 0 when friction holds it.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
 
@@ -323,12 +230,7 @@ def initial_mode(x: State, p: Parameters, u: float) -> int:
     """Return the direction of sliding (0: none) in which a simulation starts from ``x``, asked for ``u`` [N.m].
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
-
-    Returns:
-        -1, 0 or 1.
     """
     if builds_up(p):
         return 0
@@ -340,10 +242,6 @@ def initial_mode(x: State, p: Parameters, u: float) -> int:
 def settled(x: State, p: Parameters) -> int:
     """Return the direction of sliding of an axis whose bristle has settled, or 0.
 
-    Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
-
     Returns:
         -1, 0 or 1.
     """
@@ -354,10 +252,6 @@ def settled(x: State, p: Parameters) -> int:
 
 def past_stop(x: State, p: Parameters) -> int:
     """Return the end stop at which the axis is: -1, 0 (none) or 1.
-
-    Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
 
     Returns:
         -1, 0 or 1.

@@ -51,15 +51,10 @@ def longest_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: fl
     """Return a step [s] that resolves all rates well (a Runge-Kutta step errs by its 5th power).
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        The step, at most ``h``.
     """
     rate = (p[P_B] + abs(p[P_DIRECTION]) + 2.0 * p[P_DRAG] * abs(x[1])) / p[P_J]
     if p[P_RIPPLE] != 0.0:
@@ -76,12 +71,7 @@ def step_of_lag(x: State, p: Parameters, u: float) -> float:
     """Return a step [s] that resolves the drive's lag: one that has come close to its request asks for no short ones.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
-
-    Returns:
-        The step.
     """
     if filtered(p):
         return SHARE * p[P_TAU]
@@ -98,15 +88,10 @@ def step_of_fall(x: State, mode: int, p: Parameters, u: float, T_l: float, most:
     A long step may not come near that speed.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         most: step that everything else allows [s].
-
-    Returns:
-        The step, at most ``most``.
     """
     fall = abs(p[P_BREAKAWAY] - p[P_STRIBECK]) / p[P_J]
     short = SHARE * p[P_STRIBECK_SPEED] / (fall + TINY)
@@ -128,12 +113,7 @@ def further_rate(x: State, mode: int, p: Parameters) -> float:
     """Return the fastest rate [1/s] of bristle, filter, harmonics, spring, end stops and varying inertia.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The rate.
     """
     rate = 0.0
     if mode == 0 and builds_up(p):
@@ -160,12 +140,7 @@ def along(x: State, h: float, r: State) -> State:
     """Return ``x + h r``.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         h: length of the step [s].
-        r: derivative.
-
-    Returns:
-        The state.
     """
     return (x[0] + h * r[0], x[1] + h * r[1], x[2] + h * r[2], x[3] + h * r[3], x[4] + h * r[4])
 
@@ -174,14 +149,8 @@ def driven(x: State, after: State, p: Parameters, u: float, h: float) -> State:
     """Return the state ``after`` with the drive's torque as it is then: ``u + (drive - u) exp(-h / tau)``.
 
     Args:
-        x: state before.
-        after: state ``h`` later, its torque by a quadrature.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         h: time between both [s].
-
-    Returns:
-        The state; ``after`` as it is where the drive has no lag, or follows a request that is filtered.
     """
     if p[P_TAU] <= 0.0 or filtered(p):
         return after
@@ -192,15 +161,10 @@ def smooth_step(x: State, mode: int, p: Parameters, u: float, T_l: float, h: flo
     """Return the state after one classical Runge-Kutta step in one direction of sliding.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        The state.
     """
     a = mode_rates(x, mode, p, u, T_l)
     b = mode_rates(driven(x, along(x, 0.5 * h, a), p, u, 0.5 * h), mode, p, u, T_l)
@@ -221,16 +185,11 @@ def slowing_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: fl
     """Return when within ``h`` [s] an axis that slides falls to the speed ``least`` [rad/s] (bisection).
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
         least: [rad/s].
-
-    Returns:
-        The time [s].
     """
     low, high = 0.0, h
     for _ in range(50):
@@ -246,14 +205,9 @@ def held(x: State, p: Parameters, u: float, T_l: float, h: float) -> State:
     """Return the state after ``h`` [s] at rest: the drive's torque alone moves.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        The state.
     """
     if filtered(p):
         return smooth_step((x[0], 0.0, x[2], x[3], x[4]), 0, p, u, T_l, h)
@@ -264,14 +218,9 @@ def breaking_time(x: State, p: Parameters, u: float, T_l: float, h: float) -> fl
     """Return when within ``h`` [s] the growing torque of the drive breaks an axis away that sticks (bisection).
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        The time [s].
     """
     low, high = 0.0, h
     for _ in range(50):
@@ -287,15 +236,10 @@ def stop_time(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float
     """Return when within ``h`` [s] an axis reaches or leaves an end stop (bisection).
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        The time [s].
     """
     low, high = 0.0, h
     begin = past_stop(x, p)

@@ -58,9 +58,6 @@ def covariance(r: int, c: int) -> int:
     Args:
         r: row, from 0.
         c: column, from 0.
-
-    Returns:
-        The place.
     """
     return STATES + STATES * r + c
 
@@ -79,12 +76,7 @@ def start(
 
     Args:
         f: the filter, changed in place.
-        number: which size it starts from.
-        theta_m: measured motor angle.
-        theta_l: measured load angle; for a machine without load encoder, motor angle over gear ratio.
         noise_m: standard deviation of the motor's angle [rad].
-        noise_l: the same of the load's; large when it is not measured.
-        stiffness_spread: standard deviation of the stiffness's relative error.
         offset_spread: standard deviation of the twist in mid-gap [rad].
     """
     for n in range(SIZE):
@@ -102,11 +94,7 @@ def distance_variance(f: Filter, side: float) -> float:
     """Return the part of the variance [rad2] of the distance to a flank that does not concern the motor's angle.
 
     Args:
-        f: the filter's values.
         side: flank, -1.0 or 1.0.
-
-    Returns:
-        The variance.
     """
     return (
         f[covariance(2, 2)]
@@ -122,9 +110,6 @@ def flank(distance: float, variance: float) -> tuple[float, float]:
     Args:
         distance: mean of the distance beyond the flank [rad].
         variance: of it [rad2].
-
-    Returns:
-        Both.
     """
     sigma = sqrt(variance)
     z = distance / sigma
@@ -138,10 +123,8 @@ def predict(f: Filter, m: Model, u: float, h: float, s: SettingValues) -> None:
 
     Args:
         f: the filter, changed in place.
-        m: model.
         u: requested torque [N.m].
         h: step [s], short beside the shaft's oscillation.
-        s: settings, in the order of :class:`NoiseSettings`.
     """
     J_m, J_l, k, c, b_m, b_l, i, tau = m
     mean = 1.0 / i
@@ -272,13 +255,6 @@ def combine(filters: Filters, count: int) -> tuple[float, float, int]:
     """Return (alpha [rad], its standard deviation [rad], number of the heaviest filter) of the Gaussian sum.
 
     Log weights are shifted so that the largest is zero, and kept from falling out of range.
-
-    Args:
-        filters: of the Gaussian sum.
-        count: how many of them are used.
-
-    Returns:
-        The three.
     """
     largest = filters[0][WEIGHT]
     best = 0
@@ -302,15 +278,7 @@ def combine(filters: Filters, count: int) -> tuple[float, float, int]:
 
 
 def contact(f: Filter, i: float) -> int:
-    """Return the flank (-1, 0, 1) at which a filter puts the gear, for the gear ratio ``i``.
-
-    Args:
-        f: the filter's values.
-        i: gear ratio.
-
-    Returns:
-        The flank.
-    """
+    """Return the flank (-1, 0, 1) at which a filter puts the gear, for the gear ratio ``i``."""
     wound = f[0] / i - f[2] - f[8]
     if wound > f[ALPHA]:
         return 1
@@ -321,10 +289,8 @@ def begin(filters: Filters, theta_m: float, theta_l: float, s: SettingValues) ->
     """Set all filters at the first measured angles [rad] with the settings ``s``.
 
     Args:
-        filters: that are set.
         theta_m: motor angle [rad].
         theta_l: load angle [rad].
-        s: settings.
     """
     for n in range(FILTERS):
         start(filters[n], n, theta_m, theta_l, s[0], s[1], s[6], s[7])
@@ -335,8 +301,6 @@ def advance(filters: Filters, m: Model, s: SettingValues, u: float, h: float) ->
 
     Args:
         filters: ``FILTERS`` filters, changed in place.
-        m: model.
-        s: settings, in the order of :class:`NoiseSettings`.
         u: torque request held over the sample [N.m].
         h: sample time [s].
     """
@@ -352,8 +316,6 @@ def measure(filters: Filters, s: SettingValues, theta_m: float, theta_l: float) 
     """Take both measured angles [rad] into all filters.
 
     Args:
-        filters: that are corrected.
-        s: settings.
         theta_m: motor angle [rad].
         theta_l: load angle [rad].
     """

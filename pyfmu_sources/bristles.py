@@ -53,58 +53,27 @@ def breakaway(coulomb: float, sliding: float, static: float) -> float:
         coulomb: Coulomb friction [N.m].
         sliding: Stribeck's friction at high speed, above Coulomb's [N.m].
         static: Stribeck's friction at rest, above Coulomb's [N.m].
-
-    Returns:
-        The torque.
     """
     return coulomb + max(sliding, static)
 
 
 def unloaded_m(p: Parameters) -> float:
-    """Return the motor's breakaway torque [N.m] without what depends on the shaft's torque and the position.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
-    """
+    """Return the motor's breakaway torque [N.m] without what depends on the shaft's torque and the position."""
     return breakaway(p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M])
 
 
 def unloaded_l(p: Parameters) -> float:
-    """Return the load's breakaway torque [N.m] without what depends on the shaft's torque and the position.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
-    """
+    """Return the load's breakaway torque [N.m] without what depends on the shaft's torque and the position."""
     return breakaway(p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L])
 
 
 def has_friction_m(p: Parameters) -> bool:
-    """Tell whether the motor has dry friction.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when it has.
-    """
+    """Tell whether the motor has dry friction."""
     return p[P_COULOMB_M] + p[P_STRIBECK_M] + p[P_BREAKAWAY_M] + p[P_LOADED_M] + abs(p[P_WAVY_M]) > 0.0
 
 
 def has_friction_l(p: Parameters) -> bool:
-    """Tell whether the load has dry friction.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when it has.
-    """
+    """Tell whether the load has dry friction."""
     return p[P_COULOMB_L] + p[P_STRIBECK_L] + p[P_BREAKAWAY_L] + p[P_LOADED_L] + abs(p[P_WAVY_L]) > 0.0
 
 
@@ -112,12 +81,7 @@ def capacity_m(x: State, contact: int, p: Parameters) -> float:
     """Return the breakaway torque [N.m] of the motor.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
     """
     level = unloaded_m(p)
     if p[P_LOADED_M] == 0.0 and p[P_WAVY_M] == 0.0:
@@ -131,12 +95,7 @@ def capacity_l(x: State, contact: int, p: Parameters) -> float:
     """Return the breakaway torque [N.m] of the load.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
     """
     level = unloaded_l(p)
     if p[P_LOADED_L] == 0.0 and p[P_WAVY_L] == 0.0:
@@ -150,12 +109,7 @@ def carried_m(x: State, contact: int, p: Parameters) -> float:
     """Return the shaft's torque on the motor [N.m] that its friction depends on; rigid teeth leave it out.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
     """
     return 0.0 if is_rigid(p) or p[P_LOADED_M] == 0.0 else elastic_torque(x, contact, p) * lever_arm(x, p)
 
@@ -164,61 +118,28 @@ def carried_l(x: State, contact: int, p: Parameters) -> float:
     """Return the shaft's torque on the load [N.m] that its friction depends on; rigid teeth leave it out.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
     """
     return 0.0 if is_rigid(p) or p[P_LOADED_L] == 0.0 else elastic_torque(x, contact, p)
 
 
 def rest_m(p: Parameters) -> float:
-    """Return the motor's breakaway torque [N.m] at 1 N.m of the shaft's on it, without what depends on the position.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
-    """
+    """Return the motor's breakaway torque [N.m] at 1 N.m of the shaft's on it, without what depends on the position."""
     return unloaded_m(p) + p[P_LOADED_M]
 
 
 def rest_l(p: Parameters) -> float:
-    """Return the load's breakaway torque [N.m] at 1 N.m of the shaft's on it, without what depends on the position.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
-    """
+    """Return the load's breakaway torque [N.m] at 1 N.m of the shaft's on it, without what depends on the position."""
     return unloaded_l(p) + p[P_LOADED_L]
 
 
 def builds_up_m(p: Parameters) -> bool:
-    """Tell whether the motor's friction builds up over a distance; what only the shaft's torque makes is set-valued.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when it does.
-    """
+    """Tell whether the motor's friction builds up over a distance; what only the shaft's torque makes is set-valued."""
     return p[P_PRESLIDING_M] > 0.0 and unloaded_m(p) > 0.0 and not is_rigid(p)
 
 
 def builds_up_l(p: Parameters) -> bool:
-    """Tell whether the load's friction builds up over a distance; what only the shaft's torque makes is set-valued.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when it does.
-    """
+    """Tell whether the load's friction builds up over a distance; what only the shaft's torque makes is set-valued."""
     return p[P_PRESLIDING_L] > 0.0 and unloaded_l(p) > 0.0 and not is_rigid(p)
 
 
@@ -227,36 +148,18 @@ def leaving_speed(distance: float, falls: bool, stribeck_speed: float) -> float:
 
     Args:
         distance: over which friction builds up [rad].
-        falls: whether friction depends on the speed.
         stribeck_speed: [rad/s].
-
-    Returns:
-        The speed.
     """
     return min(FALLEN * stribeck_speed, QUICKEST * distance) if falls else 0.0
 
 
 def leaving_speed_m(p: Parameters) -> float:
-    """Return :func:`leaving_speed` of the motor [rad/s].
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The speed.
-    """
+    """Return :func:`leaving_speed` of the motor [rad/s]."""
     return leaving_speed(p[P_PRESLIDING_M], p[P_STRIBECK_M] != p[P_BREAKAWAY_M], p[P_STRIBECK_SPEED_M])
 
 
 def leaving_speed_l(p: Parameters) -> float:
-    """Return :func:`leaving_speed` of the load [rad/s].
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The speed.
-    """
+    """Return :func:`leaving_speed` of the load [rad/s]."""
     return leaving_speed(p[P_PRESLIDING_L], p[P_STRIBECK_L] != p[P_BREAKAWAY_L], p[P_STRIBECK_SPEED_L])
 
 
@@ -264,12 +167,7 @@ def reach_m(x: State, contact: int, p: Parameters) -> float:
     """Return the bending [rad] at which the motor's bristle slides at its speed.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The bending.
     """
     return p[P_PRESLIDING_M] * friction_m(x, carried_m(x, contact, p), p) / rest_m(p)
 
@@ -278,12 +176,7 @@ def reach_l(x: State, contact: int, p: Parameters) -> float:
     """Return the bending [rad] at which the load's bristle slides at its speed.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The bending.
     """
     return p[P_PRESLIDING_L] * friction_l(x, carried_l(x, contact, p), p) / rest_l(p)
 
@@ -297,9 +190,6 @@ def bent_sign(bristle: float, rate: float, reach: float, stiffness: float, dampi
         reach: bending at which it slides [rad].
         stiffness: of the bristle [N.m/rad].
         damping: of the bristle [N.m.s/rad].
-
-    Returns:
-        The direction.
     """
     if reach <= 0.0:
         return 0.0
@@ -314,10 +204,6 @@ def has_settled(bristle: float, speed: float, reach: float, leaving: float, fall
         speed: of the part [rad/s].
         reach: bending at which it slides [rad].
         leaving: speed below which the bristle must be followed [rad/s].
-        falls: whether friction depends on the speed.
-
-    Returns:
-        True when it has.
     """
     side = 1.0 if speed > 0.0 else -1.0
     if abs(speed) < max(LEAST_SPEED, ENTER * leaving) or reach <= 0.0:
@@ -330,12 +216,8 @@ def bent(x: State, z_m: float, z_l: float) -> State:
     """Return the state with the bristles at ``z_m`` and ``z_l`` [rad].
 
     Args:
-        x: state, as in ``equations``.
         z_m: of the motor's bristle [rad].
         z_l: of the load's [rad].
-
-    Returns:
-        The state.
     """
     return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], z_m, z_l, x[10], x[11])
 
@@ -344,12 +226,7 @@ def resting_bristles(x: State, contact: int, p: Parameters) -> State:
     """Return the state as a simulation starts: bristles of what moves have settled, others are straight.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The state.
     """
     z_m = 0.0
     z_l = 0.0
@@ -361,16 +238,7 @@ def resting_bristles(x: State, contact: int, p: Parameters) -> State:
 
 
 def turned_signs(x: State, mode: Mode, p: Parameters) -> tuple[float, float, float, float]:
-    """Return the directions of friction of motor and load, and the rates of their bristles [rad/s].
-
-    Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The four.
-    """
+    """Return the directions of friction of motor and load, and the rates of their bristles [rad/s]."""
     contact, slip_m, slip_l = mode
     sign_m = float(slip_m)
     sign_l = float(slip_l)
@@ -388,16 +256,7 @@ def turned_signs(x: State, mode: Mode, p: Parameters) -> tuple[float, float, flo
 
 
 def settled_slips(x: State, mode: Mode, p: Parameters) -> Mode:
-    """Return the mode with parts whose bristles have settled sliding.
-
-    Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The mode.
-    """
+    """Return the mode with parts whose bristles have settled sliding."""
     contact, slip_m, slip_l = mode
     if slip_m == 0 and builds_up_m(p):
         falls = p[P_STRIBECK_M] != p[P_BREAKAWAY_M]

@@ -31,8 +31,6 @@ def run_loop(
         reference_speed: wanted load speed [rad/s].
         error_m: error [rad] of the motor's encoder.
         error_l: error [rad] of the load's encoder.
-        gains: state feedback.
-        estimator: state matrix, input vector, gain and inverse innovation covariance of the filter.
         limits: gear ratio, compliance of the shaft [rad/(N.m)], torque limit [N.m].
         out: array of shape (n, 7), filled with theta_m, theta_l, theta_l_hat, u, contact, T_m, T_l_hat.
     """

@@ -38,12 +38,7 @@ def parted_twist(x: State, contact: int, p: Parameters) -> float:
     """Return the twist [rad] that a shaft keeps at the moment at which its teeth part at flank ``contact``.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The twist.
     """
     damping = shaft_damping(p)
     if damping == 0.0 or shaft_stiffness(p) > 1e7 * damping:
@@ -52,16 +47,7 @@ def parted_twist(x: State, contact: int, p: Parameters) -> float:
 
 
 def collide(x: State, restitution: float, p: Parameters) -> State:
-    """Return the state after motor and load hit each other (eqs. 2.3 and 2.4): momentum is kept.
-
-    Args:
-        x: state, as in ``equations``.
-        restitution: speed after the impact over that before.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The state.
-    """
+    """Return the state after motor and load hit each other (eqs. 2.3 and 2.4): momentum is kept."""
     i = gear(x, p)
     mobility = 1.0 / (p[P_J_M] * i * i) + 1.0 / load_inertia(x, p)
     impulse = (1.0 + restitution) * (x[1] / i - x[3]) / mobility
@@ -76,12 +62,7 @@ def on_flank(x: State, side: int, p: Parameters) -> State:
     """Return the state with the load moved to the flank ``side`` of rigid teeth and both at one speed.
 
     Args:
-        x: state, as in ``equations``.
         side: flank, -1 or 1.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The state.
     """
     theta_l = x[2] + twist(x, p) - side * p[P_ALPHA]
     return collide((x[0], x[1], theta_l, x[3], x[4], x[5], x[6], 0.0, x[8], x[9], x[10], x[11]), 0.0, p)
@@ -91,12 +72,7 @@ def joined(x: State, side: int, p: Parameters) -> State:
     """Return a state of rigid teeth in contact as it must be: at the flank and at one speed; mostly ``x`` itself.
 
     Args:
-        x: state, as in ``equations``.
         side: flank, -1 or 1.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The state.
     """
     apart = abs(twist(x, p) - side * p[P_ALPHA])
     sliding = abs(twist_rate(x, p))
@@ -109,24 +85,13 @@ def parted(x: State, wound: float) -> State:
     """Return the state with the twist ``wound`` [rad] left in the shaft, whose hysteresis starts anew.
 
     Args:
-        x: state, as in ``equations``.
         wound: [rad].
-
-    Returns:
-        The state.
     """
     return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], wound, x[8], x[9], 0.0, x[11])
 
 
 def stopped(x: State) -> State:
-    """Return the state with motor and load standing still.
-
-    Args:
-        x: state, as in ``equations``.
-
-    Returns:
-        The state.
-    """
+    """Return the state with motor and load standing still."""
     return (x[0], 0.0, x[2], 0.0, x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11])
 
 
@@ -144,18 +109,10 @@ def after_event(
     """Return state and contact after the guard ``which`` of ``contact`` has turned negative.
 
     Args:
-        x: state at the event.
-        contact: the mode that ends.
-        which: its guard, as numbered by the guard functions.
-        events: how many events this step has had; many mean chattering, which ends in a lasting contact.
         push_m: torque on the motor [N.m] without the shaft's.
         push: torque [N.m] on motor and load as one body, load side.
-        p: parameters.
         held_m: dry friction [N.m] that holds a motor at rest.
         held: dry friction [N.m], load side, that holds motor and load as one body.
-
-    Returns:
-        Both.
     """
     model = int(p[P_MODEL])
     if contact == 0:
@@ -183,16 +140,11 @@ def play_engaged(
     """Return state and contact of the play model (eq. 2.5) when the motor reaches a ``flank``.
 
     Args:
-        x: state, as in ``equations``.
         flank: that is reached, -1 or 1.
         push_m: torque on the motor without the shaft's [N.m].
         push: torque on motor and load as one body, load side [N.m].
-        p: parameters, in the order of the FMU's table.
         held_m: dry friction that holds a motor at rest [N.m].
         held: dry friction, load side, that holds motor and load as one body [N.m].
-
-    Returns:
-        Both.
     """
     after = collide(x, 0.0, p)
     if flank * after[1] > RESTING_SPEED:
@@ -204,15 +156,11 @@ def play_reversed(x: State, flank: int, push_m: float, push: float, held_m: floa
     """Return state and contact of the play model at standstill: part, rest against the flank, or go on.
 
     Args:
-        x: state, as in ``equations``.
         flank: that is reached, -1 or 1.
         push_m: torque on the motor without the shaft's [N.m].
         push: torque on motor and load as one body, load side [N.m].
         held_m: dry friction that holds a motor at rest [N.m].
         held: dry friction, load side, that holds motor and load as one body [N.m].
-
-    Returns:
-        Both.
     """
     if flank * push_m <= -held_m:
         return (x, 0)
@@ -220,15 +168,7 @@ def play_reversed(x: State, flank: int, push_m: float, push: float, held_m: floa
 
 
 def initial_contact(x: State, p: Parameters) -> int:
-    """Return the flank at which a simulation starts.
-
-    Args:
-        x: state, as in ``equations``.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The flank.
-    """
+    """Return the flank at which a simulation starts."""
     if backlash_model(p) == NONE or (is_rigid(p) and p[P_ALPHA] == 0.0):
         return 1
     contact = contact_of(twist(x, p), p[P_ALPHA])
@@ -248,13 +188,6 @@ def consistent_start(start: Start, p: Parameters) -> State:
     A rigid gear cannot be wound beyond its gap: the load is moved to the flank. The play model's load stands
     still inside the gap. Teeth that never pull may part at once and then leave the shaft its twist. What is not part of
     the first eight entries (bristles, hysteresis, filter of the drive) starts at rest, so that they may be left out.
-
-    Args:
-        start: angles, speeds, drive torque and so on, of which the first eight are given.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The state.
     """
     model = int(p[P_MODEL])
     half = p[P_ALPHA]

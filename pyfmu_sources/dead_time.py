@@ -15,11 +15,7 @@ def is_new(requests: Requests, u: float) -> int:
     """Return 1 if the torque ``u`` [N.m] is another one than was requested last, else 0.
 
     Args:
-        requests: time and torque of each request that is under way.
         u: requested torque [N.m].
-
-    Returns:
-        1 or 0.
     """
     if len(requests) == 0:
         return 1
@@ -30,13 +26,9 @@ def request_at(requests: Requests, n: int, u: float, time: float) -> Request:
     """Return the request number ``n``; the one behind the last is what is requested now, ``u`` at ``time``.
 
     Args:
-        requests: time and torque of each request that is under way.
         n: number, from 0.
         u: requested torque [N.m].
         time: [s].
-
-    Returns:
-        Time and torque.
     """
     if n < len(requests):
         return requests[n]

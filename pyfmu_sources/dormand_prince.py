@@ -19,14 +19,8 @@ def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Sta
     """Return the derivative of ``x`` in ``mode``; what sticks does not move.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The derivative.
     """
     still_m = mode[1] == 0
     still_l = mode[2] == 0
@@ -53,16 +47,7 @@ def mode_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Sta
 
 
 def ahead(x: State, f: float, k: State) -> State:
-    """Return ``x + f k``.
-
-    Args:
-        x: state, as in ``equations``.
-        f: factor.
-        k: derivative.
-
-    Returns:
-        The state.
-    """
+    """Return ``x + f k``."""
     return (
         x[0] + f * k[0],
         x[1] + f * k[1],
@@ -80,17 +65,7 @@ def ahead(x: State, f: float, k: State) -> State:
 
 
 def combine(a: float, k: State, b: float, m: State) -> State:
-    """Return ``a k + b m``.
-
-    Args:
-        a: factor.
-        k: derivative.
-        b: factor.
-        m: derivative.
-
-    Returns:
-        The sum.
-    """
+    """Return ``a k + b m``."""
     return (
         a * k[0] + b * m[0],
         a * k[1] + b * m[1],
@@ -111,11 +86,7 @@ def is_quick(p: Parameters, h: float) -> bool:
     """Tell whether a drive moves within a step, and follows the request itself: not a filtered or limited one.
 
     Args:
-        p: parameters, in the order of the FMU's table.
         h: length of the step [s].
-
-    Returns:
-        True when it does.
     """
     return h > SLOW * p[P_TAU] and p[P_FILTER] <= 0.0 and p[P_RATE] >= BIG
 
@@ -124,15 +95,8 @@ def driven(x: State, after: State, quick: bool, p: Parameters, u: float, h: floa
     """Return the state ``after`` with the torque of a quick drive as it is then: ``u + (T_m - u) exp(-h / tau)``.
 
     Args:
-        x: state before.
-        after: state ``h`` later, its torque by a quadrature.
-        quick: the drive is.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         h: time between both [s].
-
-    Returns:
-        The state; ``after`` as it is where the drive is not quick.
     """
     if not quick:
         return after
@@ -159,10 +123,6 @@ def runge_kutta(
     """Return the state after one Dormand-Prince step, its derivative there and the scaled error.
 
     Args:
-        x: state, as in ``equations``.
-        k1: derivative at the beginning.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].

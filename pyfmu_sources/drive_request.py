@@ -11,10 +11,6 @@ def saturated(u: float, limit: float) -> float:
 
     Args:
         u: what it follows [N.m].
-        limit: in the unit of what it limits.
-
-    Returns:
-        The torque.
     """
     if u > limit:
         return limit
@@ -32,10 +28,6 @@ def request_rate(request: float, u: float, time_constant: float, limit: float) -
         request: behind the lag, at the beginning [N.m].
         u: what it follows [N.m].
         time_constant: of the lag [s]; 0: none.
-        limit: in the unit of what it limits.
-
-    Returns:
-        The rate.
     """
     rate = (u - request) / max(time_constant, RAMP_END)
     return saturated(rate, limit)
@@ -48,10 +40,6 @@ def ramp_time(request: float, u: float, time_constant: float, limit: float) -> f
         request: behind the lag, at the beginning [N.m].
         u: what it follows [N.m].
         time_constant: of the lag [s]; 0: none.
-        limit: in the unit of what it limits.
-
-    Returns:
-        The time; 0.0: it does not.
     """
     return max(0.0, abs(u - request) / limit - time_constant)
 
@@ -63,11 +51,7 @@ def ramp_target(request: float, u: float, time_constant: float, limit: float, du
         request: behind the lag, at the beginning [N.m].
         u: what it follows [N.m].
         time_constant: of the lag [s]; 0: none.
-        limit: in the unit of what it limits.
         duration: [s].
-
-    Returns:
-        The request.
     """
     reach = 2.0 * limit * (duration + max(time_constant, RAMP_END))
     return request + reach if u > request else request - reach
@@ -80,10 +64,6 @@ def ramp_end(request: float, u: float, time_constant: float, limit: float) -> fl
         request: behind the lag, at the beginning [N.m].
         u: what it follows [N.m].
         time_constant: of the lag [s]; 0: none.
-        limit: in the unit of what it limits.
-
-    Returns:
-        The request.
     """
     return u - limit * time_constant if u > request else u + limit * time_constant
 
@@ -97,9 +77,6 @@ def followed_request(request: float, u: float, time_constant: float, limit: floa
         time_constant: of the lag [s]; 0: none.
         limit: largest rate [N.m/s].
         h: duration [s].
-
-    Returns:
-        Both [N.m].
     """
     ramp = min(h, ramp_time(request, u, time_constant, limit))
     slope = limit if u > request else -limit

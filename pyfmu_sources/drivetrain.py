@@ -73,14 +73,7 @@ __all__ = [
 
 
 def has_nonlinear_effect(p: Parameters) -> bool:
-    """Tell whether an effect is on that the linear solution cannot carry.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when one is.
-    """
+    """Tell whether an effect is on that the linear solution cannot carry."""
     friction = has_friction_m(p) or has_friction_l(p) or p[P_DIRECTION_M] != 0.0 or p[P_DIRECTION_L] != 0.0
     ripples = abs(p[P_RIPPLE]) + abs(p[P_RIPPLE_2]) + abs(p[P_RIPPLE_3]) + abs(p[P_ECC]) + abs(p[P_GRAVITY])
     shaft = p[P_CUBIC] + abs(p[P_K_WAVE]) + p[P_HYSTERESIS] + p[P_ONSET]
@@ -93,11 +86,7 @@ def prepare(p: Parameters, h: float) -> Table:
     """Return what steps of ``h`` [s] need again and again: the transition matrices and the relaxation.
 
     Args:
-        p: parameters, in the order of the FMU's table.
         h: length of the step [s].
-
-    Returns:
-        Transition matrices with and without contact, rate and decay of a parted shaft, and whether an effect is on.
     """
     kappa = relaxation_rate(p)
     nonlinear = has_nonlinear_effect(p)
@@ -111,15 +100,7 @@ def prepare(p: Parameters, h: float) -> Table:
 
 
 def initial_mode(x: State, p: Parameters) -> Mode:
-    """Return the mode in which a simulation starts from ``x``.
-
-    Args:
-        x: state, as in ``equations``.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The mode.
-    """
+    """Return the mode in which a simulation starts from ``x``."""
     contact = initial_contact(x, p)
     slip_m, slip_l = slips(x, contact, p, 0.0)
     return (contact, slip_m, slip_l)
@@ -127,11 +108,6 @@ def initial_mode(x: State, p: Parameters) -> Mode:
 
 def reported_contact(x: State, mode: Mode, p: Parameters) -> int:
     """Return the output ``contact``: the flank that touches; without a gap, the one the shaft is wound to.
-
-    Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
 
     Returns:
         -1, 0 or 1.
@@ -145,16 +121,10 @@ def advance(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: float,
     """Return state and mode after ``h`` [s] with the inputs held.
 
     Args:
-        x: state.
-        mode: mode, from :func:`initial_mode` or the step before.
-        p: parameters.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: step [s], positive.
         table: ``prepare(p, h)`` of the same ``p`` and ``h``.
-
-    Returns:
-        Both.
     """
     if table[4]:
         if x[11] == UNASKED and (p[P_FILTER] > 0.0 or p[P_RATE] < BIG):
@@ -173,15 +143,9 @@ def advance_ramp(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h: f
     """Return state and mode after ``h`` [s] of a drive limited in its rate; the end of a ramp is met exactly.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        Both.
     """
     before = x[11]
     ramp = min(h, ramp_time(before, u, p[P_FILTER], p[P_RATE]))
@@ -201,9 +165,6 @@ def advance_to_event(
     """Return :func:`advance` up to the first event, which has not had its effect yet.
 
     Args:
-        x: state.
-        mode: mode.
-        p: parameters.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: step [s], positive.
@@ -232,9 +193,6 @@ def ramp_to_event(
     """Return :func:`advance_ramp` up to the first event.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].

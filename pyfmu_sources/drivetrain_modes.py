@@ -27,14 +27,8 @@ def state_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> St
     """Return the time derivative of ``x`` in ``mode``; the states of an extra inertia that is not there stand still.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The derivative.
     """
     r = mode_rates(x, mode, p, u, T_l)
     if p[P_RES_J] > 0.0:
@@ -46,14 +40,8 @@ def rates_and_outputs(x: State, mode: Mode, p: Parameters, u: float, T_l: float)
     """Return the derivatives, and the outputs theta_m, theta_l, omega_m, omega_l, T_m and T_shaft.
 
     Args:
-        x: state.
-        mode: mode, which is held.
-        p: parameters.
         u: requested torque [N.m].
         T_l: load torque [N.m].
-
-    Returns:
-        Both, SI units.
     """
     shaft = shaft_torque(x, mode, p, T_l)
     outputs = (x[0] + p[P_OFFSET_M], x[2] + p[P_OFFSET_L], x[1], x[3], x[4], shaft)
@@ -64,15 +52,8 @@ def indicator(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: fl
     """Return the event indicator ``which`` (0, 1: contact; 2: motor's friction; 3: load's), 1 if it is not in use.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        which: number of the guard.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The indicator; negative ends the mode.
     """
     value = guard(x, mode, which, p, u, T_l)
     if value >= NEVER:
@@ -84,14 +65,8 @@ def indicators(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> Ind
     """Return all event indicators; the mode ends when one turns negative.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The indicators.
     """
     return (
         indicator(x, mode, 0, p, u, T_l),
@@ -105,11 +80,7 @@ def asked_first(x: State, u: float) -> State:
     """Return a state whose drive has settled at what is asked first.
 
     Args:
-        x: state, as in ``equations``.
         u: requested torque [N.m], saturated already.
-
-    Returns:
-        The state.
     """
     return (x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], u)
 
@@ -118,9 +89,6 @@ def output_rates(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> O
     """Return the derivatives of the outputs of :func:`rates_and_outputs`; that of T_shaft is a central difference.
 
     Args:
-        x: state.
-        mode: mode, which is held.
-        p: parameters.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
 
@@ -137,12 +105,7 @@ def beside(x: State, r: State, h: float) -> State:
     """Return ``x + h r``; the drive's filter, which may not have been asked yet, stays.
 
     Args:
-        x: state, as in ``equations``.
-        r: its derivative.
         h: time [s].
-
-    Returns:
-        The state.
     """
     return (
         x[0] + h * r[0],
@@ -166,16 +129,8 @@ def after_events(
     """Return state, mode and number of events in a row once no guard is violated.
 
     Args:
-        x: state at the event.
-        mode: the mode that ends.
-        which: guard that is known to end it, or ``NO_EVENT``.
-        events: how many events came before this one without a pause.
-        p: parameters.
         u: requested torque [N.m], saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The three.
     """
     if which != NO_EVENT:
         x, mode = switched(x, mode, which, events, p, u, T_l)

@@ -76,17 +76,7 @@ _FIRST = (
 
 
 def wave(effect: str, unit: str, text: str, cycles: float) -> tuple[Parameter, ...]:
-    """Return amplitude, cycles and phase of what repeats with an angle.
-
-    Args:
-        effect: its name.
-        unit: of the amplitude.
-        text: what it is.
-        cycles: default of the cycles per revolution.
-
-    Returns:
-        Three parameters.
-    """
+    """Return amplitude, cycles and phase of what repeats with an angle."""
     return (
         Parameter(f"effects.{effect}.amplitude", unit, 0.0, -BIG, BIG, text),
         Parameter(f"effects.{effect}.cycles_per_rev", "1", cycles, 0.0, BIG, "Its cycles per revolution"),
@@ -103,14 +93,7 @@ def _harmonic(order: str) -> tuple[Parameter, ...]:
 
 
 def friction_details(site: str) -> tuple[Parameter, ...]:
-    """Return what the friction of a ``site`` may depend on beside its speed.
-
-    Args:
-        site: "motor" or "load".
-
-    Returns:
-        The parameters.
-    """
+    """Return what the friction of a ``site`` may depend on beside its speed."""
     of = f"of the {site}'s friction"
     return (
         Parameter(f"effects.presliding.{site}.distance", "rad", 0.0, 0.0, BIG, f"Distance {of} to build up (0: none)"),
@@ -237,30 +220,12 @@ COUNT = len(PARAMETERS)
 
 
 def parameters(**values: float) -> tuple[float, ...]:
-    """Return ``p`` with the defaults replaced by ``values``; dots in names are written as two underscores.
-
-    Returns:
-        The parameters, in the order of ``NAMES``.
-
-    Raises:
-        KeyError: a name is not in ``NAMES``.
-    """
+    """Return ``p`` with the defaults replaced by ``values``; dots in names are written as two underscores."""
     return with_values(DEFAULTS, {name.replace("__", "."): value for name, value in values.items()})
 
 
 def with_values(p: tuple[float, ...], values: dict[str, float]) -> tuple[float, ...]:
-    """Return ``p`` with the parameters named in ``values`` (names as in the FMU) replaced.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-        values: by name.
-
-    Returns:
-        The parameters, in the order of ``NAMES``.
-
-    Raises:
-        KeyError: a name is not in ``NAMES``.
-    """
+    """Return ``p`` with the parameters named in ``values`` (names as in the FMU) replaced."""
     changed = list(p)
     for name, value in values.items():
         if name not in NAMES:

@@ -234,11 +234,7 @@ class Drivetrain(PlantSlave):
         return len(self._known) - 1
 
     def derivatives(self) -> State:
-        """Return the derivatives of the state.
-
-        Returns:
-            The derivatives, in the order of the state.
-        """
+        """Return the derivatives of the state."""
         return state_rates(self._x, self._mode, self._p, self._acting_request(), self.real[T_L])
 
     def output_rates(self) -> Outputs:
@@ -250,11 +246,7 @@ class Drivetrain(PlantSlave):
         return output_rates(self._x, self._mode, self._p, self._acting_request(), self.real[T_L])
 
     def indicators(self) -> Indicators:
-        """Return the event indicators, for model exchange.
-
-        Returns:
-            The indicators.
-        """
+        """Return the event indicators, for model exchange."""
         u = self._request()
         return indicators(self._x, self._mode, self._p, u, self.real[T_L])
 
@@ -276,11 +268,7 @@ class Drivetrain(PlantSlave):
         self._write()
 
     def begin_exchange(self) -> None:
-        """Settle the drive at what is asked first; effects that need time events are refused in model exchange.
-
-        Raises:
-            ValueError: such an effect is on.
-        """
+        """Settle the drive at what is asked first; effects that need time events are refused in model exchange."""
         if self._p[P_DELAY] > 0.0:
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
         if self._p[P_RATE] < BIG:

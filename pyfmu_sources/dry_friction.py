@@ -38,23 +38,12 @@ MOTOR, LOAD = 2, 3
 
 
 def capacity_of_both(x: State, p: Parameters) -> float:
-    """Return the breakaway torque [N.m], load side, of motor and load in rigid contact.
-
-    Args:
-        x: state, as in ``equations``.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
-    """
+    """Return the breakaway torque [N.m], load side, of motor and load in rigid contact."""
     return abs(gear(x, p)) * capacity_m(x, 0, p) + capacity_l(x, 0, p)
 
 
 def direction(value: float) -> int:
     """Return the sign of ``value``, 1 for zero.
-
-    Args:
-        value: of any unit.
 
     Returns:
         -1 or 1.
@@ -66,12 +55,7 @@ def push_on_motor(x: State, contact: int, p: Parameters) -> float:
     """Return the torque [N.m] on a motor without dry friction and without a rigid contact.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
     """
     if is_rigid(p):
         return motor_torque(x, 0.0, 0.0, p)
@@ -82,13 +66,8 @@ def push_on_load(x: State, contact: int, p: Parameters, T_l: float) -> float:
     """Return the torque [N.m] on a load without dry friction and without a rigid contact.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The torque.
     """
     if is_rigid(p):
         return load_torque(x, 0.0, 0.0, p, T_l)
@@ -99,12 +78,7 @@ def push_on_both(x: State, p: Parameters, T_l: float) -> float:
     """Return the torque [N.m], load side, on motor and load in rigid contact without dry friction.
 
     Args:
-        x: state, as in ``equations``.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The torque.
     """
     return gear(x, p) * motor_torque(x, 0.0, 0.0, p) + load_torque(x, 0.0, 0.0, p, T_l)
 
@@ -129,7 +103,6 @@ def slip_of(speed: float, push: float, capacity: float, dry: bool) -> int:
         speed: [rad/s].
         push: torque without friction [N.m].
         capacity: breakaway torque [N.m].
-        dry: whether there is dry friction.
 
     Returns:
         -1, 0 or 1.
@@ -143,13 +116,8 @@ def slips(x: State, contact: int, p: Parameters, T_l: float) -> tuple[int, int]:
     """Return the directions of sliding of motor and load that follow from speeds and torques at ``contact``.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        Both.
     """
     if is_rigid(p) and contact != 0:
         dry = has_friction_m(p) or has_friction_l(p)
@@ -168,14 +136,7 @@ def friction_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) 
     """Return the guard of the dry friction of motor (2) or load (3); negative ends the mode.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        which: number of the guard.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The guard, in N.m or rad/s.
     """
     contact = mode[0]
     play = int(p[P_MODEL]) in HELD
@@ -211,13 +172,8 @@ def held_flank_room(x: State, side: int, p: Parameters, T_l: float) -> float:
     possible. Teeth part where none of those presses them together.
 
     Args:
-        x: state, as in ``equations``.
         side: flank, -1 or 1.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The force, as a torque; negative parts them.
     """
     ratio = abs(gear(x, p))
     from_motor = ratio * (side * motor_torque(x, 0.0, 0.0, p) + capacity_m(x, 0, p))
@@ -228,13 +184,8 @@ def held_torque(x: State, side: int, p: Parameters, T_l: float) -> float:
     """Return the torque [N.m] on the load of teeth in rigid contact whose parts stick: the middle of what may be.
 
     Args:
-        x: state, as in ``equations``.
         side: flank, -1 or 1.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The torque.
     """
     largest = held_flank_room(x, side, p, T_l)
     ratio = abs(gear(x, p))
@@ -250,13 +201,7 @@ def shaft_torque(x: State, mode: Mode, p: Parameters, T_l: float) -> float:
     """Return the torque [N.m] that the shaft exerts on the load, whatever the model.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The torque.
     """
     contact = mode[0]
     if contact == 0:

@@ -14,9 +14,6 @@ def sine(angle: float) -> float:
 
     Args:
         angle: [rad].
-
-    Returns:
-        The sine.
     """
     return sin(angle) if abs(angle) <= LARGEST else 0.0
 
@@ -26,9 +23,6 @@ def cosine(angle: float) -> float:
 
     Args:
         angle: [rad].
-
-    Returns:
-        The cosine.
     """
     return cos(angle) if abs(angle) <= LARGEST else 0.0
 
@@ -51,9 +45,6 @@ def sliding_friction(speed: float, coulomb: float, sliding: float, breakaway: fl
         sliding: Stribeck's part at high speed [N.m].
         breakaway: Stribeck's part at rest [N.m].
         stribeck_speed: [rad/s].
-
-    Returns:
-        The magnitude.
     """
     if breakaway == 0.0 and sliding == 0.0:
         return coulomb
@@ -66,12 +57,7 @@ def torque_ripple(theta_m: float, amplitude: float, cycles_per_rev: float, phase
 
     Args:
         theta_m: motor angle [rad].
-        amplitude: in the unit of the result.
-        cycles_per_rev: how often it repeats per revolution.
         phase: at angle zero [rad].
-
-    Returns:
-        The torque.
     """
     if amplitude == 0.0:
         return 0.0
@@ -83,12 +69,7 @@ def periodic(angle: float, amplitude: float, cycles_per_rev: float, phase: float
 
     Args:
         angle: [rad].
-        amplitude: in the unit of the result.
-        cycles_per_rev: how often it repeats per revolution.
         phase: at angle zero [rad].
-
-    Returns:
-        The value.
     """
     if amplitude == 0.0:
         return 0.0
@@ -100,8 +81,6 @@ def periodic_slope(angle: float, amplitude: float, cycles_per_rev: float, phase:
 
     Args:
         angle: [rad].
-        amplitude: in the unit of the result.
-        cycles_per_rev: how often it repeats per revolution.
         phase: at angle zero [rad].
 
     Returns:
@@ -120,14 +99,9 @@ def dependent_friction(
     Args:
         level: its magnitude [N.m] without both.
         transmitted: torque [N.m] that the bearing or the teeth carry.
-        coefficient: friction per transmitted torque.
         angle: of the part [rad].
         amplitude: of what repeats with the angle [N.m].
-        cycles: how often it repeats per revolution.
         phase: its phase at angle zero [rad].
-
-    Returns:
-        The magnitude.
     """
     return max(0.0, level + coefficient * abs(transmitted) + periodic(angle, amplitude, cycles, phase))
 
@@ -140,9 +114,6 @@ def spring_torque(angle: float, stiffness: float, cubic: float, rest: float) -> 
         stiffness: [N.m/rad].
         cubic: [N.m/rad3].
         rest: [rad].
-
-    Returns:
-        The torque.
     """
     if stiffness == 0.0 and cubic == 0.0:
         return 0.0
@@ -165,9 +136,6 @@ def end_stop_torque(
         upper: angle of the upper stop [rad].
         stiffness: [N.m/rad].
         dissipation: [s/rad].
-
-    Returns:
-        The torque.
     """
     if angle > upper:
         return max(0.0, stiffness * (angle - upper) * (1.0 + dissipation * speed))
@@ -182,9 +150,6 @@ def set_in(depth: float, onset: float) -> float:
     Args:
         depth: of contact [rad].
         onset: depth over which it sets in [rad].
-
-    Returns:
-        The part.
     """
     return 1.0 - exp(-abs(depth) / onset)
 
@@ -198,9 +163,6 @@ def hysteresis_rate(memory: float, rate: float, width: float) -> float:
         memory: of the hysteresis, -1 to 1.
         rate: of the twist [rad/s].
         width: [rad].
-
-    Returns:
-        The rate.
     """
     return (rate - 0.5 * abs(rate) * memory - 0.5 * rate * abs(memory)) / width
 
@@ -215,9 +177,6 @@ def bristle_rate(bristle: float, speed: float, reach: float) -> float:
         bristle: its bending [rad].
         speed: of the part [rad/s].
         reach: bending [rad] at which it slides, in proportion to the friction at this speed.
-
-    Returns:
-        The rate.
     """
     return speed - abs(speed) * bristle / reach if reach > 0.0 else 0.0
 
@@ -230,11 +189,7 @@ def gravity_torque(theta_l: float, amplitude: float, phase: float) -> float:
 
     Args:
         theta_l: load angle [rad].
-        amplitude: in the unit of the result.
         phase: at angle zero [rad].
-
-    Returns:
-        The torque.
     """
     if amplitude == 0.0:
         return 0.0
@@ -247,9 +202,6 @@ def quadratic_drag(omega_l: float, coefficient: float) -> float:
     Args:
         omega_l: speed of the load [rad/s].
         coefficient: [N.m.s2/rad2].
-
-    Returns:
-        The torque.
     """
     return coefficient * omega_l * abs(omega_l)
 
@@ -263,9 +215,6 @@ def directional_friction(speed: float, difference: float) -> float:
     Args:
         speed: [rad/s].
         difference: [N.m.s/rad].
-
-    Returns:
-        The torque.
     """
     return difference * abs(speed)
 
@@ -278,10 +227,6 @@ def resonance_torque(angle: float, speed: float, inertia: float, frequency: floa
         speed: [rad/s].
         inertia: that is sprung [kg.m2].
         frequency: its own, undamped [rad/s].
-        damping_ratio: without unit.
-
-    Returns:
-        The torque.
     """
     return inertia * frequency * (frequency * angle + 2.0 * damping_ratio * speed)
 
@@ -294,12 +239,7 @@ def twist_error(theta_m: float, amplitude: float, cycles_per_rev: float, phase: 
 
     Args:
         theta_m: motor angle [rad].
-        amplitude: in the unit of the result.
-        cycles_per_rev: how often it repeats per revolution.
         phase: at angle zero [rad].
-
-    Returns:
-        The twist.
     """
     if amplitude == 0.0:
         return 0.0
@@ -311,12 +251,7 @@ def twist_error_slope(theta_m: float, amplitude: float, cycles_per_rev: float, p
 
     Args:
         theta_m: motor angle [rad].
-        amplitude: in the unit of the result.
-        cycles_per_rev: how often it repeats per revolution.
         phase: at angle zero [rad].
-
-    Returns:
-        The derivative.
     """
     if amplitude == 0.0:
         return 0.0
@@ -328,12 +263,7 @@ def twist_error_curvature(theta_m: float, amplitude: float, cycles_per_rev: floa
 
     Args:
         theta_m: motor angle [rad].
-        amplitude: in the unit of the result.
-        cycles_per_rev: how often it repeats per revolution.
         phase: at angle zero [rad].
-
-    Returns:
-        The second derivative.
     """
     if amplitude == 0.0:
         return 0.0
@@ -351,9 +281,6 @@ def hardening_torque(twist: float, cubic: float, stiffness: float, sharpness: fl
         cubic: [N.m/rad3].
         stiffness: of small twists [N.m/rad]; without one there is no fifth power.
         sharpness: [1].
-
-    Returns:
-        The torque.
     """
     third = cubic * twist * twist * twist
     if sharpness == 0.0 or stiffness <= 0.0:

@@ -119,14 +119,7 @@ SMALLEST_SLOPE = 1e-12
 
 
 def backlash_model(p: Parameters) -> int:
-    """Return the backlash model that acts: without a gap, the elastic models are all ``NONE``.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        Its number.
-    """
+    """Return the backlash model that acts: without a gap, the elastic models are all ``NONE``."""
     model = int(p[P_MODEL])
     if p[P_ALPHA] == 0.0 and model in PLAIN_WHEN_CLOSED:
         return NONE
@@ -134,77 +127,33 @@ def backlash_model(p: Parameters) -> int:
 
 
 def is_rigid(p: Parameters) -> bool:
-    """Tell whether teeth in contact couple motor and load rigidly (``hysteresis``, ``rigid_impact``).
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when they do.
-    """
+    """Tell whether teeth in contact couple motor and load rigidly (``hysteresis``, ``rigid_impact``)."""
     return int(p[P_MODEL]) in RIGID
 
 
 def teeth_never_pull(p: Parameters) -> bool:
-    """Tell whether the teeth part when their torque reaches zero (``nordin``, ``elastic_impact``).
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when they do.
-    """
+    """Tell whether the teeth part when their torque reaches zero (``nordin``, ``elastic_impact``)."""
     return backlash_model(p) in NEVER_PULLING
 
 
 def shaft_stiffness(p: Parameters) -> float:
-    """Return the stiffness [N.m/rad] of teeth in contact and shaft.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The stiffness.
-    """
+    """Return the stiffness [N.m/rad] of teeth in contact and shaft."""
     model = int(p[P_MODEL])  # whose teeth may have a stiffness of their own
     return p[P_CONTACT_K] if model in OWN_CONTACT else p[P_K]
 
 
 def shaft_damping(p: Parameters) -> float:
-    """Return the damping [N.m.s/rad] of teeth in contact and shaft.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The damping.
-    """
+    """Return the damping [N.m.s/rad] of teeth in contact and shaft."""
     return p[P_CONTACT_C] if int(p[P_MODEL]) in OWN_CONTACT else p[P_C]
 
 
 def twist(x: State, p: Parameters) -> float:
-    """Return the twist [rad], ``theta_m / i - theta_l`` plus the error of an eccentric gear.
-
-    Args:
-        x: state, see the head of the module.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The twist.
-    """
+    """Return the twist [rad], ``theta_m / i - theta_l`` plus the error of an eccentric gear."""
     return x[0] / p[P_I] - x[2] + twist_error(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
 def twist_slope(x: State, p: Parameters) -> float:
-    """Return the derivative of the twist by the motor angle [rad/rad], which is 1/i for an ideal gear.
-
-    Args:
-        x: state, see the head of the module.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The derivative.
-    """
+    """Return the derivative of the twist by the motor angle [rad/rad], which is 1/i for an ideal gear."""
     return 1.0 / p[P_I] + twist_error_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
@@ -213,27 +162,12 @@ def lever_arm(x: State, p: Parameters) -> float:
 
     The arm of teeth that conserve energy is :func:`twist_slope`. That of a gear whose teeth only stand off their
     places, or of an encoder that sits off its axis, keeps its length.
-
-    Args:
-        x: state, see the head of the module.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The ratio.
     """
     return 1.0 / p[P_I] + p[P_ECC_LEVER] * twist_error_slope(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE])
 
 
 def twist_rate(x: State, p: Parameters) -> float:
-    """Return the time derivative of the twist [rad/s].
-
-    Args:
-        x: state, see the head of the module.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The rate.
-    """
+    """Return the time derivative of the twist [rad/s]."""
     return x[1] * twist_slope(x, p) - x[3]
 
 
@@ -243,9 +177,6 @@ def contact_of(angle: float, alpha: float) -> int:
     Args:
         angle: the twist [rad].
         alpha: half-gap [rad].
-
-    Returns:
-        The flank.
     """
     if angle > alpha:
         return 1
@@ -258,12 +189,7 @@ def elastic_torque(x: State, contact: int, p: Parameters) -> float:
     """Return the load-side shaft torque [N.m] of an elastic model at the flank ``contact`` (eq. 2.6, mended).
 
     Args:
-        x: state, see the head of the module.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
     """
     if contact == 0:
         return 0.0
@@ -286,12 +212,7 @@ def friction_m(x: State, transmitted: float, p: Parameters) -> float:
     """Return the magnitude of the motor's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it.
 
     Args:
-        x: state, see the head of the module.
         transmitted: torque of the shaft that friction depends on [N.m].
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The magnitude.
     """
     level = sliding_friction(x[1], p[P_COULOMB_M], p[P_STRIBECK_M], p[P_BREAKAWAY_M], p[P_STRIBECK_SPEED_M])
     if p[P_LOADED_M] == 0.0 and p[P_WAVY_M] == 0.0:
@@ -303,12 +224,7 @@ def friction_l(x: State, transmitted: float, p: Parameters) -> float:
     """Return the magnitude of the load's dry friction [N.m]; ``transmitted`` [N.m] is the shaft's torque on it.
 
     Args:
-        x: state, see the head of the module.
         transmitted: torque of the shaft that friction depends on [N.m].
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The magnitude.
     """
     level = sliding_friction(x[3], p[P_COULOMB_L], p[P_STRIBECK_L], p[P_BREAKAWAY_L], p[P_STRIBECK_SPEED_L])
     if p[P_LOADED_L] == 0.0 and p[P_WAVY_L] == 0.0:
@@ -321,10 +237,6 @@ def ripple(theta_m: float, p: Parameters) -> float:
 
     Args:
         theta_m: motor angle [rad].
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
     """
     cycles = p[P_RIPPLE_N]
     torque = torque_ripple(theta_m, p[P_RIPPLE], cycles, p[P_RIPPLE_PHASE])
@@ -338,13 +250,8 @@ def motor_torque(x: State, transmitted: float, sign_m: float, p: Parameters) -> 
     """Return the torque on the motor [N.m] without the shaft's: drive, ripple, viscous and dry friction.
 
     Args:
-        x: state, see the head of the module.
         transmitted: torque of the shaft that friction depends on [N.m].
         sign_m: direction of the motor's dry friction, -1 to 1.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The torque.
     """
     torque = x[4] + ripple(x[0], p) - p[P_B_M] * x[1] - sign_m * friction_m(x, transmitted, p)
     if p[P_DIRECTION_M] != 0.0:
@@ -356,14 +263,8 @@ def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l:
     """Return the torque on the load [N.m] without the shaft's: external, friction, gravity, drag, springs, stops.
 
     Args:
-        x: state, see the head of the module.
         transmitted: torque of the shaft that friction depends on [N.m].
-        sign_l: the same of the load.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The torque.
     """
     against = T_l + p[P_LOAD_TORQUE] + p[P_B_L] * x[3] + sign_l * friction_l(x, transmitted, p)
     against += gravity_torque(x[2], p[P_GRAVITY], p[P_GRAVITY_PHASE]) + quadratic_drag(x[3], p[P_DRAG])
@@ -381,30 +282,14 @@ def load_torque(x: State, transmitted: float, sign_l: float, p: Parameters, T_l:
 
 
 def load_inertia(x: State, p: Parameters) -> float:
-    """Return the load's inertia [kg.m2] at its angle; a wave larger than the inertia leaves a thousandth of it.
-
-    Args:
-        x: state, see the head of the module.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The inertia.
-    """
+    """Return the load's inertia [kg.m2] at its angle; a wave larger than the inertia leaves a thousandth of it."""
     if p[P_J_WAVE] == 0.0:
         return p[P_J_L]
     return max(1e-3 * p[P_J_L], p[P_J_L] + periodic(x[2], p[P_J_WAVE], p[P_J_WAVE_N], p[P_J_WAVE_PHASE]))
 
 
 def gear(x: State, p: Parameters) -> float:
-    """Return motor angle over load angle [rad/rad] for small motions of rigid teeth: ``i``, unless eccentric.
-
-    Args:
-        x: state, see the head of the module.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The ratio.
-    """
+    """Return motor angle over load angle [rad/rad] for small motions of rigid teeth: ``i``, unless eccentric."""
     if p[P_ECC] == 0.0:
         return p[P_I]
     slope = twist_slope(x, p)
@@ -415,14 +300,8 @@ def rigid_acceleration(x: State, sign_m: float, sign_l: float, p: Parameters, T_
     """Return the load's acceleration [rad/s2] while gear and load turn as one body.
 
     Args:
-        x: state, see the head of the module.
         sign_m: direction of the motor's dry friction, -1 to 1.
-        sign_l: the same of the load.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The acceleration.
     """
     i = gear(x, p)
     drive = i * motor_torque(x, 0.0, sign_m, p) + load_torque(x, 0.0, sign_l, p, T_l)
@@ -432,15 +311,7 @@ def rigid_acceleration(x: State, sign_m: float, sign_l: float, p: Parameters, T_
 
 
 def gear_acceleration(x: State, p: Parameters) -> float:
-    """Return the load's acceleration [rad/s2] that an eccentric gear makes of a constant motor speed.
-
-    Args:
-        x: state, see the head of the module.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The acceleration.
-    """
+    """Return the load's acceleration [rad/s2] that an eccentric gear makes of a constant motor speed."""
     return twist_error_curvature(x[0], p[P_ECC], p[P_ECC_N], p[P_ECC_PHASE]) * x[1] * x[1]
 
 
@@ -448,16 +319,9 @@ def rates(x: State, contact: int, sign_m: float, sign_l: float, p: Parameters, u
     """Return the time derivative of ``x`` in one smooth mode (eq. 3.5 with the effects).
 
     Args:
-        x: state.
-        contact: flank that touches.
         sign_m: direction of the motor's dry friction, -1 to 1; a smooth approximation passes ``tanh(w/v)``.
-        sign_l: the same of the load.
-        p: parameters.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The derivative.
     """
     wound_rate = 0.0
     if contact == 0 and x[7] != 0.0:
@@ -490,15 +354,9 @@ def rigid_rates(x: State, contact: int, sign_m: float, sign_l: float, p: Paramet
     """Return both accelerations [rad/s2] of the rigid models (eqs. 2.3 to 2.5).
 
     Args:
-        x: state, see the head of the module.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
         sign_m: direction of the motor's dry friction, -1 to 1.
-        sign_l: the same of the load.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        Motor's and load's.
     """
     if contact in (-2, 2):
         return (0.0, 0.0)

@@ -52,8 +52,6 @@ class Bridge:
         """Call a method of the slave; what it raises is left in the shared memory.
 
         Args:
-            method: its name.
-            a: first argument, if it takes one.
             b: second argument, if it takes two.
 
         Returns:
@@ -99,9 +97,6 @@ class Bridge:
 
     def restore(self, text: bytes) -> float:
         """Take over a hidden state.
-
-        Args:
-            text: from ``save``.
 
         Returns:
             0, or 1 where the text is none of this slave.

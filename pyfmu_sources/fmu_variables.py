@@ -53,18 +53,7 @@ class FmuVariable(NamedTuple):
 
 
 def with_starts(variables: tuple[FmuVariable, ...], starts: dict[str, float]) -> tuple[FmuVariable, ...]:
-    """Return the table with other start values.
-
-    Args:
-        variables: the table.
-        starts: value by name.
-
-    Returns:
-        The table.
-
-    Raises:
-        ValueError: a name is unknown or not a parameter, or a value is outside its bounds.
-    """
+    """Return the table with other start values."""
     table = {variable.name: variable for variable in variables}
     for name, value in starts.items():
         variable = table.get(name)
@@ -78,17 +67,7 @@ def with_starts(variables: tuple[FmuVariable, ...], starts: dict[str, float]) ->
 
 
 def unit_exponents(unit: str) -> Exponents:
-    """Return the exponents of the SI base units (and rad) in a unit such as ``N.m.s2/rad2`` or ``rad/(N.m)``.
-
-    Args:
-        unit: its name.
-
-    Returns:
-        Exponent by base unit; none is zero.
-
-    Raises:
-        ValueError: the unit has a symbol that is not in ``SYMBOLS``.
-    """
+    """Return the exponents of the SI base units (and rad) in a unit such as ``N.m.s2/rad2`` or ``rad/(N.m)``."""
     total: Exponents = {}
     for position, part in enumerate(unit.split("/")):
         sign = 1 if position == 0 else -1

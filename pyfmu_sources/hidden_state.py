@@ -8,24 +8,13 @@ from typing import Any
 
 
 def hidden_names(cls: type) -> tuple[str, ...]:
-    """Return the attributes that a class itself declares by an annotation, class variables apart.
-
-    Returns:
-        The names, in the order of declaration.
-    """
+    """Return the attributes that a class itself declares by an annotation, class variables apart."""
     own = vars(cls).get("__annotations__", {})
     return tuple(name for name, kind in own.items() if not str(kind).startswith("ClassVar"))
 
 
 def hidden_type(cls: Any, name: str) -> Any:
-    """Return the type that is declared for an attribute.
-
-    Args:
-        name: of the attribute.
-
-    Returns:
-        The type.
-    """
+    """Return the type that is declared for an attribute."""
     return _type_of(cls, name)
 
 
@@ -36,27 +25,12 @@ def _type_of(cls: Any, name: str) -> Any:
 
 
 def copied(value: Any) -> Any:
-    """Return a value whose lists are copies; tuples hold no lists.
-
-    Args:
-        value: of the hidden state.
-
-    Returns:
-        The copy.
-    """
+    """Return a value whose lists are copies; tuples hold no lists."""
     return [copied(item) for item in value] if isinstance(value, list) else value
 
 
 def shaped(value: Any, kind: Any) -> Any:
-    """Return lists and tuples as ``kind``, a type of the hidden state, says.
-
-    Args:
-        value: as it was restored.
-        kind: a type.
-
-    Returns:
-        The value.
-    """
+    """Return lists and tuples as ``kind``, a type of the hidden state, says."""
     base = getattr(kind, "__origin__", kind)  # Annotated[list[T], N] leads to list[T], that to list
     if hasattr(kind, "__metadata__"):
         return shaped(value, base)

@@ -21,15 +21,7 @@ Update = tuple[Vector6, float, float, float]
 
 
 def product(row: Vector6, x: Vector6) -> float:
-    """Return the scalar product of two vectors of six.
-
-    Args:
-        row: the one.
-        x: the other.
-
-    Returns:
-        Their product.
-    """
+    """Return the scalar product of two vectors of six."""
     return row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3] * x[3] + row[4] * x[4] + row[5] * x[5]
 
 
@@ -37,13 +29,7 @@ def predict(x: Vector6, u: float, A: Matrix6, B: Vector6) -> Vector6:
     """Return the state one sample later with the torque request ``u`` [N.m] held.
 
     Args:
-        x: corrected state.
         u: [N.m].
-        A: discrete state matrix.
-        B: discrete input vector.
-
-    Returns:
-        The predicted state.
     """
     return (
         product(A[0], x) + B[0] * u,
@@ -59,14 +45,10 @@ def correct(x: Vector6, theta_m: float, theta_l: float, L: Gain, weight: Weight)
     """Return the corrected state, both innovations [rad] and the normalised innovation squared.
 
     Args:
-        x: predicted state.
         theta_m: measured motor angle [rad].
         theta_l: measured load angle [rad].
         L: gain, 6 x 2.
         weight: ``(S11, S12, S22)`` of the inverse innovation covariance [1/rad2].
-
-    Returns:
-        The four.
     """
     e_m = theta_m - x[0]
     e_l = theta_l - x[2]
@@ -95,16 +77,8 @@ def update(
     """Return :func:`correct` after :func:`predict`: one sample of the filter.
 
     Args:
-        x: corrected state of the sample before.
         u: torque request [N.m] that was held since then.
         theta_m: measured motor angle [rad] now.
         theta_l: measured load angle [rad] now.
-        A: discrete state matrix.
-        B: discrete input vector.
-        L: gain.
-        weight: inverse innovation covariance.
-
-    Returns:
-        The four.
     """
     return correct(predict(x, u, A, B), theta_m, theta_l, L, weight)

@@ -26,17 +26,7 @@ CLOSE = 1e-9  # of a period, within which a cyclic law is at its knot
 
 
 def straight(s: float, p: Law, knot_at: int, value_at: int) -> float:
-    """Return a law's value: straight lines between its knots, the last ones go on.
-
-    Args:
-        s: its argument.
-        p: a tuple or an array that holds the law.
-        knot_at: place of the first knot in it.
-        value_at: place of the first value in it.
-
-    Returns:
-        The value.
-    """
+    """Return a law's value: straight lines between its knots, the last ones go on."""
     n = 1
     while n < KNOTS - 1 and s > p[knot_at + n]:
         n += 1
@@ -47,9 +37,6 @@ def straight(s: float, p: Law, knot_at: int, value_at: int) -> float:
 def kind_of(law: Law) -> int:
     """Return what a law follows.
 
-    Args:
-        law: the law.
-
     Returns:
         1 to 7.
     """
@@ -57,26 +44,12 @@ def kind_of(law: Law) -> int:
 
 
 def begins_late(law: Law) -> bool:
-    """Tell whether a law acts from some time on only.
-
-    Args:
-        law: the law.
-
-    Returns:
-        True when it does.
-    """
+    """Tell whether a law acts from some time on only."""
     return law[L_FORM] >= LATER
 
 
 def is_cyclic(law: Law) -> bool:
-    """Tell whether a law comes by a clock alone, once a cycle.
-
-    Args:
-        law: the law.
-
-    Returns:
-        True when it does.
-    """
+    """Tell whether a law comes by a clock alone, once a cycle."""
     return kind_of(law) in (CYCLE_M, CYCLE_L)
 
 
@@ -84,11 +57,7 @@ def until_knot(law: Law, clock: float) -> float:
     """Return how long a cyclic law runs straight on [s].
 
     Args:
-        law: the law.
         clock: time of the record that it was learned from [s].
-
-    Returns:
-        The time to its next knot, or to the end of its cycle.
     """
     period = law[L_PERIOD]
     close = CLOSE * period
@@ -106,9 +75,7 @@ def law_torque(law: Law, clock: float, motion: Motion) -> float:
     """Return the torque of a law that acts, without its dry friction.
 
     Args:
-        law: the law.
         clock: time of the record that it was learned from [s].
-        motion: of the plant.
 
     Returns:
         The torque [N.m]: against motor or load; on the shaft, with the elastic one.
@@ -125,9 +92,7 @@ def at_bodies(law: Law, torque: float, ratio: float) -> tuple[float, float]:
     """Return a law's torque where it acts.
 
     Args:
-        law: the law.
         torque: of the law [N.m].
-        ratio: of the gear.
 
     Returns:
         Torques against the motor and against the load [N.m].
@@ -144,13 +109,8 @@ def longest_piece(law: Law, motor: float, load: float, ratio: float) -> float:
     """Return over how long a law may be held [s]: a share of the shortest time constant that it makes.
 
     Args:
-        law: the law.
         motor: inertia [kg.m2].
         load: inertia [kg.m2].
-        ratio: of the gear.
-
-    Returns:
-        The time [s].
     """
     kind = kind_of(law)
     steepest = largest = 0.0

@@ -44,16 +44,7 @@ _Base: Any = PlantSlave if TYPE_CHECKING else object
 
 
 def law_variables(law: Mapping[str, Any], parameters: Sequence[Parameter]) -> tuple[FmuVariable, ...]:
-    """Return the variables that an FMU has more for a law.
-
-    Args:
-        law: ``form``, ``words``, ``unit`` (of its argument), ``value_unit``, ``knots`` and ``values``; where it has
-            them, ``since``, ``period`` and ``dry``; ``changes`` of parameters by name.
-        parameters: of the plant.
-
-    Returns:
-        Variables, all of them parameters.
-    """
+    """Return the variables that an FMU has more for a law."""
 
     def real(name: str, unit: str, start: float, text: str, low: float = -BIG, high: float = BIG) -> FmuVariable:
         return FmuVariable(PREFIX + name, "parameter", unit, float(start), text, low, high)
@@ -100,11 +91,7 @@ class WithLaw(_Base):
 
     @classmethod
     def learn(cls, law: Mapping[str, Any]) -> None:
-        """Give the class its law.
-
-        Args:
-            law: as :func:`law_variables` takes it.
-        """
+        """Give the class its law."""
         cls.title = f"{cls.title}; with a law learned from a record"
         added = law_variables(law, cls.plant_parameters)
         follow = tuple(variable.name for variable in added)

@@ -48,10 +48,6 @@ def law_of(contact: int, p: Parameters) -> Law:
 
     Args:
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The four.
     """
     if is_rigid(p):
         if contact in (-2, 2):
@@ -70,15 +66,9 @@ def linear_rates(x: State6, constant: float, law: Law, p: Parameters, u: float, 
     """Return ``x'`` for ``constant`` = 1 and its linear part for ``constant`` = 0 (``s`` left to its decay).
 
     Args:
-        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
         constant: 1: with inputs and offsets; 0: the linear part alone.
-        law: kind, stiffness, damping and offset of the linear law.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The derivative.
     """
     kind, stiffness, damping, offset = law
     i = p[P_I]
@@ -100,16 +90,10 @@ def taylor(x: State6, law: Law, p: Parameters, u: float, T_l: float, step: float
     """Return the Taylor coefficients of the state, scaled so that time runs from 0 to 1 over ``step`` [s].
 
     Args:
-        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
-        law: kind, stiffness, damping and offset of the linear law.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         step: over which it is expanded [s].
         kappa: rate at which a parted shaft unwinds [1/s].
-
-    Returns:
-        ``TERMS + 1`` states.
     """
     coefficients: Coefficients = [x]
     term = x
@@ -125,11 +109,7 @@ def evaluate(coefficients: Coefficients, time: float) -> State6:
     """Return the state of a scaled Taylor series at ``time`` in [0, 1].
 
     Args:
-        coefficients: of the scaled Taylor series, one state each.
         time: 0 to 1.
-
-    Returns:
-        The state.
     """
     a, b, c, d, e, f = coefficients[TERMS]
     for n in range(TERMS - 1, -1, -1):
@@ -148,7 +128,6 @@ def guard_count(contact: int, p: Parameters) -> int:
 
     Args:
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
 
     Returns:
         0, 1 or 2.
@@ -164,16 +143,10 @@ def guard(x: State6, constant: float, contact: int, which: int, p: Parameters, u
     Guards are affine in the state; ``constant`` = 0 asks for their linear part.
 
     Args:
-        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
         constant: 1: with inputs and offsets; 0: the linear part alone.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        which: number of the guard.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The guard, in rad, N.m or rad/s.
     """
     model = int(p[P_MODEL])
     i = p[P_I]
@@ -201,12 +174,7 @@ def guard_tolerance(x: State6, contact: int, p: Parameters) -> float:
     """Return how far below zero rounding alone can take a guard.
 
     Args:
-        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The distance, in the guard's unit.
     """
     angles = GUARD_ROUNDINGS * EPSILON * (1.0 + abs(x[0] / p[P_I]) + abs(x[2]) + p[P_ALPHA])
     if contact != 0 and teeth_never_pull(p):
@@ -220,14 +188,9 @@ def first_event(coefficients: Coefficients, contact: int, p: Parameters, u: floa
     """Return (time in [0, 1], guard) of the first event of a scaled Taylor series, or (1, -1).
 
     Args:
-        coefficients: of the scaled Taylor series, one state each.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        Both.
     """
     earliest = 1.0
     which = -1
@@ -249,14 +212,6 @@ def first_root(series: Series, end: float, tolerance: float) -> float:
     March by the earliest moment at which a root is possible: with value v, slope s and a bound L on the
     curvature that is the positive root of ``v + s t - L t^2 / 2``. No root is stepped over, and the
     march converges to a simple root quadratically.
-
-    Args:
-        series: coefficients of the polynomial.
-        end: of the interval.
-        tolerance: values below it count as zero.
-
-    Returns:
-        The root.
     """
     if series[0] <= REACHED * tolerance:
         if series[1] < -tolerance:

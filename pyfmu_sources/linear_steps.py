@@ -25,16 +25,11 @@ def leap(x: State, contact: int, p: Parameters, u: float, T_l: float, h: float, 
     An event is ruled out when both ends are farther from it than the speeds at both ends could carry.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
         table: ``prepare(p, h)`` of the same ``p`` and ``h``.
-
-    Returns:
-        Both.
     """
     i = p[P_I]
     model = backlash_model(p)
@@ -93,16 +88,10 @@ def advance_linear(
     """Return state and mode after ``h`` [s] of the exact linear solution, events located; NaN for too much work.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
         kappa: rate at which a parted shaft unwinds [1/s].
-
-    Returns:
-        Both.
     """
     contact = mode[0]
     elapsed = 0.0
@@ -127,18 +116,12 @@ def linear_to_event(
     """Return the exact linear solution at its next event, or at the end of a step.
 
     Args:
-        x: state, as in ``equations``.
         contact: flank that touches: -1, 0 or 1; -2 or 2 where both bodies stand still against it.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
         kappa: rate at which a parted shaft unwinds [1/s].
         elapsed: time since the beginning of the step at which ``x`` is [s].
-        pieces: of the step so far.
-
-    Returns:
-        State, time since the beginning of the step, pieces so far, and the guard: ``NO_EVENT``, ``TOO_MUCH`` work.
     """
     most = MAX_PIECES + int(MAX_PIECES_PER_SECOND * h)
     law = law_of(contact, p)

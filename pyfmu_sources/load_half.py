@@ -29,9 +29,6 @@ def held_motion(theta_m: float, omega_m: float) -> Motion:
     Args:
         theta_m: [rad].
         omega_m: [rad/s].
-
-    Returns:
-        The coefficients.
     """
     return (theta_m, 0.0, 0.0, 0.0, omega_m, 0.0, 0.0)
 
@@ -40,14 +37,7 @@ def cubic_motion(theta: float, omega: float, theta_end: float, omega_end: float,
     """Return the motion that has these angles [rad] and speeds [rad/s] at both ends of ``h`` [s] (Hermite's cubic).
 
     Args:
-        theta: at the beginning.
-        omega: at the beginning.
-        theta_end: at the end.
-        omega_end: at the end.
         h: [s].
-
-    Returns:
-        The coefficients.
     """
     mean = (theta_end - theta) / h
     second = (3.0 * mean - 2.0 * omega - omega_end) / h
@@ -59,11 +49,7 @@ def moved(motion: Motion, t: float) -> Motion:
     """Return a motion with its time counted from ``t`` [s].
 
     Args:
-        motion: coefficients.
         t: [s].
-
-    Returns:
-        The coefficients; the first and the fifth are angle and speed at ``t``.
     """
     a, b, c, d, e, f, g = motion
     return (
@@ -83,7 +69,6 @@ def settled(x: State, contact: int, p: Parameters, theta_m: float, speed: float)
     A motor's angle from elsewhere is never exact: within ``LOOSE`` a contact ends only when the teeth move on that way.
 
     Args:
-        x: load angle and load speed.
         contact: flank that touched: -1, 0 or 1.
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
         theta_m: motor angle [rad].
@@ -128,12 +113,8 @@ def rounding(x: State, p: Parameters, theta_m: float) -> float:
     """Return how far off a twist may be by rounding [rad].
 
     Args:
-        x: load angle and load speed.
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
         theta_m: motor angle [rad].
-
-    Returns:
-        The distance.
     """
     return GUARD_ROUNDINGS * EPSILON * (1.0 + abs(theta_m / p[P_I]) + abs(x[0]) + p[P_ALPHA])
 
@@ -142,14 +123,10 @@ def shaft_torque(x: State, contact: int, p: Parameters, theta_m: float, omega_m:
     """Return the torque of the shaft on the load [N.m].
 
     Args:
-        x: load angle and load speed.
         contact: flank that touches: -1, 0 or 1.
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
         theta_m: motor angle [rad].
         omega_m: motor speed [rad/s].
-
-    Returns:
-        The torque.
     """
     if contact == 0:
         return 0.0
@@ -163,15 +140,11 @@ def rates_and_outputs(
     """Return the derivatives, and the outputs theta_l, omega_l and T_shaft.
 
     Args:
-        x: load angle and load speed.
         contact: flank that touches: -1, 0 or 1.
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
         theta_m: motor angle [rad].
         omega_m: motor speed [rad/s].
         T_l: load torque [N.m].
-
-    Returns:
-        Both, SI units.
     """
     torque = shaft_torque(x, contact, p, theta_m, omega_m)
     return ((x[1], (torque - T_l - p[P_B] * x[1]) / p[P_J]), (x[0], x[1], torque))
@@ -181,13 +154,9 @@ def guards(x: State, contact: int, p: Parameters, theta_m: float) -> tuple[float
     """Return how far the contact is from its end at either flank [rad]; 1 for a guard that is not in use.
 
     Args:
-        x: load angle and load speed.
         contact: flank that touches: -1, 0 or 1.
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
         theta_m: motor angle [rad].
-
-    Returns:
-        Both; negative ends the contact.
     """
     if p[P_ALPHA] == 0.0:
         return (1.0, 1.0)
@@ -218,15 +187,10 @@ def solution(
     """Return the state at the first event within ``step`` [s], at what share of it, and the guard.
 
     Args:
-        x: load angle and load speed.
         contact: flank that touches: -1, 0 or 1.
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        motion: of the motor, its time counted from ``x``.
         T_l: load torque [N.m].
         step: short enough for the series [s].
-
-    Returns:
-        The three; 1 and ``NO_EVENT`` without an event.
     """
     touches = 1.0 if contact != 0 else 0.0
     k, c, i = touches * p[P_K], touches * p[P_C], p[P_I]
@@ -267,11 +231,7 @@ def value(series: Series, time: float) -> float:
     """Return a power series at ``time``.
 
     Args:
-        series: coefficients.
         time: 0 to 1.
-
-    Returns:
-        Its value.
     """
     total = series[TERMS]
     for n in range(TERMS - 1, -1, -1):
@@ -284,9 +244,6 @@ def fastest(p: Parameters) -> float:
 
     Args:
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-
-    Returns:
-        The rate.
     """
     return sqrt(p[P_K] / p[P_J]) + (p[P_C] + p[P_B]) / p[P_J]
 
@@ -297,16 +254,11 @@ def advance_to_event(
     """Return the state at the first event of a motion between two times, the time, and the guard.
 
     Args:
-        x: load angle and load speed at ``begin``.
         contact: flank that touches: -1, 0 or 1.
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        motion: of the motor.
         T_l: load torque [N.m].
         begin: in the motion's time [s].
         end: in the motion's time [s].
-
-    Returns:
-        The three; ``end`` and ``NO_EVENT`` without an event.
     """
     longest = 1.0 / fastest(p)
     time = begin
@@ -334,16 +286,11 @@ def advance(
     """Return state and contact at the end of a motion, all events inside; NaN where there are far too many.
 
     Args:
-        x: load angle and load speed at ``begin``.
         contact: flank that touches: -1, 0 or 1.
         p: inertia, stiffness, damping, friction, gear ratio and half-gap.
-        motion: of the motor.
         T_l: load torque [N.m].
         begin: in the motion's time [s].
         end: in the motion's time [s].
-
-    Returns:
-        Both.
     """
     time = begin
     for _ in range(MOST_EVENTS):

@@ -115,11 +115,7 @@ class LoadHalf(SlaveBase):
         return taken
 
     def take_node(self, node: int) -> None:
-        """Take the inputs of the moment for the begin (0), the middle (1) or the end (2) of the next step.
-
-        Args:
-            node: which.
-        """
+        """Take the inputs of the moment for the begin (0), the middle (1) or the end (2) of the next step."""
         motion = (self.real[THETA_M], self.real[OMEGA_M])
         if node == 0:
             self._begin = motion
@@ -134,7 +130,6 @@ class LoadHalf(SlaveBase):
         Args:
             time: [s].
             step: [s].
-            to_event: stop at the first event.
 
         Returns:
             How far it is [s].
@@ -187,11 +182,7 @@ class LoadHalf(SlaveBase):
         self._write()
 
     def derivatives(self) -> State:
-        """Return the derivatives of the state.
-
-        Returns:
-            The derivatives, in the order of the state.
-        """
+        """Return the derivatives of the state."""
         real = self.real
         r, _ = rates_and_outputs(self._x, self._contact, self._p, real[THETA_M], real[OMEGA_M], real[T_L])
         return r
@@ -208,11 +199,7 @@ class LoadHalf(SlaveBase):
         return (r[0], r[1], rate)
 
     def indicators(self) -> tuple[float, float]:
-        """Return the event indicators: the rooms at both flanks.
-
-        Returns:
-            The indicators.
-        """
+        """Return the event indicators: the rooms at both flanks."""
         theta_m = self.real[THETA_M]
         one, other = load_half.guards(self._x, self._contact, self._p, theta_m)
         room = 2.0 * load_half.rounding(self._x, self._p, theta_m)

@@ -25,12 +25,8 @@ def control(
         reference_speed: wanted load speed [rad/s].
         estimate: ``(theta_m, omega_m, theta_l, omega_l, T_l, T_m)`` as estimated.
         gains: ``K`` for ``(theta_m, omega_m, theta_l, omega_l, T_m)``.
-        i: gear ratio.
         compliance: 1/k of the shaft [rad/(N.m)].
         u_max: torque limit [N.m].
-
-    Returns:
-        The torque, within the limit.
     """
     theta_m, omega_m, theta_l, omega_l, T_l, T_m = estimate
     k1, k2, k3, k4, k5 = gains

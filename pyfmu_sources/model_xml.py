@@ -34,15 +34,7 @@ class Described(Protocol):
 
 
 def model_description(slave: Described, name: str) -> Element:
-    """Return the root element; GUID and model identifier of the build are put in by the builder.
-
-    Args:
-        slave: class of the adapter.
-        name: of the model.
-
-    Returns:
-        The element.
-    """
+    """Return the root element; GUID and model identifier of the build are put in by the builder."""
     root = Element(
         "fmiModelDescription",
         {

@@ -17,13 +17,8 @@ def rates_and_outputs(x: State, p: Parameters, u: float, T_shaft: float) -> tupl
     """Return the derivatives, and the outputs theta_m, omega_m and T_m.
 
     Args:
-        x: motor angle, motor speed and motor torque.
-        p: inertia, friction, gear ratio and time constant.
         u: requested torque [N.m].
         T_shaft: torque of the shaft on the load [N.m].
-
-    Returns:
-        Both, SI units.
     """
     acceleration = (x[2] - T_shaft / p[P_I] - p[P_B] * x[1]) / p[P_J]
     return ((x[1], acceleration, (u - x[2]) / p[P_TAU]), (x[0], x[1], x[2]))
@@ -33,14 +28,9 @@ def advance(x: State, p: Parameters, u: float, T_shaft: float, h: float) -> Stat
     """Return the state after ``h`` [s] with the inputs held.
 
     Args:
-        x: motor angle, motor speed and motor torque.
-        p: inertia, friction, gear ratio and time constant.
         u: requested torque [N.m].
         T_shaft: torque of the shaft on the load [N.m].
         h: length of the step [s].
-
-    Returns:
-        The state.
     """
     count = 1 + int(h * (p[P_B] / p[P_J] + 1.0 / p[P_TAU]))
     step = h / count

@@ -67,9 +67,6 @@ class MotorHalf(SlaveBase):
         Args:
             time: [s].
             step: [s].
-
-        Raises:
-            StepRefusedError: the step is far too long, or the motion leaves all bounds.
         """
         p = self._p
         if step * (p[1] / p[0] + 1.0 / p[3]) > MOST_PIECES:
@@ -94,11 +91,7 @@ class MotorHalf(SlaveBase):
         return step
 
     def derivatives(self) -> State:
-        """Return the derivatives of the state.
-
-        Returns:
-            The derivatives, in the order of the state.
-        """
+        """Return the derivatives of the state."""
         r, _ = rates_and_outputs(self._x, self._p, self.real[U], self.real[T_SHAFT])
         return r
 

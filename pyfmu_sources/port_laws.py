@@ -18,14 +18,8 @@ def built_up(kind: int, z: float, v: float, distance: float, time: float) -> flo
     speed.
 
     Args:
-        kind: number of the law.
         z: at the beginning, -1 to 1.
-        v: speed, in the port's unit.
-        distance: over which it builds up, in the port's unit.
         time: [s].
-
-    Returns:
-        The state at the end.
     """
     if v == 0.0:
         return z
@@ -40,14 +34,7 @@ def built_up(kind: int, z: float, v: float, distance: float, time: float) -> flo
 
 
 def has_memory(kind: int) -> bool:
-    """Tell whether a law builds up over a distance (the last of its parameters).
-
-    Args:
-        kind: number of the law.
-
-    Returns:
-        True when it does.
-    """
+    """Tell whether a law builds up over a distance (the last of its parameters)."""
     return kind in (COULOMB, STRIBECK, HYSTERESIS)
 
 
@@ -55,12 +42,7 @@ def distance_of(kind: int, q1: float, q3: float) -> float:
     """Return the distance over which a law with memory builds up.
 
     Args:
-        kind: number of the law.
         q1: second parameter of the law.
-        q3: its fourth parameter.
-
-    Returns:
-        The distance, in the port's unit.
     """
     return q3 if kind == STRIBECK else q1
 
@@ -69,13 +51,7 @@ def resistance(kind: int, x: float, v: float, a: float, z: float, q0: float, q1:
     """Return the force against the motion.
 
     Args:
-        kind: one of the constants above.
-        x, v, a: position, speed and acceleration.
         z: how far dry friction or hysteresis has built up, -1 to 1.
-        q0, q1, q2: parameters of the law.
-
-    Returns:
-        The force, in the port's unit.
     """
     if kind in (COULOMB, HYSTERESIS):
         return q0 * z
@@ -102,14 +78,7 @@ def resistance(kind: int, x: float, v: float, a: float, z: float, q0: float, q1:
 
 
 def cuts(kind: int) -> bool:
-    """Tell whether a law stands in a connection between two FMUs, and not at a port.
-
-    Args:
-        kind: number of the law.
-
-    Returns:
-        True when it does.
-    """
+    """Tell whether a law stands in a connection between two FMUs, and not at a port."""
     return kind in (BACKLASH, COMPLIANCE)
 
 
@@ -117,14 +86,7 @@ def across(kind: int, near: float, other: float, sign: float, q0: float) -> floa
     """Return the position that arrives beyond a cut.
 
     Args:
-        kind: one of the constants above.
-        near: position before it.
-        other: of a gap, the position of what lies beyond; of a spring, the effort that goes through it.
-        sign: of an effort that drives what lies beyond.
         q0: width of the gap, or how far an effort of 1 winds the spring.
-
-    Returns:
-        The position, in the unit of ``near``.
     """
     if kind == COMPLIANCE:
         return near - q0 * sign * other

@@ -24,15 +24,7 @@ SETTLED = 1e-15
 
 
 def product(a: Square, b: Square) -> Square:
-    """Return ``a b``.
-
-    Args:
-        a: row by row.
-        b: row by row.
-
-    Returns:
-        Row by row.
-    """
+    """Return ``a b``."""
     made: Square = [0.0] * SIZE
     for r in range(ORDER):
         for c in range(ORDER):
@@ -42,14 +34,7 @@ def product(a: Square, b: Square) -> Square:
 
 
 def transposed(a: Square) -> Square:
-    """Return ``a'``.
-
-    Args:
-        a: row by row.
-
-    Returns:
-        Row by row.
-    """
+    """Return ``a'``."""
     made: Square = [0.0] * SIZE
     for r in range(ORDER):
         for c in range(ORDER):
@@ -58,15 +43,7 @@ def transposed(a: Square) -> Square:
 
 
 def symmetric_sum(a: Square, b: Square) -> Square:
-    """Return the symmetric part of ``a + b``.
-
-    Args:
-        a: row by row.
-        b: row by row.
-
-    Returns:
-        Row by row.
-    """
+    """Return the symmetric part of ``a + b``."""
     made: Square = [0.0] * SIZE
     for r in range(ORDER):
         for c in range(ORDER):
@@ -76,14 +53,7 @@ def symmetric_sum(a: Square, b: Square) -> Square:
 
 
 def largest(a: Square) -> float:
-    """Return the largest magnitude in ``a``.
-
-    Args:
-        a: row by row.
-
-    Returns:
-        The magnitude.
-    """
+    """Return the largest magnitude in ``a``."""
     most = 0.0
     for n in range(SIZE):
         most = max(most, abs(a[n]))
@@ -91,15 +61,7 @@ def largest(a: Square) -> float:
 
 
 def divided_by(w: Square, a: Square) -> Square:
-    """Return ``w^-1 a`` (Gauss and Jordan, each column's pivot its largest item).
-
-    Args:
-        w: row by row, regular.
-        a: row by row.
-
-    Returns:
-        Row by row.
-    """
+    """Return ``w^-1 a`` (Gauss and Jordan, each column's pivot its largest item)."""
     left: Square = list(w)
     right: Square = list(a)
     for k in range(ORDER):
@@ -129,20 +91,7 @@ def divided_by(w: Square, a: Square) -> Square:
 
 
 def regulator_gains(A: Square, B: Column, weights: Column, input_weight: float) -> Gains:
-    """Return the gains ``K`` of ``u = -K x`` that minimise the sum of ``x' Q x + R u^2``.
-
-    Args:
-        A: discrete state matrix.
-        B: discrete input vector.
-        weights: the diagonal of ``Q``, not negative.
-        input_weight: ``R``, positive.
-
-    Returns:
-        The gains, one per state.
-
-    Raises:
-        ValueError: the equation has no stabilising solution for these weights.
-    """
+    """Return the gains ``K`` of ``u = -K x`` that minimise the sum of ``x' Q x + R u^2``."""
     F: Square = list(A)
     G: Square = [0.0] * SIZE
     H: Square = [0.0] * SIZE
@@ -170,17 +119,7 @@ def regulator_gains(A: Square, B: Column, weights: Column, input_weight: float) 
 
 
 def gains_of(X: Square, A: Square, B: Column, input_weight: float) -> Gains:
-    """Return ``B' X A / (R + B' X B)``.
-
-    Args:
-        X: solution of the Riccati equation, row by row.
-        A: discrete state matrix, row by row.
-        B: discrete input vector.
-        input_weight: ``R``, positive.
-
-    Returns:
-        The gains, one per state.
-    """
+    """Return ``B' X A / (R + B' X B)``."""
     pushed: Square = [0.0] * ORDER
     gains: Square = [0.0] * ORDER
     whole = input_weight

@@ -28,30 +28,18 @@ class SampledSlave(SlaveBase):
     _warned = False
 
     def begin(self) -> None:
-        """Compute the outputs at the first sample instant.
-
-        Raises:
-            NotImplementedError: a subclass must do it.
-        """
+        """Compute the outputs at the first sample instant."""
         raise NotImplementedError
 
     def predict(self) -> None:
         """Move the hidden state to the next sample instant, with the inputs of the step that ends there."""
 
     def correct(self) -> None:
-        """Compute the outputs of this sample instant from the hidden state and the inputs; may be repeated.
-
-        Raises:
-            NotImplementedError: a subclass must do it.
-        """
+        """Compute the outputs of this sample instant from the hidden state and the inputs; may be repeated."""
         raise NotImplementedError
 
     def take_parameters(self) -> None:
-        """Collect the parameters from the values.
-
-        Raises:
-            NotImplementedError: a subclass must do it.
-        """
+        """Collect the parameters from the values."""
         raise NotImplementedError
 
     def initialise(self) -> None:
@@ -67,9 +55,6 @@ class SampledSlave(SlaveBase):
         Args:
             time: [s].
             step: [s].
-
-        Raises:
-            StepRefusedError: too many samples are due.
         """
         period = self.real[self.sample_time_reference]
         slack = SLACK * period
@@ -106,18 +91,10 @@ class SampledSlave(SlaveBase):
                 self.begin()
 
     def saved(self) -> Any:
-        """Return the clock and the hidden state.
-
-        Returns:
-            Plain data.
-        """
+        """Return the clock and the hidden state."""
         return [self._samples, self._at_sample, super().saved()]
 
     def restore(self, saved: Any) -> None:
-        """Take over a saved clock and hidden state.
-
-        Args:
-            saved: what ``saved`` returned.
-        """
+        """Take over a saved clock and hidden state."""
         self._samples, self._at_sample, hidden = saved
         super().restore(hidden)

@@ -54,15 +54,9 @@ def advance(x: State, mode: int, p: Parameters, u: float, T_l: float, h: float) 
     The state is NaN where damping, lag or ripple are so quick that no sensible number of steps resolves them.
 
     Args:
-        x: state.
-        mode: direction of sliding, from :func:`initial_mode` or the step before.
-        p: parameters.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: step [s], positive.
-
-    Returns:
-        Both.
     """
     if x[4] == UNASKED and filtered(p):
         x = (x[0], x[1], x[2], x[3], u)
@@ -83,15 +77,10 @@ def advance_request(x: State, mode: int, p: Parameters, u: float, T_l: float, h:
     """Return :func:`advance` for a request whose ramp does not end inside the step.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        Both.
     """
     elapsed = 0.0
     pieces = 0
@@ -107,9 +96,6 @@ def advance_to_event(
     """Return :func:`advance` up to the first event, its effect included.
 
     Args:
-        x: state.
-        mode: direction of sliding.
-        p: parameters.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: step [s], positive.
@@ -141,17 +127,11 @@ def request_to_event(
     An axis that breaks away is still at rest; its direction follows from the torque of what comes next.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
         elapsed: time since the beginning of the step at which ``x`` is [s].
-        pieces: integration steps of the step so far.
-
-    Returns:
-        State, direction of sliding, time since the beginning of the step, pieces so far, and whether it is an event.
     """
     bends = builds_up(p)
     dry = rest(p) + abs(p[P_WAVY]) > 0.0

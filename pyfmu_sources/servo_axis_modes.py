@@ -37,9 +37,6 @@ def decided(x: State, mode: int, p: Parameters, u: float) -> int:
     """Return the direction of sliding, from the state and the request if nothing has decided it yet.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
-        mode: direction of sliding, or ``UNDECIDED``.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
 
     Returns:
@@ -51,14 +48,7 @@ def decided(x: State, mode: int, p: Parameters, u: float) -> int:
 
 
 def is_dry(p: Parameters) -> bool:
-    """Tell whether the axis has dry friction.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        True when it has.
-    """
+    """Tell whether the axis has dry friction."""
     return rest(p) + abs(p[P_WAVY]) > 0.0
 
 
@@ -66,14 +56,8 @@ def rates_and_outputs(x: State, mode: int, p: Parameters, u: float, T_l: float) 
     """Return the derivatives, and the outputs theta_m, omega_m and T_m.
 
     Args:
-        x: state.
-        mode: direction of sliding, which is held.
-        p: parameters.
         u: requested torque [N.m].
         T_l: load torque [N.m].
-
-    Returns:
-        Both, SI units.
     """
     asked = saturated(u, p[P_LIMIT])
     outputs = (x[0] + p[P_OFFSET], x[1], drive_torque(x, p, asked))
@@ -84,11 +68,7 @@ def slipping_room(x: State, mode: int) -> float:
     """Return how far below zero the friction's indicator may fall by rounding.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-
-    Returns:
-        The room: N.m of an axis that sticks, rad/s of one that slides.
     """
     return 1e-12 * (1.0 + abs(x[2])) if mode == 0 else 1e-14
 
@@ -97,9 +77,7 @@ def slipping(x: State, mode: int, p: Parameters, u: float, T_l: float) -> float:
     """Return how far dry friction is from the end of its mode, in N.m (it sticks) or rad/s (it slides).
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
 
@@ -114,14 +92,7 @@ def slipping(x: State, mode: int, p: Parameters, u: float, T_l: float) -> float:
 
 
 def stop_room(x: State) -> float:
-    """Return how far below zero the end stops' indicator may fall by rounding [rad].
-
-    Args:
-        x: position, speed, drive torque, bristle and filtered request.
-
-    Returns:
-        The room.
-    """
+    """Return how far below zero the end stops' indicator may fall by rounding [rad]."""
     return 1e-14 * (1.0 + abs(x[0]))
 
 
@@ -129,12 +100,7 @@ def to_stop(x: State, stop: int, p: Parameters) -> float:
     """Return how far [rad] the axis is from reaching an end stop, or from leaving the one at which it is.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         stop: at which it is: -1, 0 (none) or 1.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The distance; 1 without end stops.
     """
     if p[P_STOP_UPPER] >= BIG and p[P_STOP_LOWER] <= -BIG:
         return 1.0
@@ -149,15 +115,10 @@ def indicators(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: flo
     """Return both event indicators: dry friction and end stops; the mode ends when one turns negative.
 
     Args:
-        x: position, speed, drive torque, bristle and filtered request.
         mode: direction of sliding, 0: none.
         stop: end stop at which the axis is: -1, 0 (none) or 1.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The indicators.
     """
     return (
         slipping(x, mode, p, u, T_l) + ROOMS * slipping_room(x, mode),
@@ -169,15 +130,8 @@ def after_events(x: State, mode: int, stop: int, p: Parameters, u: float, T_l: f
     """Return state, direction of sliding and end stop once none of them is at its end.
 
     Args:
-        x: state at the event.
-        mode: direction of sliding, or ``UNDECIDED``.
-        stop: end stop.
-        p: parameters.
         u: requested torque [N.m], saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The three.
     """
     mode = decided(x, mode, p, u)
     if slipping(x, mode, p, u, T_l) < -slipping_room(x, mode):

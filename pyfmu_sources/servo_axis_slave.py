@@ -110,11 +110,7 @@ class ServoAxis(PlantSlave):
         self._write()
 
     def derivatives(self) -> State:
-        """Return the derivatives of the state.
-
-        Returns:
-            The derivatives, in the order of the state.
-        """
+        """Return the derivatives of the state."""
         u = self._acting_request()
         mode = decided(self._x, self._mode, self._p, u)
         return servo_axis.mode_rates(self._x, mode, self._p, u, self.real[T_L])
@@ -129,11 +125,7 @@ class ServoAxis(PlantSlave):
         return (r[0], r[1], r[2] if self._p[P_TAU] > 0.0 else 0.0)
 
     def indicators(self) -> Indicators:
-        """Return the event indicators, for model exchange.
-
-        Returns:
-            The indicators.
-        """
+        """Return the event indicators, for model exchange."""
         u = self._request()
         return indicators(self._x, self._mode, self._end_stop, self._p, u, self.real[T_L])
 
@@ -152,11 +144,7 @@ class ServoAxis(PlantSlave):
         self.observe()
 
     def begin_exchange(self) -> None:
-        """Settle the drive at what is asked first; effects that need time events are refused in model exchange.
-
-        Raises:
-            ValueError: such an effect is on.
-        """
+        """Settle the drive at what is asked first; effects that need time events are refused in model exchange."""
         if self._p[P_DELAY] > 0.0:
             raise ValueError("`effects.input_delay.delay` must be 0 in model exchange, which has no dead time")
         if self._p[P_RATE] < BIG:

@@ -67,13 +67,7 @@ class SlaveBase(Fmi2Slave):
 
     @classmethod
     def customise(cls, name: str, build: str, starts: dict[str, float]) -> None:
-        """Give the class the name, the build identity and the start values of one built FMU.
-
-        Args:
-            name: of the model.
-            build: its fingerprint.
-            starts: value by parameter.
-        """
+        """Give the class the name, the build identity and the start values of one built FMU."""
         cls.model_name = name
         cls.build = build
         cls.table = with_starts(cls.table, starts)
@@ -118,11 +112,7 @@ class SlaveBase(Fmi2Slave):
     # What a subclass implements -------------------------------------------------------------------------
 
     def initialise(self) -> None:
-        """Compute state and outputs from the parameters; may be called repeatedly. ValueError refuses.
-
-        Raises:
-            NotImplementedError: a subclass must do it.
-        """
+        """Compute state and outputs from the parameters; may be called repeatedly. ValueError refuses."""
         raise NotImplementedError
 
     def advance(self, time: float, step: float) -> None:
@@ -131,9 +121,6 @@ class SlaveBase(Fmi2Slave):
         Args:
             time: beginning of the step [s].
             step: its length [s].
-
-        Raises:
-            NotImplementedError: a subclass must do it.
         """
         raise NotImplementedError
 
@@ -141,31 +128,18 @@ class SlaveBase(Fmi2Slave):
         """Recompute outputs that depend on inputs directly, after inputs have been set in step mode."""
 
     def saved(self) -> Any:
-        """Return the hidden state: the attributes that the class declares, lists copied.
-
-        Returns:
-            Plain data.
-        """
+        """Return the hidden state: the attributes that the class declares, lists copied."""
         return [copied(getattr(self, name)) for name in self._hidden]
 
     def restore(self, saved: Any) -> None:
-        """Take over what ``saved`` returned; lists may stand for tuples, as they do after serialisation.
-
-        Args:
-            saved: plain data.
-        """
+        """Take over what ``saved`` returned; lists may stand for tuples, as they do after serialisation."""
         for name, value in zip(self._hidden, saved):  # noqa: B905 - Python 3.9 has no `strict`
             setattr(self, name, shaped(value, hidden_type(self.__class__, name)))
 
     # Messages ---------------------------------------------------------------------------------------------
 
     def say(self, status: Fmi2Status, message: str) -> None:
-        """Queue a message; a percent sign is doubled because hosts take messages as printf formats.
-
-        Args:
-            status: of the message.
-            message: one line.
-        """
+        """Queue a message; a percent sign is doubled because hosts take messages as printf formats."""
         category = f"logStatus{status.name.capitalize()}"
         self.log_queue.append(LogMsg(status, category, message.replace("%", "%%")))
 
@@ -197,7 +171,6 @@ class SlaveBase(Fmi2Slave):
         Args:
             start_time: [s].
             stop_time: [s]; None: open.
-            tolerance: relative; it is not used.
         """
         if not self._expects("fmi2SetupExperiment", INSTANTIATED):
             return
@@ -233,7 +206,7 @@ class SlaveBase(Fmi2Slave):
             step_size: its length [s].
 
         Returns:
-            True when it was done.
+            Whether the step was taken.
         """
         try:
             end = current_time + step_size
@@ -283,14 +256,7 @@ class SlaveBase(Fmi2Slave):
             self.refresh()
 
     def get_real(self, vrs: list[int]) -> list[float]:
-        """Return the values of Real variables, NaN for all if that is refused.
-
-        Args:
-            vrs: value references.
-
-        Returns:
-            A value per reference.
-        """
+        """Return the values of Real variables, NaN for all if that is refused."""
         try:
             if not self._fresh:
                 self._recompute()
@@ -300,14 +266,7 @@ class SlaveBase(Fmi2Slave):
             return [self.real.get(vr, float("nan")) for vr in vrs]
 
     def get_integer(self, vrs: list[int]) -> list[int]:
-        """Return the values of Integer and Enumeration variables.
-
-        Args:
-            vrs: value references.
-
-        Returns:
-            A value per reference.
-        """
+        """Return the values of Integer and Enumeration variables."""
         try:
             if not self._fresh:
                 self._recompute()
@@ -324,21 +283,11 @@ class SlaveBase(Fmi2Slave):
             self.say(Fmi2Status.error, f"{what} must not be used for {self._name(wrong)}, which is of another type")
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Set Real inputs, and parameters before the first step.
-
-        Args:
-            vrs: value references.
-            values: one per reference.
-        """
+        """Set Real inputs, and parameters before the first step."""
         self._set("fmi2SetReal", self.real, self._writable_real, vrs, values)
 
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """Set Integer and Enumeration parameters before the first step.
-
-        Args:
-            vrs: value references.
-            values: one per reference.
-        """
+        """Set Integer and Enumeration parameters before the first step."""
         self._set("fmi2SetInteger", self.integer, self._writable_integer, vrs, values)
 
     def _set(self, what: str, store: dict[int, Any], writable: Bounds, vrs: list[int], values: list[Any]) -> None:
@@ -364,48 +313,24 @@ class SlaveBase(Fmi2Slave):
         return "input" if causality == "input" else f"FMU {causality}"
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """Refuse: there are no Boolean variables.
-
-        Args:
-            vrs: value references.
-
-        Returns:
-            False, one per reference.
-        """
+        """Refuse: there are no Boolean variables."""
         for vr in vrs:
             self._other_type("fmi2GetBoolean", vr)
         return [False] * len(vrs)
 
     def get_string(self, vrs: list[int]) -> list[str]:
-        """Refuse: there are no String variables.
-
-        Args:
-            vrs: value references.
-
-        Returns:
-            Empty texts, one per reference.
-        """
+        """Refuse: there are no String variables. Return empty texts, one per reference."""
         for vr in vrs:
             self._other_type("fmi2GetString", vr)
         return [""] * len(vrs)
 
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        """Refuse: there are no Boolean variables.
-
-        Args:
-            vrs: value references.
-            values: one per reference.
-        """
+        """Refuse: there are no Boolean variables."""
         for vr in vrs:
             self._other_type("fmi2SetBoolean", vr)
 
     def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """Refuse: there are no String variables.
-
-        Args:
-            vrs: value references.
-            values: one per reference.
-        """
+        """Refuse: there are no String variables."""
         for vr in vrs:
             self._other_type("fmi2SetString", vr)
 
@@ -462,14 +387,7 @@ class SlaveBase(Fmi2Slave):
         return found if isinstance(found, dict) else {}
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Any:
-        """Return the complete model description.
-
-        Args:
-            model_options: of PythonFMU; they are not used.
-
-        Returns:
-            The root element.
-        """
+        """Return the complete model description."""
         from .model_xml import model_description
 
         return model_description(type(self), self.modelName)

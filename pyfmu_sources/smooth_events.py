@@ -45,15 +45,8 @@ def guard(x: State, mode: Mode, which: int, p: Parameters, u: float, T_l: float)
     """Return guard ``which`` of ``mode`` (0, 1: contact; 2: motor's friction; 3: load's); negative ends it.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        which: number of the guard.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        The guard.
     """
     if which in (MOTOR, LOAD):
         return friction_guard(x, mode, which, p, T_l)
@@ -64,14 +57,7 @@ def contact_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -
     """Return the guard of the contact; the same conditions as in the linear solution.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        which: number of the guard.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        The guard.
     """
     contact = mode[0]
     model = backlash_model(p)
@@ -102,17 +88,7 @@ def contact_guard(x: State, mode: Mode, which: int, p: Parameters, T_l: float) -
 
 
 def guard_room(x: State, mode: Mode, which: int, p: Parameters) -> float:
-    """Return how far below zero a guard may fall by rounding.
-
-    Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        which: number of the guard.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The room, in the guard's unit.
-    """
+    """Return how far below zero a guard may fall by rounding."""
     if which == 2 or which == 3:
         standing = mode[1] == 0 if which == 2 else mode[2] == 0
         return 1e-12 * (1.0 + abs(x[4])) if standing else 1e-14
@@ -125,14 +101,8 @@ def violated(x: State, mode: Mode, p: Parameters, u: float, T_l: float) -> int:
     """Return the guard that ``x`` violates most, relative to its room, or -1.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        Its number.
     """
     worst = -1
     depth = 1.0
@@ -150,16 +120,8 @@ def switched(x: State, mode: Mode, which: int, events: int, p: Parameters, u: fl
     """Return state and mode after the guard ``which`` has ended ``mode``.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        which: number of the guard.
-        events: how many events this step has had.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        Both.
     """
     contact, slip_m, slip_l = mode
     if which == MOTOR and is_rigid(p) and contact != 0:
@@ -198,15 +160,8 @@ def settled(x: State, mode: Mode, events: int, p: Parameters, u: float, T_l: flo
     """Return state and mode once no guard is violated any more at this moment.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        events: how many events this step has had.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
-
-    Returns:
-        State, mode and number of events.
     """
     for _ in range(2 * GUARDS):
         which = violated(x, mode, p, u, T_l)
@@ -221,13 +176,7 @@ def joined_body(x: State, mode: Mode, p: Parameters, T_l: float) -> tuple[State,
     """Return state and mode with rigid teeth in contact at one flank, one speed and one direction of friction.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         T_l: load torque [N.m].
-
-    Returns:
-        Both.
     """
     contact = mode[0]
     if contact == 0 or not is_rigid(p):

@@ -24,12 +24,6 @@ def dipped(x: State, k1: State, after: State, k7: State, mode: Mode, p: Paramete
     """Return the moment inside a step at which a twist or a speed turns back, or 0 when none does.
 
     Args:
-        x: state, as in ``equations``.
-        k1: derivative at the beginning.
-        after: state at the end.
-        k7: derivative at the end.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         h: length of the step [s].
 
     Returns:
@@ -53,16 +47,9 @@ def locate(x: State, k1: State, mode: Mode, p: Parameters, u: float, T_l: float,
     """Return (state, time, guard) at which the first guard turns negative inside a step that ends beyond it.
 
     Args:
-        x: state, as in ``equations``.
-        k1: derivative at the beginning.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        The three.
     """
     low = 0.0
     high = h
@@ -87,14 +74,7 @@ def locate(x: State, k1: State, mode: Mode, p: Parameters, u: float, T_l: float,
 
 
 def refused(x: State) -> State:
-    """Return the state that says that a step has no result: NaN throughout.
-
-    Args:
-        x: state, as in ``equations``.
-
-    Returns:
-        The state.
-    """
+    """Return the state that says that a step has no result: NaN throughout."""
     nan = float("nan")
     return (nan, nan, nan, nan, nan, nan, nan, nan, nan, nan, nan, nan)
 
@@ -103,15 +83,9 @@ def advance_smooth(x: State, mode: Mode, p: Parameters, u: float, T_l: float, h:
     """Return state and mode after ``h`` [s] with the inputs held; NaN where no step size resolves the motion.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        Both.
     """
     elapsed = 0.0
     work = 0
@@ -134,9 +108,6 @@ def advance_smooth_to_event(
     """Return :func:`advance_smooth` up to the first event, which has not had its effect yet.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
@@ -156,17 +127,10 @@ def smooth_to_event(
     """Return the solution at its next event, or at the end of a step.
 
     Args:
-        x: state, as in ``equations``.
-        mode: contact, and the directions in which motor and load slide.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
         elapsed: time since the beginning of the step at which ``x`` is [s].
-        work: integration steps of the step so far.
-
-    Returns:
-        State, mode, time since the beginning of the step, work so far, and the guard: ``NO_EVENT``, ``TOO_MUCH`` work.
     """
     k1 = mode_rates(x, mode, p, u, T_l)
     step = h - elapsed

@@ -12,29 +12,14 @@ MOST_DOUBLINGS = 200
 
 
 def fastest_rate(law: Law, p: Parameters) -> float:
-    """Return a bound [1/s] on the rates of the linear law, by which Taylor steps are scaled.
-
-    Args:
-        law: kind, stiffness, damping and offset of the linear law.
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The bound.
-    """
+    """Return a bound [1/s] on the rates of the linear law, by which Taylor steps are scaled."""
     mobility = 1.0 / p[P_J_L] + 1.0 / (p[P_J_M] * p[P_I] * p[P_I])
     friction = p[P_B_M] / p[P_J_M] + p[P_B_L] / p[P_J_L] + 1.0 / p[P_TAU]
     return sqrt(law[1] * mobility) + law[2] * mobility + friction
 
 
 def relaxation_rate(p: Parameters) -> float:
-    """Return the rate [1/s] at which a parted shaft unwinds; zero where it does so at once or has none.
-
-    Args:
-        p: parameters, in the order of the FMU's table.
-
-    Returns:
-        The rate.
-    """
+    """Return the rate [1/s] at which a parted shaft unwinds; zero where it does so at once or has none."""
     damping = shaft_damping(p)
     stiffness = shaft_stiffness(p)
     if not teeth_never_pull(p) or damping == 0.0 or stiffness > 1e7 * damping:
@@ -43,15 +28,7 @@ def relaxation_rate(p: Parameters) -> float:
 
 
 def column(x: State6, start: State6) -> Row:
-    """Return what a unit start value has added to each state.
-
-    Args:
-        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
-        start: state at the beginning.
-
-    Returns:
-        The row.
-    """
+    """Return what a unit start value has added to each state."""
     return (x[0] - start[0], x[1] - start[1], x[2] - start[2], x[3] - start[3], x[4] - start[4], 0.0)
 
 
@@ -59,15 +36,9 @@ def propagate(x: State6, law: Law, p: Parameters, u: float, T_l: float, h: float
     """Return the state after ``h`` [s] in one linear mode, whatever its guards say.
 
     Args:
-        x: motor angle, motor speed, load angle, load speed, drive torque and the parted shaft's twist.
-        law: kind, stiffness, damping and offset of the linear law.
-        p: parameters, in the order of the FMU's table.
         u: requested torque [N.m], delayed and saturated already.
         T_l: load torque [N.m].
         h: length of the step [s].
-
-    Returns:
-        The state.
     """
     count = max(1, ceil(h * fastest_rate(law, p)))
     for _ in range(count):
@@ -79,12 +50,7 @@ def transition(law: Law, p: Parameters, h: float) -> Transition:
     """Return the five rows by which ``(twist, omega_m, omega_l, T_m, u, T_l)`` moves the state in ``h`` [s].
 
     Args:
-        law: kind, stiffness, damping and offset of the linear law.
-        p: parameters, in the order of the FMU's table.
         h: length of the step [s].
-
-    Returns:
-        Five rows.
     """
     free = (law[0], law[1], law[2], 0.0)
     doublings = 0
@@ -115,15 +81,7 @@ def transition(law: Law, p: Parameters, h: float) -> Transition:
 
 
 def doubled(rows: Transition, i: float) -> Transition:
-    """Return the transition rows of two steps in a row: a stiff law needs too many Taylor steps for one.
-
-    Args:
-        rows: of the transition.
-        i: gear ratio.
-
-    Returns:
-        Five rows.
-    """
+    """Return the transition rows of two steps in a row: a stiff law needs too many Taylor steps for one."""
     r0, r1, r2, r3, r4 = rows
     wound = added(scaled(r0, 1.0 / i), scaled(r2, -1.0))
     return (
@@ -136,28 +94,12 @@ def doubled(rows: Transition, i: float) -> Transition:
 
 
 def scaled(row: Row, f: float) -> Row:
-    """Return ``f row``.
-
-    Args:
-        row: six numbers.
-        f: factor.
-
-    Returns:
-        Six numbers.
-    """
+    """Return ``f row``."""
     return (f * row[0], f * row[1], f * row[2], f * row[3], f * row[4], f * row[5])
 
 
 def added(a: Row, b: Row) -> Row:
-    """Return ``a + b``.
-
-    Args:
-        a: six numbers.
-        b: six numbers.
-
-    Returns:
-        Six numbers.
-    """
+    """Return ``a + b``."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
 
 
@@ -166,13 +108,6 @@ def followed(row: Row, wound: Row, motor: Row, load: Row, torque: Row) -> Row:
 
     Args:
         row: of the second step.
-        wound: row of the twist of the first step.
-        motor: row of the motor's speed.
-        load: row of the load's speed.
-        torque: row of the drive's torque.
-
-    Returns:
-        The row of both steps.
     """
     moved = added(
         added(scaled(wound, row[0]), scaled(motor, row[1])), added(scaled(load, row[2]), scaled(torque, row[3]))

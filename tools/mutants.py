@@ -53,7 +53,7 @@ class Room:
 
 
 ROOMS = (
-    Room("calibration", ("orchestrator/paired/calibration.py",), ("tests/paired/test_calibration_units.py",)),
+    Room("calibration", ("orchestrator/paired/calibration.py",), ("tests/paired/test_calibration_map.py",)),
     Room("metric", ("orchestrator/paired/metric.py",), ("tests/paired/test_metric.py",)),
     Room(
         "search",
@@ -66,7 +66,7 @@ ROOMS = (
         ("orchestrator/diagnosis/inference/fitting.py", "orchestrator/diagnosis/inference/problem.py"),
         ("tests/diagnosis/test_fitting.py", "tests/diagnosis/test_search.py"),
     ),
-    Room("likelihood", ("orchestrator/estimation/innovations.py",), ("tests/estimation/test_innovations_units.py",)),
+    Room("likelihood", ("orchestrator/estimation/innovations.py",), ("tests/estimation/test_innovations.py",)),
     Room(
         "contact",
         ("pyfmu_sources/contact.py", "pyfmu_sources/equations.py"),

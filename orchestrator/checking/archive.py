@@ -22,29 +22,17 @@ class FmuFiles(Protocol):
     """Read access to the files of an FMU, packed or not."""
 
     def names(self) -> list[str]:
-        """Paths of the files, with forward slashes, folders left out.
-
-        Returns:
-            Paths inside the FMU.
-        """
+        """Paths of the files, with forward slashes, folders left out."""
 
     def read(self, name: str, limit: int) -> bytes:
         """At most ``limit`` + 1 bytes of a file, so that a longer one can be told.
-
-        Args:
-            name: path inside the FMU.
-            limit: bytes that a reader takes.
 
         Returns:
             The bytes; more than ``limit`` of them when the file is longer.
         """
 
     def extract(self, target: Path) -> None:
-        """Copy all files below ``target``.
-
-        Args:
-            target: a folder; it is made where missing.
-        """
+        """Copy all files below ``target``."""
 
     def close(self) -> None:
         """Let go of the archive."""
@@ -100,10 +88,6 @@ class FolderFiles(FmuFiles):
 
 def open_fmu(path: Path, limits: ArchiveLimits) -> tuple[FmuFiles | None, list[Finding]]:
     """Open an FMU (file or unpacked folder) and check its archive.
-
-    Args:
-        path: the FMU's file or folder.
-        limits: the most bytes and files that are unpacked.
 
     Returns:
         The files, or None when the archive is not fit to be read, and the findings.

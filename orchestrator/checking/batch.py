@@ -15,21 +15,7 @@ def check_fmus(
     policy: Policy,
     progress: Callable[[Verdict], None] = lambda verdict: None,
 ) -> list[Verdict]:
-    """Check FMUs one after the other.
-
-    Args:
-        paths: of the FMUs, as ``find_fmus`` returns them.
-        options: how to check.
-        policy: which rules count, and how much.
-        progress: called with the verdict on each FMU as it is ready.
-
-    Returns:
-        A verdict for each FMU.
-
-    Raises:
-        InputError: the baseline cannot be read.
-        OutputError: there is no room to unpack an FMU.
-    """
+    """Check FMUs one after the other. Return A verdict for each FMU."""
     baseline = read_baseline(Path(policy.baseline)) if policy.baseline else frozenset()
     verdicts = []
     for path in paths:
@@ -39,32 +25,12 @@ def check_fmus(
 
 
 def chosen_policy(path: Path | str | None) -> Policy:
-    """Return the policy of a file, or the default one.
-
-    Args:
-        path: of the file; None for none.
-
-    Returns:
-        The policy.
-
-    Raises:
-        InputError: the file cannot be read, or something in it is wrong.
-    """
+    """Return the policy of a file, or the default one."""
     return Policy() if path is None else read_policy(Path(path))
 
 
 def find_fmus(paths: Sequence[Path | str]) -> list[Path]:
-    """Return the FMUs that paths mean: files, unpacked FMUs, and the ``*.fmu`` of folders.
-
-    Args:
-        paths: files and folders.
-
-    Returns:
-        Each FMU once, in their order.
-
-    Raises:
-        FmuError: a path does not exist, or a folder has no FMU.
-    """
+    """Return the FMUs that paths mean: files, unpacked FMUs, and the ``*.fmu`` of folders."""
     found: list[Path] = []
     for path in map(Path, paths):
         if path.is_dir() and not (path / "modelDescription.xml").exists():

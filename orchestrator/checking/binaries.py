@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, Interface
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Finding, listed
 from orchestrator.checking.library_headers import LibraryHeader, inspect
 from orchestrator.checking.rules import Version
 from orchestrator.checking.rules_model import C_NAME
@@ -85,29 +85,14 @@ FMI3_FUNCTIONS = tuple(f"fmi3{n}" for n in _ALL.split()) + tuple(
 
 
 def functions_of(version: Version, interface: str) -> tuple[str, ...]:
-    """The functions that a library must export; in FMI 3.0 all of them, whatever the interface.
-
-    Args:
-        version: of FMI.
-        interface: "CoSimulation", "ModelExchange" or "ScheduledExecution".
-
-    Returns:
-        Their names.
-    """
+    """The functions that a library must export; in FMI 3.0 all of them, whatever the interface."""
     if version == "3.0":
         return FMI3_FUNCTIONS
     return COSIMULATION_FUNCTIONS if interface == "CoSimulation" else MODEL_EXCHANGE_FUNCTIONS
 
 
 def here(version: Version = "2.0") -> str:
-    """Folder of the binaries for this machine, such as "linux64" or "x86_64-linux".
-
-    Args:
-        version: of FMI.
-
-    Returns:
-        The folder's name.
-    """
+    """Folder of the binaries for this machine, such as "linux64" or "x86_64-linux"."""
     bits = 64 if sys.maxsize > 2**32 else 32
     if version == "2.0":
         return f"{'win' if sys.platform == 'win32' else sys.platform}{bits}"
@@ -116,31 +101,13 @@ def here(version: Version = "2.0") -> str:
 
 
 def library_name(identifier: str, folder: str, version: Version = "2.0") -> str:
-    """Path of the shared library inside the FMU.
-
-    Args:
-        identifier: the model identifier of the interface.
-        folder: of the binaries, such as "linux64".
-        version: of FMI.
-
-    Returns:
-        The path, with forward slashes.
-    """
+    """Path of the shared library inside the FMU. Return the path, with forward slashes."""
     described = PLATFORMS[version].get(folder)
     return f"binaries/{folder}/{identifier}{described.suffix if described else ''}"
 
 
 def loadable(d: Description, interface: Interface, names: Collection[str]) -> str:
-    """The library of an interface for this machine.
-
-    Args:
-        d: the model description.
-        interface: whose library.
-        names: of the FMU's files.
-
-    Returns:
-        Its path; where none is named after the modelIdentifier, that of the only one there is; otherwise nothing.
-    """
+    """The library of an interface for this machine."""
     version = d.dialect.version
     folder = here(version)
     path = library_name(interface.identifier or "", folder, version)
@@ -152,23 +119,15 @@ def loadable(d: Description, interface: Interface, names: Collection[str]) -> st
 
 
 def check_binaries(d: Description, files: FmuFiles) -> Iterator[Finding]:
-    """Findings about binaries, sources and their folders.
-
-    Args:
-        d: the model description.
-        files: of the FMU.
-
-    Yields:
-        Each finding.
-    """
+    """Findings about binaries, sources and their folders."""
     version = d.dialect.version
     names = set(files.names())
     folders = sorted({n.split("/")[1] for n in names if n.startswith("binaries/") and n.count("/") >= 2})
     for interface in d.interfaces:
-        for element, source in interface.sources:
-            if posixpath.normpath(f"sources/{source}") not in names:
-                message = f"a source file must be in sources/, but `{source}` is not"
-                yield Finding("file.source-missing", xpath(element, "name"), message)
+        absent = [(e, s) for e, s in interface.sources if posixpath.normpath(f"sources/{s}") not in names]
+        if absent:
+            message = f"source files must be in sources/, but are not: {listed([f'`{s}`' for _, s in absent])}"
+            yield Finding("file.source-missing", xpath(absent[0][0], "name"), message)
     for folder in folders:
         other = folder in WITHOUT_NAME if version == "2.0" else _WITH_ABI.fullmatch(folder)
         if folder not in PLATFORMS[version] and not other:
@@ -206,8 +165,8 @@ def _check_library(
         return
     missing = [f for f in functions_of(d.dialect.version, interface.kind) if not _exports(library, data, f)]
     if missing:
-        few = ", ".join(missing[:12]) + (f" and {len(missing) - 12} more" if len(missing) > 12 else "")
-        yield Finding("binary.exports", path, f"the library must export all FMI functions, but lacks {few}")
+        message = f"the library must export all FMI functions, but lacks {listed(missing)}"
+        yield Finding("binary.exports", path, message)
     python = sorted(u for u in library.undefined or () if u.startswith(("Py", "_Py")))
     if python and not any("python" in n for n in library.needed or ()):
         message = (
@@ -225,12 +184,6 @@ def _static_only(folder: str, names: set[str]) -> bool:
 
 def misfit(library: LibraryHeader, path: str, wanted: Platform, native: bool) -> Finding | None:
     """Why a library cannot be loaded on a platform, as far as its header tells.
-
-    Args:
-        library: its header.
-        path: inside the FMU.
-        wanted: the platform of its folder.
-        native: whether that is this machine's.
 
     Returns:
         The finding, or None when it can.

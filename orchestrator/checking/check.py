@@ -16,7 +16,6 @@ class CheckOptions:
     """How to check.
 
     Attributes:
-        static: execute nothing.
         archive, limits: what the archive and the running FMU may use.
         trust: run the FMU without the kernel's walls around it; limits remain.
     """
@@ -29,10 +28,6 @@ class CheckOptions:
 
 def check_fmu(path: Path, options: CheckOptions | None = None) -> FmuFindings:
     """Check an FMU file or an unpacked FMU.
-
-    Args:
-        path: an existing file or folder.
-        options: default limits when None.
 
     Returns:
         All findings; nothing of the FMU has been executed unless ``executed`` is set.

@@ -8,7 +8,7 @@ from lxml import etree
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import FmuFiles
 from orchestrator.checking.description import Description, number
-from orchestrator.checking.findings import Finding
+from orchestrator.checking.findings import Finding, listed
 from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.xml_reading import xpath
 
@@ -20,15 +20,7 @@ _MATCHED_BY_NAME = ("plug", "bus")
 
 
 def check_companions(d: Description, files: FmuFiles) -> Iterator[Finding]:
-    """Findings about both files and about what they name.
-
-    Args:
-        d: the model description.
-        files: of the FMU.
-
-    Yields:
-        Each finding.
-    """
+    """Findings about both files and about what they name."""
     names = set(files.names())
     root, findings = _read(files, names, TERMINALS, "fmiTerminalsAndIcons")
     yield from findings
@@ -128,15 +120,7 @@ def _icons(files: FmuFiles, names: set[str]) -> Iterator[Finding]:
 
 
 def check_icon(files: FmuFiles, path: str) -> Iterator[Finding]:
-    """Findings about an icon.
-
-    Args:
-        files: of the FMU.
-        path: of the icon in it.
-
-    Yields:
-        A finding where it is no PNG image.
-    """
+    """Findings about an icon."""
     if files.read(path, _LARGEST_ICON)[: len(_PNG)] != _PNG:
         yield Finding("file.icon", path, "the icon must be a PNG image, but is not")
 
@@ -148,11 +132,11 @@ def _build(d: Description, root: etree._Element, names: set[str]) -> Iterator[Fi
         if own is not None and own not in identifiers:
             message = f"modelIdentifier must be that of an interface of the FMU, but is `{own}`"
             yield Finding("build.identifier", xpath(element, "modelIdentifier", BUILD), message)
-    for element in root.iter("SourceFile"):
-        name = element.get("name", "")
-        if name and posixpath.normpath(f"sources/{name}") not in names:
-            message = f"a source file must be in sources/, but `{name}` is not"
-            yield Finding("build.file", xpath(element, "name", BUILD), message)
+    files = ((e, e.get("name", "")) for e in root.iter("SourceFile"))
+    absent = [(e, name) for e, name in files if name and posixpath.normpath(f"sources/{name}") not in names]
+    if absent:
+        message = f"source files must be in sources/, but are not: {listed([f'`{name}`' for _, name in absent])}"
+        yield Finding("build.file", xpath(absent[0][0], "name", BUILD), message)
     for element in root.iter("IncludeDirectory"):
         folder = posixpath.normpath(f"sources/{element.get('name', '')}")
         if not any(n.startswith(f"{folder}/") for n in names):

@@ -1,19 +1,12 @@
-"""The modelDescription.xml of an FMU as plain data, with the defaults of the standard filled in.
+"""The modelDescription.xml of an FMU as plain data, with the defaults of the standard filled in."""
 
-Whatever the schema would refuse is read as None here, so that a rule is never violated twice.
-"""
-
-from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import prod
-from typing import Any
 
 from lxml import etree
 
-from orchestrator.checking.dialects import FMI2, FMI3, KINDS, REAL, FmiDialect
-
-_FILE = "modelDescription.xml:/fmiModelDescription"
+from orchestrator.checking.dialects import FMI2, REAL, FmiDialect
 
 
 @dataclass(frozen=True)
@@ -64,14 +57,7 @@ class DescribedVariable:
     aliases: tuple[etree._Element, ...] = ()
 
     def number(self, attribute: str) -> float | int | None:
-        """A numeric attribute, or None when it is absent or no number.
-
-        Args:
-            attribute: its name in the XML.
-
-        Returns:
-            The value, in the variable's unit.
-        """
+        """A numeric attribute, or None when it is absent or no number."""
         return number(self.attributes.get(attribute), self.kind)
 
     @property
@@ -85,23 +71,13 @@ class DescribedVariable:
         return "Integer" if self.kind == "Enumeration" else self.kind
 
     def flag(self, name: str) -> bool:
-        """A flag among its attributes; absent means false.
-
-        Args:
-            name: of the attribute.
-
-        Returns:
-            True when it is set.
-        """
+        """A flag among its attributes; absent means false."""
         return self.attributes.get(name) in ("true", "1")
 
     def path(self, attribute: str = "") -> str:
         """XPath of the variable; attributes of the type element are looked for there.
 
         Put together here, for lxml counts all siblings each time: too slow for 100,000 variables.
-
-        Args:
-            attribute: of the variable or of its type element; empty for the element.
 
         Returns:
             The path, after the file's name and a colon.
@@ -125,14 +101,7 @@ class StructureEntry:
     kinds: tuple[str, ...] | None
 
     def path(self, attribute: str) -> str:
-        """XPath of an attribute.
-
-        Args:
-            attribute: its name in the XML.
-
-        Returns:
-            The path, after the file's name and a colon.
-        """
+        """XPath of an attribute. Return the path, after the file's name and a colon."""
         return f"{self.place}/@{attribute}"
 
 
@@ -150,14 +119,7 @@ class Interface:
         return str(self.element.tag)
 
     def flag(self, name: str) -> bool:
-        """A capability flag; absent means false.
-
-        Args:
-            name: of the capability, such as "canGetAndSetFMUstate".
-
-        Returns:
-            True when it is set.
-        """
+        """A capability flag; absent means false."""
         return self.element.get(name) in ("true", "1")
 
 
@@ -179,21 +141,11 @@ class Description:
     event_indicators: tuple[StructureEntry, ...]
 
     def interface(self, kind: str) -> Interface | None:
-        """An interface of the FMU.
-
-        Args:
-            kind: "CoSimulation", "ModelExchange" or "ScheduledExecution".
-
-        Returns:
-            The interface, or None when the FMU has it not.
-        """
+        """An interface of the FMU."""
         return next((i for i in self.interfaces if i.kind == kind), None)
 
     def identity(self, v: DescribedVariable) -> int | None:
         """The number by which ModelStructure names a variable.
-
-        Args:
-            v: the variable.
 
         Returns:
             Its index, counted from 1, or its value reference.
@@ -201,21 +153,11 @@ class Description:
         return v.index if self.dialect is FMI2 else v.reference
 
     def variable(self, number: int | None) -> DescribedVariable | None:
-        """The variable with a number of ModelStructure, or None when there is none.
-
-        Args:
-            number: see ``identity``.
-
-        Returns:
-            The variable.
-        """
+        """The variable with a number of ModelStructure, or None when there is none."""
         return None if number is None else self.numbered.get(number)
 
     def size(self, v: DescribedVariable) -> int | None:
         """Number of values of a variable at its initial dimensions.
-
-        Args:
-            v: the variable.
 
         Returns:
             The number, or None when it cannot be told.
@@ -225,24 +167,14 @@ class Description:
         return prod(known) if len(known) == len(sizes) else None
 
     def extent(self, dimension: Dimension) -> int | None:
-        """Initial size of a dimension.
-
-        Args:
-            dimension: of an array.
-
-        Returns:
-            The size, or None when it cannot be told.
-        """
+        """Initial size of a dimension. Return the size, or None when it cannot be told."""
         if dimension.size is not None or dimension.reference is None:
             return dimension.size
         holder = self.variable(dimension.reference)
-        return None if holder is None else _integer(holder.start)
+        return None if holder is None else integer(holder.start)
 
     def experiment(self, name: str) -> float | None:
         """A number of DefaultExperiment.
-
-        Args:
-            name: "startTime", "stopTime", "stepSize" or "tolerance".
 
         Returns:
             The number [s] (a tolerance without unit), or None when it is absent.
@@ -253,15 +185,7 @@ class Description:
 
 
 def number(text: str | None, kind: str) -> float | int | None:
-    """Read a number as the XML schema types it; None when ``text`` is absent or not one.
-
-    Args:
-        text: as the XML has it.
-        kind: "Real", "Int32" and so on, as the XML names the type.
-
-    Returns:
-        The number.
-    """
+    """Read a number as the XML schema types it; None when ``text`` is absent or not one."""
     if text is None:
         return None
     try:
@@ -270,145 +194,9 @@ def number(text: str | None, kind: str) -> float | int | None:
         return None
 
 
-def read_description(root: etree._Element) -> Description:
-    """Read what the rules need; never fails on a document that is merely wrong.
-
-    Args:
-        root: of modelDescription.xml.
-
-    Returns:
-        The description; what is missing or wrong is None or empty.
-    """
-    dialect = FMI2 if root.get("fmiVersion") == "2.0" else FMI3
-    types = tuple(_simple_types(root, dialect))
-    by_name = {t.name: t for t in types}
-    variables = tuple(_variables(root, dialect, by_name))
-    numbers = ((v.index if dialect is FMI2 else v.reference, v) for v in reversed(variables))
-    return Description(
-        dialect=dialect,
-        root=root,
-        variables=variables,
-        numbered={number: v for number, v in numbers if number is not None},
-        types=types,
-        units={e.get("name", ""): e for e in root.findall("UnitDefinitions/Unit")},
-        interfaces=tuple(_interfaces(root)),
-        outputs=_entries(root, dialect, dialect.outputs),
-        derivatives=_entries(root, dialect, dialect.derivatives),
-        initial_unknowns=_entries(root, dialect, dialect.initial_unknowns),
-        clocked_states=_entries(root, dialect, dialect.clocked_states),
-        event_indicators=_entries(root, dialect, dialect.event_indicators),
-    )
-
-
-def _simple_types(root: etree._Element, dialect: FmiDialect) -> Iterator[SimpleType]:
-    for element in root.findall("TypeDefinitions/*"):
-        holder = element if dialect is FMI3 else next(iter(element), None)
-        if holder is not None:
-            items = tuple((i.get("name", ""), _integer(i.get("value"))) for i in holder.findall("Item"))
-            kind = _tag(holder).removesuffix("Type")
-            yield SimpleType(element, holder, element.get("name", ""), kind, dict(holder.attrib), items)
-
-
-def _variables(
-    root: etree._Element, dialect: FmiDialect, types: Mapping[str, SimpleType]
-) -> Iterator[DescribedVariable]:
-    path = "ModelVariables/ScalarVariable" if dialect is FMI2 else "ModelVariables/*"
-    counts: Counter[str] = Counter()
-    for index, element in enumerate(root.findall(path), 1):
-        tag = _tag(element)
-        counts[tag] += 1
-        yield _variable(element, index, f"{_FILE}/ModelVariables/{tag}[{counts[tag]}]", dialect, types)
-
-
-def _variable(
-    element: etree._Element, index: int, place: str, dialect: FmiDialect, types: Mapping[str, SimpleType]
-) -> DescribedVariable:
-    inner: Any = element if dialect is FMI3 else next((e for e in element if e.tag in KINDS), None)
-    own = {} if inner is None else dict(inner.attrib)
-    kind = _tag(inner) if inner is not None and inner.tag in KINDS else ""
-    declared = types.get(own.get("declaredType", ""))
-    inherited = dict(declared.attributes) if declared is not None and declared.kind == kind else {}
-    causality = element.get("causality", "local")
-    variability = element.get("variability", _variability(kind, causality, dialect))
-    declared_initial = element.get("initial")
-    default = None if kind == "Clock" else dialect.initial.get((causality, variability), (None,))[0]
-    clocks = element.get("clocks")
-    return DescribedVariable(
-        element=element,
-        place=place,
-        index=index,
-        name=element.get("name", ""),
-        reference=_integer(element.get("valueReference")),
-        kind=kind,
-        causality=causality,
-        variability=variability,
-        declared_initial=declared_initial,
-        initial=declared_initial if declared_initial is not None else default,
-        attributes={**inherited, **own},
-        own=own,
-        starts=_starts(element, own, dialect),
-        dimensions=tuple(
-            Dimension(_integer(e.get("start")), _integer(e.get("valueReference"))) for e in element.findall("Dimension")
-        ),
-        clocks=None if clocks is None else _integers(clocks),
-        previous=_integer(element.get("previous")),
-        aliases=tuple(element.findall("Alias")),
-    )
-
-
-def _variability(kind: str, causality: str, dialect: FmiDialect) -> str:
-    """The default."""
-    if dialect is FMI2:
-        return "continuous"
-    if causality in ("parameter", "structuralParameter", "calculatedParameter"):
-        return "fixed"
-    return "continuous" if kind in REAL else "discrete"
-
-
-def _starts(element: etree._Element, own: Mapping[str, str], dialect: FmiDialect) -> tuple[str, ...] | None:
-    text = own.get("start")
-    if dialect is FMI2:
-        return None if text is None else (text,)
-    texts = [e.get("value", "") for e in element.findall("Start")]
-    return tuple(texts or ([] if text is None else text.split())) or None
-
-
-def _entries(root: etree._Element, dialect: FmiDialect, section: str) -> tuple[StructureEntry, ...]:
-    found = []
-    for position, element in enumerate(root.findall(f"ModelStructure/{section}") if section else (), 1):
-        dependencies, kinds = element.get("dependencies"), element.get("dependenciesKind")
-        place = f"{_FILE}/ModelStructure/{section}[{position}]"
-        found.append(
-            StructureEntry(
-                place,
-                _integer(element.get(dialect.identity)),
-                None if dependencies is None else _integers(dependencies),
-                None if kinds is None else tuple(kinds.split()),
-            )
-        )
-    return tuple(found)
-
-
-def _interfaces(root: etree._Element) -> Iterator[Interface]:
-    for kind in ("CoSimulation", "ModelExchange", "ScheduledExecution"):
-        element = root.find(kind)
-        if element is not None:
-            sources = tuple((e, e.get("name", "")) for e in element.findall("SourceFiles/File"))
-            yield Interface(element, element.get("modelIdentifier"), sources)
-
-
-def _tag(element: etree._Element) -> str:
-    return element.tag if isinstance(element.tag, str) else ""
-
-
-def _integer(text: str | None) -> int | None:
+def integer(text: str | None) -> int | None:
+    """Read a whole number."""
     try:
         return None if text is None else int(text)
     except ValueError:
         return None
-
-
-def _integers(text: str) -> tuple[int, ...] | None:
-    found = [_integer(part) for part in text.split()]
-    known = tuple(value for value in found if value is not None)
-    return known if len(known) == len(found) else None

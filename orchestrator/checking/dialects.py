@@ -21,8 +21,6 @@ class FmiDialect:
 
     Attributes:
         version: "2.0" or "3.0".
-        causalities: all there are.
-        initial: see ``InitialTable``.
         identity: attribute by which ModelStructure and `derivative` name a variable.
         token: attribute that is handed over at instantiation.
         outputs, derivatives, initial_unknowns, clocked_states, event_indicators: elements of ModelStructure, as paths.

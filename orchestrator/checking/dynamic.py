@@ -13,13 +13,15 @@ from orchestrator.checking.probing import (
     probes,
     probes_3,
     probes_compare,
+    probes_derivatives,
     probes_misuse,
     probes_reference,
     trajectory,
 )
-from orchestrator.checking.probing.binding import PENDING, Library, StatusError, TerminatedError
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.describing import make_job
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.statuses import PENDING, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.process import Process
 from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, OutputError
@@ -36,6 +38,7 @@ _PROBES: dict[str, probes.Probe] = {
     "reset": probes_compare.reset,
     "state": probes_compare.state,
     "variable steps": probes_compare.variable_steps,
+    "derivatives": probes_derivatives.derivatives,
     "early return": probes_3.early_return,
     "intermediate update": probes_3.intermediate,
     "clocks": probes_3.clocks,
@@ -52,15 +55,7 @@ _MOST_FINDINGS = 10_000
 
 
 def obstacle(d: Description, files: FmuFiles) -> str:
-    """Why an FMU cannot be executed here; empty when one of its interfaces can.
-
-    Args:
-        d: the model description.
-        files: of the FMU.
-
-    Returns:
-        The reason, in words.
-    """
+    """Why an FMU cannot be executed here; empty when one of its interfaces can."""
     reasons = [_obstacle(d, interface, files) for interface in d.interfaces]
     return "it has no interface" if not reasons else "" if "" in reasons else reasons[0]
 
@@ -82,17 +77,8 @@ def check_dynamic(
 
     The child only does FMI calls, one by one; what is called and what is made of the answers is decided here.
 
-    Args:
-        d, files: of an FMU without an ``obstacle``.
-        references: reference results; each is simulated, by the first interface that is run.
-        limits: of a child process.
-        walls: whether the kernel shall keep the FMU from files, network and other processes.
-
     Returns:
         What it did wrong, and which probes were carried out.
-
-    Raises:
-        OutputError: there is no room to unpack the FMU.
     """
     findings: list[Finding] = []
     executions: list[Execution] = []
@@ -164,8 +150,8 @@ class _Watcher:
         context = probes.Context(trajectory.Bench(job, library, self._add), self._add, single=single)
         for self.probe in names:
             try:
-                _PROBES[self.probe](context)
-            except probes.SkippedError as reason:
+                probes.carry_out(_PROBES[self.probe], context)
+            except (probes.SkippedError, DiscardedError) as reason:
                 self.stages[self.probe] = str(reason)
                 continue
             except TerminatedError:

@@ -1,7 +1,7 @@
 """What the checks report: one flat list of findings per FMU."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -19,7 +19,6 @@ class Finding:
     """One violated rule at one place.
 
     Attributes:
-        rule: key of ``RULES``.
         path: file inside the FMU, and an XPath after a colon where there is one.
         message: what was expected and what was found, one sentence.
     """
@@ -51,7 +50,6 @@ class RuleOutcome:
     """What became of one rule on one FMU.
 
     Attributes:
-        rule: key of ``RULES``.
         outcome: "failed" with a finding of the rule, "passed" when its stage was carried out without one.
         reason: why it was not run; empty otherwise.
     """
@@ -126,14 +124,7 @@ class FmuFindings:
         return RuleOutcome(rule, "not run", reasons[0] if reasons else self.not_executed)
 
     def count(self, severity: str) -> int:
-        """Number of findings of one severity.
-
-        Args:
-            severity: one of ``SEVERITIES``.
-
-        Returns:
-            Their number.
-        """
+        """Number of findings of one severity."""
         return sum(f.severity == severity for f in self.findings)
 
     @property
@@ -142,18 +133,21 @@ class FmuFindings:
         return self.count("error") == 0
 
 
-def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Errors first, each kept in the order found, repeats removed, at most ``MOST_PER_RULE`` of one rule.
+def listed(names: Sequence[str], most: int = 12) -> str:
+    """Names for a message, not too many of them."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
-    Args:
-        findings: in any order.
+
+def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Errors first, each kept in the order found, equal ones as one, at most ``MOST_PER_RULE`` of one rule.
 
     Returns:
         The findings that a report shows.
     """
     seen: Counter[str] = Counter()
     kept = []
-    for finding in dict.fromkeys(findings):
+    for finding in _grouped(findings):
         seen[finding.rule] += 1
         if seen[finding.rule] <= MOST_PER_RULE:
             kept.append(finding)
@@ -163,13 +157,17 @@ def ordered(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(kept, key=lambda f: SEVERITIES.index(f.severity)))
 
 
+def _grouped(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """Findings of one rule with the same message as one, at the first place in a file; those of a probe stay apart."""
+    places: dict[tuple[str, str, str], dict[str, None]] = {}
+    for finding in findings:
+        probe = finding.path if finding.path.startswith("(") else ""
+        places.setdefault((finding.rule, finding.message, probe), {})[finding.path] = None
+    for (rule, message, _), paths in places.items():
+        first, *rest = paths
+        yield Finding(rule, first, f"{message} (at {len(paths)} places)" if rest else message)
+
+
 def has_errors(findings: Iterable[Finding]) -> bool:
-    """Whether any finding is an error.
-
-    Args:
-        findings: in any order.
-
-    Returns:
-        True when one is.
-    """
+    """Whether any finding is an error."""
     return any(f.severity == "error" for f in findings)

@@ -111,11 +111,7 @@ def known_attributes(kind: str, version: str) -> frozenset[str]:
     """The attributes that the standard has for a type.
 
     Args:
-        kind: name of the type, mostly the element's tag.
         version: "2.0" or "3.0".
-
-    Returns:
-        Their names.
     """
     return frozenset(_grammar(FMI2 if version == "2.0" else FMI3)[kind].attributes)
 
@@ -124,12 +120,7 @@ def check_grammar(root: etree._Element, version: str, file: str = "modelDescript
     """Findings about elements and attributes; equal faults of one kind of element are one finding.
 
     Args:
-        root: of the document.
         version: "2.0" or "3.0".
-        file: path of the document inside the FMU.
-
-    Yields:
-        Each finding.
     """
     grammar = _grammar(FMI2 if version == "2.0" else FMI3)
     faults: dict[tuple[str, str], _Fault] = {}

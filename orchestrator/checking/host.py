@@ -48,14 +48,7 @@ class _EventInfo(ctypes.Structure):
 
 
 def opened(_: Any) -> Callable[[Any], Any]:
-    """Return the handler of requests ``[name of a method of Host, argument, ...]``.
-
-    Args:
-        _: what the jail hands over; nothing is needed.
-
-    Returns:
-        Called with a request, it gives what the method returns.
-    """
+    """Return the handler of requests ``[name of a method of Host, argument, ...]``."""
     host = Host()
     return lambda request: getattr(host, request[0])(*request[1:])
 
@@ -97,17 +90,7 @@ class Host:
         self._locks += change
 
     def load(self, path: str, texts: list[str], makers: list[str], freer: str) -> str:
-        """Load the library; return why that fails, or nothing.
-
-        Args:
-            path: of the shared library.
-            texts: functions that return a text.
-            makers: functions that return an instance.
-            freer: the function that frees one.
-
-        Returns:
-            The reason, empty when it is loaded.
-        """
+        """Load the library; return why that fails, or nothing. Return the reason, empty when it is loaded."""
         try:
             self._handle = ctypes.CDLL(path)
         except OSError as error:
@@ -122,9 +105,6 @@ class Host:
     def text(self, function: str) -> str | None:
         """Call a function without arguments that returns a text.
 
-        Args:
-            function: its name.
-
         Returns:
             What it returned; None: a null pointer.
         """
@@ -135,10 +115,7 @@ class Host:
         """Make an instance of FMI 2.0; return its number (``None``: the FMU returned null) and what it logged.
 
         Args:
-            name: of the instance.
             kind: 0 for model exchange, 1 for co-simulation.
-            guid: of the model.
-            resources: URI of the unpacked resources.
 
         Returns:
             Number (or None) and messages.
@@ -156,14 +133,6 @@ class Host:
         self, function: str, name: str, token: str, resources: str | None, flags: list[bool], required: list[int]
     ) -> list[Any]:
         """Make an instance of FMI 3.0; return its number (``None``: the FMU returned null) and what it logged.
-
-        Args:
-            function: the one that makes it.
-            name: of the instance.
-            token: instantiation token.
-            resources: path of the unpacked resources, with a separator at its end, or None.
-            flags: for co-simulation: eventModeUsed, earlyReturnAllowed, whether intermediate updates are wanted.
-            required: value references of the required intermediate variables.
 
         Returns:
             Number (or None) and messages.
@@ -195,32 +164,19 @@ class Host:
         return [self._number, self._messages]
 
     def free(self, instance: int, function: str) -> None:
-        """Free an instance.
-
-        Args:
-            instance: its number.
-            function: that does it.
-        """
+        """Free an instance."""
         getattr(self._handle, function)(self._instances[instance][0])
 
     def plan(self, instance: int, reads: list[int], writes: list[int], values: list[float], early: int) -> None:
         """Say what to do in intermediate updates.
 
         Args:
-            instance: whose.
-            reads, writes: value references of Float64 variables.
-            values: of those that are written.
             early: at which update, counted from 0, an early return is asked for; -1 for never.
         """
         self._plan = [instance, reads, writes, values, early]
 
     def updates(self) -> list[Any]:
-        """What the intermediate updates since the last call were.
-
-        Returns:
-            Rows of function under way, time, the four flags, status of getting and of setting (None: not done); and
-            how often preemption was locked without being unlocked.
-        """
+        """What the intermediate updates since the last call were."""
         found, self._updates = self._updates, []
         return [found, self._locks]
 
@@ -250,11 +206,6 @@ class Host:
     def call(self, instance: int, function: str, arguments: list[Any]) -> list[Any]:
         """Call a function.
 
-        Args:
-            instance: its number.
-            function: its name.
-            arguments: lists of kind and value, see ``_argument``.
-
         Returns:
             Status, what the output arguments hold, what was logged, and how many of that as errors.
         """
@@ -266,10 +217,6 @@ class Host:
 
     def calls(self, instance: int, requests: list[list[Any]]) -> list[Any]:
         """Call several functions, up to the first that returns neither OK nor Warning.
-
-        Args:
-            instance: its number.
-            requests: pairs of function and arguments.
 
         Returns:
             For each function that was called what ``call`` returns.

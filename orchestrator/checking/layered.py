@@ -41,15 +41,7 @@ class ReferenceResult:
 
 
 def check_files(d: Description, files: FmuFiles) -> Iterator[Finding]:
-    """Findings about the documentation, the icon, and the further files of FMI 3.0.
-
-    Args:
-        d: the model description.
-        files: of the FMU.
-
-    Yields:
-        Each finding.
-    """
+    """Findings about the documentation, the icon, and the further files of FMI 3.0."""
     names = set(files.names())
     if d.dialect.version == "3.0":
         yield from check_companions(d, files)
@@ -81,10 +73,6 @@ def _documents(d: Description, names: set[str]) -> Iterator[Finding]:
 
 def check_layered(d: Description, files: FmuFiles) -> tuple[list[ReferenceResult], list[Finding]]:
     """Check every manifest of a layered standard, and read the reference results of FMI-LS-REF.
-
-    Args:
-        d: the model description.
-        files: of the FMU.
 
     Returns:
         The reference results that can be read, and the findings.

@@ -28,14 +28,7 @@ class LibraryHeader:
 
 
 def inspect(data: bytes) -> LibraryHeader:
-    """Read the header of a shared library; what cannot be read is "unknown".
-
-    Args:
-        data: the library's bytes.
-
-    Returns:
-        Its format, machine and exported symbols.
-    """
+    """Read the header of a shared library; what cannot be read is "unknown"."""
     try:
         if data[:4] == b"\x7fELF":
             return _elf(data)

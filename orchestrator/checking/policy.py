@@ -42,14 +42,7 @@ class FmuPolicy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     severity: dict[str, Severity] = {}
 
     def fits(self, fmu: str) -> bool:
-        """Whether the pattern fits an FMU.
-
-        Args:
-            fmu: its path.
-
-        Returns:
-            True when it does.
-        """
+        """Whether the pattern fits an FMU."""
         path = Path(fmu).as_posix()
         return fnmatch.fnmatchcase(path, self.fmu) or fnmatch.fnmatchcase(Path(fmu).name, self.fmu)
 
@@ -73,14 +66,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     fmu: tuple[FmuPolicy, ...] = ()
 
     def severities(self, fmu: str) -> dict[str, Severity]:
-        """Return the rules that count for an FMU, each with its severity.
-
-        Args:
-            fmu: its path.
-
-        Returns:
-            Severity by name of rule.
-        """
+        """Return the rules that count for an FMU, each with its severity."""
         special = [entry for entry in self.fmu if entry.fits(fmu)]
         selected = _fitting(self.select) - _fitting(self.ignore)
         for entry in special:
@@ -93,17 +79,7 @@ class Policy(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 def read_policy(path: Path) -> Policy:
-    """Read a file of a policy.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        The policy; the path of its baseline is relative to the working directory.
-
-    Raises:
-        InputError: the file cannot be read, or something in it is wrong.
-    """
+    """Read a file of a policy."""
     try:
         data = path.read_bytes()
     except OSError as error:

@@ -9,9 +9,6 @@ from orchestrator.shared.isolation.jail import Jail
 class Process:
     """A jail with the host of FMI calls.
 
-    Args:
-        start: starts one.
-
     Attributes:
         jail: the present one; it must be closed by ``close``.
         left: whether a process outlived one of those before.
@@ -29,22 +26,11 @@ class Process:
         self.jail.close()
 
     def call(self, request: Any) -> Any:
-        """Return what ``checking.host.Host`` returns.
-
-        Args:
-            request: name of a method of ``checking.host.Host`` and its arguments.
-
-        Returns:
-            What the method returns.
-        """
+        """Return what ``checking.host.Host`` returns."""
         return self.jail.call(request)
 
     def resident(self) -> int:
-        """Resident memory of the child in bytes; 0 where the system does not tell.
-
-        Returns:
-            The bytes.
-        """
+        """Resident memory of the child in bytes; 0 where the system does not tell."""
         return self.jail.resident()
 
     def renew(self) -> None:

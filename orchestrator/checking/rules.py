@@ -43,6 +43,7 @@ _HEADINGS = {
     "2.2.8.3": "clocked-variable",
     "2.2.8.4": "_clocks_specific_api",
     "2.2.9": "model-dependencies",
+    "2.2.11": "partial-derivatives",
     "2.3": "common-state-machine",
     "2.3.1": "FMUStateSettable",
     "2.3.2": "Instantiated",
@@ -122,9 +123,6 @@ class Rule:
 
     def link(self, version: Version) -> str:
         """Where the standard's text says so.
-
-        Args:
-            version: one of ``versions``.
 
         Returns:
             An address, at the section's heading where the text has names for them; empty for a rule of our own.

@@ -14,9 +14,6 @@ def check_arrays(d: Description) -> Iterator[Finding]:
 
     Args:
         d: the description of an FMU of FMI 3.0.
-
-    Yields:
-        Each finding.
     """
     for v in d.variables:
         for dimension in v.dimensions:
@@ -64,9 +61,6 @@ def check_clocks(d: Description) -> Iterator[Finding]:
 
     Args:
         d: the description of an FMU of FMI 3.0.
-
-    Yields:
-        Each finding.
     """
     clocks = {v.reference: v for v in d.variables if v.kind == "Clock"}
     cosimulation = d.interface("CoSimulation")

@@ -22,14 +22,7 @@ _C_KEYWORD = re.compile(
 
 
 def check_model(d: Description) -> Iterator[Finding]:
-    """Findings about everything but ModelVariables and ModelStructure.
-
-    Args:
-        d: the model description.
-
-    Yields:
-        Each finding.
-    """
+    """Findings about everything but ModelVariables and ModelStructure."""
     yield from _head(d)
     yield from _experiment(d)
     yield from _types(d)

@@ -13,14 +13,7 @@ _OF_INITIALISATION = ("dependent", "constant")
 
 
 def check_structure(d: Description) -> Iterator[Finding]:
-    """Findings about ModelStructure.
-
-    Args:
-        d: the model description.
-
-    Yields:
-        Each finding.
-    """
+    """Findings about ModelStructure."""
     if d.root.find("ModelStructure") is None:
         return
     valid = True
@@ -55,14 +48,7 @@ def check_structure(d: Description) -> Iterator[Finding]:
 
 
 def required_initial_unknowns(d: Description) -> list[DescribedVariable]:
-    """The variables that the list of initial unknowns must have.
-
-    Args:
-        d: the model description.
-
-    Returns:
-        The variables; one may be there twice.
-    """
+    """The variables that the list of initial unknowns must have."""
     expected = [v for v in d.variables if v.causality == "output" and v.initial in _FREE and not v.clocks]
     expected += [v for v in d.variables if v.causality == "calculatedParameter"]
     for u in d.derivatives:
@@ -150,7 +136,7 @@ def _kinds(u: StructureEntry, v: DescribedVariable | None, initial: bool, three:
         message = "dependenciesKind of an initial unknown must be dependent or constant, but is"
         yield Finding("structure.dependencies-kind", path, f"{message} {' '.join(u.kinds)}")
     elif three and v is not None and v.kind not in REAL and set(u.kinds) - {"dependent"}:
-        message = f"dependenciesKind of `{v.name}`, which is no floating point variable, must be dependent, but is"
+        message = "dependenciesKind of variables that are no floating point ones must be dependent, but is"
         yield Finding("structure.dependencies-kind-type", path, f"{message} {' '.join(u.kinds)}")
 
 

@@ -17,14 +17,7 @@ _STRUCTURED = re.compile(rf"(?:{_IDENTIFIER}|der\({_IDENTIFIER}(?:,[0-9]+)?\))")
 
 
 def check_variables(d: Description) -> Iterator[Finding]:
-    """All findings about ModelVariables.
-
-    Args:
-        d: the model description.
-
-    Yields:
-        Each finding.
-    """
+    """All findings about ModelVariables."""
     yield from _names(d)
     types = {t.name: t for t in d.types}
     states = {_as_int(v.own.get("derivative")) for v in d.variables}

@@ -8,7 +8,8 @@ from pathlib import Path
 from orchestrator.checking import xml_reading
 from orchestrator.checking.archive import ArchiveLimits, FmuFiles, open_fmu
 from orchestrator.checking.binaries import PLATFORMS, check_binaries
-from orchestrator.checking.description import Description, read_description
+from orchestrator.checking.description import Description
+from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Facts, Finding
 from orchestrator.checking.grammar import check_grammar
 from orchestrator.checking.layered import ReferenceResult, check_files, check_layered
@@ -41,10 +42,6 @@ class StaticResult:
 
 def check_static(path: Path, limits: ArchiveLimits) -> StaticResult:
     """Check one FMU (file or unpacked folder) without executing anything of it.
-
-    Args:
-        path: the FMU's file or folder.
-        limits: the most bytes and files that are unpacked.
 
     Returns:
         Findings, and what the probes need: files, description, reference results, facts.

@@ -24,9 +24,6 @@ _FACTOR = re.compile(r"([A-Za-z%]+|1)\^?(-?[0-9]+)?")
 def dimension_of(name: str) -> dict[str, int] | None:
     """Exponents of the SI base units of a name such as ``N.m.s/rad`` or ``kg.m2``; None when it is not understood.
 
-    Args:
-        name: of the unit.
-
     Returns:
         Exponent by symbol of the base unit; zero exponents may be left out.
     """

@@ -24,7 +24,6 @@ class Issue:
     """A finding as the policy rates it.
 
     Attributes:
-        finding: what was found.
         severity: of its rule, by the policy.
         fingerprint: 32 hexadecimal digits that stay the same while the finding does, on every machine.
         known: whether the baseline has it.
@@ -63,39 +62,16 @@ class Verdict:
         return not any(self.fails(issue) for issue in self.issues)
 
     def fails(self, issue: Issue) -> bool:
-        """Whether an issue fails the check: bad enough, and not known.
-
-        Args:
-            issue: of this verdict.
-
-        Returns:
-            True when it does.
-        """
+        """Whether an issue fails the check: bad enough, and not known."""
         return not issue.known and SEVERITIES.index(issue.severity) <= SEVERITIES.index(self.fail_on)
 
     def count(self, severity: str) -> int:
-        """Number of issues of one severity that the baseline does not have.
-
-        Args:
-            severity: one of ``SEVERITIES``.
-
-        Returns:
-            Their number.
-        """
+        """Number of issues of one severity that the baseline does not have."""
         return sum(issue.severity == severity and not issue.known for issue in self.issues)
 
 
 def judge(report: FmuFindings, policy: Policy, baseline: frozenset[str] = frozenset()) -> Verdict:
-    """Rate the findings on one FMU.
-
-    Args:
-        report: what the checks found.
-        policy: which rules count, and how much.
-        baseline: fingerprints of known findings.
-
-    Returns:
-        The verdict.
-    """
+    """Rate the findings on one FMU."""
     severities = policy.severities(report.fmu)
     issues = []
     seen: Counter[str] = Counter()
@@ -121,14 +97,7 @@ def _content(fmu: str, finding: Finding) -> str:
 
 
 def artifact(fmu: str) -> str:
-    """Return the path of an FMU as platforms want it: relative to the working directory where it is below that.
-
-    Args:
-        fmu: path, as the user gave it.
-
-    Returns:
-        The path, with forward slashes.
-    """
+    """Return the path of an FMU as platforms want it: relative to the working directory where it is below that."""
     path = Path(fmu)
     if path.is_absolute() and path.is_relative_to(Path.cwd()):
         path = path.relative_to(Path.cwd())
@@ -145,17 +114,7 @@ class _Known(msgspec.Struct, frozen=True):
 
 
 def read_baseline(path: Path) -> frozenset[str]:
-    """Read the fingerprints of known findings.
-
-    Args:
-        path: of a file that ``write_baseline`` made.
-
-    Returns:
-        The fingerprints.
-
-    Raises:
-        InputError: the file cannot be read, or is no baseline.
-    """
+    """Read the fingerprints of known findings."""
     try:
         with path.open("rb") as stream:
             data = stream.read(_MOST_BYTES + 1)
@@ -172,14 +131,7 @@ def read_baseline(path: Path) -> frozenset[str]:
 
 
 def baseline_of(verdicts: Iterable[Verdict]) -> str:
-    """Write all issues as known ones.
-
-    Args:
-        verdicts: one for each FMU.
-
-    Returns:
-        A JSON document for ``read_baseline``.
-    """
+    """Write all issues as known ones. Return A JSON document for ``read_baseline``."""
     known = [
         _Known(issue.fingerprint, artifact(verdict.fmu), issue.finding.rule, issue.finding.message)
         for verdict in verdicts

@@ -19,10 +19,6 @@ def parse(data: bytes, name: str) -> tuple[etree._Element | None, list[Finding]]
     Entities are never expanded and nothing is fetched: a document type, which is where entities and
     external subsets live, ends the reading at once.
 
-    Args:
-        data: the document.
-        name: of the file, for findings.
-
     Returns:
         The root, or None, and the findings.
     """
@@ -60,11 +56,6 @@ def _parser() -> etree.XMLParser:
 
 def xpath(element: etree._Element, attribute: str = "", name: str = "modelDescription.xml") -> str:
     """Where an element is, such as ``modelDescription.xml:/fmiModelDescription/ModelVariables/ScalarVariable[3]``.
-
-    Args:
-        element: of the document.
-        attribute: of the element; empty for the element itself.
-        name: of the file.
 
     Returns:
         The path, after the file's name and a colon.

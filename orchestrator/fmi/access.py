@@ -49,9 +49,6 @@ def whole_range(kind: str) -> tuple[int, int] | None:
 
     Args:
         kind: of FMI 3.0, such as "UInt8".
-
-    Returns:
-        Both; None: it is none.
     """
     c_type = FMI3_TYPES.get(kind)
     if kind in {"Boolean", "String"} or c_type is None or c_type in FLOATS:

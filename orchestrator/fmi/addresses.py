@@ -15,17 +15,7 @@ from orchestrator.master.protocol import NativeCalls, NativeTransfer
 def native_calls(
     functions: Functions, inputs: Sequence[Access], outputs: Sequence[Access], python: bool
 ) -> NativeCalls | None:
-    """Return addresses for calls from machine code.
-
-    Args:
-        functions: of the instance.
-        inputs: numeric inputs.
-        outputs: numeric outputs.
-        python: the functions run Python.
-
-    Returns:
-        The addresses; None where a part of an array would have to be set or read.
-    """
+    """Return addresses for calls from machine code."""
     sent, received = _transfers(functions, inputs, "Set"), _transfers(functions, outputs, "Get")
     if sent is None or received is None:
         return None

@@ -26,7 +26,6 @@ class VariableBatch:
         references: value references as a C array.
         rest: elements of arrays that keep their values, but are set along with others.
         kept: elements of arrays that are set.
-        call: returns the status.
         function: its name, for messages.
     """
 
@@ -59,8 +58,6 @@ class Functions:
     Attributes:
         library: the FMU's, loaded.
         component: first argument of every call.
-        version: of FMI.
-        arrays: see ``Arrays``.
     """
 
     library: Any
@@ -72,12 +69,7 @@ class Functions:
         """Return the calls that set or read variables, one for each type.
 
         Args:
-            accesses: of the variables, in the order of ``buffer``.
-            direction: "Set" or "Get".
             buffer: shape (len(accesses),); neighbours in it that the FMU takes as doubles are passed in place.
-
-        Returns:
-            The batches.
         """
         groups: dict[str, list[int]] = {}
         for position, access in enumerate(accesses):
@@ -127,29 +119,13 @@ class Functions:
 
 
 def in_c(value: Any, values: Any) -> Any:
-    """Return a value as a C array takes it.
-
-    Args:
-        value: number, truth value or text.
-        values: the C array.
-
-    Returns:
-        The value.
-    """
+    """Return a value as a C array takes it."""
     if isinstance(value, str):
         return value.encode()
     return float(value) if values._type_ in FLOATS else int(value)
 
 
 def shares(values: Any, buffer: Signals) -> bool:
-    """Return whether a C array lies in a buffer.
-
-    Args:
-        values: the C array.
-        buffer: of signals.
-
-    Returns:
-        Whether it does.
-    """
+    """Return whether a C array lies in a buffer."""
     first = int(buffer.ctypes.data)
     return first <= ctypes.addressof(values) < first + max(buffer.nbytes, 1)

@@ -26,12 +26,7 @@ class ClockedTransfers:
         """Return a call that sets variables from ``buffer``, as far as their clocks allow.
 
         Args:
-            names: of variables.
             buffer: shape (len(names),).
-            bind: makes the call for variables that can be set at any time.
-
-        Returns:
-            Called without arguments.
         """
         parts = self._parts(names, buffer, bind)
         if parts is None:
@@ -49,12 +44,7 @@ class ClockedTransfers:
         """Return a call that reads variables into ``buffer``; between the ticks of its clocks a value stays there.
 
         Args:
-            names: of variables.
             buffer: shape (len(names),).
-            bind: makes the call for variables that can be read at any time.
-
-        Returns:
-            Called without arguments.
         """
         parts = self._parts(names, buffer, bind)
         if parts is None:

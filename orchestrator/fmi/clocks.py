@@ -34,19 +34,7 @@ class EventFeatures:
 
 
 def read_clocks(variables: Variables3) -> tuple[dict[str, PeriodicClock], EventFeatures, list[str]]:
-    """Return the clocks of an FMU.
-
-    Args:
-        variables: of its model description.
-
-    Returns:
-        The clocks that the master ticks, what else there is for event mode, and names of clocks that are left out.
-
-    Raises:
-        KeyError: an attribute is missing.
-        UnusableError: nobody would tick a clock.
-        ValueError: a clock is wrong.
-    """
+    """Return the clocks of an FMU."""
     periodic: dict[str, PeriodicClock] = {}
     timed: dict[str, tuple[int, str]] = {}
     told, left_out, triggered = [], [], set()
@@ -98,12 +86,5 @@ def _seconds(clock: etree._Element, what: str) -> Fraction | None:
 
 
 def clock_names(names: Sequence[str]) -> str:
-    """Return names as a sentence lists them.
-
-    Args:
-        names: of clocks.
-
-    Returns:
-        The first ones.
-    """
+    """Return names as a sentence lists them."""
     return ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")

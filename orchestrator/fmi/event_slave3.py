@@ -61,7 +61,7 @@ class EventFmuSlave(Fmu3Slave, EventSlave):
         return needed
 
     def _intermediate(self) -> tuple[Any, Any]:
-        if not self.model.takes_inputs_inside_steps:
+        if not self.model.inputs_inside_steps:
             return super()._intermediate()
         references = sorted({self._description.access[name].reference for name in self._description.events.inside})
         return (ctypes.c_uint * len(references))(*references), self._updates.callback

@@ -18,14 +18,8 @@ _root: tuple[int, Scratch] | None = None
 def content_hash(path: Path) -> str:
     """Return the SHA-256 of a file's content in hexadecimal.
 
-    Args:
-        path: the file.
-
     Returns:
         64 hexadecimal digits.
-
-    Raises:
-        FmuError: the file cannot be read.
     """
     digest = hashlib.sha256()
     try:
@@ -38,18 +32,7 @@ def content_hash(path: Path) -> str:
 
 
 def extracted(path: Path) -> Path:
-    """Return the folder in which the FMU at ``path`` is unpacked; the same for the same content within a process.
-
-    Args:
-        path: of an FMU, or of the folder of one that is unpacked already.
-
-    Returns:
-        The folder; it is removed when the process ends.
-
-    Raises:
-        FmuError: the archive cannot be read, or holds what no FMU may hold.
-        OutputError: there is no room for it in the temporary directory.
-    """
+    """Return the folder in which the FMU at ``path`` is unpacked; the same for the same content within a process."""
     if path.is_dir():
         return path
     digest = content_hash(path)
@@ -71,21 +54,7 @@ def _private_root() -> Path:
 
 
 def library_of(name: str, path: Path, folder: Path, identifier: str, version: str) -> Path:
-    """Return the shared library of an FMU for this platform.
-
-    Args:
-        name: of the instance, for messages.
-        path: of the FMU.
-        folder: into which it has been unpacked.
-        identifier: its ``modelIdentifier``.
-        version: of FMI, on which the platform's name depends.
-
-    Returns:
-        The library.
-
-    Raises:
-        FmuError: there is none, or it has another name.
-    """
+    """Return the shared library of an FMU for this platform."""
     from fmpy import platform as platform2
     from fmpy import platform_tuple, sharedLibraryExtension
 

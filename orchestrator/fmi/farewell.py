@@ -17,11 +17,7 @@ _known: set[int] = set()
 
 
 def ends_cleanly(folder: Path) -> None:
-    """See to the libraries in ``folder`` that are loaded and have that function, once each.
-
-    Args:
-        folder: of the FMU's binaries.
-    """
+    """See to the libraries in ``folder`` that are loaded and have that function, once each."""
     if not hasattr(os, "RTLD_NOLOAD"):
         return
     for path in sorted(folder.glob("*.so")):

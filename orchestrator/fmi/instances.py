@@ -12,19 +12,7 @@ from orchestrator.master.system import Instance, Start
 
 
 def make_slave(name: str, path: Path, description: FmuDescription | None = None) -> FmuSlave:
-    """Return a new instance of the FMU at ``path``, of its version of FMI.
-
-    Args:
-        name: of the instance.
-        path: the FMU's file or the folder of an unpacked one.
-        description: what ``read_description`` returned, if it has been read already.
-
-    Returns:
-        The slave.
-
-    Raises:
-        FmuError: the FMU cannot be read, loaded or instantiated here.
-    """
+    """Return a new instance of the FMU at ``path``, of its version of FMI."""
     known = read_description(path) if description is None else description
     kind = Fmu2Slave if known.version == "2.0" else EventFmuSlave if known.model.has_events else Fmu3Slave
     return kind(name, path, known)
@@ -45,20 +33,6 @@ class FmuFactory:
 def fmu_instance(
     name: str, path: Path, start: Start | None = None, solver_tolerance: float | None = None, events: bool = False
 ) -> Instance:
-    """Return an instance of the FMU at ``path``, with parameters and start values by variable name.
-
-    Args:
-        name: of the instance.
-        path: the FMU's file or the folder of an unpacked one.
-        start: values by variable name.
-        solver_tolerance: relative tolerance for the FMU's own solver; None: its default.
-        events: use event mode, where the FMU has it.
-
-    Returns:
-        The instance, whose slave is made when a session needs it.
-
-    Raises:
-        FmuError: see ``read_description``.
-    """
+    """Return an instance of the FMU at ``path``, with parameters and start values by variable name."""
     description = read_description(path, events)
     return Instance(name, description.model, FmuFactory(path, description), start or {}, solver_tolerance)

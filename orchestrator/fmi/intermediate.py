@@ -21,9 +21,6 @@ CALLBACK = ctypes.CFUNCTYPE(
 class IntermediateUpdates:
     """What one instance is told inside its steps. Nothing can be raised there, but after the step.
 
-    Args:
-        name: of the instance, for messages.
-
     Attributes:
         callback: to be handed over at instantiation, and kept as long.
     """
@@ -42,8 +39,6 @@ class IntermediateUpdates:
         """Say what inputs are inside steps, from now on.
 
         Args:
-            functions: of the instance.
-            accesses: of the inputs.
             values: a value per input at a time [s]; None: inputs are held.
         """
         self._buffer = np.empty(len(accesses))
@@ -51,11 +46,7 @@ class IntermediateUpdates:
         self._values = values
 
     def take_failure(self) -> BaseException | None:
-        """Return what went wrong inside the step that has just been done, and forget it.
-
-        Returns:
-            An error to be raised, or None.
-        """
+        """Return what went wrong inside the step that has just been done, and forget it."""
         failure, self._failure = self._failure, None
         return failure
 

@@ -20,11 +20,7 @@ MESSAGES_KEPT = 20
 
 
 class Inbox:
-    """What one instance logs beside ``OK``, and how often its calls were answered with a warning.
-
-    Attributes:
-        messages: the newest.
-    """
+    """What one instance logs beside ``OK``, and how often its calls were answered with a warning."""
 
     def __init__(self) -> None:
         self.messages: deque[str] = deque(maxlen=MESSAGES_KEPT)
@@ -32,36 +28,19 @@ class Inbox:
         self._warned, self._call = 0, ""
 
     def log(self, status: int, text: str) -> None:
-        """Take a message.
-
-        Args:
-            status: with which it was logged.
-            text: of the message.
-        """
+        """Take a message."""
         self.messages.append(text)
         first, count = self._logged.get(status, (text, 0))
         self._logged[status] = (first, count + 1)
 
     def warn(self, call: str, count: int = 1) -> None:
-        """Count calls that were answered with a warning.
-
-        Args:
-            call: the first of them, in words.
-            count: how many.
-        """
+        """Count calls that were answered with a warning."""
         if not self._warned:
             self._call = call
         self._warned += count
 
     def take_remarks(self, instance: str) -> list[RunRemark]:
-        """Return what a run is to be remembered for, and forget it.
-
-        Args:
-            instance: name of the instance.
-
-        Returns:
-            Warnings, and what was logged while all calls went well.
-        """
+        """Return what a run is to be remembered for, and forget it."""
         logged, self._logged = self._logged, {}
         found = []
         if self._warned:
@@ -105,14 +84,7 @@ def _shared() -> tuple[Any, ...]:
 
 
 def logging_callbacks(inbox: Inbox) -> Any:
-    """Return callbacks for one instance, which put its warnings and worse into ``inbox``.
-
-    Args:
-        inbox: of the instance; it is written by the FMU's calls.
-
-    Returns:
-        An ``fmi2CallbackFunctions``, which must live as long as the instance.
-    """
+    """Return callbacks for one instance, which put its warnings and worse into ``inbox``."""
     from fmpy import fmi2
 
     shared = _shared()[0]
@@ -134,14 +106,7 @@ def _log_message(environment: int | None, status: int, category: bytes, message:
 
 
 def log_message_callback(inbox: Inbox) -> tuple[int, Any]:
-    """Return what FMI 3.0 takes to put warnings and worse of one instance into ``inbox``.
-
-    Args:
-        inbox: of the instance, which must keep it.
-
-    Returns:
-        The instance's environment, and an ``fmi3LogMessageCallback``.
-    """
+    """Return what FMI 3.0 takes to put warnings and worse of one instance into ``inbox``."""
     number = next(_numbers)
     _inboxes[number] = inbox
     return number, _log_message

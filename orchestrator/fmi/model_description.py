@@ -50,26 +50,14 @@ class FmuDescription:
 
 
 def read_description(path: Path, events: bool = True) -> FmuDescription:
-    """Read the model description of the FMU at ``path``, a file or the folder of an unpacked one.
-
-    Args:
-        path: a file or a folder.
-        events: use event mode, where the FMU has it; False: steps pass over events.
-
-    Returns:
-        The description.
-
-    Raises:
-        FmuError: the file is missing, no FMU, not FMI 2.0 or 3.0, or not for co-simulation; or it has clocks, which
-            tick in event mode, and that is not used.
-    """
+    """Read the model description of the FMU at ``path``, a file or the folder of an unpacked one."""
     description = _read_unpacked(path) if path.is_dir() else _read_archive(path)
     if events or not description.model.has_events:
         return description
     if clocks := [*description.model.clocks, *description.events.timed]:
         raise FmuError(f"{path}: its clocks ({clock_names(clocks)}) tick in event mode, which is not used here")
     model = replace(
-        description.model, has_events=False, output_derivatives=0, takes_inputs_inside_steps=False, clocks={}
+        description.model, has_events=False, output_derivatives=0, inputs_inside_steps=frozenset(), clocks={}
     )
     return replace(description, model=model, events=EventFeatures())
 
@@ -113,19 +101,7 @@ def _read_unpacked(folder: Path) -> FmuDescription:
 
 
 def parse_description(content: bytes, origin: str, python: bool = False) -> FmuDescription:
-    """Parse a model description.
-
-    Args:
-        content: the XML.
-        origin: what to call it in messages.
-        python: see ``FmuDescription``.
-
-    Returns:
-        The description.
-
-    Raises:
-        FmuError: it is no co-simulation description of FMI 2.0 or 3.0, or needs what no master here does.
-    """
+    """Parse a model description."""
     parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False)
     try:
         root = etree.fromstring(content, parser)
@@ -186,9 +162,9 @@ def _description3(root: etree._Element, cosimulation: etree._Element, python: bo
         can_vary_step=_flag(cosimulation, "canHandleVariableCommunicationStepSize"),
         has_events=has_events,
         output_derivatives=int(cosimulation.get("maxOutputDerivativeOrder", "0")) if has_events else 0,
-        takes_inputs_inside_steps=has_events
-        and _flag(cosimulation, "providesIntermediateUpdate")
-        and bool(events.inside),
+        inputs_inside_steps=events.inside
+        if has_events and _flag(cosimulation, "providesIntermediateUpdate")
+        else frozenset(),
         clocks=clocks,
     )
     return FmuDescription(

@@ -15,14 +15,7 @@ _known: set[str] = set()
 
 
 def record(path: Path) -> None:
-    """Remember the content of the FMU at ``path``, which has just been built, as our own.
-
-    Args:
-        path: the FMU's file.
-
-    Raises:
-        FmuError: it cannot be read.
-    """
+    """Remember the content of the FMU at ``path``, which has just been built, as our own."""
     digest = content_hash(path)
     _known.add(digest)
     with contextlib.suppress(OSError):
@@ -30,14 +23,7 @@ def record(path: Path) -> None:
 
 
 def is_ours(path: Path) -> bool:
-    """Return whether the content of the FMU at ``path`` was built here; an unpacked FMU never counts.
-
-    Args:
-        path: the FMU's file.
-
-    Returns:
-        True when it was.
-    """
+    """Return whether the content of the FMU at ``path`` was built here; an unpacked FMU never counts."""
     try:
         digest = content_hash(path)
     except FmuError:

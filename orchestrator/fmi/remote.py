@@ -34,9 +34,6 @@ DONE, DISCARDED, ENDED = range(3)
 def opened(request: tuple[str, Path, FmuDescription]) -> Callable[[tuple[str, list[Any]]], Any]:
     """Make the instance in the child, and return what calls it.
 
-    Args:
-        request: name of the instance, folder of the unpacked FMU, its description.
-
     Returns:
         Called with a method's name and arguments, it gives what that returns.
     """
@@ -115,15 +112,7 @@ class RemoteSlave(Slave):
     """One instance; see ``Slave`` for the order of calls.
 
     Args:
-        name: of the instance.
-        folder: of the unpacked FMU.
-        description: of the FMU.
-        limits: of its process.
         walls: whether the kernel shall keep it from files, network and other processes.
-
-    Raises:
-        FmuError: the FMU cannot be loaded or instantiated.
-        SimulationError: no process can be started.
     """
 
     def __init__(self, name: str, folder: Path, description: FmuDescription, limits: Limits, walls: bool) -> None:
@@ -200,11 +189,7 @@ class RemoteSlave(Slave):
         self._ask("reset")
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return warnings and shortened steps since this was last asked.
-
-        Returns:
-            The remarks.
-        """
+        """Return warnings and shortened steps since this was last asked."""
         return list(claimed_remarks(self._ask("remarks")))
 
     def shorten_steps(self) -> bool:
@@ -253,15 +238,8 @@ class EventRemoteSlave(RemoteSlave, EventSlave):
 
 
 def without_feed(description: FmuDescription) -> FmuDescription:
-    """Return the description of an FMU whose instances run in processes of their own.
-
-    Args:
-        description: of the FMU.
-
-    Returns:
-        The same, but nothing is set inside steps.
-    """
-    return replace(description, model=replace(description.model, takes_inputs_inside_steps=False))
+    """Return the description of an FMU whose instances run in processes of their own."""
+    return replace(description, model=replace(description.model, inputs_inside_steps=frozenset()))
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,7 @@ class _Stepped(Protocol):
 
 
 class ShorterSteps:
-    """Steps of one slave.
-
-    Args:
-        slave: whose steps are done.
-    """
+    """Steps of one slave."""
 
     def __init__(self, slave: _Stepped) -> None:
         self._slave = slave
@@ -40,10 +36,6 @@ class ShorterSteps:
         Args:
             time: [s].
             step: [s].
-
-        Raises:
-            StepDiscardedError: no shorter step can be tried, or none is taken.
-            RunEndedError: the slave wants the run to end.
         """
         end, now, length = time + step, time, step
         while now < end:
@@ -59,11 +51,7 @@ class ShorterSteps:
                 raise StepDiscardedError(f"{self._slave.name}: {text}", self._slave.name, time)
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return how many communication steps were done in shorter ones, and forget it.
-
-        Returns:
-            One remark or none.
-        """
+        """Return how many communication steps were done in shorter ones, and forget it."""
         count, self._steps = self._steps, 0
         text = f"fmi2DoStep at t = {self._first:g} s returned Discard"
         done = f"done in shorter steps, the least of {self._least:g} s"

@@ -43,12 +43,7 @@ class FmuSlave(Slave):
     """One FMU instance. See ``Slave`` for the order of calls; ``messages`` holds the warnings and worse that it logged.
 
     Args:
-        name: of the instance.
-        path: of the FMU.
         description: what ``read_description`` returned, if it has been read already.
-
-    Raises:
-        FmuError: the FMU cannot be read, loaded or instantiated here.
     """
 
     PREFIX: ClassVar[str]  # of the functions' names
@@ -92,11 +87,7 @@ class FmuSlave(Slave):
 
     @abstractmethod
     def _instantiate(self) -> tuple[Any, ctypes.c_void_p]:
-        """Return the loaded library and an instance of it.
-
-        Raises:
-            FmuError: it cannot be loaded or instantiated.
-        """
+        """Return the loaded library and an instance of it."""
 
     @abstractmethod
     def _free(self) -> None:
@@ -152,11 +143,7 @@ class FmuSlave(Slave):
         """
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return warnings and shortened steps since this was last asked.
-
-        Returns:
-            The remarks.
-        """
+        """Return warnings and shortened steps since this was last asked."""
         shortened = [] if self._shorter is None else self._shorter.take_remarks()
         left_out = [RunRemark(self.name, self._description.left_out)] if self._description.left_out else []
         return [*left_out, *self._inbox.take_remarks(self.name), *shortened]
@@ -339,15 +326,7 @@ class FmuSlave(Slave):
     # The compiled loop -----------------------------------------------------------------------------------------
 
     def native_calls(self, inputs: Sequence[str], outputs: Sequence[str]) -> NativeCalls | None:
-        """Return addresses for calls from machine code; ``None`` where it cannot make them.
-
-        Args:
-            inputs: names of the inputs.
-            outputs: names of the outputs.
-
-        Returns:
-            The addresses.
-        """
+        """Return addresses for calls from machine code; ``None`` where it cannot make them."""
         if self._shorter is not None or self._worst >= ERROR or self.model.has_events:
             return None
         variables = self.model.variables
@@ -359,8 +338,6 @@ class FmuSlave(Slave):
         """Take warnings that the compiled loop met.
 
         Args:
-            count: of calls that returned a warning.
-            function: name of the FMI function that returned the first.
             time: when [s].
         """
         self._inbox.warn(f"{function} at t = {time:g} s", count)
@@ -369,8 +346,6 @@ class FmuSlave(Slave):
         """Raise for a status that the compiled loop met.
 
         Args:
-            status: of FMI.
-            function: name of the FMI function that returned it.
             time: when [s].
         """
         self._reached = time

@@ -6,34 +6,12 @@ from orchestrator.master.protocol import Value
 
 
 def number(text: str | None) -> float | None:
-    """Return the number that a text is.
-
-    Args:
-        text: of an attribute; None: there is none.
-
-    Returns:
-        The number, or None.
-
-    Raises:
-        ValueError: it is no number.
-    """
+    """Return the number that a text is."""
     return None if text is None else float(text)
 
 
 def start_value(kind: str, text: str | None, name: str) -> Value | None:
-    """Return a start value.
-
-    Args:
-        kind: type of the variable, see ``Variable.type``.
-        text: of the attribute; None: there is none.
-        name: of the variable, for messages.
-
-    Returns:
-        The value, or None.
-
-    Raises:
-        ValueError: it is none of this type.
-    """
+    """Return a start value."""
     if text is None or kind == "String":
         return text
     if kind == "Boolean":

@@ -33,7 +33,6 @@ class TimedClocks:
 
     Args:
         clocks: value reference and kind (``fixed``, ``tunable``, ``changing`` or ``countdown``) by name.
-        call: see ``Call``.
     """
 
     def __init__(self, clocks: Mapping[str, tuple[int, str]], call: Call) -> None:
@@ -56,11 +55,7 @@ class TimedClocks:
                 self._ticks[reference] = _Tick(start + interval, interval)
 
     def next_time(self) -> float:
-        """Return when the next clock ticks [s]; infinity for none.
-
-        Returns:
-            The time.
-        """
+        """Return when the next clock ticks [s]; infinity for none."""
         return min((tick.time for tick in self._ticks.values()), default=math.inf)
 
     def take(self, time: float) -> list[int]:
@@ -68,9 +63,6 @@ class TimedClocks:
 
         Args:
             time: [s].
-
-        Returns:
-            Value references.
         """
         near = time + 1e-12 * max(1.0, abs(time))
         due = [reference for reference, tick in self._ticks.items() if tick.time <= near]
@@ -89,7 +81,6 @@ class TimedClocks:
 
         Args:
             time: [s].
-            ticked: value references of the clocks that were active in the instant that has just ended.
         """
         for reference, kind in self._kinds.items():
             if kind == "countdown" or (kind == "changing" and reference in ticked):
@@ -98,19 +89,11 @@ class TimedClocks:
                     self._ticks[reference] = _Tick(time + interval, interval)
 
     def saved(self) -> dict[int, object]:
-        """Return what belongs to a saved state.
-
-        Returns:
-            It, to be handed to ``restore``.
-        """
+        """Return what belongs to a saved state."""
         return dict(self._ticks)
 
     def restore(self, saved: Mapping[int, object]) -> None:
-        """Return to a saved state.
-
-        Args:
-            saved: what ``saved`` returned.
-        """
+        """Return to a saved state."""
         self._ticks = {reference: tick for reference, tick in saved.items() if isinstance(tick, _Tick)}
 
     def _interval(self, reference: int) -> tuple[float, int]:

@@ -10,18 +10,7 @@ _TYPES = ("Real", "Integer", "Boolean", "String", "Enumeration")
 
 
 def read_variables(root: etree._Element) -> tuple[list[Variable], list[Access]]:
-    """Return the variables and where their values are, in the order of declaration.
-
-    Args:
-        root: the model description.
-
-    Returns:
-        Both lists, equally long.
-
-    Raises:
-        KeyError: an attribute is missing.
-        ValueError: a variable is wrong.
-    """
+    """Return the variables and where their values are, in the order of declaration."""
     types = {t.attrib["name"]: t for t in root.findall("TypeDefinitions/SimpleType")}
     found = []
     for scalar in root.findall("ModelVariables/ScalarVariable"):
@@ -65,18 +54,7 @@ def _limit(kind: etree._Element, text: str | None) -> float | None:
 
 
 def read_feedthrough(root: etree._Element, variables: list[Variable]) -> dict[str, frozenset[str]]:
-    """Return for each output whose dependencies are declared the inputs on which it depends at once.
-
-    Args:
-        root: the model description.
-        variables: all, in the order of declaration.
-
-    Returns:
-        Names of inputs by that of the output.
-
-    Raises:
-        IndexError: a dependency is no variable's.
-    """
+    """Return for each output whose dependencies are declared the inputs on which it depends at once."""
     direct = {}
     for unknown in root.findall("ModelStructure/Outputs/Unknown"):
         listed = unknown.get("dependencies")

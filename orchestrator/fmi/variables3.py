@@ -46,18 +46,7 @@ class Variables3:
 
 
 def read_variables(root: etree._Element) -> Variables3:
-    """Return the variables of a model description.
-
-    Args:
-        root: the model description.
-
-    Returns:
-        The variables, in the order of declaration.
-
-    Raises:
-        KeyError: an attribute is missing.
-        ValueError: a variable is wrong.
-    """
+    """Return the variables of a model description."""
     elements = [e for e in root.iterfind("ModelVariables/*") if isinstance(e.tag, str)]
     types = {t.attrib["name"]: t for t in root.iterfind("TypeDefinitions/*") if isinstance(t.tag, str)}
     lengths = {
@@ -189,15 +178,7 @@ def _starts(element: etree._Element, count: int) -> list[str | None]:
 
 
 def read_feedthrough(root: etree._Element, variables: Variables3) -> dict[str, frozenset[str]]:
-    """Return for each output whose dependencies are declared the inputs on which it depends at once.
-
-    Args:
-        root: the model description.
-        variables: of it.
-
-    Returns:
-        Names of inputs by that of the output.
-    """
+    """Return for each output whose dependencies are declared the inputs on which it depends at once."""
     inputs = {v.name for v in variables.scalars if v.causality == "input"}
     direct = {}
     for output in root.iterfind("ModelStructure/Output"):

@@ -112,34 +112,20 @@ def run_adaptive(
     """Run from ``start`` to ``stop`` [s]; ``rows`` has shape (grid points, recorded) with row 0 already there.
 
     Args:
-        wiring: bound slaves, initialised.
         signals: signals in place of those of ``System.sources``, by index.
         start: [s].
         stop: [s].
-        settings: tolerance and bounds of the step.
-        rows: filled with the recorded signals on the grid.
         record: (recorded,) slots of the recorded signals.
 
     Returns:
         Steps taken, steps refused, sizes.
-
-    Raises:
-        ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.
-        ConvergenceError: the tolerance cannot be met with the smallest step allowed.
     """
     check_adaptive(wiring.layout)
     return _Run(wiring, signals, start, stop, settings, rows, record).run()
 
 
 def check_adaptive(layout: Layout) -> None:
-    """Refuse a system that cannot go back or that holds values by itself.
-
-    Args:
-        layout: plan of the signals.
-
-    Raises:
-        ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.
-    """
+    """Refuse a system that cannot go back or that holds values by itself."""
     for instance in layout.system.instances:
         model = instance.model
         if not (model.can_save_state and model.can_vary_step):
@@ -161,9 +147,6 @@ def window_end(time: float, length: float, target: float) -> float:
         time: where it begins [s].
         length: wanted [s].
         target: beyond which it must not go [s].
-
-    Returns:
-        The time.
     """
     left = target - time
     if left <= 1.01 * length:

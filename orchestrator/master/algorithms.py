@@ -80,12 +80,6 @@ def step_count(start: float, stop: float, step: float) -> int:
         start: beginning of the run [s].
         stop: its end [s].
         step: length of a step [s].
-
-    Returns:
-        The number of steps.
-
-    Raises:
-        ScenarioError: the times are not finite, not in order, or no whole number of steps fits.
     """
     if not (math.isfinite(step) and step > 0.0):
         raise ScenarioError(f"`step` must be finite and positive, but is {step!r}")

@@ -9,14 +9,7 @@ from orchestrator.master.system import System
 
 
 def clock_problems(system: System) -> list[Problem]:
-    """Return the clocks of a system that could not be ticked: each would stand still, and nobody would notice.
-
-    Args:
-        system: whose instances may have clocks.
-
-    Returns:
-        Each problem with the path to its instance.
-    """
+    """Return the clocks of a system that could not be ticked: each would stand still, and nobody would notice."""
     found = []
     for instance in system.instances:
         for name, clock in instance.model.clocks.items():
@@ -35,7 +28,6 @@ class ClockSchedule:
     """The ticks of all periodic clocks of a run, in order of time.
 
     Args:
-        system: sound, see ``clock_problems``.
         start: of the run [s]; the decimal number that it is printed as counts.
     """
 
@@ -51,19 +43,11 @@ class ClockSchedule:
         heapq.heapify(self._waiting)
 
     def next_time(self) -> float:
-        """Return when the next clock ticks [s], rounded once; infinity without clocks.
-
-        Returns:
-            The time.
-        """
+        """Return when the next clock ticks [s], rounded once; infinity without clocks."""
         return self._waiting[0][0] / self._per_second if self._waiting else math.inf
 
     def take(self) -> dict[str, list[str]]:
-        """Return the clocks that tick next, all at one and the same instant, and go on to those after them.
-
-        Returns:
-            Names of clocks by instance.
-        """
+        """Return the clocks that tick next, all at one and the same instant, and go on to those after them."""
         due: dict[str, list[str]] = {}
         instant = self._waiting[0][0] if self._waiting else 0
         while self._waiting and self._waiting[0][0] == instant:

@@ -98,12 +98,7 @@ class _Failure(ctypes.Structure):
 
 @cache
 def _loaded(holds_lock: bool) -> Any:
-    """Return ``run_steps`` of the compiled ``loop.c``, or ``None``.
-
-    Args:
-        holds_lock: keep the interpreter's lock. Python FMUs would take it back at once; others must not have it, since
-            they may wait for threads of their own that log.
-    """
+    """Return ``run_steps`` of the compiled ``loop.c``, or ``None``."""
     path = compiled_library(SOURCE)
     if path is None:
         return None
@@ -142,9 +137,7 @@ class CompiledWiring:
     """The slaves of a wiring, ready for machine code.
 
     Args:
-        wiring: bound slaves.
         natives: what each of its stages offers, in the same order.
-        run_steps: the function of ``loop.c``.
     """
 
     def __init__(self, wiring: Wiring, natives: Sequence[NativeCalls], run_steps: Any) -> None:
@@ -172,15 +165,9 @@ class CompiledWiring:
         """Run on the grid; ``out`` has shape (steps + 1, recorded), row 0 is already there.
 
         Args:
-            table: what the sources add to inputs, see ``Layout.signal_table``.
             start: [s].
             step: [s].
-            simultaneous: all slaves take their inputs at the start of a step (Jacobi).
-            out: filled with the recorded signals.
             record: (recorded,) slots of the recorded signals.
-
-        Raises:
-            SlaveError: a slave refused or failed a call.
         """
         table, record = np.ascontiguousarray(table), np.ascontiguousarray(record)
         assert out.flags.c_contiguous
@@ -218,14 +205,7 @@ class CompiledWiring:
 
 
 def compiled_loop(wiring: Wiring) -> CompiledWiring | None:
-    """Return the compiled loop, or ``None`` when a slave does not offer native calls or nothing can compile it.
-
-    Args:
-        wiring: bound slaves.
-
-    Returns:
-        The loop.
-    """
+    """Return the compiled loop, or ``None`` when a slave does not offer native calls or nothing can compile it."""
     natives = []
     for stage in wiring.stages:
         offer = getattr(stage.slave, "native_calls", None)

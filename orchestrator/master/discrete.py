@@ -10,14 +10,7 @@ from orchestrator.master.values import typed_value
 
 
 def levels(signal: Signal) -> Sequence[float] | None:
-    """Return the values that a signal jumps between.
-
-    Args:
-        signal: any.
-
-    Returns:
-        The values, each once; None for a signal that changes gradually, or at random.
-    """
+    """Return the values that a signal jumps between."""
     match signal:
         case Constant():
             return [signal.value]
@@ -34,15 +27,7 @@ def levels(signal: Signal) -> Sequence[float] | None:
 
 
 def discrete_problem(variable: Variable, signal: Signal) -> str | None:
-    """Return what keeps a signal from being fed into an input that is not Real, in words.
-
-    Args:
-        variable: the input, of type Integer, Boolean or Enumeration.
-        signal: that is fed into it.
-
-    Returns:
-        "must ..., but ..."; None when it fits.
-    """
+    """Return what keeps a signal from being fed into an input that is not Real, in words."""
     values = levels(signal)
     if values is None:
         kinds = "a constant, a step, a square or a table with hold = true"

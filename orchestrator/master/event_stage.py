@@ -19,37 +19,30 @@ def slack(time: float) -> float:
 
     Args:
         time: [s].
-
-    Returns:
-        The distance.
     """
     return 1e-12 * max(1.0, abs(time))
 
 
 def is_discrete(variable: Variable) -> bool:
-    """Return whether a variable changes at events alone.
-
-    Args:
-        variable: any.
-
-    Returns:
-        True for types that are not Real and for the variability ``discrete``.
-    """
+    """Return whether a variable changes at events alone."""
     return variable.type != "Real" or variable.variability == "discrete"
+
+
+def _is_smooth(variable: Variable) -> bool:
+    return variable.causality == "output" and not is_discrete(variable) and variable.variability == "continuous"
 
 
 class EventStage:
     """One instance of a system with events; its slave may have none.
 
-    Args:
-        stage: the instance.
-        values: the slots.
-
     Attributes:
         steps: calls that asked the slave for a step.
         can_go_back: it can be taken back to a saved state, and step to any time from there.
-        send: moves the continuous inputs; of a slave without events all.
-        outputs: its output slots.
+        names: of the inputs that it takes at steps: the continuous ones; of a slave without events all.
+        inside: those that it can be told inside a step.
+        places: of these among ``names``.
+        rated: outputs whose derivatives it knows.
+        follows: outputs that depend on an input of ``names`` at once.
         next_event: [s], as the slave said last; infinity where it knows of none.
     """
 
@@ -61,6 +54,9 @@ class EventStage:
         self.outputs = slice(block.first_output, block.first_output + len(block.outputs))
         self.next_event, self.steps = math.inf, 0
         self.send, self.receive = stage.send, stage.receive
+        self._take_inputs(block.inputs)
+        self.rated: list[str] = []
+        self.rate_slots = np.empty(0, dtype=np.int64)
         self._values = values
         self._clocks: dict[str, tuple[Callable[[], None], Callable[[], None]]] = {}
         self._sent = np.empty(0)
@@ -72,7 +68,12 @@ class EventStage:
         discrete = [name for name in free if is_discrete(model.variables[name])]
         places = {name: block.first_input + k for k, name in enumerate(block.inputs)}
         self._discrete = np.array([places[name] for name in discrete], dtype=np.int64)
-        self.send = bind_send(self.slave, block, [name for name in free if name not in discrete], values)
+        self._take_inputs([name for name in free if name not in discrete])
+        self.send = bind_send(self.slave, block, self.names, values)
+        if model.output_derivatives:
+            self.rated = [n for n in block.outputs if n not in clocked and _is_smooth(model.variables[n])]
+            slots = [block.first_output + block.outputs.index(name) for name in self.rated]
+            self.rate_slots = np.array(slots, dtype=np.int64)
         self._send_discrete = bind_send(self.slave, block, discrete, values)
         for name, clock in model.clocks.items():
             inputs = [v for v in block.inputs if v in clock.variables]
@@ -82,18 +83,28 @@ class EventStage:
                 bind_receive(self.slave, block, outputs, values),
             )
 
+    def _take_inputs(self, names: Sequence[str]) -> None:
+        """Take these inputs at steps."""
+        block, model = self.block, self.slave.model
+        self.names = tuple(names)
+        self.feeds = [block.feeds[block.inputs.index(name)] for name in names]
+        self.inputs = np.array([feed.slot for feed in self.feeds], dtype=np.int64)
+        self.inside = [name for name in names if self.has_events and name in model.inputs_inside_steps]
+        self.places = [self.names.index(name) for name in self.inside]
+        outputs = [name for name in block.outputs if model.variables[name].causality == "output"]
+        self.follows = {name for name in outputs if not model.depends_on(name).isdisjoint(names)}
+
+    def read_rates(self, rates: Signals) -> None:
+        """Read the derivatives of the outputs where the slave is."""
+        if self.rated:
+            rates[self.rate_slots] = self.events.output_rates(self.rated)
+
     def step(self, begin: float, end: float) -> StepOutcome:
-        """Step towards ``end`` [s].
+        """Step towards ``end`` [s]. Return where it ended; ``end`` itself, where that is missed by rounding.
 
         Args:
             begin: where the slave is [s].
             end: [s].
-
-        Returns:
-            Where it ended; ``end`` itself, where that is missed by rounding.
-
-        Raises:
-            SlaveError: the slave went back.
         """
         self.steps += 1
         if not self.has_events:
@@ -105,12 +116,7 @@ class EventStage:
         return StepOutcome(end, found.event) if found.reached >= end - slack(end) else found
 
     def exchange(self, gather: Gather, clocks: Sequence[str]) -> None:
-        """Take inputs and show outputs, in event mode.
-
-        Args:
-            gather: fills the input slots.
-            clocks: that are active.
-        """
+        """Take inputs and show outputs, in event mode."""
         gather(self.stage)
         self.send()
         self._send_discrete()
@@ -122,30 +128,17 @@ class EventStage:
         self._sent = self._values[self._discrete]
 
     def takes_discrete_news(self, gather: Gather) -> bool:
-        """Return whether a discrete input has another value than the slave has, which it takes at events alone.
-
-        Args:
-            gather: fills the input slots.
-
-        Returns:
-            True when one has.
-        """
+        """Return whether a discrete input has another value than the slave has, which it takes at events alone."""
         if not len(self._discrete):
             return False
         gather(self.stage)
         return not np.array_equal(self._values[self._discrete], self._sent, equal_nan=True)
 
     def update(self, time: float) -> bool:
-        """End an instant.
+        """End an instant. Return whether the slave needs another.
 
         Args:
             time: [s].
-
-        Returns:
-            Whether the slave needs another.
-
-        Raises:
-            RunEndedError: it wants the run to end.
         """
         found = self.events.update_discrete_states()
         self.next_event = math.inf if found.next_event is None else found.next_event

@@ -104,6 +104,8 @@ class FixedSteps:
         self.values, self.view = events.wiring.values, events.wiring.view
         self.passes = self.undone = 0
         self._column, self._late = 0, False
+        self._leads = any(stage.inside for stage in events.stages)
+        self._before, self._rates = self.values.copy(), np.zeros(len(self.values))
         by_name = {stage.name: stage for stage in events.stages}
         if isinstance(algorithm, Iterated):
             loops = loop_groups(events.wiring)
@@ -158,7 +160,8 @@ class FixedSteps:
         """Take all slaves to ``end`` [s] or to the first event; return where they are, and whether there is one."""
         for group in self._groups:
             group.save(begin)
-        values = self.values.copy()
+        values = self._before = self.values.copy()
+        self._rates = self.events.rates() if self._leads else self._rates
         try:
             for _ in range(MOST_HALVINGS):
                 try:
@@ -221,12 +224,43 @@ class FixedSteps:
         group.keep(self.values)
 
     def _step(self, stage: EventStage, begin: float, end: float) -> StepOutcome:
-        if not self._simultaneous:
+        last: Array | None = None
+        if stage.inside:
+            last = self._lead(stage, begin, end)
+        elif not self._simultaneous:
             self.gather(stage.stage)
         stage.send()
         outcome = stage.step(begin, end)
         stage.receive()
+        if last is not None:
+            self.values[stage.inputs] = last
         return outcome
+
+    def _lead(self, stage: EventStage, begin: float, end: float) -> Array:
+        """Set inputs as they are at ``begin`` [s] and lead them on straight lines inside the step; return the ends.
+
+        Lines go to the values of those that have stepped already, else along derivatives where these are known.
+        """
+        now = self.values.copy()
+        newest = self._before if self._simultaneous else now
+        self.values[:] = newest
+        self.gather(stage.stage)
+        last = self.values[stage.inputs]
+        self.values[:] = self._before
+        self.gather(stage.stage)
+        first = self.values[stage.inputs]
+        self.values[:] = now
+        held = np.delete(np.arange(len(first)), stage.places)
+        first[held] = last[held]
+        self.values[stage.inputs] = first
+        for k in stage.places:
+            feed = stage.feeds[k]
+            if self.events.rated[feed.source] and feed.source >= 0 and newest[feed.source] == self._before[feed.source]:
+                last[k] += feed.factor * self._rates[feed.source] * (end - begin)
+        slopes = (last - first) / (end - begin)
+        lines = [(float(first[k]), float(slopes[k])) for k in stage.places]
+        stage.events.feed(stage.inside, lambda time: [value + slope * (time - begin) for value, slope in lines])
+        return last
 
     def _solve(self, group: _Group, begin: float, end: float) -> None:
         """Step a loop until what it exchanges settles, to where the first of its slaves stops."""

@@ -8,7 +8,6 @@ stops at an event the window becomes shorter, and the sweeps go on until the eve
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 from orchestrator.master.event_stage import EventStage, is_discrete, slack
 from orchestrator.master.events import EventIteration
 from orchestrator.master.pieces import piece_times, piece_weights
-from orchestrator.master.protocol import EventSlave, Variable
 from orchestrator.master.rollback import rollback
 from orchestrator.master.tracks import Track, cell_coefficients
 
@@ -46,7 +44,6 @@ class Swept:
         track: all signals, up to ``end``; of no use where that is the begin of the window.
         end: of the window, or an event before it [s].
         event: a slave has an event there.
-        rates: derivatives there.
     """
 
     track: Track
@@ -55,43 +52,17 @@ class Swept:
     rates: Array
 
 
-class _Part:
-    """One instance in a sweep: which slots it takes and shows, and how it is stepped."""
-
-    def __init__(self, stage: EventStage) -> None:
-        self.stage, block, model = stage, stage.block, stage.slave.model
-        taken = block.inputs
-        clocked = {name for clock in model.clocks.values() for name in clock.variables}
-        if stage.has_events:
-            taken = tuple(n for n in taken if n not in clocked and not is_discrete(model.variables[n]))
-        self.names = taken
-        self.feeds = [block.feeds[block.inputs.index(name)] for name in taken]
-        self.inputs = np.array([feed.slot for feed in self.feeds], dtype=np.int64)
-        self.inside = stage.has_events and model.takes_inputs_inside_steps and bool(taken)
-        rated = [n for n in block.outputs if model.output_derivatives and _is_smooth(model.variables[n])]
-        self.rated = [n for n in rated if n not in clocked] if stage.has_events else []
-        self.rate_slots = np.array([block.first_output + block.outputs.index(n) for n in self.rated], dtype=np.int64)
-        direct = [n for n in block.outputs if model.variables[n].causality == "output"]
-        self.closing = any(name in model.depends_on(output) for output in direct for name in taken)
-        self.follows = {n for n in block.outputs if n in direct and not model.depends_on(n).isdisjoint(block.inputs)}
-
-
-def _is_smooth(variable: Variable) -> bool:
-    return variable.causality == "output" and variable.type == "Real" and variable.variability == "continuous"
-
-
 class Sweeper:
     """Sweeps the slaves of a wiring.
 
     Args:
-        events: the slaves.
         sources: what sources add to inputs at three nodes, shape (rows, 3), from their times [s].
         difference: of two sets of outputs, as a multiple of the tolerance.
 
     Attributes:
         sweeps: passes over all slaves.
         held: signals that do not change within a window.
-        rated: signals whose derivatives make cubics of them; of outputs that follow inputs at once they are incomplete.
+        rated: see ``EventIteration``; derivatives make cubics of these signals.
     """
 
     def __init__(
@@ -101,29 +72,11 @@ class Sweeper:
         difference: Callable[[Array, Array], float],
     ) -> None:
         self.wiring, self._sources, self._difference = events.wiring, sources, difference
-        self._parts = [_Part(stage) for stage in events.stages]
+        self._stages = events.stages
         self.sweeps = 0
         system, slots = self.wiring.layout.system, self.wiring.layout.slots
         self.held = np.array([(v := system.variable(a)) is not None and is_discrete(v) for a in slots], dtype=bool)
-        self.rated = np.zeros(len(slots), dtype=bool)
-        for part in self._parts:
-            for name, slot in zip(part.rated, part.rate_slots, strict=True):
-                self.rated[slot] = name not in part.follows
-
-    def rates(self) -> Array:
-        """Return the derivatives of the outputs where the slaves are, as far as they know them; zero for others.
-
-        Returns:
-            Shape (slots,).
-        """
-        found = np.zeros(len(self.wiring.values))
-        for part in self._parts:
-            self._read_rates(part, found)
-        return found
-
-    def _read_rates(self, part: _Part, rates: Array) -> None:
-        if part.rated:
-            rates[part.rate_slots] = cast(EventSlave, part.stage.slave).output_rates(part.rated)
+        self.rated = events.rated
 
     def sweep(self, begin: float, end: float, rates: Array, guess: Track | None) -> Swept:
         """Take all slaves from ``begin`` to ``end`` [s], or to the first event before it.
@@ -131,14 +84,6 @@ class Sweeper:
         Args:
             begin: where they are [s].
             end: [s].
-            rates: derivatives at the begin.
-            guess: signals in an earlier window, or in this one.
-
-        Returns:
-            What the signals do.
-
-        Raises:
-            UnsettledError: the window is too long.
         """
         with rollback(self.wiring) as restore:
             track = self._guessed(begin, end, rates, guess)
@@ -147,7 +92,7 @@ class Sweeper:
                     restore()
                 found, stopped = self._pass(track)
                 if stopped is not None:
-                    part, reached = stopped
+                    stage, reached = stopped
                     brief = begin + BRIEF * slack(begin)
                     if reached - begin <= slack(begin) and track.end > brief:  # a poor guess may have brought it about
                         restore()
@@ -155,7 +100,7 @@ class Sweeper:
                         continue
                     if reached - begin <= slack(begin):
                         restore()
-                        self._pass(track, only=part)
+                        self._pass(track, only=stage)
                         return Swept(track, begin, True, rates)
                     track = self._shortened(found.track, reached)
                     continue
@@ -184,29 +129,29 @@ class Sweeper:
         values[0], rates[0] = track.values[0], track.rates[0]
         return Track(track.start, end, values, rates, self.rated)
 
-    def _pass(self, track: Track, only: _Part | None = None) -> tuple[Swept, tuple[_Part, float] | None]:
+    def _pass(self, track: Track, only: EventStage | None = None) -> tuple[Swept, tuple[EventStage, float] | None]:
         """Step all slaves once; return what they show, and the first one that stopped, with the time [s]."""
         self.sweeps += only is None
         begin, end = track.start, track.end
         values, rates = track.values.copy(), track.rates.copy()
         sources = self._sources(begin + 0.5 * (end - begin) * np.arange(3.0))
         event = False
-        for part in self._parts if only is None else [only]:
+        for stage in self._stages if only is None else [only]:
             kept = values.copy(), rates.copy()
-            run = self._along if part.inside else self._in_pieces
-            reached, due = run(part, begin, end, values, rates, sources)
+            run = self._along if stage.inside else self._in_pieces
+            reached, due = run(stage, begin, end, values, rates, sources)
             if reached < end:
-                return Swept(Track(begin, end, *kept, self.rated), end, True, rates), (part, reached)
+                return Swept(Track(begin, end, *kept, self.rated), end, True, rates), (stage, reached)
             event = event or due
         return Swept(Track(begin, end, values, rates, self.rated), end, event, rates[2].copy()), None
 
     def _input_nodes(
-        self, part: _Part, values: Array, rates: Array, sources: Array
+        self, stage: EventStage, values: Array, rates: Array, sources: Array
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return values and derivatives of a slave's inputs at the nodes, and which of them have derivatives."""
-        nodes, slopes = np.empty((3, len(part.feeds))), np.zeros((3, len(part.feeds)))
-        rated = np.zeros(len(part.feeds), dtype=bool)
-        for k, feed in enumerate(part.feeds):
+        nodes, slopes = np.empty((3, len(stage.feeds))), np.zeros((3, len(stage.feeds)))
+        rated = np.zeros(len(stage.feeds), dtype=bool)
+        for k, feed in enumerate(stage.feeds):
             nodes[:, k] = feed.offset
             if feed.source >= 0:
                 source = values[:, feed.source]
@@ -218,15 +163,17 @@ class Sweeper:
         return nodes, slopes, rated
 
     def _along(
-        self, part: _Part, begin: float, end: float, values: Array, rates: Array, sources: Array
+        self, stage: EventStage, begin: float, end: float, values: Array, rates: Array, sources: Array
     ) -> tuple[float, bool]:
         """Step a slave that is fed the polynomials of its inputs; return where it stopped, and whether at an event."""
-        nodes, slopes, rated = self._input_nodes(part, values, rates, sources)
+        nodes, slopes, rated = self._input_nodes(stage, values, rates, sources)
         middle, cell = 0.5 * (begin + end), 0.5 * (end - begin)
         cubics = cell_coefficients(nodes, slopes, rated, cell)
         times = (begin, middle, end)
-        slave, event = cast(EventSlave, part.stage.slave), False
-        rows: list[list[list[float]]] = cubics.transpose(0, 2, 1).tolist()
+        event = False
+        rows: list[list[list[float]]] = cubics[:, :, stage.places].transpose(0, 2, 1).tolist()
+        begins = cubics.transpose(0, 2, 1) @ np.array([1.0, 0.5, 1.0 / 3.0, 0.25])  # means, of those that are held
+        begins[:, stage.places] = cubics[:, 0, stage.places]
         for k in range(2):
             origin, cubic = times[k], rows[k]
 
@@ -234,42 +181,43 @@ class Sweeper:
                 s = (time - origin) / cell
                 return [a + s * (b + s * (c + s * d)) for a, b, c, d in cubic]
 
-            self.wiring.values[part.inputs] = cubics[k, 0]
-            part.stage.send()
-            slave.feed(part.names, fed)
-            outcome = part.stage.step(times[k], times[k + 1])
+            self.wiring.values[stage.inputs] = begins[k]
+            stage.send()
+            stage.events.feed(stage.inside, fed)
+            outcome = stage.step(times[k], times[k + 1])
             event = outcome.event
-            self._show(part, k + 1, values, rates)
+            self._show(stage, k + 1, values, rates)
             if outcome.reached < times[k + 1] or (event and k == 0):
                 return outcome.reached, event
-        self.wiring.values[part.inputs] = nodes[2]
+        self.wiring.values[stage.inputs] = nodes[2]
         return end, event
 
     def _in_pieces(
-        self, part: _Part, begin: float, end: float, values: Array, rates: Array, sources: Array
+        self, stage: EventStage, begin: float, end: float, values: Array, rates: Array, sources: Array
     ) -> tuple[float, bool]:
         """Step a slave that holds its inputs; see ``_along``."""
-        nodes, _, _ = self._input_nodes(part, values, rates, sources)
-        constants = piece_weights(part.closing) @ nodes
-        times, at_node = piece_times(begin, end, part.closing)
+        nodes, _, _ = self._input_nodes(stage, values, rates, sources)
+        closing = bool(stage.follows)
+        constants = piece_weights(closing) @ nodes
+        times, at_node = piece_times(begin, end, closing)
         node, event = 1, False
         for k, ends_cell in enumerate(at_node):
-            self.wiring.values[part.inputs] = constants[k]
-            part.stage.send()
-            outcome = part.stage.step(times[k], times[k + 1])
+            self.wiring.values[stage.inputs] = constants[k]
+            stage.send()
+            outcome = stage.step(times[k], times[k + 1])
             event = outcome.event
             if outcome.reached < times[k + 1] or (event and k + 1 < len(at_node)):
-                part.stage.receive()
+                stage.receive()
                 return outcome.reached, event
             if ends_cell:
-                self._show(part, node, values, rates)
+                self._show(stage, node, values, rates)
                 node += 1
         return end, event
 
-    def _show(self, part: _Part, node: int, values: Array, rates: Array) -> None:
+    def _show(self, stage: EventStage, node: int, values: Array, rates: Array) -> None:
         """Read the outputs at a node, and their derivatives."""
-        part.stage.receive()
-        outputs = part.stage.outputs
+        stage.receive()
+        outputs = stage.outputs
         values[node, outputs] = self.wiring.values[outputs]
-        values[node, part.inputs] = self.wiring.values[part.inputs]
-        self._read_rates(part, rates[node])
+        values[node, stage.inputs] = self.wiring.values[stage.inputs]
+        stage.read_rates(rates[node])

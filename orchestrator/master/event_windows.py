@@ -65,9 +65,6 @@ class EventWindows:
         start: [s].
         stop: [s].
         settings: tolerance and bounds of the step.
-
-    Raises:
-        ScenarioError: a slave cannot save its state or vary its step, or a connection rounds to a quantum.
     """
 
     def __init__(
@@ -93,14 +90,10 @@ class EventWindows:
 
         Returns:
             Windows taken and refused, calls of slaves, events.
-
-        Raises:
-            ConvergenceError: the tolerance cannot be met with the smallest step allowed, or events have no end.
-            SlaveError: a slave wants the run to end, or cannot do a step of any length.
         """
         time, length, row = self.start, min(self.settings.first, self.settings.largest), 1
         guess: Track | None = None
-        rates, longest = self.sweeper.rates(), self.settings.largest / GROW
+        rates, longest = self.events.rates(), self.settings.largest / GROW
         while time < self.stop - slack(self.stop):
             jump = next(t for t in self.breaks if t > time + slack(time))
             target = min(jump, self.events.next_time())
@@ -115,7 +108,7 @@ class EventWindows:
                 self.rejected += 1
             length = self._next_length(window)
             if self._take_events(time, window, jump):
-                guess, rates, length = None, self.sweeper.rates(), min(length, longest)
+                guess, rates, length = None, self.events.rates(), min(length, longest)
                 if row and abs(self._grid(row - 1) - time) <= slack(time):
                     np.take(self.wiring.values, record, out=rows[row - 1], mode="clip")
             elif window.end is None and length < self.settings.smallest:

@@ -43,12 +43,9 @@ def _chattering(time: float, names: Sequence[str]) -> ChatteringError:
 class EventIteration:
     """Takes all slaves of a wiring through their events.
 
-    Args:
-        wiring: bound slaves.
-
     Attributes:
         stages: all instances, in execution order.
-        late: see ``EventStatistics``.
+        rated: signals whose derivatives are known; those of outputs that follow inputs at once would lack the inputs'.
         late_for: an instance that could not be taken back to events, for which they were late.
     """
 
@@ -66,6 +63,22 @@ class EventIteration:
         sources = {feed.source for stage in self._taking for feed in stage.block.feeds if feed.source >= 0}
         self._sources = np.array(sorted(sources), dtype=np.int64)
 
+        self.rated = np.zeros(len(slots), dtype=bool)
+        for stage in self._taking:
+            for name, slot in zip(stage.rated, stage.rate_slots, strict=True):
+                self.rated[slot] = name not in stage.follows
+
+    def rates(self) -> Array:
+        """Return the derivatives of the outputs where the slaves are, as far as they know them; zero for others.
+
+        Returns:
+            Shape (slots,), in the slots' units per second.
+        """
+        found = np.zeros(len(self.wiring.values))
+        for stage in self._taking:
+            stage.read_rates(found)
+        return found
+
     def _forget(self, start: float) -> None:
         """Begin anew at ``start`` [s]."""
         self._clocks = ClockSchedule(self.wiring.layout.system, start)
@@ -78,30 +91,18 @@ class EventIteration:
             stage.next_event, stage.steps = math.inf, 0
 
     def statistics(self) -> EventStatistics:
-        """Return what happened.
-
-        Returns:
-            The events of the run so far.
-        """
+        """Return what happened."""
         return EventStatistics(tuple(self._times), self._instants, self._ticks, tuple(self.late[:MOST_TIMES]))
 
     def remarks(self) -> list[RunRemark]:
-        """Return what is to be known of events that were late.
-
-        Returns:
-            A remark, or none.
-        """
+        """Return what is to be known of events that were late."""
         if not self.late:
             return []
         text = "cannot be taken back to an event: such events reach the others at the communication point only"
         return [RunRemark(self.late_for, f"{text}, up to {max(self.late):g} s late", len(self.late))]
 
     def next_time(self) -> float:
-        """Return the next time [s] at which an event is due, as far as is known before any step.
-
-        Returns:
-            The time; infinity for none.
-        """
+        """Return the next time [s] at which an event is due, as far as is known before any step."""
         return min(self._clocks.next_time(), min((s.next_event for s in self._taking), default=math.inf))
 
     def begin(self, time: float, gather: Gather) -> None:
@@ -109,7 +110,6 @@ class EventIteration:
 
         Args:
             time: start of the run [s].
-            gather: fills the input slots of a stage.
         """
         self._forget(time)
         for stage in self.stages:
@@ -119,20 +119,7 @@ class EventIteration:
         self.catch_up(time, gather)
 
     def catch_up(self, time: float, gather: Gather, event: bool = False) -> bool:
-        """Take what is due at ``time`` [s]: events, ticks, and changes of discrete inputs.
-
-        Args:
-            time: where all slaves are.
-            gather: fills the input slots of a stage.
-            event: a slave has reported one.
-
-        Returns:
-            Whether there was anything.
-
-        Raises:
-            ChatteringError: there is no end of events at this time.
-            RunEndedError: a slave wants the run to end.
-        """
+        """Take what is due at ``time`` [s]: events, ticks, and changes of discrete inputs."""
         found = False
         while event or self._is_due(time) or any(s.takes_discrete_news(gather) for s in self._taking):
             if event or min(s.next_event for s in self._taking) <= time + slack(time):
@@ -152,11 +139,7 @@ class EventIteration:
         """Take one slave through an event with inputs as they are; others do not see it.
 
         Args:
-            stage: whose slave.
             time: where it is [s].
-
-        Raises:
-            ChatteringError: there is no end of instants.
         """
         self._note(time)
         stage.events.enter_event_mode()
@@ -168,12 +151,7 @@ class EventIteration:
         raise _chattering(time, [stage.name])
 
     def jump(self, time: float, gather: Gather) -> None:
-        """Take all slaves through an instant because a source jumps at ``time`` [s].
-
-        Args:
-            time: where all slaves are.
-            gather: fills the input slots of a stage.
-        """
+        """Take all slaves through an instant because a source jumps at ``time`` [s]."""
         self.enter()
         self._settle(time, gather)
         self.catch_up(time, gather)

@@ -22,14 +22,9 @@ def fixed_point(sweep: Callable[[Array], Array], guess: Array, tolerance: float,
         sweep: the map; its argument and its value have the shape of ``guess``.
         guess: first point, shape (n,).
         tolerance: largest ``|sweep(x) - x|`` relative to ``max(1, |x|)``.
-        iterations: most calls of ``sweep``.
-        what: what is being solved, for the message.
 
     Returns:
         The number of calls of ``sweep``.
-
-    Raises:
-        ConvergenceError: not converged within ``iterations`` calls, or the values ran away.
     """
     points: list[Array] = []
     residuals: list[Array] = []

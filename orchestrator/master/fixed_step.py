@@ -15,11 +15,9 @@ def run_sequential(
     """Step the instances one after the other, each with the newest values there are.
 
     Args:
-        wiring: bound slaves, initialised, their outputs in the slots.
         table: signals, shape (signals, steps + 1).
         start: time of the first step [s].
         step: communication step [s].
-        steps: number of steps.
         rows: results, shape (steps + 1, recorded); row 0 is already there.
         record: recorded slots, shape (recorded,).
     """
@@ -43,11 +41,8 @@ def run_simultaneous(
     """Step all instances with the values of the start of the step; arguments as for ``run_sequential``.
 
     Args:
-        wiring: bound slaves, initialised.
-        table: what the sources add to inputs, see ``Layout.signal_table``.
         start: [s].
         step: [s].
-        steps: their number.
         rows: (steps + 1, recorded) filled from row 1 on.
         record: (recorded,) slots of the recorded signals.
     """

@@ -8,13 +8,6 @@ def components(nodes: Sequence[str], edges: Mapping[str, Iterable[str]]) -> list
 
     Among components that are free to run, the one whose first node was declared earliest comes first, and the nodes
     of one component keep their order of declaration: the answer does not depend on hashing.
-
-    Args:
-        nodes: all nodes in the order of declaration.
-        edges: for each node, the nodes that must come after it.
-
-    Returns:
-        Groups of nodes; a node that is in no circle is a group of its own.
     """
     reach = {node: _reachable(node, edges) for node in nodes}
     groups: list[tuple[str, ...]] = []

@@ -20,13 +20,6 @@ def backward_slots(layout: Layout, names: Iterable[str]) -> Slots:
     """Return the output slots that an instance of ``names`` takes from itself or from one that is stepped later.
 
     Fixing their values fixes what one pass over the instances computes: they are the unknowns of the loop.
-
-    Args:
-        layout: plan of the signals.
-        names: of instances.
-
-    Returns:
-        The slots, rising.
     """
     position = {block.name: k for k, block in enumerate(layout.blocks)}
     owner = {block.first_output + j: block.name for block in layout.blocks for j in range(len(block.outputs))}
@@ -41,21 +34,7 @@ def backward_slots(layout: Layout, names: Iterable[str]) -> Slots:
 
 
 def initialise(wiring: Wiring, cut: Slots, table: Array, tolerance: float, iterations: int) -> int:
-    """Make inputs and outputs agree while all slaves are in initialisation; return the number of passes.
-
-    Args:
-        wiring: bound slaves.
-        cut: ``backward_slots`` of all of them.
-        table: what the sources add to inputs, see ``Layout.signal_table``.
-        tolerance: largest relative change in the last pass.
-        iterations: the most passes.
-
-    Returns:
-        The number of passes.
-
-    Raises:
-        ConvergenceError: the initial values of a loop do not settle.
-    """
+    """Make inputs and outputs agree while all slaves are in initialisation; return the number of passes."""
     values, view = wiring.values, wiring.view
     for stage in wiring.stages:
         stage.receive()
@@ -79,20 +58,10 @@ def run_iterated(
     Returns the number of passes over loops. Arguments as for ``fixed_step.run_sequential``.
 
     Args:
-        wiring: bound slaves.
-        table: what the sources add to inputs, see ``Layout.signal_table``.
         start: [s].
         settings: step [s], tolerance and number of passes.
-        steps: their number.
         rows: (steps + 1, recorded) filled from row 1 on.
         record: (recorded,) slots of the recorded signals.
-
-    Returns:
-        The number of passes.
-
-    Raises:
-        ScenarioError: an instance of a loop cannot save its state.
-        ConvergenceError: a loop does not settle.
     """
     groups = loop_groups(wiring)
     passes = 0
@@ -109,17 +78,7 @@ def run_iterated(
 
 
 def loop_groups(wiring: Wiring) -> list[tuple[tuple[Stage, ...], Slots]]:
-    """Return the stages in execution order, those of one algebraic loop together, with the unknowns of each loop.
-
-    Args:
-        wiring: bound slaves.
-
-    Returns:
-        Stages and slots of each group; no slots for a group without a loop.
-
-    Raises:
-        ScenarioError: an instance of a loop cannot save its state.
-    """
+    """Return the stages in execution order, those of one algebraic loop together, with the unknowns of each loop."""
     loops = wiring.layout.system.loops()
     groups: list[tuple[tuple[Stage, ...], Slots]] = []
     done: set[str] = set()

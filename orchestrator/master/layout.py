@@ -72,7 +72,6 @@ class Layout:
 
     Attributes:
         blocks: one per instance, in execution order.
-        size: number of slots.
         slots: slot by ``instance.variable``.
         recorded: slots of the recorded signals, in the order asked for.
         signals: for each row of the table of signals, the sources (index into ``System.sources``, factor and offset
@@ -92,7 +91,6 @@ class Layout:
 
         Args:
             times: communication points [s], shape (steps + 1,).
-            replaced: signals that stand in for those of ``System.sources``, by index.
 
         Returns:
             Shape (rows of ``signals``, steps + 1), in the units of the inputs.
@@ -104,9 +102,7 @@ class Layout:
         """Return one row of the table.
 
         Args:
-            row: which.
             times: communication points [s], shape (steps + 1,).
-            replaced: as for ``signal_table``.
 
         Returns:
             Shape (steps + 1,), in the unit of the input.
@@ -121,17 +117,7 @@ class Layout:
 
 
 def lay_out(system: System, record: Sequence[str], simultaneous: bool, states: bool = False) -> Layout:
-    """Plan the signals of a sound system.
-
-    Args:
-        system: without problems.
-        record: signals to be recorded, ``instance.variable``.
-        simultaneous: all instances take their inputs at the start of a step (Jacobi).
-        states: outputs that show an instance's state are needed too, whether or not anybody reads them.
-
-    Returns:
-        The plan.
-    """
+    """Plan the signals of a sound system."""
     shown = _state_outputs(system) if states else []
     needed = _needed(system, [*record, *shown])
     fed = _fed(system)

@@ -21,9 +21,6 @@ def own_step_remarks(system: System, names: tuple[str, ...], rows: Array, start:
     of the future where it steps beyond the communication point, of the past where it waits.
 
     Args:
-        system: what ran.
-        names: of the recorded signals.
-        rows: (communication points, signals) what was recorded on the grid.
         start: of the run [s].
         step: communication step [s].
 

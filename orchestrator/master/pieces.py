@@ -45,9 +45,6 @@ def _node_basis(nodes: int) -> list[Polynomial]:
 def piece_weights(closing: bool) -> Array:
     """Return the matrix from an input's values at the nodes to its constants on all pieces of a window.
 
-    Args:
-        closing: cells end with the short piece.
-
     Returns:
         shape (pieces of the window, nodes).
     """
@@ -83,9 +80,6 @@ def _integral(u: Polynomial) -> float:
 def dense_matrix(nodes: int) -> Array:
     """Return the matrix from values at equidistant nodes to the coefficients of the polynomial in ``s``, square.
 
-    Args:
-        nodes: their number.
-
     Returns:
         Shape (nodes, nodes); row ``k`` holds the coefficients of ``s**k``, ``s`` being the fraction of the window.
     """
@@ -98,10 +92,6 @@ def piece_times(start: float, end: float, closing: bool) -> tuple[list[float], l
     Args:
         start: of the window [s].
         end: of the window [s].
-        closing: whether cells end with the short piece.
-
-    Returns:
-        The instants, one more than pieces, and a truth value per piece.
     """
     edges = _breakpoints(closing)
     length = (end - start) / CELLS

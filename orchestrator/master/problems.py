@@ -25,16 +25,7 @@ class Problem:
 
 
 def raise_problems(problems: list[Problem], origin: str = "", *arguments: str) -> None:
-    """Raise one error that names all ``problems``; none, no error.
-
-    Args:
-        problems: of one system or file.
-        origin: what the text begins with, such as a file's name.
-
-    Raises:
-        ConnectionMismatchError: all of them are connections that cannot be made.
-        ScenarioError: otherwise.
-    """
+    """Raise one error that names all ``problems``; none, no error."""
     if not problems:
         return
     text = one_line((f"{origin}: " if origin else "") + "; ".join(str(p) for p in problems))

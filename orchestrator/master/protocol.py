@@ -51,8 +51,8 @@ class Unit:
     Attributes:
         name: as it is written beside a value.
         exponents: of kg, m, s, A, K, mol, cd, rad; ``None`` when the unit is a mere name.
-        factor: see above.
-        offset: see above.
+        factor: by which a value is multiplied to be in SI.
+        offset: that is added to the product, in SI.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Variable:
         minimum: smallest value allowed; ``None`` when none is declared.
         maximum: largest value allowed; ``None`` when none is declared.
         items: an ``Enumeration``'s literals with their values.
-        description: one line.
+        description: one line that an FMU's author wrote.
         reference: the slave's own handle.
     """
 
@@ -123,7 +123,7 @@ class ModelInterface:
         can_vary_step: ``do_step`` takes steps of any length.
         has_events: its slaves are ``EventSlave``.
         output_derivatives: order up to which ``EventSlave.output_rates`` knows derivatives of outputs; 0: none.
-        takes_inputs_inside_steps: ``EventSlave.feed`` works.
+        inputs_inside_steps: names of the continuous inputs that ``EventSlave.feed`` takes.
         clocks: periodic input clocks by name, which the master ticks.
     """
 
@@ -135,7 +135,7 @@ class ModelInterface:
     can_vary_step: bool = True
     has_events: bool = False
     output_derivatives: int = 0
-    takes_inputs_inside_steps: bool = False
+    inputs_inside_steps: frozenset[str] = frozenset()
     clocks: Mapping[str, "PeriodicClock"] = field(default_factory=dict)
 
     def named(self, causality: str) -> tuple[str, ...]:
@@ -145,7 +145,7 @@ class ModelInterface:
             causality: "input", "output", "parameter" and so on.
 
         Returns:
-            The names.
+            Names in the order of the variables.
         """
         return tuple(v.name for v in self.variables.values() if v.causality == causality)
 
@@ -153,10 +153,10 @@ class ModelInterface:
         """Return the inputs on which ``output`` depends at the same instant (all of them when it is not declared).
 
         Args:
-            output: its name.
+            output: name of the output.
 
         Returns:
-            Names of inputs.
+            Names of the inputs that act on it at once.
         """
         declared = self.feedthrough.get(output)
         return frozenset(self.named("input")) if declared is None else declared
@@ -167,12 +167,12 @@ class NativeTransfer:
     """A C function that sets or reads neighbouring signals: ``status f(component, references, n, values)``.
 
     Attributes:
-        function: its address.
-        name: for messages.
+        function: address of the C function.
+        name: of the C function, for messages.
         number: what a value is in C, as NumPy writes it: "f8", "i4", "b1" and so on.
         sized: the function takes the number of values as a fifth argument.
         references: of the variables, shape (n,).
-        count: number of values.
+        count: how many values one call transfers.
     """
 
     function: int
@@ -246,7 +246,7 @@ class Slave(Protocol):
         """Return variables of any type by name.
 
         Args:
-            names: of variables.
+            names: of variables of this slave.
 
         Returns:
             A value per name.
@@ -256,22 +256,22 @@ class Slave(Protocol):
         """Return a call that sets the numeric variables ``names`` from ``buffer``; shape (len(names),).
 
         Args:
-            names: of variables.
+            names: of numeric inputs and parameters.
             buffer: read at every call.
 
         Returns:
-            Called without arguments.
+            A call without arguments, for every step.
         """
 
     def receives(self, names: Sequence[str], buffer: Signals) -> Transfer:
         """Return a call that reads the numeric variables ``names`` into ``buffer``; shape (len(names),).
 
         Args:
-            names: of variables.
+            names: of numeric variables of any causality.
             buffer: written at every call.
 
         Returns:
-            Called without arguments.
+            A call without arguments, for every step.
         """
 
     def begin(self, start: float, stop: float | None, tolerance: float | None) -> None:
@@ -309,14 +309,14 @@ class Slave(Protocol):
         """Return to a state; the handle stays valid.
 
         Args:
-            state: the handle.
+            state: handle that `get_state` returned.
         """
 
     def free_state(self, state: Any) -> None:
         """Give a handle back.
 
         Args:
-            state: the handle.
+            state: handle that `get_state` returned.
         """
 
     def terminate(self) -> None:
@@ -393,14 +393,14 @@ class EventSlave(Slave, Protocol):
         """Activate input clocks for this instant, in event mode.
 
         Args:
-            clocks: their names.
+            clocks: names of the clocks that tick now.
         """
 
     def update_discrete_states(self) -> EventUpdate:
         """End an instant in event mode.
 
         Returns:
-            What comes next.
+            What the slave wants after these events.
         """
 
     def leave_event_mode(self) -> None:
@@ -410,7 +410,7 @@ class EventSlave(Slave, Protocol):
         """Say what continuous inputs are inside steps, from now on.
 
         Args:
-            names: of inputs.
+            names: of inputs, all of them among ``ModelInterface.inputs_inside_steps``.
             values: a value per name at a time [s]; ``None``: inputs are held again.
         """
 
@@ -418,7 +418,7 @@ class EventSlave(Slave, Protocol):
         """Return derivatives of outputs with respect to time at the end of the last step.
 
         Args:
-            names: of outputs.
+            names: of outputs that change continuously.
             order: of the derivative, at most ``ModelInterface.output_derivatives``.
 
         Returns:

@@ -18,7 +18,6 @@ class EventStatistics:
     Attributes:
         times: when slaves had events, rising [s], the first 50,000; each once, however many instants it took.
         instants: updates of all slaves at one time, over the whole run: initial ones, ticks and source jumps included.
-        ticks: of clocks.
         late: how long after each event that slaves could not be taken back to it was taken [s].
     """
 
@@ -29,14 +28,7 @@ class EventStatistics:
 
 
 def claimed_events(claimed: object) -> EventStatistics:
-    """Return the events that a child process sends, as far as they are such.
-
-    Args:
-        claimed: times, numbers of instants and ticks, and delays.
-
-    Returns:
-        The events.
-    """
+    """Return the events that a child process sends, as far as they are such."""
     match claimed:
         case [list() as times, int() as instants, int() as ticks, list() as late]:
             numbers = [tuple(t for t in found if isinstance(t, float)) for found in (times, late)]
@@ -70,7 +62,6 @@ class RunRemark:
     """What is to be known of a run that went on.
 
     Attributes:
-        instance: whose it is.
         text: the first of its kind.
         count: how many there were.
     """
@@ -88,14 +79,7 @@ MOST_REMARKS, LONGEST_REMARK = 1000, 1000
 
 
 def claimed_remarks(claimed: object) -> tuple[RunRemark, ...]:
-    """Return the remarks that a child process sends, as far as they are such.
-
-    Args:
-        claimed: lists of instance, text and count.
-
-    Returns:
-        The remarks, of bounded number and length.
-    """
+    """Return the remarks that a child process sends, as far as they are such."""
     found = []
     for entry in claimed[:MOST_REMARKS] if isinstance(claimed, list) else ():
         match entry:

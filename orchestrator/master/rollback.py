@@ -9,14 +9,7 @@ from orchestrator.master.wiring import Stage, Wiring
 
 @contextmanager
 def rollback(wiring: Wiring) -> Iterator[Callable[[], None]]:
-    """Yield a call that takes all slaves and signals back to now, as often as it is made.
-
-    Args:
-        wiring: bound slaves, all of which can save their states.
-
-    Yields:
-        The call.
-    """
+    """Yield a call that takes all slaves and signals back to now, as often as it is made."""
     states: list[tuple[Stage, Any]] = []
     values = wiring.values.copy()
 

@@ -45,15 +45,8 @@ class Session:
     Use as a context manager, or call ``close``. A slave that failed is dropped, and made anew by the next run.
 
     Args:
-        system: what to run.
-        record: signals to record, ``instance.variable``.
-        algorithm: master algorithm with its settings.
         stop: end of a run [s].
         start: beginning of a run [s].
-
-    Raises:
-        ScenarioError: the system, the record list or the times are wrong; all problems in one message.
-        ConnectionMismatchError: there is nothing wrong but connections.
     """
 
     def __init__(
@@ -110,18 +103,10 @@ class Session:
         """Run once.
 
         Args:
-            start: parameters and start values by ``instance.variable``, over those of the system.
             signals: signals in place of those of ``System.sources``, by index.
-            allow_early_end: where a slave ends the run, return what there is up to then, with a remark: for callers
-                that show remarks, and can do with fewer values than a run has points.
 
         Returns:
             Times [s], recorded signals and statistics.
-
-        Raises:
-            ScenarioError: a start value is wrong.
-            SlaveError: a slave refused or failed a call, or ended the run.
-            ConvergenceError: a loop did not settle.
         """
         values = self._start_values(start or {})
         wiring = self._ready()

@@ -27,25 +27,10 @@ class Signal(Protocol):
     """See the module."""
 
     def sample(self, times: Array) -> Array:
-        """Return the values at ``times`` [s]; both of shape (n,).
-
-        Args:
-            times: rising.
-
-        Returns:
-            The values, in the signal's unit.
-        """
+        """Return the values at ``times`` [s]; both of shape (n,)."""
 
     def breaks(self, start: float, stop: float) -> list[float]:
-        """Return the instants strictly between ``start`` and ``stop`` [s] at which the signal is not smooth.
-
-        Args:
-            start: of the span.
-            stop: its end.
-
-        Returns:
-            The instants, rising.
-        """
+        """Return the instants strictly between ``start`` and ``stop`` [s] at which the signal is not smooth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +114,6 @@ class Square(Signal):
 
         Returns:
             Times [s] within the step at which the signal jumps.
-
-        Raises:
-            ScenarioError: the period is so short that they are too many.
         """
         half = 0.5 * self.period
         if (stop - start) / half > MAXIMUM_DRAWS:
@@ -211,9 +193,6 @@ class Noise(Signal):
 
         Returns:
             Values at those times, shape (n,).
-
-        Raises:
-            ScenarioError: the period is so short that too many values would be drawn.
         """
         index = np.floor((times - self.start) / self.period + GRID_SLACK).astype(np.int64)
         count = int(index.max(initial=0)) + 1

@@ -30,7 +30,6 @@ class Instance:
 
     Attributes:
         name: without a dot, unique in the system.
-        model: its interface.
         create: makes the slave, given the instance's name.
         start: parameters and start values by variable name.
         solver_tolerance: relative tolerance for the slave's own solver; None: its default.
@@ -50,7 +49,6 @@ class Connection:
     Attributes:
         source: ``instance.variable`` of an output.
         target: ``instance.variable`` of an input.
-        factor: see above.
         offset: in the target's unit.
         quantum: resolution of the target's sensor in the target's unit; 0 for none. Sources that feed the same
             target are added before rounding.
@@ -85,14 +83,7 @@ class SignalSource:
 
 
 def split(address: str) -> tuple[str, str]:
-    """Return instance and variable of ``instance.variable``; only the variable's name may contain dots.
-
-    Args:
-        address: ``instance.variable``.
-
-    Returns:
-        The two names.
-    """
+    """Return instance and variable of ``instance.variable``; only the variable's name may contain dots."""
     instance, _, variable = address.partition(".")
     return instance, variable
 
@@ -114,38 +105,17 @@ class System:
     order: tuple[str, ...] = ()
 
     def instance(self, name: str) -> Instance | None:
-        """Return the instance called ``name``, if there is one.
-
-        Args:
-            name: of the instance.
-
-        Returns:
-            The instance.
-        """
+        """Return the instance called ``name``, if there is one."""
         return next((i for i in self.instances if i.name == name), None)
 
     def variable(self, address: str) -> Variable | None:
-        """Return the variable at ``instance.variable``, if there is one.
-
-        Args:
-            address: ``instance.variable``.
-
-        Returns:
-            The variable.
-        """
+        """Return the variable at ``instance.variable``, if there is one."""
         name, variable = split(address)
         instance = self.instance(name)
         return None if instance is None else instance.model.variables.get(variable)
 
     def unit(self, address: str) -> Unit | None:
-        """Return the unit of the variable at ``address``, if it has one.
-
-        Args:
-            address: ``instance.variable``.
-
-        Returns:
-            The unit.
-        """
+        """Return the unit of the variable at ``address``, if it has one."""
         variable = self.variable(address)
         instance = self.instance(split(address)[0])
         if variable is None or variable.unit is None or instance is None:
@@ -153,11 +123,7 @@ class System:
         return units.resolve(variable.unit, instance.model.units)
 
     def loops(self) -> list[tuple[str, ...]]:
-        """Return the algebraic loops: groups of instances whose outputs depend on one another at the same instant.
-
-        Returns:
-            Names of instances, a group per loop.
-        """
+        """Return the algebraic loops: groups of instances whose outputs depend on one another at the same instant."""
         edges = self._feedthrough_edges()
         groups = components([i.name for i in self.instances], edges)
         return [g for g in groups if len(g) > 1 or g[0] in edges.get(g[0], ())]
@@ -167,9 +133,6 @@ class System:
 
         A connection orders two instances only if an output of the receiver depends on the input directly. An input
         that is held over a step, such as a plant's torque, orders nothing: plant, estimator, controller.
-
-        Returns:
-            Every instance's name once.
         """
         if self.order:
             return self.order
@@ -177,14 +140,7 @@ class System:
         return tuple(name for group in groups for name in group)
 
     def fed_through(self, address: str) -> bool:
-        """Return whether the model declares that an output depends on this input at the same instant.
-
-        Args:
-            address: ``instance.variable``.
-
-        Returns:
-            True when one does.
-        """
+        """Return whether the model declares that an output depends on this input at the same instant."""
         name, variable = split(address)
         instance = self.instance(name)
         return instance is not None and any(variable in inputs for inputs in instance.model.feedthrough.values())
@@ -201,11 +157,7 @@ class System:
         return edges
 
     def problems(self) -> list[Problem]:
-        """Return everything that is wrong with names, causalities, types, units, values and order; empty when sound.
-
-        Returns:
-            Each problem with the path to its entry.
-        """
+        """Return everything that is wrong with names, causalities, types, units, values and order; empty when sound."""
         found = self._instance_problems()
         driven: dict[str, int] = {}
         for k, connection in enumerate(self.connections):
@@ -219,23 +171,11 @@ class System:
         return found + self._order_problems()
 
     def check(self, origin: str = "") -> None:
-        """Raise what ``problems`` finds, see ``raise_problems``.
-
-        Args:
-            origin: what the text begins with, such as a file's name.
-        """
+        """Raise what ``problems`` finds, see ``raise_problems``."""
         raise_problems(self.problems(), origin)
 
     def start_value(self, address: str, value: Value | Quantity) -> tuple[Value | None, str | None]:
-        """Return ``value`` as the variable at ``address`` takes it, or ``None`` and what is wrong with it.
-
-        Args:
-            address: ``instance.variable``.
-            value: plain, in the variable's unit, or with a unit of its own.
-
-        Returns:
-            The value and None, or None and the reason.
-        """
+        """Return ``value`` as the variable at ``address`` takes it, or ``None`` and what is wrong with it."""
         variable = self.variable(address)
         if variable is None:
             return None, self._unknown(address)
@@ -366,14 +306,7 @@ class System:
         return []
 
     def record_problems(self, record: tuple[str, ...]) -> list[Problem]:
-        """Return what is wrong with a list of signals to be recorded.
-
-        Args:
-            record: ``instance.variable`` of each.
-
-        Returns:
-            Each problem with the path to its entry.
-        """
+        """Return what is wrong with a list of signals to be recorded."""
         found = []
         for k, address in enumerate(record):
             variable = self.variable(address)

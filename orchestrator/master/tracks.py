@@ -74,7 +74,6 @@ def cell_coefficients(values: Array, rates: Array, rated: NDArray[np.bool_], cel
     Args:
         values: at begin, middle and end, shape (3, signals).
         rates: derivatives there, shape (3, signals).
-        rated: which signals have derivatives.
         cell: length of a cell [s].
 
     Returns:
@@ -93,11 +92,7 @@ def cell_coefficients(values: Array, rates: Array, rated: NDArray[np.bool_], cel
 
 
 class JoinedTracks:
-    """Signals over neighbouring windows; those without derivatives are one polynomial through all nodes.
-
-    Args:
-        tracks: one or two.
-    """
+    """Signals over neighbouring windows; those without derivatives are one polynomial through all nodes."""
 
     def __init__(self, tracks: tuple[Track, ...]) -> None:
         self._tracks, self._rated = tracks, tracks[0].rated
@@ -141,11 +136,7 @@ class JoinedTracks:
         return held
 
     def roughness(self) -> Array:
-        """Return the fourth differences of five nodes, zero for fewer.
-
-        Returns:
-            Shape (signals,).
-        """
+        """Return the fourth differences of five nodes, zero for fewer."""
         weights = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
         found: Array = np.abs(weights @ self._values) if len(self._nodes) == 5 else np.zeros(self._values.shape[1])
         return found

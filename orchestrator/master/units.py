@@ -7,15 +7,7 @@ from orchestrator.shared.units import parse_unit
 
 
 def resolve(name: str, declared: Mapping[str, Unit]) -> Unit:
-    """Return the unit called ``name``: as declared, else a well-known one, else a mere name.
-
-    Args:
-        name: as the model writes it.
-        declared: units of the model by name.
-
-    Returns:
-        The unit.
-    """
+    """Return the unit called ``name``: as declared, else a well-known one, else a mere name."""
     unit = declared.get(name)
     if unit is None or unit.exponents is None:
         return _well_known(name)
@@ -34,13 +26,6 @@ def conversion(source: Unit | None, target: Unit | None) -> tuple[float, float] 
     """Return ``(factor, offset)`` with ``target value = factor * source value + offset``.
 
     A side without a unit takes the other's. ``None`` is returned when the two do not measure the same quantity.
-
-    Args:
-        source: unit of what is sent; None: none is declared.
-        target: unit of what is received; None: none is declared.
-
-    Returns:
-        Factor and offset, or None.
     """
     if source is None or target is None or source.name == target.name:
         return _same_name(source, target)

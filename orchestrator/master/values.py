@@ -10,56 +10,25 @@ _INT32 = -(2**31), 2**31 - 1
 
 
 def one_line(text: str) -> str:
-    """Return ``text`` with what would break the line, or steer a terminal, written as escapes.
-
-    Args:
-        text: of any origin.
-
-    Returns:
-        Printable text.
-    """
+    """Return ``text`` with what would break the line, or steer a terminal, written as escapes."""
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def nearest(name: str, known: list[str]) -> str:
-    """Return a hint such as ``; did you mean 'theta_m'?``, or nothing when no name is near.
-
-    Args:
-        name: what was asked for.
-        known: what there is.
-
-    Returns:
-        The hint, possibly empty.
-    """
+    """Return a hint such as ``; did you mean 'theta_m'?``, or nothing when no name is near."""
     close = difflib.get_close_matches(name, known, n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def types_fit(source: Variable, target: Variable) -> bool:
-    """Return whether a value of ``source`` is one of ``target``: the same type, or an Integer into a Real.
-
-    Args:
-        source: an output.
-        target: an input.
-
-    Returns:
-        True when it is.
-    """
+    """Return whether a value of ``source`` is one of ``target``: the same type, or an Integer into a Real."""
     if source.type == "Enumeration" and target.type == "Enumeration":
         return not source.items or not target.items or source.items == target.items
     return source.type == target.type or (source.type == "Integer" and target.type == "Real")
 
 
 def typed_value(variable: Variable, value: Value) -> tuple[Value | None, str | None]:
-    """Return ``value`` as ``variable`` takes it, or ``None`` and what is wrong with it.
-
-    Args:
-        variable: that is to be set.
-        value: what somebody gave for it.
-
-    Returns:
-        The value and None, or None and the reason.
-    """
+    """Return ``value`` as ``variable`` takes it, or ``None`` and what is wrong with it."""
     kind = variable.type
     if kind == "String":
         return (value, None) if isinstance(value, str) else (None, f"must be a string, but is {value!r}")

@@ -34,9 +34,6 @@ class Waveform:
 
         Args:
             times: (times,) [s].
-
-        Returns:
-            The values, in the slots' units.
         """
         s = (times - self.start) / (self.end - self.start)
         return np.vander(s, len(self.nodes), increasing=True) @ self.coefficients
@@ -55,11 +52,7 @@ class Waveform:
         It is Newton's term for one more node, the last one but one of ``before``, the window that ended at ``start``.
 
         Args:
-            before: the window that ended where this one starts.
             times: (times,) [s].
-
-        Returns:
-            The errors, in the slots' units.
         """
         nodes = self.times()
         extra = before.times()[-2]

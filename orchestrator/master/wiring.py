@@ -21,7 +21,6 @@ class Stage:
     """One instance, ready to be stepped.
 
     Attributes:
-        slave: the slave.
         block: its part of the layout.
         copies: ``(inputs, outputs)`` pairs of equal length: runs of neighbouring slots that are mere copies.
         mixed: feeds that are more than a copy.
@@ -46,8 +45,6 @@ class Wiring:
     Attributes:
         values: the slots, shape (size,).
         view: the same memory, quicker to read one value from.
-        stages: see ``Stage``.
-        layout: the plan.
     """
 
     values: Signals
@@ -57,15 +54,7 @@ class Wiring:
 
 
 def wire(layout: Layout, slaves: Mapping[str, Slave]) -> Wiring:
-    """Bind ``slaves`` to the slots of ``layout``.
-
-    Args:
-        layout: plan of the signals.
-        slaves: by instance name.
-
-    Returns:
-        Slots, all zero, and stages in execution order.
-    """
+    """Bind ``slaves`` to the slots of ``layout``. Return slots, all zero, and stages in execution order."""
     values = np.zeros(layout.size)
     view = values.data
     stages = tuple(_stage(block, slaves[block.name], values, view) for block in layout.blocks)
@@ -77,17 +66,7 @@ def nothing() -> None:
 
 
 def bind_send(slave: Slave, block: Block, names: Sequence[str], values: Signals) -> Transfer:
-    """Return a call that moves some of a block's inputs from their slots into the slave.
-
-    Args:
-        slave: whose inputs.
-        block: its part of the layout.
-        names: of the inputs.
-        values: the slots.
-
-    Returns:
-        Called without arguments.
-    """
+    """Return a call that moves some of a block's inputs from their slots into the slave."""
     if not names:
         return nothing
     slots = np.array([block.first_input + block.inputs.index(name) for name in names])
@@ -102,17 +81,7 @@ def bind_send(slave: Slave, block: Block, names: Sequence[str], values: Signals)
 
 
 def bind_receive(slave: Slave, block: Block, names: Sequence[str], values: Signals) -> Transfer:
-    """Return a call that moves some of a block's outputs from the slave into their slots.
-
-    Args:
-        slave: whose outputs.
-        block: its part of the layout.
-        names: of the outputs.
-        values: the slots.
-
-    Returns:
-        Called without arguments.
-    """
+    """Return a call that moves some of a block's outputs from the slave into their slots."""
     if not names:
         return nothing
     slots = np.array([block.first_output + block.outputs.index(name) for name in names])
@@ -164,9 +133,6 @@ def gather(stage: Stage, view: View, table: NDArray[np.float64], column: int) ->
     """Fill the input slots of a stage from the outputs and from ``column`` of the table of signals.
 
     Args:
-        stage: whose inputs are filled.
-        view: of all slots.
-        table: see ``Layout.signal_table``.
         column: 0 for initialisation, ``n + 1`` for step ``n``.
     """
     for target, source in stage.copies:

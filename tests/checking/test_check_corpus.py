@@ -11,7 +11,7 @@ from orchestrator.shared.isolation.limits import Limits
 from tests.support.broken_ball3 import behavioural
 from tests.support.broken_ball3_xml import static
 from tests.support.broken_fmus import QUICK, Broken, corpus, good
-from tests.support.c_fmu import build_c_fmu, fmu_files, have_compiler, write_fmu
+from tests.support.c_fmu import REFERENCE, build_c_fmu, fmu_files, have_compiler, write_fmu
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or not have_compiler(), reason="the FMUs are built with a C compiler on Linux"
@@ -54,6 +54,48 @@ def test_what_the_flags_do_not_promise_is_not_asked_for(behaviour: str, old: str
     report = check_fmu(path, QUICK)
     assert report.findings == ()
     assert report.executed
+
+
+def test_inputs_are_set_in_initialisation_mode_and_not_before(tmp_path: Path) -> None:
+    files = fmu_files("input_late")
+    path = f"{REFERENCE}/MassSpring_out.csv"
+    rows = files[path].decode().splitlines()
+    files[path] = "\n".join([rows[0] + ",force", *(row + ",0" for row in rows[1:])]).encode()
+    report = check_fmu(write_fmu(tmp_path / "late.fmu", files), QUICK)
+    assert report.findings == ()
+    assert not any(report.executions[0].stages.values())
+
+
+@pytest.mark.parametrize(("tolerance", "rule"), [(b"1e-6", "state.restore"), (b"1e-4", "run.inexact")])
+def test_a_restored_state_is_exact_to_what_the_tolerance_allows(tolerance: bytes, rule: str, tmp_path: Path) -> None:
+    files = fmu_files("state_coarse")
+    xml = files["modelDescription.xml"].replace(b'tolerance="1e-6"', b'tolerance="' + tolerance + b'"')
+    report = check_fmu(write_fmu(tmp_path / "coarse.fmu", files | {"modelDescription.xml": xml}), QUICK)
+    assert {f.rule for f in report.findings} == {rule}
+
+
+def test_a_crash_is_not_hidden_by_the_state_that_is_left(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "crash_restore"), QUICK)
+    (finding,) = (f for f in report.findings if f.rule == "run.crash")
+    assert finding.message.endswith("during fmi2SetFMUstate")
+
+
+def test_a_discarded_step_is_done_in_shorter_ones(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "discard_long"), QUICK)
+    assert {f.rule for f in report.findings} == {"step.discarded"}
+    assert not any(report.executions[0].stages.values())
+
+
+def test_a_run_ends_before_a_step_that_is_discarded_at_any_size(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "discard_step"), QUICK)
+    assert {f.rule for f in report.findings} == {"step.discarded"}
+    assert report.ok
+    assert {stage for stage, reason in report.executions[0].stages.items() if reason} == {"variable steps", "reference"}
+
+
+def test_an_fmu_that_discards_its_first_step_at_any_size_does_not_pass(tmp_path: Path) -> None:
+    report = check_fmu(build_c_fmu(tmp_path, "discard_first"), QUICK)
+    assert {f.rule for f in report.findings if f.severity == "error"} == {"run.status"}
 
 
 def test_a_hang_after_misuse_is_a_warning_as_a_crash_is(tmp_path: Path) -> None:

@@ -12,10 +12,22 @@ from lxml import etree
 from benchmarks.fuzz_check import one_case
 from orchestrator.checking.check import check_fmu
 from orchestrator.checking.grammar import check_grammar
-from tests.support.ball3 import INTERFACES, build_ball, model_description
-from tests.support.broken_ball3 import QUICK, Mutant, behavioural
+from tests.support.ball3 import INTERFACES, XML, ball_files, build_ball, model_description
+from tests.support.broken_ball3 import (
+    KICKED,
+    PARTIAL,
+    QUICK,
+    RESIZED,
+    SETTABLE,
+    SLOPES,
+    Edits,
+    Mutant,
+    behavioural,
+    extended,
+)
+from tests.support.broken_ball3 import STATIC as STATIC_ONLY
 from tests.support.broken_ball3_xml import static
-from tests.support.c_fmu import have_compiler
+from tests.support.c_fmu import have_compiler, write_fmu
 from tests.support.c_fmu import model_description as model_description_2
 from tests.support.fuzz_fmu import damaged_tree
 
@@ -44,6 +56,72 @@ def test_the_good_fmu_has_no_finding(interface: str, tmp_path: Path) -> None:
 def test_an_update_of_a_trial_step_may_lie_after_the_next_one(tmp_path: Path) -> None:
     report = check_fmu(build_ball(tmp_path, "update_trial"), QUICK)
     assert report.findings == ()
+
+
+def test_a_discarded_step_is_done_in_shorter_ones(tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "discard_long"), QUICK)
+    assert {f.rule for f in report.findings} == {"step.discarded"}
+    assert {stage for stage, reason in report.executions[0].stages.items() if reason} == {"derivatives"}
+
+
+def test_discrete_inputs_stay_in_continuous_time_mode(tmp_path: Path) -> None:
+    files = ball_files("input_discrete", "ModelExchange")
+    changed = (
+        files[XML]
+        .replace(b'name="u"', b'name="u" variability="discrete"')
+        .replace(b'\n        intermediateUpdate="true"/>', b"/>")
+    )
+    report = check_fmu(write_fmu(tmp_path / "discrete.fmu", files | {XML: changed}), QUICK)
+    assert report.findings == ()
+    assert report.executed
+
+
+@pytest.mark.parametrize(
+    ("interface", "edits", "fault", "stage"),
+    [
+        ("CoSimulation", SLOPES, "", "derivatives"),
+        ("ModelExchange", PARTIAL, "", "derivatives"),
+        ("CoSimulation", KICKED, "", "clocks"),
+        ("ModelExchange", KICKED, "", "clocks"),
+        ("CoSimulation", RESIZED, "", "configuration"),
+        ("ModelExchange", RESIZED, "", "configuration"),
+        ("CoSimulation", SETTABLE, "interval_wanted", "clocks"),
+    ],
+    ids=[
+        "output derivatives",
+        "partial derivatives",
+        "kick",
+        "kick of a model",
+        "resized",
+        "resized model",
+        "interval",
+    ],
+)
+def test_what_more_a_description_promises_is_probed(
+    interface: str, edits: Edits, fault: str, stage: str, tmp_path: Path
+) -> None:
+    report = check_fmu(write_fmu(tmp_path / "more.fmu", extended(fault, interface, edits)), QUICK)
+    assert report.findings == ()
+    assert report.executions[0].stages[stage] == ""
+
+
+def test_an_event_may_change_what_is_hidden(tmp_path: Path) -> None:
+    assert check_fmu(build_ball(tmp_path, "event_silent"), QUICK).findings == ()
+
+
+def test_a_text_with_an_attribute_start_is_one_finding(tmp_path: Path) -> None:
+    files = ball_files()
+    old = b'variability="fixed"><Start value="ball"/></String>'
+    assert files[XML].count(old) == 1
+    changed = files[XML].replace(old, b'variability="fixed" start="two words"/>')
+    report = check_fmu(write_fmu(tmp_path / "text.fmu", files | {XML: changed}), STATIC_ONLY)
+    assert [f.rule for f in report.findings] == ["schema.invalid"]
+
+
+def test_a_solver_goes_on_in_shorter_steps_where_derivatives_are_discarded(tmp_path: Path) -> None:
+    report = check_fmu(build_ball(tmp_path, "discard_below", "ModelExchange"), QUICK)
+    assert report.findings == ()
+    assert report.executed
 
 
 def _named(mutant: Mutant, folder: Path) -> set[str]:

@@ -29,7 +29,7 @@ def test_the_ball_of_the_tests_is_read_with_all_that_it_has() -> None:
     variables = ball.model.variables
     assert (ball.version, ball.guid, ball.identifier) == ("3.0", "{ball}", "Ball")
     assert (ball.model.has_events, ball.model.can_save_state, ball.model.can_vary_step) == (True, True, True)
-    assert ball.model.takes_inputs_inside_steps
+    assert ball.model.inputs_inside_steps == {"u"}
     assert (variables["x"].unit, variables["x"].maximum, variables["x"].start) == ("m", 50.0, 1.0)
     assert [variables[f"p[{n}]"].start for n in (1, 2, 3)] == [1.0, 2.0, 3.0]
     assert [ball.access[f"q[{n}]"] for n in (1, 2, 3)] == [Access("Float64", 9, n, 3) for n in (0, 1, 2)]

@@ -55,7 +55,7 @@ def test_halves_that_hold_their_inputs_are_met_too() -> None:
     """Without inputs inside steps the polynomials are handed over as constant pieces; events are less sharp."""
     system = halves(0.01)
     held = tuple(
-        Instance(i.name, replace(i.model, takes_inputs_inside_steps=False, output_derivatives=0), _held(i), i.start)
+        Instance(i.name, replace(i.model, inputs_inside_steps=frozenset(), output_derivatives=0), _held(i), i.start)
         for i in system.instances
     )
     result, error, late = compared(0.01, replace(system, instances=held), 1e-6)
@@ -68,7 +68,7 @@ def _held(made):
     def create(name):
         slave = made.create(name)
         assert isinstance(slave, HalfSlave)
-        slave.model = replace(slave.model, takes_inputs_inside_steps=False, output_derivatives=0)
+        slave.model = replace(slave.model, inputs_inside_steps=frozenset(), output_derivatives=0)
         return slave
 
     return create

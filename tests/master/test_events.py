@@ -6,12 +6,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from benchmarks.half_drivetrains import solve
 from orchestrator.errors import ChatteringError, ConvergenceError, SlaveError
 from orchestrator.master.algorithms import GaussSeidel, Iterated, Jacobi
 from orchestrator.master.protocol import EventUpdate, PeriodicClock, StepDiscardedError, StepOutcome
 from orchestrator.master.session import Session
 from orchestrator.master.signals import Square, Step
 from orchestrator.master.system import Connection, Instance, SignalSource, System
+from tests.support.half_slaves import halves
 from tests.support.mock_event_slave import MockEventSlave, event_instance, go
 from tests.support.mock_slave import instance, model, variable
 
@@ -478,6 +480,20 @@ def test_an_algebraic_loop_at_an_event_is_solved() -> None:
         result = session.run()
     np.testing.assert_allclose(result["one.y"], [0.0, 4.0 / 7.0, 4.0 / 7.0], atol=1e-9)
     np.testing.assert_allclose(result["other.y"], [0.0, -1.0 / 7.0, -1.0 / 7.0], atol=1e-9)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_inputs_are_led_inside_steps(algorithm) -> None:
+    """Both halves of a drivetrain through their first contact; inputs that jump at steps would end it over and over."""
+    errors = []
+    for step in (2e-3, 1e-3):
+        with Session(halves(0.01), ["motor.theta_m", "load.theta_l"], algorithm(step), 0.4) as session:
+            result = session.run()
+        rows, _ = solve(0.01, np.append(result.time, 2.0))
+        errors.append(np.abs(result.values.T - rows[:-1, [0, 3]]).max())
+        assert 1 <= len(result.statistics.events.times) <= 3
+        assert result.statistics.events.times[0] == pytest.approx(0.05356, abs=1e-4)
+    assert errors[1] < 0.6 * errors[0] < 0.1
 
 
 def test_what_ends_a_contact_under_iterated_is_met_by_both() -> None:

@@ -17,7 +17,7 @@ static void *volatile hoard;
 #define TOKEN "{ball}"
 #endif
 enum { X = 1, V, U, G, E, BOUNCES, N, P, Q, LABEL, TITLE, BLOB, FLAG, MODE, SMALL, COUNT, TIME, DER_X, DER_V, SMOOTH, OLD,
-       BIG, TICK = 100, HIT };
+       BIG, TICK = 100, HIT, KICK };
 enum { SIZE = 8, TEXT = 64 };
 enum { INSTANTIATED, CONFIGURATION, INITIALISATION, EVENT, CONTINUOUS, STEP, ACTIVATION, TERMINATED };
 
@@ -29,12 +29,13 @@ typedef struct {
     int64_t mode;
     bool flag, tick, hit;
     char label[TEXT];
-    int steps;
+    int steps, echo;
 } State;
 
 typedef struct {
     State s;
-    int kind, mode, updating;
+    int kind, mode, before, updating;
+    bool interval;
     bool events, early;
     char resources[512];
     fmi3InstanceEnvironment environment;
@@ -149,6 +150,9 @@ FMI3_Export fmi3Status fmi3ExitInitializationMode(fmi3Instance i) {
 #ifdef FAULT_exit_error
     return refuse(i, "no solution");
 #endif
+#ifdef FAULT_interval_wanted
+    if (!b->interval) return refuse(b, "the interval of a fixed clock must be set");
+#endif
     int next = b->kind == 0 ? EVENT : b->kind == 2 ? ACTIVATION : b->events ? EVENT : STEP;
     return go(b, INITIALISATION, next);
 }
@@ -165,9 +169,19 @@ FMI3_Export fmi3Status fmi3EnterConfigurationMode(fmi3Instance i) {
 #ifdef FAULT_configuration_refused
     return refuse(i, "not now");
 #endif
-    return go(i, INSTANTIATED, CONFIGURATION);
+    Ball *b = i;
+    if (b->mode == STEP || (b->mode == EVENT && b->kind == 0)) {
+#ifdef FAULT_reconfiguration_refused
+        return refuse(b, "only before the run");
+#endif
+        b->before = b->mode;
+        b->mode = CONFIGURATION;
+        return fmi3OK;
+    }
+    b->before = INSTANTIATED;
+    return go(b, INSTANTIATED, CONFIGURATION);
 }
-FMI3_Export fmi3Status fmi3ExitConfigurationMode(fmi3Instance i) { return go(i, CONFIGURATION, INSTANTIATED); }
+FMI3_Export fmi3Status fmi3ExitConfigurationMode(fmi3Instance i) { return go(i, CONFIGURATION, ((Ball *)i)->before); }
 FMI3_Export fmi3Status fmi3Terminate(fmi3Instance i) {
     AT(terminate);
 #ifdef FAULT_terminate_error

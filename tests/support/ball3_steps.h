@@ -10,6 +10,7 @@ static void bounce(State *s) {
     s->x = 0.0;
     s->v *= -s->e;
     s->bounces++;
+    s->echo = s->steps;
 }
 
 FMI3_Export fmi3Status fmi3UpdateDiscreteStates(fmi3Instance i, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals,
@@ -70,6 +71,9 @@ FMI3_Export fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance i, fmi3Flo
     Ball *b = i;
     out[0] = b->s.v;
     out[1] = acceleration(&b->s);
+#ifdef FAULT_discard_below
+    if (b->s.x < -1e-3) return fmi3Discard;
+#endif
 #ifdef FAULT_derivative_error
     if (b->s.steps == 5) return refuse(b, "no derivative");
 #endif
@@ -170,7 +174,13 @@ FMI3_Export fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 t, fmi3Float64 h, 
     if (s->steps == 5) return refuse(b, "solver failed");
 #endif
 #ifdef FAULT_discard_step
-    if (s->steps == 5) return fmi3Discard;
+    if (s->steps == 5) { s->steps--; return fmi3Discard; }
+#endif
+#ifdef FAULT_discard_first
+    return fmi3Discard;
+#endif
+#ifdef FAULT_discard_long
+    if (h > 0.012) { s->steps--; return fmi3Discard; }
 #endif
 #ifdef FAULT_fatal_step
     if (s->steps == 5) return fmi3Fatal;
@@ -225,7 +235,10 @@ FMI3_Export fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 t, fmi3Float64 h, 
     if (s->steps == 5 && !b->events) *event = true;
 #endif
 #ifdef FAULT_event_without_cause
-    if (s->steps == 5 && b->events) *event = true;
+    if (b->events && s->bounces > 0 && s->steps == s->echo + 1) *event = true;
+#endif
+#ifdef FAULT_event_silent
+    if (s->steps == 5 && b->events) *event = true;  /* no fault: what an event changes may be hidden */
 #endif
     double end = t + h;
     if (b->update) {

@@ -91,6 +91,9 @@ FMI3_Export fmi3Status fmi3SetFloat64(fmi3Instance i, const fmi3ValueReference r
 #ifdef FAULT_input_refused
                 if (value != 0.0) return refuse(b, "too much");
 #endif
+#ifdef FAULT_input_discrete
+                if (b->mode == CONTINUOUS) return refuse(b, "in event mode only");
+#endif
                 s->u = value; break;
             case X: case V:
                 if (!early && b->kind != 0) {
@@ -198,7 +201,10 @@ FMI3_Export fmi3Status fmi3SetClock(fmi3Instance i, const fmi3ValueReference r[]
 #ifdef FAULT_clock_refused
     return refuse(b, "no such clock");
 #endif
-    for (size_t k = 0; k < n; k++) if (r[k] == TICK) b->s.tick = in[k]; else return refuse(b, "no input clock");
+#ifdef FAULT_kick_refused
+    for (size_t k = 0; k < n; k++) if (r[k] == KICK) return refuse(b, "no such clock");
+#endif
+    for (size_t k = 0; k < n; k++) if (r[k] == TICK) b->s.tick = in[k]; else if (r[k] != KICK) return refuse(b, "no input clock");
     return b->mode == EVENT ? fmi3OK : refuse(b, "only in event mode");
 }
 
@@ -254,8 +260,32 @@ FMI3_Export fmi3Status fmi3DeserializeFMUState(fmi3Instance i, const fmi3Byte in
 
 FMI3_Export fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance i, fmi3ValueReference r, size_t *n) { return fmi3Error; }
 FMI3_Export fmi3Status fmi3GetVariableDependencies(fmi3Instance i, fmi3ValueReference r, size_t a[], fmi3ValueReference b[], size_t c[], fmi3DependencyKind d[], size_t n) { return fmi3Error; }
-FMI3_Export fmi3Status fmi3GetDirectionalDerivative(fmi3Instance i, const fmi3ValueReference a[], size_t na, const fmi3ValueReference b[], size_t nb, const fmi3Float64 c[], size_t nc, fmi3Float64 d[], size_t nd) { return fmi3Error; }
-FMI3_Export fmi3Status fmi3GetAdjointDerivative(fmi3Instance i, const fmi3ValueReference a[], size_t na, const fmi3ValueReference b[], size_t nb, const fmi3Float64 c[], size_t nc, fmi3Float64 d[], size_t nd) { return fmi3Error; }
+static double partial(fmi3ValueReference unknown, fmi3ValueReference known) {
+#ifdef FAULT_directional_wrong
+    return unknown == DER_V && known == U ? 2.0 : 0.0;
+#endif
+    return unknown == DER_V && known == U ? 1.0 : 0.0;
+}
+FMI3_Export fmi3Status fmi3GetDirectionalDerivative(fmi3Instance i, const fmi3ValueReference a[], size_t na, const fmi3ValueReference b[], size_t nb, const fmi3Float64 c[], size_t nc, fmi3Float64 d[], size_t nd) {
+#ifdef FAULT_directional_refused
+    return refuse(i, "no derivatives");
+#endif
+    for (size_t k = 0; k < na; k++) {
+        d[k] = 0.0;
+        for (size_t m = 0; m < nb; m++) d[k] += partial(a[k], b[m]) * c[m];
+    }
+    return na == nd && nb == nc ? fmi3OK : fmi3Error;
+}
+FMI3_Export fmi3Status fmi3GetAdjointDerivative(fmi3Instance i, const fmi3ValueReference a[], size_t na, const fmi3ValueReference b[], size_t nb, const fmi3Float64 c[], size_t nc, fmi3Float64 d[], size_t nd) {
+    for (size_t m = 0; m < nb; m++) {
+        d[m] = 0.0;
+        for (size_t k = 0; k < na; k++) d[m] += partial(a[k], b[m]) * c[k];
+#ifdef FAULT_adjoint_wrong
+        d[m] *= 1.01;
+#endif
+    }
+    return na == nc && nb == nd ? fmi3OK : fmi3Error;
+}
 FMI3_Export fmi3Status fmi3GetIntervalDecimal(fmi3Instance i, const fmi3ValueReference r[], size_t n, fmi3Float64 out[], fmi3IntervalQualifier q[]) {
     for (size_t k = 0; k < n; k++) { out[k] = 0.1; q[k] = fmi3IntervalUnchanged; }
 #ifdef FAULT_clock_interval
@@ -266,11 +296,28 @@ FMI3_Export fmi3Status fmi3GetIntervalDecimal(fmi3Instance i, const fmi3ValueRef
 FMI3_Export fmi3Status fmi3GetIntervalFraction(fmi3Instance i, const fmi3ValueReference r[], size_t n, fmi3UInt64 c[], fmi3UInt64 d[], fmi3IntervalQualifier q[]) { return fmi3Error; }
 FMI3_Export fmi3Status fmi3GetShiftDecimal(fmi3Instance i, const fmi3ValueReference r[], size_t n, fmi3Float64 out[]) { out[0] = 0.05; return fmi3OK; }
 FMI3_Export fmi3Status fmi3GetShiftFraction(fmi3Instance i, const fmi3ValueReference r[], size_t n, fmi3UInt64 c[], fmi3UInt64 d[]) { return fmi3Error; }
-FMI3_Export fmi3Status fmi3SetIntervalDecimal(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3Float64 in[]) { return fmi3Error; }
+FMI3_Export fmi3Status fmi3SetIntervalDecimal(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3Float64 in[]) {
+    Ball *b = i;
+    b->interval = true;
+    return n == 1 && r[0] == TICK && in[0] == 0.1 ? fmi3OK : refuse(b, "no such interval");
+}
 FMI3_Export fmi3Status fmi3SetIntervalFraction(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3UInt64 c[], const fmi3UInt64 d[]) { return fmi3Error; }
 FMI3_Export fmi3Status fmi3SetShiftDecimal(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3Float64 in[]) { return fmi3Error; }
 FMI3_Export fmi3Status fmi3SetShiftFraction(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3UInt64 c[], const fmi3UInt64 d[]) { return fmi3Error; }
 FMI3_Export fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance i) { return fmi3OK; }
 #ifndef FAULT_missing_function
-FMI3_Export fmi3Status fmi3GetOutputDerivatives(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3Int32 o[], fmi3Float64 out[], size_t nOut) { return fmi3Error; }
+FMI3_Export fmi3Status fmi3GetOutputDerivatives(fmi3Instance i, const fmi3ValueReference r[], size_t n, const fmi3Int32 o[], fmi3Float64 out[], size_t nOut) {
+    State *s = &((Ball *)i)->s;
+    for (size_t k = 0; k < n; k++) {
+#ifdef FAULT_slope_refused
+        return refuse(i, "no derivatives");
+#endif
+        if (o[k] != 1 || (r[k] != X && r[k] != V)) return refuse(i, "only the first derivative of x and v");
+        out[k] = r[k] == X ? s->v : acceleration(s);
+#ifdef FAULT_slope_zero
+        out[k] = 0.0;
+#endif
+    }
+    return fmi3OK;
+}
 #endif

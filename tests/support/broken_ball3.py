@@ -37,7 +37,9 @@ CO_SIMULATION = {
     "init_error": "run.status",
     "exit_error": "run.status",
     "error_step": "run.status",
-    "discard_step": "run.status",
+    "discard_first": "run.status",
+    "discard_long": "step.discarded",
+    "discard_step": "step.discarded",
     "fatal_step": "run.status",
     "illegal_status": "run.status",
     "get_error": "run.status",
@@ -125,6 +127,29 @@ FLAGS = {
     "early_unflagged": ("step.early-return", 'mightReturnEarlyFromDoStep="true"', ""),
     "update_undeclared": ("intermediate.unexpected", 'providesIntermediateUpdate="true"', ""),
 }
+Edits = tuple[tuple[str, str], ...]
+SLOPES: Edits = (('hasEventMode="true"/>', 'hasEventMode="true" maxOutputDerivativeOrder="1"/>'),)
+PARTIAL: Edits = (
+    ('canSerializeFMUState="true"/>', 'canSerializeFMUState="true" providesDirectionalDerivatives="true" '
+     'providesAdjointDerivatives="true"/>'),
+)  # fmt: skip
+KICKED: Edits = (
+    ('<Clock name="hit"', '<Clock name="kick" valueReference="102" causality="input" intervalVariability="triggered"/>'
+     '<Clock name="hit"'),
+)  # fmt: skip
+RESIZED: Edits = (('causality="structuralParameter" variability="fixed"', 'causality="structuralParameter" '
+                   'variability="tunable"'),)  # fmt: skip
+SETTABLE: Edits = (('intervalVariability="constant"', 'intervalVariability="fixed"'),)
+EXTENDED: dict[str, tuple[str, str, Edits]] = {
+    # fault: interface, rule, and what the description has more
+    "slope_refused": ("CoSimulation", "derivative.status", SLOPES),
+    "slope_zero": ("CoSimulation", "derivative.value", SLOPES),
+    "directional_refused": ("ModelExchange", "derivative.status", PARTIAL),
+    "directional_wrong": ("ModelExchange", "derivative.value", PARTIAL),
+    "adjoint_wrong": ("ModelExchange", "derivative.adjoint", PARTIAL),
+    "kick_refused": ("CoSimulation", "run.status", KICKED),
+    "reconfiguration_refused": ("CoSimulation", "configuration.status", RESIZED),
+}
 
 
 def _behaviour(fault: str, interface: str) -> Callable[[Path], object]:
@@ -150,6 +175,20 @@ def _flags(fault: str, old: str, new: str) -> Callable[[Path], object]:
     return make
 
 
+def extended(fault: str, interface: str, edits: Edits) -> dict[str, bytes]:
+    """The files of a ball with more in its description, and a fault (empty: none)."""
+    files = ball_files(fault, interface)
+    text = files[XML].decode()
+    for old, new in edits:
+        assert text.count(old) == 1, f"{old!r} must be in the description once"
+        text = text.replace(old, new)
+    return files | {XML: text.encode()}
+
+
+def _extended(fault: str, interface: str, edits: Edits) -> Callable[[Path], object]:
+    return lambda path: write_fmu(path, extended(fault, interface, edits))
+
+
 def behavioural() -> list[Mutant]:
     """All faults of behaviour."""
     kinds = {
@@ -165,5 +204,9 @@ def behavioural() -> list[Mutant]:
     found += [
         Mutant(f"CoSimulation {fault}", rule, _without_clocks(fault))
         for fault, rule in (("event_not_used", "event.not-used"), ("event_mode", "misuse.event-mode"))
+    ]
+    found += [
+        Mutant(f"{interface} {fault}", rule, _extended(fault, interface, edits))
+        for fault, (interface, rule, edits) in EXTENDED.items()
     ]
     return found + [Mutant(f"flags {n}", rule, _flags(n, old, new)) for n, (rule, old, new) in FLAGS.items()]

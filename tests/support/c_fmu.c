@@ -255,6 +255,12 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
 #ifdef FAULT_input_refused
         if (vr[i] == VR_FORCE && value[i] != 0.0) return refuse(self, "force cannot be set");
 #endif
+#ifdef FAULT_input_late
+        if (vr[i] == VR_FORCE && self->phase == INSTANTIATED) return refuse(self, "FMI 2.0 allows it in initialisation mode");
+#endif
+#ifdef FAULT_input_never
+        if (vr[i] == VR_FORCE && self->phase == INITIALISING) return refuse(self, "force cannot be set");
+#endif
 #ifdef FAULT_set_refused
         if (vr[i] == VR_STIFFNESS) return refuse(self, "stiffness cannot be set");
 #endif

@@ -57,6 +57,16 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 #ifdef FAULT_discard_step
     if (self->s.steps == 5) return fmi2Discard;
 #endif
+#ifdef FAULT_discard_first
+    if (self->s.steps == 0) return fmi2Discard;
+#endif
+#ifdef FAULT_discard_long
+    if (step > 6e-3) {
+        integrate(&self->s, 5e-3);
+        self->s.time += 5e-3;
+        return fmi2Discard;
+    }
+#endif
 #ifdef FAULT_fatal_step
     if (self->s.steps == 5) return fmi2Fatal;
 #endif
@@ -189,14 +199,29 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 }
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
                                         fmi2Real value[]) {
-    (void)vr; (void)n; (void)order; (void)value;
-    return refuse(c, "output derivatives are not supported");
+    State *s = &((Instance *)c)->s;
+    double a = acceleration(s, s->x, s->v);
+    for (size_t i = 0; i < n; i++) {
+        if (order[i] != 1) return refuse(c, "output derivatives are of order 1");
+        if (vr[i] == VR_X) value[i] = s->v;
+        else if (vr[i] == VR_V) value[i] = a;
+        else if (vr[i] == VR_ENERGY) value[i] = s->v * (s->mass * a + s->stiffness * s->x);
+        else return refuse(c, "this variable has no output derivative");
+#ifdef FAULT_slope_zero
+        value[i] = 0.0;
+#endif
+    }
+    return fmi2OK;
 }
 #ifndef FAULT_missing_function
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t nu,
                                         const fmi2ValueReference known[], size_t nk, const fmi2Real dv[], fmi2Real dz[]) {
-    (void)unknown; (void)nu; (void)known; (void)nk; (void)dv; (void)dz;
+    (void)c; (void)unknown; (void)known; (void)nk; (void)dv;
+#ifdef FAULT_directional_refused
     return refuse(c, "directional derivatives are not supported");
+#endif
+    for (size_t i = 0; i < nu; i++) dz[i] = 0.0;  /* outputs follow the force after a step only */
+    return fmi2OK;
 }
 #endif
 
@@ -219,6 +244,9 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     Instance *self = c;
     const Saved *saved = state;
+#ifdef FAULT_crash_restore
+    volatile int *nowhere = NULL; *nowhere = 1;
+#endif
 #ifdef FAULT_state_not_restored
     double v = self->s.v;
 #endif
@@ -230,6 +258,9 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
 #endif
 #ifdef FAULT_state_rounded
     self->s.x = (float)self->s.x;
+#endif
+#ifdef FAULT_state_coarse
+    self->s.x += 4e-4;
 #endif
     return fmi2OK;
 }

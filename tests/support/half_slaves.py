@@ -24,7 +24,13 @@ def _model(kind: Any) -> ModelInterface:
     }  # fmt: skip
     feedthrough = {v.name: frozenset(v.depends_on or ()) for v in kind.table if v.causality == "output"}
     return ModelInterface(
-        kind.__name__, variables, {}, feedthrough, has_events=True, output_derivatives=1, takes_inputs_inside_steps=True
+        kind.__name__,
+        variables,
+        {},
+        feedthrough,
+        has_events=True,
+        output_derivatives=1,
+        inputs_inside_steps=frozenset(v.name for v in kind.table if v.causality == "input"),
     )
 
 

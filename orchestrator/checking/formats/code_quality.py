@@ -12,14 +12,7 @@ _SEVERITIES: Mapping[Severity, str] = {"error": "major", "warning": "minor", "in
 
 
 def as_code_quality(verdicts: Sequence[Verdict]) -> str:
-    """Write the issues that the baseline does not have.
-
-    Args:
-        verdicts: one for each FMU.
-
-    Returns:
-        The document.
-    """
+    """Write the issues that the baseline does not have."""
     issues = [
         {
             "description": plain(f"{issue.finding.message} ({issue.finding.path})"),

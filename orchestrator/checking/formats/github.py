@@ -18,9 +18,6 @@ _LEVELS: Mapping[Severity, str] = {"error": "error", "warning": "warning", "info
 def as_annotations(verdicts: Sequence[Verdict]) -> list[str]:
     """Write the issues that the baseline does not have as workflow commands.
 
-    Args:
-        verdicts: one for each FMU.
-
     Returns:
         The lines, at most ``MOST_ANNOTATIONS`` of each level.
     """
@@ -38,14 +35,7 @@ def as_annotations(verdicts: Sequence[Verdict]) -> list[str]:
 
 
 def as_summary(verdicts: Sequence[Verdict]) -> str:
-    """Write the summary of the step: a row per FMU, then the issues.
-
-    Args:
-        verdicts: one for each FMU.
-
-    Returns:
-        Markdown.
-    """
+    """Write the summary of the step: a row per FMU, then the issues."""
     lines = ["## FMU check", "", "| FMU | result | executed | passed | failed | not run |", "|---|---|---|---|---|---|"]
     for verdict in verdicts:
         counts = Counter(o.outcome for o in verdict.outcomes)

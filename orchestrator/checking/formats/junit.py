@@ -13,12 +13,6 @@ def as_junit(verdicts: Sequence[Verdict]) -> str:
     """Write a case for each rule: failed when an issue fails, skipped when the rule was not run, else passed.
 
     A case that passes although the rule has issues (mild ones, or known ones) has them as its output.
-
-    Args:
-        verdicts: one for each FMU.
-
-    Returns:
-        The document.
     """
     suites = [_suite(v) for v in verdicts]
     root = etree.Element("testsuites", name="fmu-check", **_counts([c for suite in suites for c in suite]))

@@ -27,9 +27,6 @@ _LEVELS: Mapping[Severity, str] = {"error": "error", "warning": "warning", "info
 def as_sarif(verdicts: Sequence[Verdict]) -> str:
     """Write one run.
 
-    Args:
-        verdicts: one for each FMU.
-
     Returns:
         The document; it has at most ``MOST_RESULTS`` results, the worst, and a notification where there are more.
     """

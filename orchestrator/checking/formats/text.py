@@ -11,14 +11,7 @@ FORBIDDEN = dict.fromkeys((*range(9), 11, 12, *range(14, 32), *range(0xD800, 0xE
 
 
 def summary(verdict: Verdict) -> str:
-    """The line of one FMU: how many issues of which severity, what the baseline has, and what was executed.
-
-    Args:
-        verdict: on the FMU.
-
-    Returns:
-        One line.
-    """
+    """The line of one FMU: how many issues of which severity, what the baseline has, and what was executed."""
     counts = [f"{verdict.count(s)} {s}{'s' * (verdict.count(s) > 1)}" for s in SEVERITIES if verdict.count(s)]
     known = sum(issue.known for issue in verdict.issues)
     if known:
@@ -35,14 +28,7 @@ def _extent(report: FmuFindings) -> str:
 
 
 def as_lines(verdict: Verdict) -> list[str]:
-    """The verdict for a terminal: the summary, then three lines for each issue that the baseline does not have.
-
-    Args:
-        verdict: on one FMU.
-
-    Returns:
-        The lines, without control characters.
-    """
+    """The verdict for a terminal: the summary, then three lines for each issue that the baseline does not have."""
     lines = [summary(verdict)]
     for issue in verdict.issues:
         if not issue.known:
@@ -52,26 +38,12 @@ def as_lines(verdict: Verdict) -> list[str]:
 
 
 def plain(text: str) -> str:
-    """Return one line without control characters.
-
-    Args:
-        text: of anybody.
-
-    Returns:
-        The line.
-    """
+    """Return one line without control characters."""
     return " ".join(text.translate(FORBIDDEN).splitlines())
 
 
 def as_results(verdicts: Sequence[Verdict]) -> CheckFound:
-    """The results for a JSON document and for the page.
-
-    Args:
-        verdicts: one for each FMU.
-
-    Returns:
-        What was found.
-    """
+    """The results for a JSON document and for the page."""
     return CheckFound(
         ok=all(v.ok for v in verdicts),
         counts={severity: sum(v.count(severity) for v in verdicts) for severity in SEVERITIES},

@@ -19,14 +19,10 @@ _BEFORE_UNITS = ("ModelExchange", "CoSimulation", "ScheduledExecution")
 
 
 def mend_description(root: etree._Element, findings: Iterable[Finding]) -> list[str]:
-    """Mend what single findings name.
+    """Mend what single findings name. Return what was mended, a line each.
 
     Args:
         root: of modelDescription.xml; it is changed.
-        findings: of the static checks.
-
-    Returns:
-        What was mended, a line each.
     """
     repairs = []
     for finding in findings:
@@ -122,10 +118,6 @@ def mend_token(root: etree._Element, members: Mapping[str, bytes]) -> list[str]:
 
     Args:
         root: of modelDescription.xml; it is changed.
-        members: content by path in the FMU.
-
-    Returns:
-        What was mended.
     """
     name = "guid" if root.get("guid") is not None else "instantiationToken"
     written = root.get(name, "")

@@ -22,18 +22,7 @@ class UnmendableError(FmuError):
 
 
 def read_members(path: Path, limits: ArchiveLimits) -> tuple[dict[str, bytes], list[str]]:
-    """Read an FMU.
-
-    Args:
-        path: the FMU's file or folder.
-        limits: the most bytes and files that are unpacked.
-
-    Returns:
-        Content by path in the FMU, and what was mended.
-
-    Raises:
-        UnmendableError: the archive has a fault that cannot be mended.
-    """
+    """Read an FMU."""
     files, findings = open_fmu(path, limits)
     if files is not None:
         files.close()

@@ -38,17 +38,8 @@ class Repair:
 def mend_fmu(path: Path, target: Path, limits: ArchiveLimits | None = None) -> Repair:
     """Write an FMU anew without the faults that can be mended without its source. Nothing of it is executed.
 
-    Args:
-        path: the FMU's file or folder.
-        target: the file of the mended FMU.
-        limits: the most bytes and files that are unpacked (default: those of the check).
-
     Returns:
         What was mended, and what was not.
-
-    Raises:
-        UnmendableError: the archive or the XML has a fault that cannot be mended.
-        FmuError: ``target`` is ``path``, or cannot be written.
     """
     limits = limits or ArchiveLimits()
     if target.exists() and target.samefile(path):

@@ -17,8 +17,6 @@ def mend_library(members: dict[str, bytes], guid: str, findings: Iterable[Findin
 
     Args:
         members: content by path in the FMU; it is changed.
-        guid: of the FMU.
-        findings: of the static checks.
 
     Returns:
         What was mended, and what could not be.

@@ -4,7 +4,8 @@ from collections.abc import Iterable, Sequence
 
 from lxml import etree
 
-from orchestrator.checking.description import DescribedVariable, Description, read_description
+from orchestrator.checking.description import DescribedVariable, Description
+from orchestrator.checking.description_reading import read_description
 from orchestrator.checking.findings import Finding
 from orchestrator.checking.rules_structure import required_initial_unknowns
 
@@ -20,10 +21,6 @@ def mend_structure(root: etree._Element, findings: Iterable[Finding]) -> list[st
 
     Args:
         root: of modelDescription.xml; it is changed.
-        findings: of the static checks.
-
-    Returns:
-        What was mended.
     """
     if root.find("ModelStructure") is None or not any(finding.rule in _LISTS for finding in findings):
         return []

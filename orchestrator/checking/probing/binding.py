@@ -4,16 +4,16 @@ The child does the calls (``checking.host``); what it says is taken for what the
 types and sizes, and nothing more.
 """
 
-import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
+from orchestrator.checking.probing.statuses import ERROR, StatusError, odd
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.rules import Version
 from orchestrator.errors import ChildError, SimulationError
 
-OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 _REFERENCE = re.compile(r"#([ribs])(\d+)#")
 _LETTERS = {"Real": "r", "Integer": "i", "Boolean": "b", "String": "s"}
 
@@ -52,100 +52,14 @@ NAMES: Mapping[Version, Names] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class ProbedVariable:
-    """A variable as the model description has it.
-
-    Attributes:
-        base: suffix of the functions that access it, such as "Real" or "Int32".
-        size: number of its values at the initial dimensions.
-        start: its values at the start, None when the description has none.
-        clocks: value references of its clocks; it is accessed while one of them ticks.
-        intermediate: whether it can be accessed in intermediate updates.
-        extents: its dimensions: a size, or minus one less the value reference of the parameter that has it.
-    """
-
-    name: str
-    reference: int
-    base: str
-    causality: str
-    variability: str
-    initial: str | None
-    start: tuple[Any, ...] | None
-    minimum: float | None
-    maximum: float | None
-    nominal: float | None
-    size: int = 1
-    clocks: tuple[int, ...] = ()
-    intermediate: bool = False
-    extents: tuple[int, ...] = ()
-
-    def resized(self, sizes: Mapping[int, int]) -> "ProbedVariable":
-        """The variable after structural parameters have changed.
-
-        Args:
-            sizes: by value reference of the structural parameter.
-
-        Returns:
-            The variable with its new size.
-        """
-        lengths = (e if e >= 0 else sizes.get(-1 - e, 1) for e in self.extents)
-        return replace(self, size=math.prod(lengths))
-
-    @property
-    def real(self) -> bool:
-        """Whether its values are floating point numbers."""
-        return self.base in ("Real", "Float32", "Float64")
-
-    @property
-    def numeric(self) -> bool:
-        """Whether its values are numbers, Boolean ones left out."""
-        return self.real or "Int" in self.base
-
-    @property
-    def labels(self) -> list[str]:
-        """A name for each of its values."""
-        return [self.name] if self.size == 1 else [f"{self.name}[{i}]" for i in range(self.size)]
-
-
-class StatusError(Exception):
-    """A call returned something else than was wanted.
-
-    Attributes:
-        function, status: what was called and what came back.
-        rule: the rule that is broken, where that is no matter of the status.
-    """
-
-    def __init__(self, function: str, status: int, detail: str, rule: str = "") -> None:
-        super().__init__(detail)
-        self.function = function
-        self.status = status
-        self.rule = rule
-
-
-class TerminatedError(Exception):
-    """The slave asks for the simulation to end, or cannot be followed further; that is no fault."""
-
-
 class FmiProcess(Protocol):
     """A child process that does FMI calls."""
 
     def call(self, request: Any) -> Any:
-        """Return what ``checking.host.Host`` returns.
-
-        Args:
-            request: name of a method of ``checking.host.Host`` and its arguments.
-
-        Returns:
-            What the method returns.
-        """
+        """Return what ``checking.host.Host`` returns."""
 
     def resident(self) -> int:
-        """Resident memory of the child in bytes; 0 where the system does not tell.
-
-        Returns:
-            The bytes.
-        """
+        """Resident memory of the child in bytes; 0 where the system does not tell."""
 
     def renew(self) -> None:
         """End the child and start another one."""
@@ -176,9 +90,6 @@ class Library:
     def load(self, path: str) -> str:
         """Load the library at ``path``; return why that fails, or nothing.
 
-        Args:
-            path: of the shared library.
-
         Returns:
             The reason, empty when it is loaded.
         """
@@ -201,36 +112,18 @@ class Library:
             self.ended = True
             raise
         except SimulationError as error:
-            raise StatusError(doing, ERROR, f"{doing} cannot be called: {error}") from None
+            raise StatusError(doing, ERROR, f"{doing} cannot be called: {error}", "binary.exports") from None
         self.current = ""
         return answer
 
     def text(self, function: str) -> str:
-        """Call a function that returns a text.
-
-        Args:
-            function: its name without prefix.
-
-        Returns:
-            What it returned; "null" for a null pointer.
-        """
+        """Call a function that returns a text. Return what it returned; "null" for a null pointer."""
         name = self.names.prefix + function
         value = self._ask(name, "text", name)
         return "null" if value is None else str(value)
 
     def make(self, function: str, *request: Any) -> int | None:
-        """Make an instance; None when the FMU returns null.
-
-        Args:
-            function: that makes it, with prefix.
-            request: to the host.
-
-        Returns:
-            The instance's number, or None.
-
-        Raises:
-            ChildError: the answer of the child is none that the function can have.
-        """
+        """Make an instance; None when the FMU returns null. Return the instance's number, or None."""
         match self._ask(function, *request):
             case [number, messages]:
                 self.messages = self._texts(messages)
@@ -238,28 +131,12 @@ class Library:
         raise odd(function)
 
     def free(self, number: int) -> None:
-        """Free an instance.
-
-        Args:
-            number: of the instance.
-        """
+        """Free an instance."""
         name = f"{self.names.prefix}FreeInstance"
         self._ask(name, "free", number, name)
 
     def raw(self, number: int, function: str, arguments: Sequence[Sequence[Any]]) -> tuple[int, list[Any]]:
-        """Call a function of an instance; return its status and what its output arguments hold.
-
-        Args:
-            number: of the instance.
-            function: name of an FMI function.
-            arguments: kind and value of each.
-
-        Returns:
-            Status and values.
-
-        Raises:
-            ChildError: the answer of the child is none that the function can have.
-        """
+        """Call a function of an instance; return its status and what its output arguments hold."""
         answer = self._ask(function, "call", number, function, [list(a) for a in arguments])
         return self._checked(answer, function, arguments)
 
@@ -277,15 +154,8 @@ class Library:
     ) -> list[tuple[int, list[Any]]]:
         """Call functions of an instance in one go, up to the first that fails.
 
-        Args:
-            number: of the instance.
-            requests: function and arguments of each.
-
         Returns:
             Status and values of each that was called.
-
-        Raises:
-            ChildError: the answer of the child is none that the functions can have.
         """
         doing = ", ".join(dict.fromkeys(function for function, _ in requests))
         answers = self._ask(doing, "calls", number, [[f, [list(a) for a in arguments]] for f, arguments in requests])
@@ -302,60 +172,22 @@ class Library:
         """Say what the host does in intermediate updates; see there.
 
         Args:
-            number: of the instance.
-            reads, writes: value references.
-            values: to be written.
             early: at which update an early return is asked for; -1 for never.
         """
         self._ask("", "plan", number, reads, writes, values, early)
 
     def updates(self) -> tuple[list[list[Any]], int]:
-        """The intermediate updates since the last call, and locks of preemption that are open; see the host.
-
-        Returns:
-            Rows, and a number.
-
-        Raises:
-            ChildError: the answer of the child is none that it can have.
-        """
+        """The intermediate updates since the last call, and locks of preemption that are open; see the host."""
         match self._ask("", "updates"):
             case [list() as rows, int() as locks] if all(isinstance(r, list) and len(r) == 8 for r in rows):
                 return rows, locks
         raise odd("an intermediate update")
 
     def resident(self) -> int:
-        """Resident memory of the child in bytes, as the system tells; 0 where it does not.
-
-        Returns:
-            The bytes.
-        """
+        """Resident memory of the child in bytes, as the system tells; 0 where it does not."""
         return self._host.resident()
 
     def _texts(self, messages: Any) -> list[str]:
         """Messages with the names of the variables that they refer to."""
         texts = [str(m)[:200] for m in messages[:4]] if isinstance(messages, list) else []
         return [_REFERENCE.sub(lambda m: self._known.get((m[1], int(m[2])), m[0]), text) for text in texts]
-
-
-def odd(function: str) -> ChildError:
-    """The error of an answer that a function cannot have.
-
-    Args:
-        function: what was called.
-
-    Returns:
-        The error, to be raised.
-    """
-    return ChildError(f"the answer to {function} is not valid", "protocol")
-
-
-def finite(value: Any) -> bool:
-    """Whether a value is no NaN and no infinity.
-
-    Args:
-        value: of any type.
-
-    Returns:
-        True for a finite number and for what is no float.
-    """
-    return not isinstance(value, float) or math.isfinite(value)

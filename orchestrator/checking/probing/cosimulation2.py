@@ -3,9 +3,10 @@
 import time
 from typing import Any
 
-from orchestrator.checking.probing.binding import DISCARD, OK, PENDING, WARNING, Library, TerminatedError
-from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.binding import Library
+from orchestrator.checking.probing.driver import MOST_PARTS, Driver
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.statuses import DISCARD, OK, PENDING, WARNING, DiscardedError, TerminatedError
 
 _DO_STEP_STATUS, _TERMINATED = 0, 3
 
@@ -29,18 +30,38 @@ class CoSimulation2(Driver):
         self.call("EnterInitializationMode")
 
     def advance(self, t: float, size: float, when: str = "") -> None:
+        parts, done = 1, 0
+        while done < parts:
+            h = size / parts
+            saved = self.get_state() if self.job.careful else None
+            complete = self._step(t + done * h, h, when)
+            if not complete:
+                self.report_discard(when)
+                again = self.job.saves and self.job.varies and not self.job.careful
+                if saved is None or parts >= MOST_PARTS:
+                    raise DiscardedError(f"a step was discarded {when}", again)
+                self.set_state(saved)  # FMI 2.0 allows no other way on
+                parts, done = 2 * parts, 2 * done
+            if saved is not None:
+                self.free_state(saved)
+            done += complete
+
+    def _step(self, t: float, size: float, when: str) -> bool:
+        """One call of fmi2DoStep; False when it was discarded."""
         status, _ = self.raw("DoStep", ("double", t), ("double", size), ("int", 0))
         messages, errors = self.library.messages, self.library.errors
         if status == DISCARD:
             answer, ended = self.raw("GetBooleanStatus", ("int", _TERMINATED), ("out", "int", 1))
             if answer == OK and ended[0][0]:
                 raise TerminatedError
-        elif status == PENDING and "canRunAsynchronuously" in self.job.flags:
+            return False
+        if status == PENDING and "canRunAsynchronuously" in self.job.flags:
             status = self._wait()
         self.library.messages = messages
         if status not in (OK, WARNING):
             raise self.refused("DoStep", status, when)
         self._remark("fmi2DoStep", status, messages, errors)
+        return True
 
     def _wait(self) -> int:
         """Ask until the step is done; the child's limits end this when it takes too long."""

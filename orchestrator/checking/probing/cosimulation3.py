@@ -1,10 +1,13 @@
 """The driver of co-simulation of FMI 3.0: steps, early return, event mode and clocks."""
 
+import math
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, StatusError, TerminatedError
+from orchestrator.checking.probing.binding import Library
+from orchestrator.checking.probing.driver import MOST_PARTS
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.statuses import DISCARD, OK, WARNING, DiscardedError, StatusError, TerminatedError
 
 _MOST_RETURNS = 1000
 _SMALL = 1e-9
@@ -44,13 +47,19 @@ class CoSimulation3(EventDriver):
             self.call("EnterStepMode")
 
     def advance(self, t: float, size: float, when: str = "") -> None:
-        end = t + size
+        end, h = t + size, size
         slack = _SMALL * max(abs(end), size)
         for _ in range(_MOST_RETURNS):
-            goal = min(end, self.next_instant(end)) if self.events else end
+            goal = min(end, self.next_instant(end), t + h) if self.events else min(end, t + h)
             wanted = False
             if goal > t + slack:
-                wanted, reached = self._step(t, goal, slack, when)
+                found = self._step(t, goal, slack, when)
+                if found is None:
+                    h = 0.5 * (goal - t)
+                    if not self.job.varies or h * MOST_PARTS < size:
+                        raise DiscardedError(f"a step was discarded {when}")
+                    continue
+                wanted, reached = found
                 t = reached if reached < goal - slack else goal
             if self.events and (wanted or self.next_instant(end + size) <= t + slack):
                 self._event(t, wanted, when)
@@ -59,12 +68,18 @@ class CoSimulation3(EventDriver):
         text = f"fmi3DoStep must get on, but returned early {_MOST_RETURNS} times {when}"
         raise StatusError("fmi3DoStep", 0, text, "step.no-progress")
 
-    def _step(self, t: float, goal: float, slack: float, when: str) -> tuple[bool, float]:
-        """One call of fmi3DoStep: whether an event is to be handled, and the time that was reached."""
-        found = self.call(
+    def _step(self, t: float, goal: float, slack: float, when: str) -> tuple[bool, float] | None:
+        """One call of fmi3DoStep: whether an event is to be handled, and the time that was reached; None: discarded."""
+        status, found = self.raw(
             "DoStep", ("double", t), ("double", goal - t), ("bool", True), *(("out", "bool", 1),) * 3,
-            ("out", "double", 1, goal), when=when,
+            ("out", "double", 1, goal),
         )  # fmt: skip
+        if status == DISCARD:
+            self.report_discard(when)
+            return None
+        if status not in (OK, WARNING):
+            raise self.refused("DoStep", status, when)
+        self._remark("fmi3DoStep", status, self.library.messages, self.library.errors)
         event, terminate, early, last = (values[0] for values in found)
         if not t - slack <= last <= goal + slack:
             text = f"lastSuccessfulTime must lie in the step from {t:g} to {goal:g}, but is {last:g} {when}"
@@ -84,7 +99,10 @@ class CoSimulation3(EventDriver):
         return bool(flags & self.job.flags)
 
     def _event(self, t: float, wanted: bool, when: str) -> None:
-        """Handle an event; say so when the FMU asked for it and it changes nothing."""
+        """Handle an event; say so when the FMU asked for it, it changes nothing, and the last one was just before.
+
+        An event may change what is hidden; one that is told twice changes nothing the second time.
+        """
         announced = self.memory.get("next")
         expected = announced is not None and announced <= t + _SMALL * max(abs(t), self.job.step)
         watched = self.job.watched() if wanted and not expected and not self.due(t) else []
@@ -94,8 +112,13 @@ class CoSimulation3(EventDriver):
         idle = not any(o.again or o.nominals_changed or o.states_changed for o in outcomes)
         same_next = announced == self.memory["next"]
         if watched and idle and same_next and before == self.read(watched, when):
-            text = "an event must have a cause, but one changes no output and no local variable"
-            self.report("event.without-cause", text, when=f"at t = {t:g}")
+            if t - self.memory.get("visible", -math.inf) <= (1.0 + _SMALL) * self.job.step:
+                text = (
+                    "an event must have a cause, but one that follows another changes no output and no local variable"
+                )
+                self.report("event.without-cause", text, when=f"at t = {t:g}")
+        elif wanted:
+            self.memory["visible"] = t
         self.call("EnterStepMode", when=when)
 
 
@@ -103,7 +126,6 @@ def enter_initialisation_3(driver: Any, start: float, stop: float | None) -> Non
     """Into initialisation mode of FMI 3.0.
 
     Args:
-        driver: of an instance.
         start, stop: of the experiment [s].
     """
     tolerance = driver.job.tolerance

@@ -6,8 +6,8 @@ from typing import Any
 
 from orchestrator.checking.description import DescribedVariable, Description, Interface, number
 from orchestrator.checking.layered import ReferenceResult
-from orchestrator.checking.probing.binding import ProbedVariable
 from orchestrator.checking.probing.job import ProbedClock, ProbeJob
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.shared.isolation.limits import Limits
 
 _STEPS = 100
@@ -16,6 +16,7 @@ _BUDGET = 0.5  # s of a run; there are about fifteen
 _FLAGS = (
     "canGetAndSetFMUstate", "canSerializeFMUstate", "canGetAndSetFMUState", "canSerializeFMUState",
     "canHandleVariableCommunicationStepSize", "canBeInstantiatedOnlyOncePerProcess", "canRunAsynchronuously",
+    "providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives",
     "hasEventMode", "mightReturnEarlyFromDoStep", "canReturnEarlyAfterIntermediateUpdate", "providesIntermediateUpdate",
 )  # fmt: skip
 
@@ -23,19 +24,7 @@ _FLAGS = (
 def make_job(
     d: Description, interface: Interface, fmu: Path, library: str, reference: ReferenceResult | None, limits: Limits
 ) -> ProbeJob:
-    """What is to be run of an interface.
-
-    Args:
-        d: the model description.
-        interface: the one that is run.
-        fmu: the folder of the unpacked FMU.
-        library: path of the shared library in it.
-        reference: the result to be reproduced, or None.
-        limits: of the child process.
-
-    Returns:
-        The job; what the description has wrong is replaced by what makes sense.
-    """
+    """What is to be run of an interface."""
     start = _or(d.experiment("startTime"), 0.0)
     stop = d.experiment("stopTime")
     if stop is not None and not start < stop < math.inf:
@@ -61,6 +50,10 @@ def make_job(
         clocks=tuple(_clock(v) for v in known if v.kind == "Clock"),
         states=_count(d, [d.variable(u.variable) for u in d.derivatives]),
         indicators=_indicators(d),
+        rates=frozenset(
+            v.reference for u in d.derivatives if (v := d.variable(u.variable)) and v.reference is not None
+        ),
+        output_order=int(number(interface.element.get("maxOutputDerivativeOrder"), "Integer") or 0),
         start=start,
         stop=stop,
         step=step,

@@ -3,9 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, ProbedVariable, odd
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.instance import FmuInstance
 from orchestrator.checking.probing.job import ProbeJob, references
+from orchestrator.checking.probing.statuses import odd
+from orchestrator.checking.probing.variables import ProbedVariable
 
 Report = Callable[..., None]
 _CTYPES = {
@@ -18,13 +20,14 @@ _CTYPES = {
 _PYTHON: dict[str, tuple[type, ...]] = {"double": (float,), "float": (float,), "bool": (bool,)}
 _TEXTS: tuple[type, ...] = (bytes, type(None))
 MOST_ITERATIONS = 100
+MOST_PARTS = 1024
+"""Into so many a communication step is divided when longer ones are discarded."""
 
 
 class Driver(FmuInstance):
     """Base of the drivers.
 
     Attributes:
-        job: what is run.
         report: called with rule, message, path and the time of the first one in words (``when``).
     """
 
@@ -37,44 +40,14 @@ class Driver(FmuInstance):
 
     @classmethod
     def make(cls, library: Library, name: str, token: str, job: ProbeJob, **options: bool) -> int | None:
-        """Ask the FMU for an instance.
-
-        Args:
-            library: of the FMU.
-            name: of the instance.
-            token: guid or instantiation token.
-            job: what is run.
-            options: of the interface.
-
-        Returns:
-            Its number, or None when the FMU returns null.
-
-        Raises:
-            NotImplementedError: always; the drivers of the interfaces do it.
-        """
+        """Ask the FMU for an instance. Return its number, or None when the FMU returns null."""
         raise NotImplementedError
 
     def options(self, **options: bool) -> None:
-        """Take note of the options of the instantiation.
-
-        Args:
-            options: of the interface.
-        """
+        """Take note of the options of the instantiation."""
 
     def get(self, variables: Sequence[ProbedVariable], when: str = "") -> list[Any]:
-        """Read variables of one base type; a null text is None.
-
-        Args:
-            variables: all with the same ``base``.
-            when: words for the message of an error.
-
-        Returns:
-            All values, one variable after the other.
-
-        Raises:
-            StatusError: it is refused.
-            ChildError: the answer of the child is none that the function can have.
-        """
+        """Read variables of one base type; a null text is None."""
         if not variables:
             return []
         function, arguments = self._getting(variables)
@@ -100,16 +73,7 @@ class Driver(FmuInstance):
         return values
 
     def set(self, variables: Sequence[ProbedVariable], values: Sequence[Any], when: str = "") -> None:
-        """Write variables of one base type.
-
-        Args:
-            variables: all with the same ``base``.
-            values: all values, one variable after the other.
-            when: words for the message of an error.
-
-        Raises:
-            StatusError: it is refused.
-        """
+        """Write variables of one base type."""
         if not variables:
             return
         base = variables[0].base
@@ -121,15 +85,7 @@ class Driver(FmuInstance):
             self.call(f"Set{base}", *head, ("in", _CTYPES[self.job.version][base], list(values)), *tail, when=when)
 
     def read(self, variables: Sequence[ProbedVariable], when: str = "") -> list[Any]:
-        """Values of variables of any type, one after the other; those of clocked variables at their last tick.
-
-        Args:
-            variables: what to read.
-            when: words for the message of an error.
-
-        Returns:
-            The values.
-        """
+        """Values of variables of any type, one after the other; those of clocked variables at their last tick."""
         found: dict[int, list[Any]] = {}
         held = self.memory.get("held", {})
         groups = [
@@ -152,9 +108,6 @@ class Driver(FmuInstance):
 
         Args:
             start, stop: of the experiment [s].
-
-        Raises:
-            NotImplementedError: always; the drivers of the interfaces do it.
         """
         raise NotImplementedError
 
@@ -173,13 +126,13 @@ class Driver(FmuInstance):
         Args:
             t: beginning of the step [s].
             size: its length [s].
-            when: words for the message of an error.
-
-        Raises:
-            StatusError: it was not done.
-            TerminatedError: the slave ended the simulation.
         """
         raise NotImplementedError
+
+    def report_discard(self, when: str) -> None:
+        """Report that a step was discarded."""
+        name = f"{self.library.names.prefix}DoStep"
+        self.report("step.discarded", f"{name} must do the steps that it is asked for, but discards one", when=when)
 
     def terminate(self) -> None:
         """End the simulation."""

@@ -1,12 +1,13 @@
 """Event mode: what model exchange and co-simulation share, in both versions of FMI."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.checking.probing.binding import OK, WARNING, StatusError, TerminatedError
 from orchestrator.checking.probing.driver import MOST_ITERATIONS, Driver
 from orchestrator.checking.probing.job import ProbedClock
+from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
 
 _NOT_YET_KNOWN, _UNCHANGED, _CHANGED = range(3)
 _SMALL = 1e-9
@@ -40,6 +41,9 @@ class EventDriver(Driver):
             qualifier = _CHANGED
             if interval is None:
                 interval, qualifier = self._interval(clock)
+            elif clock.kind in ("fixed", "tunable"):  # the description has a default, which the importer sets
+                arguments = (("in", "uint32", [clock.reference]), ("size", 1), ("in", "double", [interval]))
+                self.call("SetIntervalDecimal", *arguments, when=f"for the clock `{clock.name}`")
             if shift is None:
                 shift = self._shift(clock) if clock.kind in ("fixed", "tunable") else 0.0
             if qualifier == _NOT_YET_KNOWN:
@@ -67,9 +71,6 @@ class EventDriver(Driver):
         """Ask for the intervals that the description has; what differs from it.
 
         An FMU that refuses to tell is left alone; it must not be called any further then.
-
-        Returns:
-            Sentences.
         """
         wrong = []
         for clock in self.job.clocks:
@@ -111,30 +112,19 @@ class EventDriver(Driver):
 
         Args:
             t: time [s].
-
-        Returns:
-            Clocks, the most urgent first.
         """
         ticks = self.memory.get("ticks", {})
         slack = _SMALL * max(abs(t), self.job.step)
         chosen = [c for c in self.job.clocks if c.reference in ticks and ticks[c.reference] <= t + slack]
         return sorted(chosen, key=lambda c: c.priority)
 
-    def settle(self, t: float, when: str) -> list[EventOutcome]:
+    def settle(self, t: float, when: str, triggered: Sequence[ProbedClock] = ()) -> list[EventOutcome]:
         """In event mode: tick what is due, then update the discrete states until nothing is left to do.
 
         Args:
             t: time [s].
-            when: words for the message of an error.
-
-        Returns:
-            What each update said.
-
-        Raises:
-            StatusError: a call is refused, or there is no end.
-            TerminatedError: the FMU ends the simulation.
         """
-        ticking = self.due(t)
+        ticking = [*self.due(t), *triggered]
         outcomes: list[EventOutcome] = []
         for position in range(MOST_ITERATIONS):
             active = {c.reference for c in ticking} if position == 0 else set()
@@ -204,13 +194,6 @@ class EventDriver(Driver):
 
         Args:
             t: time [s].
-            when: words for the message of an error.
-
-        Returns:
-            What it said.
-
-        Raises:
-            StatusError: a call is refused, or the next event is not later than ``t``.
         """
         if self.job.version == "2.0":
             ((again, terminate, nominals, states, defined, time),) = self.call(

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from orchestrator.checking.probing.binding import FATAL, OK, PENDING, WARNING, Library, StatusError, odd
+from orchestrator.checking.probing.binding import Library
+from orchestrator.checking.probing.statuses import FATAL, OK, PENDING, WARNING, StatusError, odd
 
 _STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 _LARGEST_STATE = 64 << 20
@@ -25,18 +26,7 @@ class FmuInstance:
         self._memories: dict[int, dict[str, Any]] = {}
 
     def raw(self, function: str, *arguments: Sequence[Any]) -> tuple[int, list[Any]]:
-        """Call a function and return its status and what its output arguments hold.
-
-        Args:
-            function: its FMI name without prefix.
-            arguments: kind and value of each.
-
-        Returns:
-            Status and values.
-
-        Raises:
-            StatusError: the instance must not be called any more.
-        """
+        """Call a function and return its status and what its output arguments hold."""
         name = self.library.names.prefix + function
         if self.dead:
             raise StatusError(name, FATAL, f"{name} was not called, because a call before returned a fatal error")
@@ -47,16 +37,8 @@ class FmuInstance:
     def call(self, function: str, *arguments: Sequence[Any], when: str = "") -> list[Any]:
         """Call a function that must return OK or Warning; return what its output arguments hold.
 
-        Args:
-            function: its FMI name without prefix.
-            arguments: kind and value of each.
-            when: words for the message of an error.
-
         Returns:
             A value per output argument, in their order.
-
-        Raises:
-            StatusError: it did not.
         """
         status, values = self.raw(function, *arguments)
         if status not in (OK, WARNING):
@@ -74,15 +56,8 @@ class FmuInstance:
     def call_many(self, requests: Sequence[Request], when: str = "") -> list[list[Any]]:
         """Call functions in one go, each of which must return OK or Warning.
 
-        Args:
-            requests: name without prefix, and arguments, of each.
-            when: words for the message of an error.
-
         Returns:
             What the output arguments of each hold.
-
-        Raises:
-            StatusError: one did not, or the instance must not be called any more.
         """
         if not requests:
             return []
@@ -101,16 +76,7 @@ class FmuInstance:
         return [values for _, values in done]
 
     def refused(self, function: str, status: int, when: str = "") -> StatusError:
-        """The error of a status that is not wanted.
-
-        Args:
-            function: its FMI name without prefix.
-            status: what it returned.
-            when: words for the message.
-
-        Returns:
-            The error, to be raised.
-        """
+        """The error of a status that is not wanted."""
         prefix = self.library.names.prefix
         known = 0 <= status < len(_STATUS) and not (prefix == "fmi3" and status == PENDING)
         name = prefix + _STATUS[status] if known else f"the status {status}, which does not exist"
@@ -125,48 +91,24 @@ class FmuInstance:
             self.dead = True
 
     def get_state(self) -> int:
-        """A new FMU state, by its number.
-
-        Returns:
-            The number.
-        """
+        """A new FMU state, by its number."""
         state = int(self.call(self.library.names.get_state, ("new state",))[0])
         self._memories[state] = dict(self.memory)
         return state
 
     def set_state(self, state: int) -> None:
-        """Restore a state.
-
-        Args:
-            state: its number.
-        """
+        """Restore a state."""
         self.call(self.library.names.set_state, ("state", state))
         self.memory = dict(self._memories[state])
 
     def free_state(self, state: int) -> bool:
-        """Free a state; whether the pointer was set to null.
-
-        Args:
-            state: its number.
-
-        Returns:
-            True when it was.
-        """
+        """Free a state, unless that is forbidden; whether the pointer was set to null."""
+        if self.dead or self.library.ended:
+            return True
         return bool(self.call(self.library.names.free_state, ("free state", state))[0])
 
     def serialise(self, state: int) -> bytes:
-        """The bytes of a state.
-
-        Args:
-            state: its number.
-
-        Returns:
-            The bytes.
-
-        Raises:
-            StatusError: a call failed, or the size is zero.
-            ChildError: the answer of the child is none that the function can have.
-        """
+        """The bytes of a state."""
         names = self.library.names
         (size,) = self.call(names.state_size, ("state", state), ("out", "size", 1))[0]
         if not 0 < size <= _LARGEST_STATE:
@@ -178,15 +120,7 @@ class FmuInstance:
         return data
 
     def deserialise(self, data: bytes, memory: dict[str, Any]) -> int:
-        """A state from bytes, by its number.
-
-        Args:
-            data: what ``serialise`` gave.
-            memory: of the instance at that time.
-
-        Returns:
-            The number.
-        """
+        """A state from bytes, by its number."""
         names = self.library.names
         state = int(self.call(names.deserialise, ("bytes", data), ("size", len(data)), ("new state",))[0])
         self._memories[state] = dict(memory)

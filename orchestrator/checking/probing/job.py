@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from orchestrator.checking.layered import ReferenceResult
-from orchestrator.checking.probing.binding import ProbedVariable
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.checking.rules import Version
 
 
@@ -39,11 +39,14 @@ class ProbeJob:
         resources: the folder of resources as the version hands it over; None when there is none.
         states: number of continuous states, None when the FMU has to be asked.
         indicators: number of event indicators, likewise.
+        rates: value references of the derivatives of states.
+        output_order: up to which order outputs have derivatives over time.
         start, stop, step: the experiment in s; ``stop`` is None when the FMU does not say.
         steps: number of communication steps of a test run.
         budget: seconds that a test run may take, of a :class:`Stopwatch`.
         flags: capability flags that are true.
         reference: the result to be reproduced, or None.
+        careful: whether a state is saved before each step of FMI 2.0, so that one that is discarded can be done anew.
     """
 
     version: Version
@@ -55,6 +58,8 @@ class ProbeJob:
     clocks: tuple[ProbedClock, ...]
     states: int | None
     indicators: int | None
+    rates: frozenset[int]
+    output_order: int
     start: float
     stop: float | None
     step: float
@@ -63,6 +68,12 @@ class ProbeJob:
     budget: float
     flags: frozenset[str]
     reference: ReferenceResult | None
+    careful: bool = False
+
+    @property
+    def varies(self) -> bool:
+        """Whether communication steps may be of any size."""
+        return "canHandleVariableCommunicationStepSize" in self.flags
 
     @property
     def saves(self) -> bool:
@@ -75,48 +86,30 @@ class ProbeJob:
         return bool(self.flags & {"canSerializeFMUstate", "canSerializeFMUState"})
 
     def outputs(self) -> list[ProbedVariable]:
-        """What a run records: the outputs, or all local variables when there are none; clocks are left out.
-
-        Returns:
-            Variables, in the order of the description.
-        """
+        """What a run records: the outputs, or all local variables when there are none; clocks are left out."""
         open_ = [v for v in self.variables if v.base != "Clock"]
         chosen = [v for v in open_ if v.causality == "output"]
         return chosen or [v for v in open_ if v.causality == "local" and not v.clocks]
 
     def labels(self) -> list[str]:
-        """Names of the recorded values.
-
-        Returns:
-            One for each value.
-        """
+        """Names of the recorded values."""
         return [label for v in self.outputs() for label in v.labels]
 
     def inputs(self) -> list[ProbedVariable]:
-        """Floating point inputs that may be set at any communication point.
+        """Floating point inputs that may be set at any communication point; in model exchange the continuous ones.
 
         Returns:
             Variables, in the order of the description.
         """
-        return [v for v in self.variables if v.causality == "input" and v.real and not v.clocks]
+        found = (v for v in self.variables if v.causality == "input" and v.real and not v.clocks)
+        return [v for v in found if v.variability == "continuous" or self.interface != "ModelExchange"]
 
     def watched(self) -> list[ProbedVariable]:
-        """What an event can change, as far as it can be read: outputs and local variables without clocks.
-
-        Returns:
-            Variables, in the order of the description.
-        """
+        """What an event can change, as far as it can be read: outputs and local variables without clocks."""
         kinds = ("output", "local")
         return [v for v in self.variables if v.causality in kinds and not v.clocks and v.base != "Clock"]
 
 
 def references(variables: Sequence[ProbedVariable]) -> list[int]:
-    """Value references.
-
-    Args:
-        variables: of any type.
-
-    Returns:
-        One for each.
-    """
+    """Value references."""
     return [v.reference for v in variables]

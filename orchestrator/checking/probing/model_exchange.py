@@ -7,11 +7,12 @@ Steps of an embedded pair of order 2 (Heun) with order 1 (Euler) are short enoug
 import math
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, StatusError, TerminatedError
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.cosimulation2 import CoSimulation2
 from orchestrator.checking.probing.cosimulation3 import enter_initialisation_3
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.job import ProbeJob
+from orchestrator.checking.probing.statuses import DISCARD, StatusError, TerminatedError
 
 _TOLERANCE = 1e-3
 _MOST_STEPS = 300
@@ -119,7 +120,6 @@ class ModelExchange(EventDriver):
         Args:
             t, x: time [s] and states.
             h: size of the step [s].
-            when: words for the message of an error.
 
         Returns:
             States, time, the size of the next step, and the signs of the event indicators.
@@ -128,7 +128,13 @@ class ModelExchange(EventDriver):
         shortest = 1e-4 * h
         while True:
             guess = [a + h * b for a, b in zip(x, slope, strict=True)]
-            second, _ = self._place(t + h, guess, when)
+            try:
+                second, _ = self._place(t + h, guess, when)
+            except StatusError as refused:  # a shorter step is the way on that the standard names
+                if refused.status != DISCARD or h <= shortest:
+                    raise
+                h *= 0.25
+                continue
             scaled = zip(slope, second, guess, self.memory["nominals"], strict=True)
             error = max((0.5 * h * abs(b - a) / (_TOLERANCE * (n + abs(g))) for a, b, g, n in scaled), default=0.0)
             if error <= 1.0 or h <= shortest or not all(map(math.isfinite, slope)):

@@ -8,9 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, ProbedVariable, StatusError, TerminatedError, finite
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.driver import Driver
+from orchestrator.checking.probing.statuses import DISCARD, DiscardedError, StatusError, TerminatedError
 from orchestrator.checking.probing.trajectory import Bench, Difference, compare, excitation
+from orchestrator.checking.probing.variables import ProbedVariable, finite
 from orchestrator.shared.stopwatch import Stopwatch
 
 _LEAK_PER_INSTANCE = 256 * 1024
@@ -48,22 +50,12 @@ class Context:
 
         Args:
             expected: the one run, [step][output].
-            found: the other.
-
-        Returns:
-            The first difference.
         """
         return compare(expected, found, self.names)
 
-    def report_difference(self, rule: str, wanted: str, difference: Difference) -> None:
-        """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only.
-
-        Args:
-            rule: for a difference that matters.
-            wanted: what the standard asks for, in words.
-            difference: what was found.
-        """
-        if difference.relative > _SMALL:
+    def report_difference(self, rule: str, wanted: str, difference: Difference, allowed: float = _SMALL) -> None:
+        """Report ``rule``, or a milder one when the runs differ by rounding or by a solver's tolerance only."""
+        if difference.relative > allowed:
             self.report(rule, f"{wanted}, but {difference}")
         else:
             self.report("run.inexact", f"{wanted} bit for bit, but {difference}")
@@ -76,16 +68,22 @@ class SkippedError(Exception):
     """A probe does not apply to this FMU; the text says why."""
 
 
+def carry_out(probe: Probe, context: Context) -> None:
+    """Carry out a probe, and again with a saved state before each step where that helps against discarded ones."""
+    try:
+        probe(context)
+    except DiscardedError as error:
+        if not error.again:
+            raise
+        context.bench.job = replace(context.bench.job, careful=True)
+        probe(context)
+
+
 NOT_COMPARABLE = "two equal runs of this FMU differ"
 
 
 def load(library: Library, report: Callable[..., None]) -> None:
-    """Version and platform of the library.
-
-    Args:
-        library: of the FMU.
-        report: called with rule, message and path.
-    """
+    """Version and platform of the library."""
     names = library.names
     version = library.text("GetVersion")
     wanted = names.version
@@ -98,11 +96,7 @@ def load(library: Library, report: Callable[..., None]) -> None:
 
 
 def life_cycle(context: Context) -> None:
-    """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value.
-
-    Args:
-        context: the FMU, its job and where findings go.
-    """
+    """Instantiate, initialise, step with the inputs at their start values, terminate; look at every value."""
     bench, job = context.bench, context.bench.job
     outputs = job.outputs()
     with bench.instance(initialised=False) as driver:
@@ -116,6 +110,13 @@ def life_cycle(context: Context) -> None:
             t = job.start + n * job.step
             try:
                 driver.advance(t, job.step, f"at t = {t:g} (step {n + 1})")
+            except DiscardedError as error:
+                if error.again:
+                    raise
+                if n == 0:
+                    raise StatusError("DoStep", DISCARD, "a first step must be done, but each is discarded") from None
+                bench.job = replace(job, steps=n)
+                break
             except TerminatedError:
                 bench.job = replace(job, steps=max(n, 1))
                 break
@@ -189,11 +190,7 @@ def _look(context: Context, outputs: list[ProbedVariable], values: list[Any], wh
 
 
 def inputs(context: Context) -> None:
-    """Run with moving inputs; what is recorded is what the later probes compare with.
-
-    Args:
-        context: the FMU, its job and where findings go.
-    """
+    """Run with moving inputs; what is recorded is what the later probes compare with."""
     bench = context.bench
     refused = None
     with bench.instance() as driver:
@@ -206,21 +203,31 @@ def inputs(context: Context) -> None:
     if refused is not None:
         context.report("run.input-refused", refused)
         bench.excited = False
-    with bench.instance() as driver:
-        context.trace = bench.run(driver)
-        _remarks(context, driver)
+    try:
+        with bench.instance() as driver:
+            context.trace = bench.run(driver)
+            _remarks(context, driver)
+    except DiscardedError as error:
+        if error.again or not bench.excited:
+            raise
+        bench.excited = False  # the life cycle was possible with the start values
+        with bench.instance() as driver:
+            context.trace = bench.run(driver)
 
 
 def setting(context: Context) -> None:
-    """Set everything that can be set to its start value before initialisation: accepted, and without effect.
+    """Set everything that can be set to its start value: accepted, and without effect.
 
-    Args:
-        context: the FMU, its job and where findings go.
+    Inputs are set in initialisation mode: before it, FMI 2.0 allows that for variables with ``initial`` only.
     """
     bench, job = context.bench, context.bench.job
     settable = [v for v in job.variables if _settable(v)]
     with bench.instance(initialised=False) as driver:
-        for v in settable:
+        entered = False
+        for v in sorted(settable, key=lambda v: v.causality == "input"):
+            if v.causality == "input" and not entered:
+                driver.enter_initialisation(job.start, job.stop)
+                entered = True
             try:
                 driver.set([v], v.start or (), f"for `{v.name}`, set to its start value,")
             except StatusError as error:
@@ -229,7 +236,9 @@ def setting(context: Context) -> None:
                 return
         if context.trace is None:
             return
-        driver.initialise()
+        if not entered:
+            driver.enter_initialisation(job.start, job.stop)
+        driver.exit_initialisation()
         difference = context.compare(context.trace, bench.run(driver))
     if difference is not None:
         context.report_difference("value.set", "a run must not change when start values are set", difference)
@@ -243,14 +252,7 @@ def _settable(v: ProbedVariable) -> bool:
 
 
 def memory(context: Context) -> None:
-    """Resident memory over instances and over steps.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Resident memory over instances and over steps."""
     bench, job = context.bench, context.bench.job
     resident = bench.library.resident
     if not resident():

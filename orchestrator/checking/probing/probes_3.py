@@ -2,24 +2,18 @@
 
 from typing import Any
 
-from orchestrator.checking.probing.binding import OK, WARNING, StatusError, TerminatedError
 from orchestrator.checking.probing.events import EventDriver
 from orchestrator.checking.probing.probes import NOT_COMPARABLE, Context, SkippedError
+from orchestrator.checking.probing.statuses import OK, WARNING, StatusError, TerminatedError
 
 _SMALL = 1e-9
 _FEW_STEPS = 20
 _LARGEST = 8
+_LEAVING = {"CoSimulation": "EnterStepMode", "ModelExchange": "EnterContinuousTimeMode"}
 
 
 def early_return(context: Context) -> None:
-    """Without earlyReturnAllowed, and without event mode where it can be: no step ends early, no event is announced.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Without earlyReturnAllowed, and without event mode where it can be: no step ends early, no event is announced."""
     bench, job = context.bench, context.bench.job
     if job.interface != "CoSimulation":
         raise SkippedError("the interface has no steps")
@@ -28,14 +22,7 @@ def early_return(context: Context) -> None:
 
 
 def intermediate(context: Context) -> None:
-    """Intermediate updates: only in steps, none before a finished one, with values that can be read and then set.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Intermediate updates: only in steps, none before a finished one, with values that can be read and then set."""
     bench, job = context.bench, context.bench.job
     if job.interface != "CoSimulation":
         raise SkippedError("the interface has no intermediate updates")
@@ -97,27 +84,20 @@ def _asked_to_return(context: Context) -> None:
     with bench.instance(intermediate=True) as driver:
         bench.library.updates()
         bench.library.plan(driver.number, [], [], [], 0)
-        found = driver.call(
+        status, found = driver.raw(
             "DoStep", ("double", job.start), ("double", job.step), ("bool", True), *(("out", "bool", 1),) * 3,
             ("out", "double", 1),
         )  # fmt: skip
         rows, _ = bench.library.updates()
         bench.library.plan(driver.number, [], [], [], -1)
     may = bool(rows) and bool(rows[0][5]) and rows[0][1] < job.start + job.step * (1.0 - _SMALL)
-    if may and not found[2][0]:
+    if may and status in (OK, WARNING) and not found[2][0]:
         message = "a step must end early when an intermediate update asks for it, but goes on"
         context.report("intermediate.early-return", message)
 
 
 def clocks(context: Context) -> None:
-    """The intervals are those of the description, and event mode without a tick leaves clocked outputs as they are.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """The intervals are those of the description, and event mode without a tick leaves clocked outputs as they are."""
     bench, job = context.bench, context.bench.job
     if not job.clocks:
         raise SkippedError("the FMU has no clocks")
@@ -130,6 +110,7 @@ def clocks(context: Context) -> None:
             context.report("clock.interval-value", wrong)
     if job.interface == "ScheduledExecution":
         raise SkippedError("there is no event mode")
+    _triggered(context)
     rows = []
     outputs = job.outputs()
     with bench.instance() as driver:
@@ -141,22 +122,28 @@ def clocks(context: Context) -> None:
             rows.append(driver.read(outputs))
             driver.call("EnterEventMode")
             driver.settle(t + job.step, "in event mode without a cause")
-            driver.call("EnterStepMode" if job.interface == "CoSimulation" else "EnterContinuousTimeMode")
+            driver.call(_LEAVING[job.interface])
     difference = context.compare(context.trace, rows)
     if difference is not None:
         wanted = "clocked variables must change only while their clock is active"
         context.report_difference("clock.inactive-change", wanted, difference)
 
 
+def _triggered(context: Context) -> None:
+    """Each triggered input clock can tick, and the run goes on."""
+    bench, job = context.bench, context.bench.job
+    for clock in (c for c in job.clocks if c.causality == "input" and c.kind == "triggered" and not c.clocks):
+        with bench.instance() as driver:
+            assert isinstance(driver, EventDriver)
+            bench.run(driver, 0, 1)
+            driver.call("EnterEventMode")
+            driver.settle(job.start + job.step, f"while the clock `{clock.name}` ticks", [clock])
+            driver.call(_LEAVING[job.interface])
+            bench.run(driver, 1, min(2, job.steps))
+
+
 def structure(context: Context) -> None:
-    """Structural parameters can be set in configuration mode, and arrays then have the size that follows.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Structural parameters can be set in configuration mode, and arrays then have the size that follows."""
     bench, job = context.bench, context.bench.job
     chosen = [v for v in job.variables if v.causality == "structuralParameter" and v.base == "UInt64"]
     if not chosen:
@@ -180,6 +167,32 @@ def structure(context: Context) -> None:
             except (StatusError, TerminatedError) as error:
                 context.report("configuration.status", str(error))
                 return
+    _reconfigured(context)
+
+
+def _reconfigured(context: Context) -> None:
+    """Tunable structural parameters can be set in mid-run, and the run goes on."""
+    bench, job = context.bench, context.bench.job
+    chosen = [v for v in job.variables if v.causality == "structuralParameter" and v.variability == "tunable"]
+    chosen = [v for v in chosen if v.base == "UInt64"]
+    if not chosen or job.interface == "ScheduledExecution":
+        return
+    with bench.instance() as driver:
+        bench.run(driver, 0, 1)
+        leaves = job.interface == "ModelExchange"  # there, reconfiguration begins in event mode
+        try:
+            if leaves:
+                driver.call("EnterEventMode")
+            driver.call("EnterConfigurationMode", when="in mid-run")
+            for v in chosen:
+                driver.set([v], [_size(v, 1)], f"for `{v.name}` in reconfiguration mode")
+            driver.call("ExitConfigurationMode", when="in mid-run")
+            if leaves:
+                driver.call("EnterContinuousTimeMode")
+            t = job.start + job.step
+            driver.advance(t, job.step, "after reconfiguration mode")
+        except StatusError as error:
+            context.report("configuration.status", str(error))
 
 
 def _size(v: Any, change: int) -> int:

@@ -2,19 +2,15 @@
 
 from typing import Any
 
-from orchestrator.checking.probing.binding import OK, WARNING
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context
+from orchestrator.checking.probing.statuses import OK, WARNING
 
 _NOT_REFUSED = (OK, WARNING)
 
 
 def misuse(context: Context) -> None:
-    """Wrong token, a step too early, a negative step, an unknown value reference, values too many, and more.
-
-    Args:
-        context: the FMU, its job and where findings go.
-    """
+    """Wrong token, a step too early, a negative step, an unknown value reference, values too many, and more."""
     bench, job = context.bench, context.bench.job
     prefix = bench.library.names.prefix
     bench.prepare()

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-from orchestrator.checking.probing.binding import ProbedVariable, TerminatedError
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.probes import Context, SkippedError
+from orchestrator.checking.probing.statuses import TerminatedError
+from orchestrator.checking.probing.variables import ProbedVariable
 from orchestrator.shared.stopwatch import Stopwatch
 
 _RELATIVE = 0.02
@@ -33,7 +34,6 @@ class Tube:
         """Look at the values of one row.
 
         Args:
-            values: of the FMU's variables, in the order of the columns.
             row: time [s] and the reference's values.
         """
         off = [abs(float(x) - row[i]) / w for x, (i, _), w in zip(values, self.columns, self.half_widths, strict=True)]
@@ -47,14 +47,7 @@ class Tube:
 
 
 def reference(context: Context) -> None:
-    """Simulate what the reference result shows and compare.
-
-    Args:
-        context: the FMU, its job and where findings go.
-
-    Raises:
-        SkippedError: it does not apply.
-    """
+    """Simulate what the reference result shows and compare."""
     job = context.bench.job
     if job.reference is None:
         raise SkippedError("the FMU has no reference result")
@@ -78,8 +71,9 @@ def _simulate(context: Context, rows: Sequence[Row], parameters: Columns, inputs
     variables = list(dict.fromkeys(v for _, v in tube.columns))
     budget = Stopwatch(_PATIENCE * job.budget)
     with bench.instance(initialised=False) as driver:
-        _set(driver, parameters + inputs, rows[0])
+        _set(driver, parameters, rows[0])
         driver.enter_initialisation(rows[0][0], max(rows[-1][0], job.stop or rows[-1][0]))
+        _set(driver, inputs, rows[0])
         driver.exit_initialisation()
         tube.compare(driver.read(variables, "after initialisation"), rows[0])
         for row, following in pairwise(rows):

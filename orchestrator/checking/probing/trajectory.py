@@ -6,13 +6,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.checking.probing.binding import Library, ProbedVariable, StatusError
+from orchestrator.checking.probing.binding import Library
 from orchestrator.checking.probing.cosimulation2 import CoSimulation2
 from orchestrator.checking.probing.cosimulation3 import CoSimulation3
 from orchestrator.checking.probing.driver import Driver
 from orchestrator.checking.probing.job import ProbeJob
 from orchestrator.checking.probing.model_exchange import ModelExchange
 from orchestrator.checking.probing.scheduled import ScheduledExecution
+from orchestrator.checking.probing.statuses import StatusError
+from orchestrator.checking.probing.variables import ProbedVariable
 
 _DRIVERS: dict[tuple[str, str], type[Driver]] = {
     ("2.0", "CoSimulation"): CoSimulation2,
@@ -52,19 +54,7 @@ class Bench:
 
     @contextmanager
     def instance(self, initialised: bool = True, name: str = "instance", **options: bool) -> Iterator[Driver]:
-        """An instance, at its first communication point when ``initialised``.
-
-        Args:
-            initialised: whether it is initialised.
-            name: of the instance.
-            options: of the interface.
-
-        Yields:
-            The instance.
-
-        Raises:
-            StatusError: it cannot be made or initialised.
-        """
+        """An instance, at its first communication point when ``initialised``."""
         self.prepare()
         number = self.driver.make(self.library, name, self.job.token, self.job, **options)
         if number is None:
@@ -84,7 +74,6 @@ class Bench:
         """Set the floating point inputs to a smooth signal inside their bounds, so that something happens.
 
         Args:
-            driver: of the instance.
             t: time [s].
             phase: of the signal [rad].
         """
@@ -103,13 +92,7 @@ class Bench:
         """Do the steps ``first`` to ``last`` and return the outputs after each one, [step][value].
 
         Args:
-            driver: of the instance.
             first: first step, from 0.
-            last: step to stop before; the job's number of steps when None.
-            excited: whether inputs move.
-
-        Returns:
-            Outputs, [step][value].
         """
         outputs = self.job.outputs()
         rows = []
@@ -126,13 +109,9 @@ def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0)
     """A sine of two periods over the run around each start value, a tenth of the nominal value high.
 
     Args:
-        v: a floating point input.
         t: time [s].
         duration: of the run [s].
         phase: of the signal [rad].
-
-    Returns:
-        The values at ``t``, in the input's unit, within its bounds.
     """
     low = -math.inf if v.minimum is None else v.minimum
     high = math.inf if v.maximum is None else v.maximum
@@ -142,15 +121,7 @@ def excitation(v: ProbedVariable, t: float, duration: float, phase: float = 0.0)
 
 
 def same(a: Any, b: Any) -> bool:
-    """Equal bit for bit; NaN equals NaN.
-
-    Args:
-        a: the one value.
-        b: the other.
-
-    Returns:
-        True when they are equal.
-    """
+    """Equal bit for bit; NaN equals NaN. Return true when they are equal."""
     if isinstance(a, float) and isinstance(b, float):
         return a == b or (math.isnan(a) and math.isnan(b))
     return bool(a == b)
@@ -173,16 +144,7 @@ class Difference:
 
 
 def compare(a: list[list[Any]], b: list[list[Any]], names: Sequence[str]) -> Difference | None:
-    """Hold run ``b`` against run ``a``, both [step][output]; None when they are equal bit for bit.
-
-    Args:
-        a: the one run.
-        b: the other, of as many steps.
-        names: of the outputs.
-
-    Returns:
-        The first difference.
-    """
+    """Hold run ``b`` against run ``a``, both [step][output]; None when they are equal bit for bit."""
     for n, (x, y) in enumerate(zip(a, b, strict=True)):
         for name, p, q in zip(names, x, y, strict=True):
             if not same(p, q):

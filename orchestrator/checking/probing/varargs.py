@@ -43,10 +43,6 @@ def fill_in(address: int, rest: Sequence[int | float]) -> str:
 
     Args:
         address: of the format; 0 for none.
-        rest: what the callback got after it.
-
-    Returns:
-        The text; a conversion that is not understood is left as it is.
     """
     template = _text(address)
     words = iter([int(v) for v in rest[_PASSED_OVER : _PASSED_OVER + _MOST_CONVERSIONS]])

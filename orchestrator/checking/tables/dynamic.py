@@ -28,6 +28,7 @@ value.not-finite | E | 2.2.7 | 2.4.7.5 | outputs are finite | look for a divisio
 value.out-of-range | W | 2.2.7 | 2.2.7.3 | outputs stay within min and max | correct the bounds or the model
 value.start | W | 2.2.7 | 2.4.7.5 | start values of the XML are those of the binary | generate both from one source
 value.string | E | 2.1.7 | 2.2.7.2 | strings and binaries are not null | return "" instead
+step.discarded | W | 4.2.2 | 4.2.1 | steps of the size that is asked for are done | many importers end the run there: do shorter steps inside, or state a stepSize that works
 step.last-time | E | - | 4.2.1 | lastSuccessfulTime lies in the step | return the time that was reached
 step.no-progress | E | - | 4.2.1 | a step gets on | return early only after an event that is new
 step.early-return | E | - | 4.1.3 | fmi3DoStep returns early only where the flags and earlyReturnAllowed allow it | set mightReturnEarlyFromDoStep, or go on to the end of the step
@@ -68,6 +69,11 @@ state.free | W | 2.1.8 | 2.2.7.4 | freeing a state sets it to null | set the poi
 
 [variable steps]
 steps.variable | W | 4.3.1 | 4.4 | results hardly depend on the communication step | integrate over the step given, or clear canHandleVariableCommunicationStepSize
+
+[derivatives]
+derivative.status | E | 2.1.9 | 2.2.11 | derivatives are given as the flags promise | implement the function, or clear the flag
+derivative.value | W | 2.1.9 | 2.2.11 | derivatives are those of small changes | differentiate what is computed
+derivative.adjoint | E | - | 2.2.11 | adjoint derivatives are the directional ones transposed | compute both from one matrix
 
 [intermediate update]
 intermediate.unexpected | E | - | 4.2.2 | intermediateUpdate is called in fmi3DoStep, by FMUs that say so | set providesIntermediateUpdate, or do not call it

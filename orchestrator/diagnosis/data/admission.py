@@ -14,28 +14,14 @@ NOISE_WINDOW = 9  # samples of the sliding cubic whose residual is the noise
 
 
 def check_model(model: Model) -> None:
-    """Refuse a model whose plant has no torque balance.
-
-    Args:
-        model: the model.
-
-    Raises:
-        ScenarioError: the plant refuses its values.
-    """
+    """Refuse a model whose plant has no torque balance."""
     reason = model.plant.refused({name: parameter.value for name, parameter in model.parameters.items()})
     if reason:
         raise ScenarioError(f"{model.source}: {reason}")
 
 
 def check_record(record: Record) -> None:
-    """Refuse records that hold nothing to compare a model with.
-
-    Args:
-        record: the record.
-
-    Raises:
-        RecordError: no torque was requested, or an encoder shows nothing but noise.
-    """
+    """Refuse records that hold nothing to compare a model with."""
     if not np.any(record.u):
         raise RecordError(
             f"{record.source}: column `u` must drive the machine, but is 0 in all {record.size} rows: "
@@ -56,16 +42,7 @@ def check_record(record: Record) -> None:
 
 
 def check_resolved(plant: Plant, model: Model, record: Record) -> None:
-    """Refuse a model that is far faster than the record.
-
-    Args:
-        plant: the plant.
-        model: nominal values.
-        record: whose sample time counts.
-
-    Raises:
-        ScenarioError: a time constant of the model is far below the sample time.
-    """
+    """Refuse a model that is far faster than the record."""
     p = plant.extended(model.values)
     if plant.substeps(p, record.step) > MOST_SUBSTEPS:
         raise ScenarioError(

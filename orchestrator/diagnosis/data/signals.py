@@ -61,11 +61,6 @@ def prepare_signals(
         record: with uniform time; missing samples are NaN.
         inertia: nominal inertia [kg.m2] of a single body, which bounds its band by the torque that is there; None: of
             two bodies no such bound is taken.
-        settings: of the band.
-        load_encoder: whether the load's encoder is used where the record has one.
-
-    Returns:
-        The signals.
     """
     angles = [lined(record.theta_m)]
     if load_encoder and record.theta_l is not None:
@@ -104,10 +99,6 @@ def motion_band(angle: Array, step: float, settings: BandSettings) -> float:
     Args:
         angle: (n,) [rad].
         step: sample time [s].
-        settings: of the band.
-
-    Returns:
-        The frequency.
     """
     count = angle.size
     frequencies, power = _spectrum(np.diff(angle, 2) / step**2, step, 2048)
@@ -138,10 +129,6 @@ def coherent_band(torque: Array, angle: Array, step: float, inertia: float, sett
         angle: (n,) [rad].
         step: sample time [s].
         inertia: nominal inertia [kg.m2].
-        settings: of the band.
-
-    Returns:
-        The frequency.
     """
     frequencies, acceleration = _spectrum(np.diff(angle, 2) / step**2, step, 1024, "constant")
     _, asked = _spectrum(torque[1:-1], step, 1024, "constant")
@@ -160,9 +147,6 @@ def second_difference_gain(frequencies: Array, step: float) -> Array:
     Args:
         frequencies: (n,) [Hz].
         step: sample time [s].
-
-    Returns:
-        The gain.
     """
     return np.asarray((2.0 - 2.0 * np.cos(2.0 * np.pi * frequencies * step)) / step**2)
 
@@ -173,9 +157,6 @@ def first_derivative(values: Array, step: float) -> Array:
     Args:
         values: (n,).
         step: sample time [s].
-
-    Returns:
-        The derivative.
     """
     found = np.zeros_like(values)
     found[2:-2] = (8.0 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) / (12.0 * step)
@@ -188,9 +169,6 @@ def second_derivative(values: Array, step: float) -> Array:
     Args:
         values: (n,).
         step: sample time [s].
-
-    Returns:
-        The differences.
     """
     found = np.zeros_like(values)
     found[1:-1] = (values[2:] - 2.0 * values[1:-1] + values[:-2]) / step**2
@@ -202,9 +180,6 @@ def triangle_average(values: Array) -> Array:
 
     Args:
         values: (n,).
-
-    Returns:
-        The averages.
     """
     found = values.copy()
     found[1:-1] = (values[2:] + 10.0 * values[1:-1] + values[:-2]) / 12.0
@@ -218,9 +193,6 @@ def smooth(values: Array, step: float, frequency: float) -> Array:
         values: (n,).
         step: sample time [s].
         frequency: of the sixth-order low-pass, passed forwards and backwards: a third of it passes to 1e-5.
-
-    Returns:
-        The smoothed values; unchanged where the frequency is near that of the samples.
     """
     if frequency * step > 0.4:
         return values

@@ -18,14 +18,7 @@ class Rows(Protocol):
         """Return the number of rows."""
 
     def part(self: "R", first: int, end: int) -> "R":
-        """Return some rows.
-
-        Args:
-            first, end: the first of them, and the first after them.
-
-        Returns:
-            The part.
-        """
+        """Return some rows."""
 
 
 R = TypeVar("R", bound=Rows)
@@ -47,16 +40,7 @@ class TestData(Generic[R]):
 
 
 def split_records(records: Sequence[R], share: float, other: R | None = None) -> tuple[tuple[R, ...], TestData[R]]:
-    """Return the parts of records that are fitted, and the test data.
-
-    Args:
-        records: of one machine.
-        share: of each that is test data: its last rows.
-        other: a record that is test data as a whole; the others are then fitted as a whole.
-
-    Returns:
-        Records to fit, and test data.
-    """
+    """Return the parts of records that are fitted, and the test data."""
     if other is not None:
         return tuple(records), TestData((other,), (0,))
     first = tuple(round((1.0 - share) * record.size) for record in records)

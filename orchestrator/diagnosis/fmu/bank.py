@@ -19,7 +19,6 @@ class Surroundings:
     Attributes:
         h: sample time [s].
         size: rms of the signal (at a port: of the effort that drives it).
-        peak: its largest magnitude.
         signal: its samples.
         noise: standard deviation of the measurement, for outputs.
         position: rms of the position about zero; span: from the smallest to the largest.
@@ -56,7 +55,6 @@ class Kind:
     """One row of the bank.
 
     Attributes:
-        name: of the effect.
         where: in series at an ``input`` or an ``output``, as feedback at a ``port``, in the value of a ``parameter``,
             or in the ``cut`` between two FMUs.
         parameters: their names, in the order of the values.
@@ -69,7 +67,6 @@ class Kind:
         amplitudes: in how many of the values, the first ones, the response is linear, where it is not in all.
         needs: the simpler effect that it contains.
         plausible: values -> False where the fit has left what the effect means.
-        angular: only for angles.
         scan: scene -> values of the last parameter, in order and so close that the best of them leads a fit to the
             right one: more than the FMU is run for, looked through with its surrogate.
     """
@@ -258,12 +255,5 @@ class BoxEffect:
         return len(self.kind.parameters) if self.kind.linear else self.kind.amplitudes
 
     def bounded(self, values: Array) -> Array:
-        """Return values no smaller than what the law allows.
-
-        Args:
-            values: of the effect's parameters.
-
-        Returns:
-            As many values.
-        """
+        """Return values no smaller than what the law allows."""
         return np.maximum(values, self.kind.lower) if self.kind.lower else values

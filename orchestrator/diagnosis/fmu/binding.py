@@ -22,15 +22,7 @@ BEYOND = 1.01
 
 
 def owned(name: str, members: Mapping[str, object]) -> tuple[str, str]:
-    """Return the FMU that a variable belongs to, and what it is called there.
-
-    Args:
-        name: of the variable: ``fmu.variable``, or the bare name with a lone FMU.
-        members: by name; a lone one has none.
-
-    Returns:
-        The two names.
-    """
+    """Return the FMU that a variable belongs to, and what it is called there."""
     return ("", name) if "" in members else split(name)
 
 
@@ -45,13 +37,9 @@ class Member:
     """An instance of one FMU that is reset, or made anew, before every run.
 
     Args:
-        path: of the FMU.
         inputs, tunables: variables that are set at every step, the latter only where a run asks for it.
         reads: variables that are read after every step.
         tolerance: of the FMU's own solver; None: its own.
-
-    Raises:
-        FmuError: the FMU cannot be read, loaded or instantiated, or lacks a variable.
     """
 
     def __init__(
@@ -81,11 +69,7 @@ class Member:
         return self._slave
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return what the FMU had to say of runs that went on, and forget it.
-
-        Returns:
-            The remarks.
-        """
+        """Return what the FMU had to say of runs that went on, and forget it."""
         said, self._said = self._said, []
         return [*said, *(self._slave.take_remarks() if self._slave else ())]
 
@@ -115,14 +99,7 @@ class Member:
         return self._slave
 
     def called(self, call: int) -> str:
-        """Return the name of the function that ``run_loop`` names by a number.
-
-        Args:
-            call: ``SET``, ``STEP`` or ``GET``.
-
-        Returns:
-            The name.
-        """
+        """Return the name of the function that ``run_loop`` names by a number."""
         if call == STEP:
             return self.native.step_name
         return (self.native.inputs if call == SET else self.native.outputs)[0].name
@@ -139,15 +116,7 @@ class Member:
         """Return an instance in initialisation mode, its start values set.
 
         Args:
-            starts: value by name.
             start, stop: of the run [s].
-            fresh: make a new instance instead of a reset.
-
-        Returns:
-            The instance.
-
-        Raises:
-            OrchestratorError: the FMU refused or failed a call.
         """
         slave = self._prepare(fresh)
         self._used = self._broken = True
@@ -161,9 +130,6 @@ class Box:
 
     Args:
         request: what is loaded, set and read.
-
-    Raises:
-        FmuError: an FMU cannot be read, loaded or instantiated, or lacks a variable.
     """
 
     def __init__(self, request: Load) -> None:
@@ -197,15 +163,8 @@ class Box:
     def run(self, job: Job, batch: Batch) -> Array:
         """Return what is read at every ``per_row``-th step, the initial values first.
 
-        Args:
-            job: what is set before and fed back in the run.
-            batch: the inputs of every step, or these and the tunable parameters, the grid, and what passes at once.
-
         Returns:
             Shape (rows, reads).
-
-        Raises:
-            OrchestratorError: an FMU refused or failed a call.
         """
         values, start, step, per_row = batch.tables[job.table], batch.start, batch.step, batch.per_row
         self._begin(job, values, batch)
@@ -241,11 +200,7 @@ class Box:
         return out
 
     def take_remarks(self) -> list[RunRemark]:
-        """Return what the FMUs had to say of runs that went on, and forget it.
-
-        Returns:
-            The remarks; a lone FMU has no name.
-        """
+        """Return what the FMUs had to say of runs that went on, and forget it."""
         return [replace(r, instance=name) for name, member in self._members.items() for r in member.take_remarks()]
 
     def _begin(self, job: Job, values: Array, batch: Batch) -> None:

@@ -34,12 +34,6 @@ def own_clock(problem: BoxProblem) -> OwnClock | None:
     Where the steps of an FMU fit in a communication step, rounding decides whether it takes one more: outputs are then
     a step ahead now and then, which looks like an added inertia. Steps that end clearly before or after those of the
     FMU's own clock leave nothing to rounding; of the two, the one that is nearer to what the FMU does as it is called.
-
-    Args:
-        problem: with the communication step that was wanted.
-
-    Returns:
-        The clock.
     """
     own, table = problem.settings.probe, series_of(problem, problem.n)
     before, behind = (
@@ -65,11 +59,7 @@ def compared_later(data: Data, late: float) -> Data:
     """Return a record whose outputs are those of ``late`` seconds before: what an FMU that is late shows by then.
 
     Args:
-        data: the record.
         late: seconds.
-
-    Returns:
-        The record; itself where nothing is late.
     """
     if late == 0.0:
         return data

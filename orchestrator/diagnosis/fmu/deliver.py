@@ -35,8 +35,6 @@ class Delivered:
     """A corrected system that was written.
 
     Attributes:
-        path: the SSP file.
-        parts: its effect FMUs.
         difference: largest rms difference of an output between its run under our master and the fit, over the noise.
         note: why it could not be run, where it could not.
     """
@@ -47,11 +45,7 @@ class Delivered:
     note: str = ""
 
     def found(self) -> DeliveredFound:
-        """Return what ``diagnose.json`` says of it.
-
-        Returns:
-            The corrected system.
-        """
+        """Return what ``diagnose.json`` says of it."""
         parts = tuple(
             PartFound(p.name, "connection" if p.effect is None else p.effect.label, p.values) for p in self.parts
         )
@@ -59,19 +53,7 @@ class Delivered:
 
 
 def deliver(path: Path, problem: BoxProblem, model: BoxModel) -> Delivered:
-    """Write the corrected system as SSP 1.0, and compare its run with the fit.
-
-    Args:
-        path: the SSP file.
-        problem: FMU and record.
-        model: corrected: parameters, effects and their values.
-
-    Returns:
-        What was written.
-
-    Raises:
-        FmuError: the effect FMU cannot be built.
-    """
+    """Write the corrected system as SSP 1.0, and compare its run with the fit."""
     parts = parts_of(problem, model)
     subject = problem.runner.subject
     members = {f"resources/{fmu.name}": fmu.read_bytes() for fmu in subject.members.values()}
@@ -94,20 +76,7 @@ def deliver(path: Path, problem: BoxProblem, model: BoxModel) -> Delivered:
 
 
 def difference(path: Path, problem: BoxProblem, model: BoxModel, jacobi: bool = False) -> float:
-    """Return the largest rms difference between a run of the system and the fit, over the noise.
-
-    Args:
-        path: the SSP file.
-        problem: FMU and record.
-        model: corrected: parameters, effects and their values.
-        jacobi: step all FMUs side by side.
-
-    Returns:
-        The difference, without unit.
-
-    Raises:
-        OrchestratorError: it does not run.
-    """
+    """Return the largest rms difference between a run of the system and the fit, over the noise."""
     fitted = problem.must_simulate(model)
     step = problem.step
     table = series_of(problem, problem.n)

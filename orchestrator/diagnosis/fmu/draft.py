@@ -17,16 +17,7 @@ NO_PORT = (
 
 
 def drafted(subject: Subject, columns: Sequence[str], time: str = "time") -> str:
-    """Return a map as TOML, to be looked over by its user.
-
-    Args:
-        subject: the FMU, or several.
-        columns: of the record.
-        time: name of the column with the time.
-
-    Returns:
-        The text.
-    """
+    """Return a map as TOML, to be looked over by its user."""
     model = subject.model
     reals = [v for v in model.variables.values() if v.type == "Real"]
     taken = {c.target for c in subject.connections}

@@ -38,14 +38,7 @@ class PlacedEffect:
     candidate: CandidateEffect
 
     def at(self, values: Values) -> tuple[BoxEffect, Array]:
-        """Return the effect and its values as the bank has them.
-
-        Args:
-            values: as the analysis has them.
-
-        Returns:
-            The effect, and the values of its law.
-        """
+        """Return the effect and its values as the bank has them."""
         count = len(self.effect.kind.parameters)
         given = self.effect.bounded(np.array(values[:count]))
         at_rest = len(values) > count and values[count] > 0.5
@@ -62,14 +55,8 @@ def place_effects(
     """Return effects as the analysis sees them, by label.
 
     Args:
-        effects: of the bank, each at a place.
         motions: port -> its position (n,), over which ripples repeat.
         through: port, gradient (outputs, n) by the residuals -> gradient (n,) by the effort at the port.
-        starts_off: share of its rms by which a signal starts away from zero to be tried from both.
-        linear: what an effect changes is known without a run, so that many values of it can be tried.
-
-    Returns:
-        The effects.
     """
     sorts = {effect.label: SORTS[effect.kind.name] for effect in effects}
     found = {}

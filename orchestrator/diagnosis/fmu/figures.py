@@ -16,10 +16,7 @@ def draw_signals(path: Path, problem: BoxProblem, stages: Mapping[str, Array], t
     """Draw outputs, and the residuals of each model in units of the noise at a scale of its own; shaded: test data.
 
     Args:
-        path: the picture.
-        problem: FMU and record.
         stages: name -> outputs (n, outputs) of a model, the best one last.
-        test: first row of the test data.
     """
     from matplotlib.figure import Figure
 

@@ -17,15 +17,7 @@ ITERATIONS = 8  # of each part: a motion that is hardly to be foretold converges
 
 
 def grow_fit(model: FmuResiduals, settings: FitSettings) -> ModelPoint | None:
-    """Return values that bring free runs close to the record, residuals in units of the outputs' noise.
-
-    Args:
-        model: beside the record.
-        settings: of fits.
-
-    Returns:
-        The point from which fits begin; None of a linear FMU, which they reach from anywhere.
-    """
+    """Return values that bring free runs close to the record, residuals in units of the outputs' noise."""
     if model.is_linear:
         return None
     plain = band_only(model, settings)

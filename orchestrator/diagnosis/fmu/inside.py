@@ -19,9 +19,6 @@ Answer = list[Any]
 def opened(request: Load) -> Callable[[Batch], Answer]:
     """Return what runs batches of the FMUs that ``request`` names.
 
-    Args:
-        request: the FMUs, their inputs and outputs.
-
     Returns:
         Called with a batch, it gives results, reasons of failures and the time taken [s].
     """

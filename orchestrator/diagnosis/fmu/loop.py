@@ -140,11 +140,8 @@ def run_loop(  # type: ignore[no-untyped-def]
         calls: (members, 5) component, functions that set, step and get, whether they are of FMI 3.0.
         counts: (members, 2) number of inputs, number of variables read.
         where: (members, 4) addresses of references and values of inputs, of references and values of what is read.
-        sent, read: the buffers at those addresses.
         into: (columns,) place of each column of the table in ``sent``.
-        outof: (variables read,) place of each in ``read``.
         table: (steps, columns) values held over each step.
-        grid: start time, step, steps per row of ``out``.
         wires: (wires, 2) column that is fed, variable that feeds it.
         gains: (wires, 2) factor and offset.
         passing: (pairs, 2) a wire whose source depends at once on what another feeds: both places.
@@ -153,7 +150,6 @@ def run_loop(  # type: ignore[no-untyped-def]
         sign: (effects,) direction in which the input pushes.
         q: (effects, 4) parameters.
         most: (effects,) effort at a port from which the run is given up: its loop is unstable.
-        lead: steps by which the fed-back signal is extrapolated.
         warned: (members, 3) zeros: number of calls that returned a warning, call and step of the first.
         out: (rows, variables read), row 0 the initial values.
     """

@@ -154,18 +154,7 @@ class Map(msgspec.Struct, frozen=True):
 
 
 def read_map(path: Path, subject: Subject) -> Map:
-    """Read and check a map.
-
-    Args:
-        path: a TOML file.
-        subject: the FMU, or several.
-
-    Returns:
-        The map.
-
-    Raises:
-        ScenarioError: the file cannot be read, or breaks a rule; the message names the entry.
-    """
+    """Read and check a map."""
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -180,19 +169,7 @@ def read_map(path: Path, subject: Subject) -> Map:
 
 
 def checked(written: MapFile, subject: Subject, source: str) -> Map:
-    """Check a map against an FMU, or several.
-
-    Args:
-        written: what the file says.
-        subject: the FMU, or several.
-        source: the file's name, for messages.
-
-    Returns:
-        The map.
-
-    Raises:
-        ScenarioError: see ``read_map``.
-    """
+    """Check a map against an FMU, or several."""
     look = _Look(subject.model.variables, source)
     if not written.inputs:
         raise ScenarioError(f"{source}: $.inputs must name at least one input with a column, but names none")
@@ -254,11 +231,7 @@ def checked(written: MapFile, subject: Subject, source: str) -> Map:
 
 
 def _check_ports(written: MapFile, look: "_Look") -> None:
-    """Refuse ports without a motion or flow, or of what is no input or output.
-
-    Raises:
-        ScenarioError: see ``read_map``.
-    """
+    """Refuse ports without a motion or flow, or of what is no input or output."""
     for name, port in written.ports.items():
         look.up(f"$.ports.{name}.input", port.input, ("input",))
         if not port.position and port.velocity is None:
@@ -272,11 +245,7 @@ def _check_ports(written: MapFile, look: "_Look") -> None:
 
 
 def _check_connections(written: MapFile, subject: Subject, look: "_Look") -> None:
-    """Refuse cuts where nothing is handed on, and inputs that are fed from elsewhere.
-
-    Raises:
-        ScenarioError: see ``read_map``.
-    """
+    """Refuse cuts where nothing is handed on, and inputs that are fed from elsewhere."""
     targets = {c.target for c in subject.connections}
     for name, cut in written.cuts.items():
         look.up(f"$.cuts.{name}.input", cut.input, ("input",))

@@ -18,14 +18,7 @@ Array = NDArray[np.float64]
 
 
 def test_problems(workings: FmuWorkings) -> list[tuple[BoxProblem, int]]:
-    """Return the FMU beside each record that holds test data, and the first row of the test part.
-
-    Args:
-        workings: of the diagnosis.
-
-    Returns:
-        One entry for each record.
-    """
+    """Return the FMU beside each record that holds test data, and the first row of the test part."""
     problem = workings.problem
     return [
         (replace(problem, data=compared_later(data, problem.late)), first)
@@ -34,14 +27,7 @@ def test_problems(workings: FmuWorkings) -> list[tuple[BoxProblem, int]]:
 
 
 def misfit_on_test_data(workings: FmuWorkings) -> tuple[TestMisfit, ...]:
-    """Return the misfit of the nominal, the re-fitted and the final model on test data.
-
-    Args:
-        workings: of the diagnosis.
-
-    Returns:
-        One for each record; nan where a run failed.
-    """
+    """Return the misfit of the nominal, the re-fitted and the final model on test data."""
     found, search = [], workings.search
     points = (search.problem.start, search.base.point, search.final.point)
     for number, (problem, first) in enumerate(test_problems(workings)):
@@ -59,15 +45,7 @@ def _misfit(problem: BoxProblem, first: int, stages: Sequence[Array]) -> TestMis
 
 
 def misfit_on_record(workings: FmuWorkings, data: Data) -> TestMisfit:
-    """Return the misfit of the three models on another record, to which nothing was fitted.
-
-    Args:
-        workings: of the diagnosis.
-        data: the record.
-
-    Returns:
-        The misfit; nan where a run failed.
-    """
+    """Return the misfit of the three models on another record, to which nothing was fitted."""
     problem, search = replace(workings.problem, data=compared_later(data, workings.problem.late)), workings.search
     points = (search.problem.start, search.base.point, search.final.point)
     return _misfit(problem, 0, [_misses(workings, point, problem, 0, 0) for point in points])
@@ -75,9 +53,6 @@ def misfit_on_record(workings: FmuWorkings, data: Data) -> TestMisfit:
 
 def stage_runs(workings: FmuWorkings) -> tuple[BoxProblem, dict[str, Array], int]:
     """Return the runs of the three models over the first record as a whole, for figures.
-
-    Args:
-        workings: of the diagnosis.
 
     Returns:
         FMU and record, outputs (n, outputs) by the model's name, and the first row of the test part.
@@ -92,9 +67,6 @@ def stage_runs(workings: FmuWorkings) -> tuple[BoxProblem, dict[str, Array], int
 
 def misses_of(workings: FmuWorkings) -> Callable[[ModelPoint], float]:
     """Return what says how much runs of a model miss of the test data.
-
-    Args:
-        workings: of the diagnosis.
 
     Returns:
         A model's values -> the sum of squares over the outputs, in units of their noise.

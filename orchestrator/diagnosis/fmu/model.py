@@ -52,14 +52,7 @@ class Data:
         return len(self.time)
 
     def part(self, first: int, end: int) -> "Data":
-        """Return some rows.
-
-        Args:
-            first, end: the first of them, and the first after them.
-
-        Returns:
-            The part.
-        """
+        """Return some rows."""
         rows = slice(first, end)
         held = None if self.held is None else self.held[first * self.factor : end * self.factor]
         signals = self.signals[rows] if len(self.signals) else self.signals
@@ -88,13 +81,5 @@ class BoxModel:
         return tuple(self.p.tolist()), effects
 
     def extended(self, effect: BoxEffect, values: Array) -> "BoxModel":
-        """Return this model with one more effect.
-
-        Args:
-            effect: that is added.
-            values: of its parameters.
-
-        Returns:
-            The model.
-        """
+        """Return this model with one more effect."""
         return BoxModel(self.p, (*self.effects, effect), (*self.values, np.asarray(values, dtype=float)))

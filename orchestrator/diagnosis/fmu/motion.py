@@ -34,11 +34,7 @@ def port_motions(problem: BoxProblem, reads: Array) -> dict[str, Motion]:
     A run of a model that lacks an effect may be far from the record; what the effect answers to is in the record.
 
     Args:
-        problem: the FMU and the record.
         reads: (n, reads) all that is read of a run.
-
-    Returns:
-        The motions by port; speed and acceleration of a measured one are those of a sliding cubic.
     """
     from scipy.signal import savgol_filter
 
@@ -64,13 +60,7 @@ def efforts_along(motion: Motion, law: int, values: tuple[float, ...], step: flo
     """Return the effort (n,) against the motion that a law has in each sample.
 
     Args:
-        motion: of the port.
-        law: its number in the laws of ports.
-        values: of its parameters.
         step: sample time [s].
-
-    Returns:
-        The efforts.
     """
     q = np.array([*values, *[0.0] * (4 - len(values))])
     return np.asarray(_efforts(law, motion.x, motion.v, motion.a, q, step))

@@ -28,10 +28,7 @@ def noise_of(
     brought down. Less may be noise that was filtered.
 
     Args:
-        given: the map.
-        data: the record.
         traces: (n, outputs) each: what was measured, and what a model leaves of it; the smoothest counts.
-        settings: of the probes.
 
     Returns:
         Shape (outputs,), in the units of the outputs; and a sentence for each output whose record shows another.
@@ -64,12 +61,7 @@ def begins_elsewhere(problem: BoxProblem, y: Array, settings: ProbeSettings) -> 
     """Return a sentence for each output that is far from its run in the first rows: few effects are so quick.
 
     Args:
-        problem: the FMU and the record, its noise known.
         y: (n, outputs) the run of the nominal model.
-        settings: of the probes.
-
-    Returns:
-        The sentences.
     """
     rows = settings.first_rows if problem.data.factor == 1 else 1
     off = np.max(np.abs(problem.residual(y)[:rows]), axis=0)
@@ -85,12 +77,7 @@ def lone_rows(problem: BoxProblem, y: Array, settings: ProbeSettings) -> tuple[s
     """Return a sentence for each output with rows that leave their neighbours far behind, if few.
 
     Args:
-        problem: the FMU and the record, its noise known.
         y: (n, outputs) the run of the nominal model.
-        settings: of the probes.
-
-    Returns:
-        The sentences.
     """
     left = problem.residual(y)
     off = np.abs(left[1:-1] - 0.5 * (left[:-2] + left[2:]))
@@ -114,9 +101,6 @@ def third_differences(trace: Array) -> Array:
 
     Args:
         trace: (n, outputs).
-
-    Returns:
-        Shape (outputs,).
     """
     # Their mean without the largest hundredth: a median is no measure of what comes in whole counts.
     rough = np.sort(np.abs(np.diff(trace, 3, axis=0)), axis=0)[: int(0.99 * (len(trace) - 3))]

@@ -42,17 +42,7 @@ class Part:
 
 
 def build_effect_fmu(folder: Path) -> Path:
-    """Return the effect FMU, built in ``folder`` from the laws' own source, its modules named by their content.
-
-    Args:
-        folder: that exists.
-
-    Returns:
-        The path of the FMU.
-
-    Raises:
-        FmuError: the build fails.
-    """
+    """Return the effect FMU, built in ``folder`` from the laws' own source, its modules named by their content."""
     sources = Path(pyfmu_sources.__file__).parent
     laws, slave = ((sources / f"{name}.py").read_text(encoding="utf-8") for name in ("port_laws", "attachment"))
     digest = hashlib.sha256((laws + slave).encode()).hexdigest()[:16]
@@ -73,18 +63,7 @@ def build_effect_fmu(folder: Path) -> Path:
 
 
 def parts_of(problem: BoxProblem, model: BoxModel) -> tuple[Part, ...]:
-    """Return the effect FMUs of a corrected model.
-
-    Args:
-        problem: FMU and record.
-        model: corrected: parameters, effects and their values.
-
-    Returns:
-        The parts: what hands values from one FMU to another, then the effects in their order.
-
-    Raises:
-        FmuError: what an FMU hands on depends at once on several connections.
-    """
+    """Return the effect FMUs of a corrected model."""
     found = []
     for k, c in enumerate(problem.runner.subject.connections):
         at_once = [t for t in problem.runner.through if t.wire == k]

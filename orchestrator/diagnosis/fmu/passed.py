@@ -13,13 +13,8 @@ def at_input(effect: BoxEffect, fine: Array, step: float, value: float) -> Array
     """Return an input behind an effect in series with it; before the record it had its first value, or was zero.
 
     Args:
-        effect: at an input.
         fine: (steps,) recorded input.
         step: communication step [s].
-        value: of the effect's parameter.
-
-    Returns:
-        Shape (steps,).
     """
     name, first = effect.kind.name, 0.0 if effect.at_rest else float(fine[0])
     if name == "input_gain":
@@ -43,14 +38,8 @@ def at_output(effect: BoxEffect, rows: Array, h: float, value: float, m: int) ->
     """Return an output behind an effect in series with it.
 
     Args:
-        effect: at an output.
         rows: (rows,) values of the output.
         h: time from one to the next [s].
-        value: of the effect's parameter.
-        m: of them in a sample of the inputs.
-
-    Returns:
-        Shape (rows,).
     """
     name = effect.kind.name
     if name == "output_gain":

@@ -26,20 +26,8 @@ def prepare_problems(
 ) -> tuple[tuple[BoxProblem, ...], Probe]:
     """Return a probed problem for each record, all with the same processes.
 
-    Args:
-        subject: the FMU, or several.
-        given: the map.
-        records: of one machine, at one sample time; the first one is that of the probes.
-        workers: child processes.
-        progress: called with what is being done.
-        settings: thresholds.
-
     Returns:
         The problems, whose children the caller ends, and what the FMU was found to be.
-
-    Raises:
-        FmuError: the FMU cannot be used.
-        SlaveError: it does not run over a record.
     """
     first, probe = opened(subject, given, records[0], workers, progress, settings)
     first.units = subject.units

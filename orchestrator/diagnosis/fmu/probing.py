@@ -67,18 +67,8 @@ def opened(
 ) -> tuple[BoxProblem, Probe]:
     """Return a problem ready to be fitted, and what its FMU was found to be.
 
-    Args:
-        subject: the FMU, or several.
-        given: the map.
-        data: the record.
-        workers: child processes.
-        settings: thresholds.
-
     Returns:
         The problem, whose children the caller ends, and what the FMU was found to be.
-
-    Raises:
-        FmuError: the FMU cannot be used: it does not load, run or repeat.
     """
     inputs, reads = _names_of(given, subject)
     runner = Runner(subject, inputs, reads, given.tunable, given.options.tolerance, True, workers, settings.process)
@@ -100,11 +90,7 @@ def opened(
 
 
 def _passing(runner: Runner, given: Map, data: Data, settings: FmuSettings) -> list[Through]:
-    """Return what FMUs hand on that depends at once on what they are handed, measured over one step.
-
-    Raises:
-        SlaveError: they do not run.
-    """
+    """Return what FMUs hand on that depends at once on what they are handed, measured over one step."""
     connected = runner.subject.connections
     if not connected:
         return []
@@ -136,11 +122,7 @@ def _passing(runner: Runner, given: Map, data: Data, settings: FmuSettings) -> l
 
 
 def _affordable(runner: Runner, given: Map, data: Data, progress: Progress, settings: FmuSettings) -> int:
-    """Return how many communication steps a sample has, fewer where the FMU is too slow for as many.
-
-    Raises:
-        FmuError: it does not run, or even the fewest runs take longer than the budget of the map.
-    """
+    """Return how many communication steps a sample has, fewer where the FMU is too slow for as many."""
     m, budget = _steps_in_a_sample(runner, given, data, settings.probe.stuck), given.options.budget
     short = BoxProblem(data, given, runner, m, np.ones(len(given.outputs)))
     plan = Plan(short.starts(short.nominal), series_of(short, min(len(data.time), 100)))
@@ -178,9 +160,6 @@ def _steps_in_a_sample(runner: Runner, given: Map, data: Data, stuck: float) -> 
     """Return how many communication steps a sample has: as the map says, but none in which the FMU stands still.
 
     An FMU with a fixed step of its own that is longer stands still in some, and takes two at once in others.
-
-    Raises:
-        SlaveError: it does not run.
     """
     rows = min(len(data.time), 200)
     m = steps_of(given.options.substeps, data.factor)
@@ -203,10 +182,6 @@ def _settle_resets(problem: BoxProblem) -> None:
     """Let the runner reset the FMU where runs after a reset are those of new instances, with other values, too.
 
     An FMU may take a reset and leave its old parameters at work, or end up in memory that is not its own.
-
-    Raises:
-        SlaveError: it does not run.
-        FmuError: new instances give different outputs for the same inputs.
     """
     other = problem.nominal.p + np.array([0.5 * u.standard_deviation for u in problem.map.uncertain])
     plain = series_of(problem, problem.n)
@@ -333,15 +308,7 @@ def _dead(problem: BoxProblem, base: Array, size: Array) -> list[str]:
 
 
 def reduced(given: Map, probe: Probe) -> Map:
-    """Return the map without what does nothing.
-
-    Args:
-        given: the map.
-        probe: what the FMU was found to be.
-
-    Returns:
-        The map.
-    """
+    """Return the map without what does nothing."""
     uncertain = tuple(u for u in given.uncertain if u.name not in probe.dead)
     ports = {name: port for name, port in given.ports.items() if name not in probe.blind}
     tunable = tuple(name for name in probe.tunable if name not in probe.dead)

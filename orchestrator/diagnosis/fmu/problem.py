@@ -26,14 +26,10 @@ class BoxProblem:
     """Simulates models of one record.
 
     Attributes:
-        data: the record.
-        map: what is what.
-        runner: the FMU.
         m: communication steps in a sample.
         noise: (outputs,) standard deviations.
         sign: of each port and cut, the direction in which its effort acts.
         units: of the variables that have one.
-        settings: thresholds.
         short: share by which a communication step is cut short, for an FMU that goes by a clock of its own.
         late: by how much such an FMU takes its inputs late [s]; outputs of ``data`` are as late.
     """
@@ -84,11 +80,7 @@ class BoxProblem:
         """Return outputs (rows, outputs) of each model; None where the FMU failed, or ran away.
 
         Args:
-            models: parameters, effects and their values, each.
             rows: samples to simulate (default: all).
-
-        Returns:
-            The outputs, in their own units.
         """
         found = self._runs([self._plan(model, rows) for model in models])
         runs = [None if y is None else self._measured(y, model) for y, model in zip(found, models, strict=True)]
@@ -99,11 +91,7 @@ class BoxProblem:
         """Return all that is read (rows, reads) of each model, before effects at outputs.
 
         Args:
-            models: parameters, effects and their values, each.
             rows: samples to simulate (default: all).
-
-        Returns:
-            The values, in their own units.
         """
         found = self._runs([self._plan(model, rows) for model in models])
         return [None if y is None else y[:: self.m] for y in found]
@@ -135,31 +123,11 @@ class BoxProblem:
         return [by_key[key] for key in keys]
 
     def must_simulate(self, model: BoxModel) -> Array:
-        """Return outputs (rows, outputs) of a model.
-
-        Args:
-            model: parameters, effects and their values.
-
-        Returns:
-            The outputs, in their own units.
-
-        Raises:
-            SlaveError: the FMU does not run over the record.
-        """
+        """Return outputs (rows, outputs) of a model."""
         return self._required(self.simulate([model])[0])
 
     def must_read(self, model: BoxModel) -> Array:
-        """Return all that is read (rows, reads) of a model, before effects at outputs.
-
-        Args:
-            model: parameters, effects and their values.
-
-        Returns:
-            The values, in their own units.
-
-        Raises:
-            SlaveError: the FMU does not run over the record.
-        """
+        """Return all that is read (rows, reads) of a model, before effects at outputs."""
         return self._required(self.read([model])[0])
 
     def _required(self, run: Array | None) -> Array:
@@ -168,11 +136,7 @@ class BoxProblem:
         return run
 
     def does_not_run(self) -> SlaveError:
-        """Return the error that says why the last run failed.
-
-        Returns:
-            The error.
-        """
+        """Return the error that says why the last run failed."""
         return SlaveError(f"{self.runner.path}: must run over the record, but {self.runner.reason}")
 
     def residual(self, y: Array) -> Array:
@@ -187,14 +151,7 @@ class BoxProblem:
         return np.asarray((self.data.outputs[: len(y)] - y) / self.noise)
 
     def starts(self, model: BoxModel) -> dict[str, Value]:
-        """Return what is set before a run, by name.
-
-        Args:
-            model: parameters, effects and their values.
-
-        Returns:
-            Value by name.
-        """
+        """Return what is set before a run, by name."""
         values: dict[str, Value] = dict(self.map.fixed)
         values |= {u.name: float(v) for u, v in zip(self.map.uncertain, model.p, strict=True)}
         return values
@@ -203,7 +160,6 @@ class BoxProblem:
         """Return what the FMU's inputs get: the recorded ones behind the effects in series with them.
 
         Args:
-            model: parameters, effects and their values.
             plain: (steps, inputs) recorded inputs over every communication step.
 
         Returns:
@@ -254,14 +210,7 @@ class BoxProblem:
         return tuple(found)
 
     def beyond(self, effect: BoxEffect) -> str:
-        """Return what an effect in a cut needs beside the position that is handed on.
-
-        Args:
-            effect: a gap or a spring.
-
-        Returns:
-            The variable: the position beyond the gap, or the effort through the spring.
-        """
+        """Return what an effect in a cut needs beside the position that is handed on."""
         cut = self.map.cuts[effect.place]
         name = cut.effort if effect.kind.law == COMPLIANCE else cut.far
         assert name is not None
@@ -287,18 +236,9 @@ class BoxProblem:
     ) -> tuple[Array, list[list[Array | None]]]:
         """Return the run of a model, and those with a pulse one sample long at some rows of some inputs.
 
-        Args:
-            model: parameters, effects and their values.
-            rows: at which a pulse begins, one run each.
-            places: of the inputs.
-            beyond: rows by which runs go on after the record, their inputs as at its end.
-
         Returns:
             All that is read (rows, reads) without a pulse; for each input, for each row, outputs (rows, outputs) with
             it, over the pulse's size as a share of the drive; None where the FMU failed.
-
-        Raises:
-            SlaveError: the FMU does not run over the record.
         """
         plain, feedback, starts = self._plain(self.n), self._feedback(model), self.starts(model)
         table = self.table(model, plain)
@@ -325,14 +265,7 @@ class BoxProblem:
         return [self.runner.inputs.index(name) for name in names]
 
     def drive(self, places: Sequence[int]) -> Array:
-        """Return the size of the effort at each place: of its own column, else of the columns of the same unit.
-
-        Args:
-            places: of inputs.
-
-        Returns:
-            Shape (places,).
-        """
+        """Return the size of the effort at each place: of its own column, else of the columns of the same unit."""
         sizes = self.data.sizes
         largest = float(sizes.max()) or 1.0
         found = []
@@ -351,7 +284,6 @@ def series_of(problem: BoxProblem, rows: int) -> Array:
     """Return the recorded inputs over every communication step up to ``rows`` samples; other inputs are 0.
 
     Args:
-        problem: the FMU and the record.
         rows: samples.
 
     Returns:

@@ -16,10 +16,6 @@ Array = NDArray[np.float64]
 def factor_of(data: Data, settings: RateSettings = DEFAULT.rate) -> int:
     """Return how many rows of a record come to one: none of a short record, and none where that would hide motion.
 
-    Args:
-        data: the record.
-        settings: the thresholds.
-
     Returns:
         The number; 1: all rows stay.
     """
@@ -38,13 +34,6 @@ def decimated(data: Data, factor: int) -> Data:
     """Return a record of which one row in ``factor`` is looked at.
 
     The FMU is driven as before, row by row of the file: what limits or delays an input acts on each of them.
-
-    Args:
-        data: the record.
-        factor: rows for one that is kept.
-
-    Returns:
-        The record: every ``factor``-th sample of the outputs, means of inputs and signals until the next, all inputs.
     """
     if factor == 1:
         return data

@@ -41,17 +41,7 @@ class _Column:
 
 
 def columns_of(path: Path) -> list[str]:
-    """Return the names of the columns of a record.
-
-    Args:
-        path: of the record.
-
-    Returns:
-        The names, in the order of the file.
-
-    Raises:
-        RecordError: it cannot be read.
-    """
+    """Return the names of the columns of a record."""
     return column_names(path)
 
 
@@ -61,16 +51,8 @@ def read_data(path: Path, given: Map, settings: ReadSettings = DEFAULT.read) -> 
     Rows that are lost and cells that are empty are few and short, and are filled: inputs as they are held, outputs by
     a spline.
 
-    Args:
-        path: of the record.
-        given: the map.
-        settings: what a record must be.
-
     Returns:
         Times (n,) [s], inputs (n, inputs), outputs (n, outputs), signals (n, signals) off their references.
-
-    Raises:
-        RecordError: the file is missing or unreadable, a column is not there, or its values cannot be used.
     """
     tables: tuple[tuple[str, Mapping[str, Entry]], ...] = (
         ("inputs", given.inputs), ("outputs", given.outputs), ("signals", given.signals)

@@ -37,11 +37,7 @@ BAND = 0.45  # of the rate of samples: highest frequency of the analysis
 
 
 class FmuResiduals(ResidualModel):
-    """An FMU, or several, beside one record: a :class:`ResidualModel`.
-
-    Args:
-        problem: FMU, map and record, probed.
-    """
+    """An FMU, or several, beside one record: a :class:`ResidualModel`."""
 
     def __init__(self, problem: BoxProblem) -> None:
         self.problem = problem
@@ -71,14 +67,7 @@ class FmuResiduals(ResidualModel):
     # --- residuals -----------------------------------------------------------------------------------------
 
     def box_model(self, point: ModelPoint) -> BoxModel:
-        """Return parameters and effects at a point as runs of the FMU take them.
-
-        Args:
-            point: values of the model.
-
-        Returns:
-            The model.
-        """
+        """Return parameters and effects at a point as runs of the FMU take them."""
         p = np.empty(len(self._order))
         for place, entry, value in zip(self._order, self.parameters, point.parameters, strict=False):
             own = self.problem.map.uncertain[place]
@@ -87,15 +76,7 @@ class FmuResiduals(ResidualModel):
         return BoxModel(p, tuple(effect for effect, _ in found), tuple(values for _, values in found))
 
     def placed_effect(self, label: str, values: Values) -> tuple[BoxEffect, Array]:
-        """Return an effect and its values as the bank has them.
-
-        Args:
-            label: of the effect.
-            values: as the analysis has them.
-
-        Returns:
-            Effect and values.
-        """
+        """Return an effect and its values as the bank has them."""
         return self._placed[label].at(values)
 
     def residuals(self, points: Sequence[ModelPoint]) -> list[Array]:
@@ -124,7 +105,6 @@ class FmuResiduals(ResidualModel):
         """Return what the state at the start changes of the outputs.
 
         Args:
-            point: values of the model.
             rows: of the result, a quarter more than those of the record at most.
 
         Returns:
@@ -147,11 +127,7 @@ class FmuResiduals(ResidualModel):
         return {}
 
     def without_start(self) -> "FmuResiduals":
-        """Return the model with the start as the FMU has it.
-
-        Returns:
-            A copy.
-        """
+        """Return the model with the start as the FMU has it."""
         other = copy(self)
         other._start = self._start[:0]
         other.parameters = self.parameters[: len(self._order)]
@@ -241,7 +217,6 @@ class FmuResiduals(ResidualModel):
         """Return what an effort against the motion at a port changes of the residuals, by the nominal responses.
 
         Args:
-            port: of the map.
             effort: (n,) in its unit.
 
         Returns:

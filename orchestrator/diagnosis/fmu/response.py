@@ -34,14 +34,7 @@ class PulseResponses:
     size: int
 
     def is_linear(self, share: float) -> bool:
-        """Tell whether the responses along the record are the same.
-
-        Args:
-            share: of a response by which they may differ.
-
-        Returns:
-            True where they are.
-        """
+        """Tell whether the responses along the record are the same."""
         for first, *others in self.found.values():
             for other in others:
                 same = first[: len(other)]
@@ -54,7 +47,6 @@ class PulseResponses:
 
         Args:
             pushes: (trials, n) efforts, each held over a sample.
-            place: of the input.
 
         Returns:
             Shape (trials, outputs, n).
@@ -67,15 +59,7 @@ class PulseResponses:
         return np.asarray(irfft(total, length, axis=2)[:, :, : self.size])
 
     def gradient(self, by_outputs: Array, place: int) -> Array:
-        """Return the gradient (n,) by the effort in each sample, of what has a gradient (outputs, n) by the outputs.
-
-        Args:
-            by_outputs: the gradient by the outputs.
-            place: of the input.
-
-        Returns:
-            The transpose of :meth:`changes`.
-        """
+        """Return the gradient (n,) by the effort in each sample, of what has a gradient (outputs, n) by the outputs."""
         length = next_fast_len(2 * self.size)
         spectra = rfft(by_outputs, length, axis=1)
         ends = (*self.rows[1:], self.size)
@@ -93,10 +77,6 @@ class PulseResponses:
         Args:
             frequencies: (f,) [Hz], evenly spaced from zero on.
             step: sample time [s].
-            memory: that share.
-
-        Returns:
-            The transfer.
         """
         from scipy.signal import czt
 
@@ -125,16 +105,8 @@ class PulseResponses:
 def measure_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int]) -> tuple[Array, PulseResponses]:
     """Return the run of a model, and its responses to pulses at some inputs.
 
-    Args:
-        problem: the FMU and the record.
-        model: parameters, effects and their values.
-        places: of the inputs.
-
     Returns:
         All that is read (n, reads), and the responses.
-
-    Raises:
-        SlaveError: the FMU does not run over the record.
     """
     count = problem.settings.response.pulses
     rows = tuple(int(row) for row in np.unique(np.arange(count) * problem.n // count))
@@ -158,11 +130,6 @@ def start_responses(problem: BoxProblem, model: BoxModel, places: Sequence[int])
 
     Any state that inputs lead to is one that pulses before the record have left: what they change later on. The changes
     are the principal components of that.
-
-    Args:
-        problem: the FMU and the record.
-        model: parameters, effects and their values.
-        places: of the inputs.
 
     Returns:
         Shape (changes, outputs, rows), each as large at most as the settings grant, a quarter longer than the record.

@@ -52,17 +52,12 @@ class Runner:
     """An FMU, or several, in child processes behind walls.
 
     Args:
-        subject: the FMU, or several.
         inputs, reads: what is set before and read after every step.
         tunables: parameters that are set at every step in runs that ask for it.
         tolerance: of the FMU's own solver; None: its own.
         fresh: make a new instance for every run instead of a reset; may be changed between batches.
         workers: children (default: one a core, two at most).
         settings: how long it is waited for, and what it may take.
-
-    Raises:
-        FmuError: the FMU cannot be loaded.
-        SlaveError: it crashes or hangs when it is.
     """
 
     def __init__(
@@ -126,18 +121,8 @@ class Runner:
         """Return what each run gave, (rows, reads); None where it failed (``reason`` says why).
 
         Args:
-            plans: the runs.
             start: time at which they start [s].
             step: communication step [s].
-            per_row: steps for each row that is returned.
-            lead: steps by which fed-back signals are extrapolated.
-            together: one after the other in one process.
-
-        Returns:
-            A run per plan.
-
-        Raises:
-            SlaveError: the FMU has cost too many processes.
         """
         results: list[Array | None] = [None] * len(plans)
         if not plans:
@@ -307,11 +292,7 @@ class Runner:
             jail.close()
 
     def _lose(self, reason: str) -> None:
-        """Close this thread's jail, which was lost.
-
-        Raises:
-            SlaveError: too many have been lost.
-        """
+        """Close this thread's jail, which was lost."""
         self._drop()
         with self._lock:
             self.reason = reason

@@ -17,7 +17,6 @@ def finely(u: Array, m: int, order: int = 0) -> Array:
 
     Args:
         u: the samples.
-        m: parts of an interval.
         order: 0: held; 1: straight lines.
 
     Returns:
@@ -35,8 +34,6 @@ def divided(u: Array, factor: int, m: int, order: int = 0) -> Array:
 
     Args:
         u: (samples * factor + 1,) the rows; the last one counts for straight lines alone.
-        factor: rows in a sample.
-        m: parts of a sample.
         order: 0: held; 1: straight lines.
 
     Returns:
@@ -57,10 +54,6 @@ def delayed(fine: Array, step: float, delay: float, before: float) -> Array:
         fine: (steps,) means of the signal over each communication step.
         step: length of a part, or sample time [s].
         delay: [s].
-        before: value of the signal until it begins.
-
-    Returns:
-        Shape (steps,).
     """
     if delay <= 0.0:
         return fine
@@ -79,10 +72,6 @@ def lagged(fine: Array, step: float, constant: float, before: float) -> Array:
         fine: (steps,) means of the signal over each communication step.
         step: length of a part, or sample time [s].
         constant: time constant [s].
-        before: value of the signal until it begins.
-
-    Returns:
-        Shape (steps,).
     """
     out = np.empty_like(fine)
     if constant <= 0.0:
@@ -105,10 +94,6 @@ def rate_limited(fine: Array, step: float, rate: float, before: float) -> Array:
         fine: (steps,) means of the signal over each communication step.
         step: length of a part, or sample time [s].
         rate: in the signal's unit a second, positive.
-        before: value of the signal until it begins.
-
-    Returns:
-        Shape (steps,).
     """
     out = np.empty_like(fine)
     x = before
@@ -130,10 +115,6 @@ def saturated(fine: Array, limit: float) -> Array:
 
     Args:
         fine: (steps,) means of the signal over each communication step.
-        limit: in the signal's unit.
-
-    Returns:
-        Shape (steps,).
     """
     return np.clip(fine, -limit, limit)
 
@@ -143,10 +124,6 @@ def dead_zone(fine: Array, width: float) -> Array:
 
     Args:
         fine: (steps,) means of the signal over each communication step.
-        width: in the signal's unit.
-
-    Returns:
-        Shape (steps,).
     """
     return np.asarray(fine - np.clip(fine, -width, width))
 
@@ -157,9 +134,6 @@ def quantised(fine: Array, quantum: float) -> Array:
     Args:
         fine: (steps,) means of the signal over each communication step.
         quantum: in the signal's unit; 0: none.
-
-    Returns:
-        Shape (steps,).
     """
     return np.asarray(quantum * np.rint(fine / quantum)) if quantum > 0.0 else fine
 
@@ -172,9 +146,6 @@ def later(rows: Array, step: float, delay: float, m: int = 1) -> Array:
         step: length of a part, or sample time [s].
         delay: [s].
         m: parts of a sample of the inputs: where it is 3 or more, no cubic reaches beyond a jump of these.
-
-    Returns:
-        Shape (n,).
     """
     n = len(rows)
     place = np.clip(np.arange(n) - delay / step, 0.0, n - 1.0)
@@ -201,9 +172,6 @@ def smoothed(rows: Array, step: float, constant: float) -> Array:
         rows: (n,) samples.
         step: length of a part, or sample time [s].
         constant: time constant [s].
-
-    Returns:
-        Shape (n,).
     """
     out = rows.copy()
     if constant <= 0.0:

@@ -31,15 +31,7 @@ ANGLES = ("rad", "deg", "")
 
 
 def effects_of(problem: BoxProblem, nominal: Array) -> list[BoxEffect]:
-    """Return every effect that could act, given all that is read of the nominal run (n, reads).
-
-    Args:
-        problem: the FMU and the record.
-        nominal: the nominal run.
-
-    Returns:
-        The effects, each at a place.
-    """
+    """Return every effect that could act, given all that is read of the nominal run (n, reads)."""
     found = []
     h, runner, own = problem.h, problem.runner, problem.settings.place
     motions = port_motions(problem, nominal)

@@ -15,28 +15,13 @@ PLANT = "plant"
 
 
 def owner_and_connector(problem: BoxProblem, variable: str) -> tuple[str, str]:
-    """Return component and connector of a variable of an FMU.
-
-    Args:
-        problem: FMU and record.
-        variable: as the map calls it.
-
-    Returns:
-        Both names.
-    """
+    """Return component and connector of a variable of an FMU."""
     member, name = owned(variable, problem.runner.subject.members)
     return member or PLANT, name
 
 
 def parameter_values(values: Mapping[str, float | int | bool | str]) -> bytes:
-    """Return a parameter set (SSV) of values.
-
-    Args:
-        values: by name.
-
-    Returns:
-        The file.
-    """
+    """Return a parameter set (SSV) of values."""
     spaces = {key: SPACES[key] for key in ("ssv", "ssc")}
     root = etree.Element(tag("ssv", "ParameterSet"), nsmap=spaces, version="1.0", name="initialValues")
     root.set("generationTool", "backlash-cosim")
@@ -59,27 +44,12 @@ def _kind_and_text(value: float | int | bool | str) -> tuple[str, str]:
 
 
 def border_name(name: str, way: str) -> str:
-    """Return what a signal is called at the border of the system.
-
-    Args:
-        name: of the variable.
-        way: "in" or "out".
-
-    Returns:
-        The name.
-    """
+    """Return what a signal is called at the border of the system."""
     return f"{name.replace('.', '_')}_{way}"
 
 
 def followed_signals(parts: tuple[Part, ...]) -> list[str]:
-    """Return the signals that parameters depend on.
-
-    Args:
-        parts: of the system.
-
-    Returns:
-        Their names, each once.
-    """
+    """Return the signals that parameters depend on."""
     return list(dict.fromkeys(p.effect.signal for p in parts if p.effect is not None and p.effect.signal))
 
 
@@ -93,16 +63,7 @@ def _turn(part: Part) -> int:
 
 
 def system_structure(problem: BoxProblem, parts: tuple[Part, ...], attachment: str) -> bytes:
-    """Return the structure (SSD) of a corrected system.
-
-    Args:
-        problem: FMU and record.
-        parts: the effect FMUs.
-        attachment: file name of the effect FMU.
-
-    Returns:
-        The file.
-    """
+    """Return the structure (SSD) of a corrected system."""
     members = problem.runner.subject.members
     spaces = {key: SPACES[key] for key in ("ssd", "ssc", "ssv", "osp", "oms")}
     root = etree.Element(tag("ssd", "SystemStructureDescription"), nsmap=spaces, version="1.0", name="corrected")

@@ -31,7 +31,6 @@ class Subject:
         path: of the FMU, or of the scenario.
         members: FMU by name; the name of a lone one is empty.
         model: all variables and units; those of one of several are called ``fmu.variable``.
-        connections: between them.
         given: values that the scenario sets.
         fed: inputs that the scenario feeds from a source.
     """
@@ -50,18 +49,7 @@ class Subject:
 
 
 def subject_of(path: Path) -> Subject:
-    """Return what is diagnosed.
-
-    Args:
-        path: an FMU, or a scenario file (``.toml``) of several.
-
-    Returns:
-        The FMU, or those of the scenario with their connections.
-
-    Raises:
-        FmuError: an FMU cannot be used.
-        ScenarioError: the scenario is wrong, or holds what cannot be fitted; the message names it.
-    """
+    """Return what is diagnosed."""
     if path.suffix.lower() != ".toml":
         return Subject(path, {"": path}, read_description(path, events=False).model)
     scenario = load_scenario(path)

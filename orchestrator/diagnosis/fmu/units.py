@@ -11,26 +11,14 @@ def named_values(effect: BoxEffect, values: Values) -> dict[str, float]:
     """Return the values of an effect by name; a gain is the factor, 1 where there is none.
 
     Args:
-        effect: of the bank.
         values: as they are fitted, a gain by what it has more than 1.
-
-    Returns:
-        Name -> value.
     """
     more = 1.0 if effect.kind.name.endswith("_gain") else 0.0
     return {name: more + value for name, value in zip(effect.kind.parameters, values, strict=False)}
 
 
 def effect_units(problem: BoxProblem, effect: BoxEffect) -> Mapping[str, str]:
-    """Return the units of an effect's values, at the place where it acts.
-
-    Args:
-        problem: FMU and record.
-        effect: of the bank.
-
-    Returns:
-        Name -> unit.
-    """
+    """Return the units of an effect's values, at the place where it acts."""
     if effect.kind.where == PORT:
         port = problem.map.ports[effect.place]
         flow = problem.units.get(port.position, "")

@@ -22,8 +22,6 @@ class FittedModel:
     """A fitted model.
 
     Attributes:
-        point: its values.
-        coordinates: what was fitted.
         residual: (rows,) whitened.
         jacobian: (rows, coordinates).
         cost: squared residuals and prior.
@@ -67,12 +65,7 @@ def fit_model(problem: FitProblem, point: ModelPoint, iterations: int = 0) -> Fi
     """Fit a model by Gauss and Newton's steps, damped where a step does not help.
 
     Args:
-        problem: records, whitening, prior.
-        point: where to start.
         iterations: steps at most; 0: as the settings say.
-
-    Returns:
-        The fitted model.
     """
     coordinates = problem.coordinates(point)
     (residual,) = problem.whitened([point])
@@ -144,15 +137,7 @@ def _scored(
 
 
 def weigh_prior(problem: FitProblem, fitted: FittedModel) -> FitProblem:
-    """Return the problem with the prior weighed by how much more blocks differ than white residuals do.
-
-    Args:
-        problem: of the fit.
-        fitted: a model.
-
-    Returns:
-        A copy with another overdispersion.
-    """
+    """Return the problem with the prior weighed by how much more blocks differ than white residuals do."""
     places = [
         n for n, one in enumerate(fitted.coordinates) if isinstance(one, int) and not problem.parameters[one].local
     ]
@@ -183,15 +168,7 @@ class ScoreComparison:
 
 
 def compare(before: FittedModel, after: FittedModel) -> ScoreComparison:
-    """Compare two models of one problem, block by block.
-
-    Args:
-        before: the model without.
-        after: the model with.
-
-    Returns:
-        The gain of ``after``.
-    """
+    """Compare two models of one problem, block by block."""
     a, b = before.block_errors, after.block_errors
     count = len(a)
     logs = np.log(a / b)

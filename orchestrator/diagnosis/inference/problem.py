@@ -32,7 +32,6 @@ class FitProblem:
     Attributes:
         models: one for each record; they share effects and all parameters but local ones.
         whitenings: one for each record.
-        settings: of fits.
         overdispersion: by how much blocks differ more than white residuals do, as a factor on variances: the prior
             counts for as much more.
         first: values from which a fit without effects begins too, beside the nominal ones.
@@ -82,14 +81,7 @@ class FitProblem:
         return int(self.blocks[-1]) + 1
 
     def record_points(self, point: ModelPoint) -> list[ModelPoint]:
-        """Return what each record's model sees of a point.
-
-        Args:
-            point: with the local parameters of all records.
-
-        Returns:
-            One point for each record.
-        """
+        """Return what each record's model sees of a point."""
         place, found = len(self.shared), []
         for model in self.models:
             count = sum(entry.local for entry in model.parameters)
@@ -99,14 +91,7 @@ class FitProblem:
         return found
 
     def whitened(self, points: Sequence[ModelPoint]) -> list[Array]:
-        """Return the whitened residuals (rows,) of all records at each of some points.
-
-        Args:
-            points: values of the model.
-
-        Returns:
-            One vector for each.
-        """
+        """Return the whitened residuals (rows,) of all records at each of some points."""
         seen = [self.record_points(point) for point in points]
         parts = [
             [whitening.apply(found) for found in model.residuals([of_records[n] for of_records in seen])]
@@ -118,9 +103,7 @@ class FitProblem:
         """Return what effects change of the whitened residuals, approximately where a model can tell.
 
         Args:
-            point: values of the model.
             residual: (rows,) whitened residuals there.
-            trials: an effect that the point lacks and its values, each.
 
         Returns:
             The change (rows,) for each.
@@ -140,15 +123,7 @@ class FitProblem:
         return found
 
     def reweighted(self, point: ModelPoint, quiet: bool = False) -> "FitProblem":
-        """Return the problem with the whitening that the residuals at a point ask for.
-
-        Args:
-            point: values of the model.
-            quiet: the weights take for granted only the flat noise and hardly any of the unknown torques.
-
-        Returns:
-            A copy.
-        """
+        """Return the problem with the whitening that the residuals at a point ask for."""
         seen = self.record_points(point)
         found = tuple(
             estimate_whitening(model, model.residuals([one])[0], self.settings, quiet)
@@ -159,14 +134,7 @@ class FitProblem:
     # --- coordinates ---------------------------------------------------------------------------------------
 
     def coordinates(self, point: ModelPoint) -> list[Coordinate]:
-        """Return what a fit moves: every parameter, and the values of effects that are not scanned.
-
-        Args:
-            point: with the effects of the model.
-
-        Returns:
-            The coordinates, parameters first.
-        """
+        """Return what a fit moves: every parameter, and the values of effects that are not scanned."""
         effects = self.models[0].effects
         return [*range(len(self.parameters)), *((label, n) for label in point.effects for n in effects[label].fitted)]
 
@@ -174,12 +142,7 @@ class FitProblem:
         """Return a point moved by steps: shares of parameters, scales of effects' values; bounds are kept.
 
         Args:
-            point: to move.
-            coordinates: what moves.
             steps: (coordinates,) how far.
-
-        Returns:
-            The new point.
         """
         parameters = list(point.parameters)
         effects = {label: list(values) for label, values in point.effects.items()}
@@ -200,12 +163,7 @@ class FitProblem:
         """Return the derivatives (rows, coordinates) of the whitened residuals by differences.
 
         Args:
-            point: where.
-            coordinates: by which.
             residual: (rows,) at the point.
-
-        Returns:
-            The derivatives, by shares of parameters and scales of values.
         """
         steps = [SMALL_SHARE if isinstance(one, int) else 1.0 for one in coordinates]
         points = [self.moved(point, [one], np.array([s])) for one, s in zip(coordinates, steps, strict=True)]
@@ -215,15 +173,7 @@ class FitProblem:
         return np.column_stack([(found - residual) / s for found, s in zip(columns, steps, strict=True)])
 
     def prior(self, point: ModelPoint, coordinates: Sequence[Coordinate]) -> tuple[Array, Array]:
-        """Return the prior's residuals (coordinates,) and their derivatives, each by its own coordinate.
-
-        Args:
-            point: where.
-            coordinates: of the fit.
-
-        Returns:
-            Values over standard deviations, and slopes; zero where there is no prior.
-        """
+        """Return the prior's residuals (coordinates,) and their derivatives, each by its own coordinate."""
         values, slopes = np.zeros(len(coordinates)), np.zeros(len(coordinates))
         for n, coordinate in enumerate(coordinates):
             if isinstance(coordinate, int):
@@ -239,28 +189,12 @@ class FitProblem:
         return values * weight, slopes * weight
 
     def is_possible(self, label: str, values: Values) -> bool:
-        """Tell whether a machine can have an effect of such values, and one of the records can show it.
-
-        Args:
-            label: of the effect.
-            values: of it.
-
-        Returns:
-            False for sizes that no machine has, or that act nowhere.
-        """
+        """Tell whether a machine can have an effect of such values, and one of the records can show it."""
         return any(model.is_possible(label, values) for model in self.models)
 
 
 def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:
-    """Return a parameter's distance from its nominal value in standard deviations, and its slope by a share of it.
-
-    Args:
-        entry: the parameter.
-        value: of it.
-
-    Returns:
-        Distance and slope.
-    """
+    """Return a parameter's distance from its nominal value in standard deviations, and its slope by a share of it."""
     if entry.local:
         return value / entry.nominal, 1.0
     deviation = float(np.log1p(entry.spread))
@@ -269,15 +203,6 @@ def prior_of(entry: UncertainParameter, value: float) -> tuple[float, float]:
 
 
 def fit_problem(models: Sequence[ResidualModel], settings: FitSettings, first: ModelPoint | None = None) -> FitProblem:
-    """Return the problem of some records, whitened by what the first model leaves.
-
-    Args:
-        models: one for each record.
-        settings: of fits.
-        first: values from which fits begin, beside the nominal ones.
-
-    Returns:
-        The problem.
-    """
+    """Return the problem of some records, whitened by what the first model leaves."""
     problem = FitProblem(tuple(models), tuple(band_only(model, settings) for model in models), settings, first=first)
     return problem.reweighted(first or problem.start)

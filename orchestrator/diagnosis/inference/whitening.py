@@ -51,14 +51,7 @@ class Whitening:
         return self.active.size
 
     def apply(self, residuals: Array) -> Array:
-        """Return whitened residuals (channels * m,) of residuals (channels, n).
-
-        Args:
-            residuals: of the record.
-
-        Returns:
-            Of each channel in turn, at the kept rows.
-        """
+        """Return whitened residuals (channels * m,) of residuals (channels, n)."""
         return np.asarray((self.series(residuals)[:, self.rows] * self.active).ravel())
 
     def series(self, residuals: Array) -> Array:
@@ -66,9 +59,6 @@ class Whitening:
 
         Args:
             residuals: (channels, n) of the record.
-
-        Returns:
-            The whitened ones.
         """
         spectra = rfft(residuals * self.taper, self.length, axis=1)
         weighted = np.stack(
@@ -84,10 +74,6 @@ class Whitening:
 
         Args:
             whitened: (channels * m,) as :meth:`apply` gives them.
-            channel: of the residuals.
-
-        Returns:
-            The gradient at every row.
         """
         count = len(self.active)
         spread = np.zeros((count, self.length))
@@ -98,15 +84,7 @@ class Whitening:
 
 
 def kept_rows(model: ResidualModel, settings: FitSettings) -> NDArray[np.int64]:
-    """Return rows (m,) so far apart that whitened residuals there are about independent, without the record's edges.
-
-    Args:
-        model: beside the record.
-        settings: of fits.
-
-    Returns:
-        The rows.
-    """
+    """Return rows (m,) so far apart that whitened residuals there are about independent, without the record's edges."""
     highest = max(model.cutoffs)
     apart = max(int(0.45 / (model.step * highest)), 1)
     edge = int(settings.edge / (model.step * highest)) + 3
@@ -114,15 +92,7 @@ def kept_rows(model: ResidualModel, settings: FitSettings) -> NDArray[np.int64]:
 
 
 def band_only(model: ResidualModel, settings: FitSettings) -> Whitening:
-    """Return weights that only cut off each channel at its band's end.
-
-    Args:
-        model: beside the record.
-        settings: of fits.
-
-    Returns:
-        The weights.
-    """
+    """Return weights that only cut off each channel at its band's end."""
     length = next_fast_len(2 * model.size)
     frequencies = rfftfreq(length, model.step)
     count = len(model.cutoffs)
@@ -140,13 +110,7 @@ def estimate_whitening(model: ResidualModel, residuals: Array, settings: FitSett
     """Return the weights that residuals of a model ask for.
 
     Args:
-        model: beside the record.
         residuals: (channels, n) of the model.
-        settings: of fits.
-        quiet: the weights take only the flat noise for granted and hardly any of the unknown torques.
-
-    Returns:
-        The weights.
     """
     plain = band_only(model, settings)
     segment = min(model.size // 4, 1024)
@@ -172,13 +136,9 @@ def spectral_matrix(model: ResidualModel, frequencies: Array, measurement: Array
     """Return the spectral matrix (f, channels, channels) of noise at some levels.
 
     Args:
-        model: beside the record.
         frequencies: (f,) [Hz].
         measurement: (m,) levels of the encoders' noise.
         process: (k,) levels of unknown torques.
-
-    Returns:
-        The matrix, Hermitian and positive.
     """
     sources = model.noise_sources(frequencies)
     return _matrix(sources.measurement, measurement) + _matrix(sources.process, process, RIDGE)

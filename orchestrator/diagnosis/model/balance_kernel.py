@@ -42,13 +42,6 @@ def acceleration_kernel(plant: Plant, p: Array) -> Any:
     ``motion`` (n, 4) are angle and speed of the first and the second body, ``signs`` (n, 2) the directions of dry
     friction, ``hidden`` whether hidden states move, ``out`` (n, 2) the accelerations [rad/s2] without the drive's
     torque.
-
-    Args:
-        plant: whose equations it has.
-        p: parameters that it is to be called with.
-
-    Returns:
-        The function.
     """
     return _kernel(plant, is_usual(plant, p))
 
@@ -109,13 +102,6 @@ def hidden_load_kernel(plant: Plant, p: Array) -> Any:
     speed ``motor`` (n, 2), from rest without twist. ``width`` [rad] is that of the load's friction, ``bristle`` (n,)
     the direction of the motor's; ``motion`` (n, 2), the load's
     angle and speed, ``signs`` (n,) of its friction and ``out`` (n,), the motor's acceleration, are filled.
-
-    Args:
-        plant: of two bodies.
-        p: parameters that it is to be called with.
-
-    Returns:
-        The function.
     """
     return _hidden_load_kernel(plant, is_usual(plant, p))
 

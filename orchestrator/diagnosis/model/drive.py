@@ -17,14 +17,8 @@ def delivered_torque(plant: Plant, p: Array, requests: Array, step: float, held:
     """Return the drive's torque (n,) [N.m] under the triangle average: behind limit, rate, lags and dead time.
 
     Args:
-        plant: names of the drive's parameters.
-        p: parameters of the analysis.
         requests: (n,) requested torque [N.m].
         step: sample time [s].
-        held: requests are constant over each sample; else smooth.
-
-    Returns:
-        The torque, without what it was at the first row.
     """
     drive = plant.drive
     limit = plant.value(p, drive.limit)
@@ -51,9 +45,6 @@ def held_average(requests: Array) -> Array:
 
     Args:
         requests: (n,).
-
-    Returns:
-        The averages.
     """
     return np.concatenate([requests[:1], 0.5 * (requests[1:] + requests[:-1])])
 
@@ -65,9 +56,6 @@ def lagged_hold(requests: Array, lag: float, step: float) -> Array:
         requests: (n,).
         lag: time constant [s].
         step: sample time [s].
-
-    Returns:
-        The averages.
     """
     ratio = step / lag
     decay = np.exp(-ratio)
@@ -85,9 +73,6 @@ def lagged(values: Array, lag: float, step: float) -> Array:
         values: (n,).
         lag: time constant [s].
         step: sample time [s].
-
-    Returns:
-        The lagged signal.
     """
     ratio = step / lag
     decay = np.exp(-ratio)
@@ -100,9 +85,5 @@ def shifted(values: Array, samples: float) -> Array:
 
     Args:
         values: (n,).
-        samples: not necessarily whole.
-
-    Returns:
-        The shifted signal; its ends are held.
     """
     return values if samples == 0.0 else np.asarray(shift_samples(values, samples, order=3, mode="nearest"))

@@ -40,15 +40,7 @@ class HiddenGap:
 
 
 def find_hidden_gap(record: Record, model: Model) -> HiddenGap | None:
-    """Return the gap that a record of the motor's encoder alone shows.
-
-    Args:
-        record: of a drivetrain; a load encoder is left out.
-        model: without a gap of its own.
-
-    Returns:
-        The gap, or that there is none; None where the estimator does not explain the record, or cannot be asked.
-    """
+    """Return the gap that a record of the motor's encoder alone shows."""
     alpha = model.parameters.get("alpha")
     if model.plant is not PLANT or alpha is None or alpha.value > 0.0 or record.missing:
         return None

@@ -16,16 +16,7 @@ Array = NDArray[np.float64]
 
 
 def law_arguments(models: Sequence[TorqueBalance], points: Sequence[ModelPoint], metric: bool) -> list[LawArgument]:
-    """Return what a law of a plant may be a function of.
-
-    Args:
-        models: one for each record.
-        points: values of each record's model.
-        metric: positions are metres.
-
-    Returns:
-        The arguments; those that need an encoder which is not there are left out.
-    """
+    """Return what a law of a plant may be a function of."""
     plant = models[0].plant
     found = []
     for argument in arguments_of(plant):

@@ -9,29 +9,13 @@ PERIODIC = {"phase": "rad", "cycles_per_rev": "rad/m"}
 
 
 def in_metres(model: Model) -> bool:
-    """Tell whether the model's position is a length.
-
-    Args:
-        model: that the record is compared with.
-
-    Returns:
-        True when it is.
-    """
+    """Tell whether the model's position is a length."""
     column = model.columns.get("theta_m")
     return column is not None and column.unit in ("m", "mm")
 
 
 def unit_in(unit: str, model: Model, parameter: str = "") -> str:
-    """Return the unit of a parameter of the plant's table as a model has it.
-
-    Args:
-        unit: in the table.
-        model: whose positions may be lengths.
-        parameter: its short name, for waves.
-
-    Returns:
-        The unit.
-    """
+    """Return the unit of a parameter of the plant's table as a model has it."""
     if not in_metres(model):
         return unit
     return PERIODIC.get(parameter, METRIC.get(unit, unit))

@@ -54,10 +54,6 @@ class BeforeAfter:
 def fmu_name(plant: str, source: str) -> str:
     """Return a model identifier made of the plant's name and the record's.
 
-    Args:
-        plant: its name.
-        source: file name of the record.
-
     Returns:
         At most 80 characters.
     """
@@ -66,37 +62,14 @@ def fmu_name(plant: str, source: str) -> str:
 
 
 def build_corrected(diagnosis: Diagnosis, source: str, directory: Path) -> Path:
-    """Build the plant's FMU with the corrected values as start values, check it, and return its path.
-
-    Args:
-        diagnosis: of the record.
-        source: file name of the record.
-        directory: where the FMU goes.
-
-    Returns:
-        The FMU's path.
-
-    Raises:
-        FmuError: it cannot be built.
-        SimulationError: the check found an error in it.
-    """
+    """Build the plant's FMU with the corrected values as start values, check it, and return its path."""
     plant = diagnosis.model.plant
     values = start_values(plant, diagnosis.workings.final)
     return checked(build_variant(fmu_name(plant.name, source), plant.name, values, directory))
 
 
 def checked(path: Path) -> Path:
-    """Return the path of a corrected FMU that passes the check.
-
-    Args:
-        path: of the FMU.
-
-    Returns:
-        The same.
-
-    Raises:
-        SimulationError: the check found an error in it.
-    """
+    """Return the path of a corrected FMU that passes the check."""
     report = check_fmu(path)
     if not report.ok:
         raise SimulationError(f"{path.name}: the corrected FMU does not pass `check`: {report.findings[0]}")
@@ -107,11 +80,7 @@ def start_values(plant: Plant, p: Array) -> dict[str, float]:
     """Return the start values that make the plant's FMU the model ``p``: all that differ from its defaults.
 
     Args:
-        plant: that the record is of.
         p: (parameters,) of the analysis.
-
-    Returns:
-        Value by name, in SI units.
     """
     own = plant.own(p)
     return {
@@ -125,10 +94,6 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
     """Run the nominal and the corrected FMU, in one process and one system, over the test part.
 
     Each segment starts from the initial state that :func:`free_run` finds for each model.
-
-    Args:
-        diagnosis: of the record.
-        fmu: path of the corrected FMU.
 
     Returns:
         Times, measured angles and those of both models.
@@ -172,15 +137,6 @@ def before_and_after(diagnosis: Diagnosis, fmu: Path) -> BeforeAfter:
 
 
 def requests_for_fmu(signals: RunSignals, plant: Plant, p: Array) -> Array:
-    """Return the requests (n,) for an FMU that takes one a sample: what the log has early comes later.
-
-    Args:
-        signals: of the record.
-        plant: the plant.
-        p: its parameters, those of the log among them.
-
-    Returns:
-        The requests.
-    """
+    """Return the requests (n,) for an FMU that takes one a sample: what the log has early comes later."""
     lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
     return shifted(signals.requests, -lead / signals.step)

@@ -18,16 +18,7 @@ SURE = 4.0  # half the squared distance from one, in standard deviations, from w
 
 
 def find_drive_gain(model: Model, values: dict[str, float], level_width: float) -> ValueEstimate | None:
-    """Return the gain of the drive that re-fitted values ask for.
-
-    Args:
-        model: nominal values, and how far each may be off.
-        values: re-fitted values by name.
-        level_width: half the width of an interval in standard errors.
-
-    Returns:
-        The gain; None: the values are not off by one factor.
-    """
+    """Return the gain of the drive that re-fitted values ask for."""
     ratios, weights = [], []
     for known in model.uncertain:
         unit = model.plant.entry(model.plant.index(known.name)).unit

@@ -18,16 +18,7 @@ Array = NDArray[np.float64]
 
 
 def parameter_estimates(problem: FitProblem, fitted: FittedModel, level: float) -> dict[str, ParameterEstimate]:
-    """Return the estimates of the model's own parameters.
-
-    Args:
-        problem: of the fit.
-        fitted: the final model.
-        level: of the intervals.
-
-    Returns:
-        Estimates by name.
-    """
+    """Return the estimates of the model's own parameters."""
     covariance, width = value_covariance(fitted), interval_width(problem, level)
     found = {}
     for n, entry in enumerate(problem.shared):
@@ -45,15 +36,7 @@ def effect_estimates(
     """Return the estimates of an effect's parameters.
 
     Args:
-        problem: of the fit.
-        fitted: the final model.
-        label: of the effect.
         names: values of the effect -> parameters by short name.
-        units: of these.
-        level: of the intervals.
-
-    Returns:
-        Estimates by short name.
     """
     values, effect = fitted.point.effects[label], problem.effects[label]
     covariance, width = value_covariance(fitted), interval_width(problem, level)
@@ -79,9 +62,6 @@ def block_values(
     """Return the value of each parameter of an effect as each block by itself would move it (jackknife pseudo-values).
 
     Args:
-        problem: of the fit.
-        fitted: the final model.
-        label: of the effect.
         names: values of the effect -> parameters by short name.
 
     Returns:
@@ -101,9 +81,6 @@ def block_values(
 def value_covariance(fitted: FittedModel) -> Array:
     """Return the covariance (coordinates, coordinates) of fitted values.
 
-    Args:
-        fitted: the model.
-
     Returns:
         That of white residuals, with each standard error at least what blocks differ by.
     """
@@ -113,15 +90,7 @@ def value_covariance(fitted: FittedModel) -> Array:
 
 
 def interval_width(problem: FitProblem, level: float) -> float:
-    """Return half the width of an interval in standard errors.
-
-    Args:
-        problem: whose blocks are the degrees of freedom.
-        level: of the interval.
-
-    Returns:
-        Student's quantile.
-    """
+    """Return half the width of an interval in standard errors."""
     return float(student.ppf(0.5 + 0.5 * level, problem.block_count - 1))
 
 

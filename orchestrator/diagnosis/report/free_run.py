@@ -66,16 +66,8 @@ def free_run(
     follows not even the first of them.
 
     Args:
-        plant: the plant.
-        p: its parameters.
         guess: (8,) first guess of the state at the part's first sample.
-        signals: of the record.
         part: samples to simulate.
-        settings: of the search for the initial state.
-        history: as in :class:`Simulation`.
-
-    Returns:
-        Initial state and angles.
     """
     model = Simulation(plant, p, signals, history)
     first = _closest(model, guess, part, settings)

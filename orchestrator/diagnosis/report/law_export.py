@@ -45,14 +45,7 @@ class LawRun:
 
 
 def law_refusal(diagnosis: Diagnosis) -> str:
-    """Return why the corrected FMU of a diagnosis can have no learned law, in a sentence; empty: it can.
-
-    Args:
-        diagnosis: of the record.
-
-    Returns:
-        The sentence.
-    """
+    """Return why the corrected FMU of a diagnosis can have no learned law, in a sentence; empty: it can."""
     none = "the corrected FMU has no learned law (`with_law`): "
     if diagnosis.verdict != "unknown":
         return f"{none}one is learned where the verdict is `unknown`, but it is `{diagnosis.verdict}`"
@@ -66,36 +59,14 @@ def law_refusal(diagnosis: Diagnosis) -> str:
 
 
 def build_with_law(diagnosis: Diagnosis, law: Dependence, source: str, directory: Path) -> Path:
-    """Build the corrected FMU with a learned law, which is off until ``effects.learned_law.on`` is 1, and check it.
-
-    Args:
-        diagnosis: of the record.
-        law: learned from what it leaves.
-        source: file name of the record.
-        directory: where the FMU goes.
-
-    Returns:
-        The FMU's path.
-
-    Raises:
-        FmuError: it cannot be built, or the plant cannot have a law.
-        SimulationError: the check found an error in it.
-    """
+    """Build the corrected FMU with a learned law, which is off until ``effects.learned_law.on`` is 1, and check it."""
     plant, final = diagnosis.model.plant, diagnosis.workings.final
     values, described = start_values(plant, final), describe_law(diagnosis, law)
     return checked(build_variant(fmu_name(plant.name, source), plant.name, values, directory, described))
 
 
 def describe_law(diagnosis: Diagnosis, law: Dependence) -> dict[str, Any]:
-    """Return a law as an FMU takes it, with the changes of parameters that belong to it.
-
-    Args:
-        diagnosis: of the record.
-        law: that was learned.
-
-    Returns:
-        What ``pyfmu_sources.learned_plant.law_variables`` takes.
-    """
+    """Return a law as an FMU takes it, with the changes of parameters that belong to it."""
     plant = diagnosis.model.plant
     before = plant.own(diagnosis.workings.final)
     after = plant.own(_values_with_law(diagnosis, law)[: len(plant.names)])
@@ -130,11 +101,6 @@ def run_with_law(diagnosis: Diagnosis, law: Dependence, fmu: Path) -> LawRun:
     """Run the corrected FMU over the test part with its law on, part by part.
 
     Each part starts from the initial state that lies closest for the compiled equations with the law.
-
-    Args:
-        diagnosis: of the record.
-        law: that the FMU has.
-        fmu: its path.
 
     Returns:
         What the runs miss, and how they were started.

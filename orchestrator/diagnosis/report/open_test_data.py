@@ -4,12 +4,5 @@ from orchestrator.diagnosis.data.test_data import R, TestData
 
 
 def open_test_data(data: TestData[R]) -> list[tuple[R, int]]:
-    """Return each record with the first row of its test part.
-
-    Args:
-        data: of the diagnosis.
-
-    Returns:
-        Records and rows.
-    """
+    """Return each record with the first row of its test part."""
     return list(zip(data._records, data._first_rows, strict=True))

@@ -56,10 +56,6 @@ class RunSignals:
     def aligned_angles(self, plant: Plant, p: Array) -> Array:
         """Return the angles (n, channels) as they were: what the log has late is put earlier.
 
-        Args:
-            plant: the plant.
-            p: its parameters, those of the log among them.
-
         Returns:
             The angles [rad].
         """
@@ -69,15 +65,7 @@ class RunSignals:
         return np.column_stack([self.angles[:, 0], shifted(self.angles[:, 1], -late / self.step)])
 
     def lateness(self, plant: Plant, p: Array) -> float:
-        """Return the time [s] by which requests act after their stamp; negative: before it.
-
-        Args:
-            plant: the plant.
-            p: its parameters.
-
-        Returns:
-            Dead time less lead.
-        """
+        """Return the time [s] by which requests act after their stamp; negative: before it."""
         lead = plant.value(p, LEAD.name) if LEAD.name in plant.names else 0.0
         return plant.value(p, plant.drive.delay) - lead
 
@@ -85,14 +73,6 @@ class RunSignals:
         """Return a first guess (8,) of the state at a row: smoothed angles, their derivatives, the drive's torque.
 
         The drive is at rest before the record.
-
-        Args:
-            plant: the plant.
-            p: its parameters.
-            row: of the record.
-
-        Returns:
-            The state, from which a search for the best start begins.
         """
         state = np.zeros(8)
         angles = self.aligned_angles(plant, p)
@@ -130,8 +110,6 @@ def run_signals(record: Record, channels: int, cutoff: float) -> RunSignals:
     """Return the signals of a record.
 
     Args:
-        record: the record.
-        channels: encoders that are used.
         cutoff: frequency up to which the machine moves [Hz].
 
     Returns:

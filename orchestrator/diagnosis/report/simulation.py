@@ -29,8 +29,6 @@ class Simulation:
     """A model, ready to be run: what does not depend on where a run starts is done once.
 
     Attributes:
-        plant: the plant.
-        p: its parameters.
         signals: of the record; requests before a part matter when there is a dead time.
         history: requests before a part are still under way in a dead time; False: there were none, as in an FMU that
             starts with the part.
@@ -113,7 +111,6 @@ def simulate(plant: Plant, p: Array, start: Array, signals: RunSignals, part: sl
     """Return one run (n, 2) of a model over a part of a record.
 
     Args:
-        plant, p, signals, history: as in :class:`Simulation`.
         start: (8,) state at the part's first sample.
         part: samples to simulate.
 

@@ -24,14 +24,7 @@ LEAST_TORQUE_ROWS = 200
 
 
 def test_signals(workings: Workings) -> list[tuple[Record, RunSignals, int]]:
-    """Return the records that hold test data, their signals for free runs, and the first row of the test part.
-
-    Args:
-        workings: of the diagnosis.
-
-    Returns:
-        One entry for each record.
-    """
+    """Return the records that hold test data, their signals for free runs, and the first row of the test part."""
     return [(record, _signals_of(workings, record), first) for record, first in open_test_data(workings.test_data)]
 
 
@@ -43,12 +36,6 @@ def _signals_of(workings: Workings, record: Record) -> RunSignals:
 def torque_left(part: Record, workings: Workings, model: Model, settings: DiagnosisSettings) -> tuple[float, ...]:
     """Return the share of the torque that each model leaves at the driven body: rms of the balance over that of the
     torque.
-
-    Args:
-        part: rows that nothing was fitted to.
-        workings: of the diagnosis.
-        model: nominal.
-        settings: of the band.
 
     Returns:
         (nominal, parameters, final); empty of two bodies, where the noise of encoders
@@ -66,16 +53,7 @@ def torque_left(part: Record, workings: Workings, model: Model, settings: Diagno
 
 
 def misfit_on_test_data(workings: Workings, model: Model, settings: DiagnosisSettings) -> tuple[TestMisfit, ...]:
-    """Return the misfit of the nominal, the re-fitted and the final model on test data.
-
-    Args:
-        workings: of the diagnosis.
-        model: nominal.
-        settings: of the report.
-
-    Returns:
-        One for each record.
-    """
+    """Return the misfit of the nominal, the re-fitted and the final model on test data."""
     return tuple(
         _misfit(workings, model, record, first, settings) for record, first in open_test_data(workings.test_data)
     )
@@ -91,26 +69,13 @@ def _misfit(workings: Workings, model: Model, record: Record, first: int, settin
 
 
 def misfit_on_record(diagnosis: Diagnosis, record: Record) -> TestMisfit:
-    """Return the misfit of a diagnosis's models on another record of the machine, and the torque that each leaves.
-
-    Args:
-        diagnosis: of the first record.
-        record: another one, all of it.
-
-    Returns:
-        Misfit and torque.
-    """
+    """Return the misfit of a diagnosis's models on another record of the machine, and the torque that each leaves."""
     w, model, settings = diagnosis.workings, diagnosis.model, diagnosis.settings
     return _misfit(w, model, record, 0, settings)
 
 
 def misses_of(workings: Workings, model: Model, settings: DiagnosisSettings) -> Callable[[ModelPoint], float]:
     """Return what says how much free runs of a model miss of the test data.
-
-    Args:
-        workings: of the diagnosis.
-        model: nominal.
-        settings: of the report.
 
     Returns:
         A model's values -> the sum of squares over the encoders, in units of their noise.

@@ -26,13 +26,7 @@ class ScreenedEffect:
 
 
 class Screening:
-    """What a fitted model's own values can explain, taken out of its residuals and of any further column.
-
-    Args:
-        problem: of the fit.
-        fitted: the model.
-        settings: of the search.
-    """
+    """What a fitted model's own values can explain, taken out of its residuals and of any further column."""
 
     def __init__(self, problem: FitProblem, fitted: FittedModel, settings: SelectionSettings) -> None:
         self.problem, self.fitted, self.settings = problem, fitted, settings
@@ -44,14 +38,7 @@ class Screening:
         self.unexplained = residual - self.basis @ (self.basis.T @ residual)
 
     def screen(self, effects: Sequence[CandidateEffect]) -> list[ScreenedEffect]:
-        """Return the best start of each effect, the most promising effect first.
-
-        Args:
-            effects: to be screened.
-
-        Returns:
-            Those that may gain anything.
-        """
+        """Return the best start of each effect, the most promising effect first."""
         trials = [(effect, values) for effect in effects for values in self._starts(effect)]
         changes = self._changes(trials)
         best: dict[str, ScreenedEffect] = {}
@@ -159,9 +146,6 @@ def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[n
         values: (n,).
         phase: (n,) over which waves repeat.
         cycles: (k,) evenly spaced multiples of a spacing, from any first one on.
-
-    Returns:
-        The products.
     """
     if cycles.size < 2:
         return np.exp(1j * np.outer(cycles, phase)) @ values
@@ -176,13 +160,5 @@ def products_with_waves(values: Array, phase: Array, cycles: Array) -> NDArray[n
 
 
 def screened_point(fitted: FittedModel, screened: ScreenedEffect) -> ModelPoint:
-    """Return the point from which a model with a screened effect is fitted.
-
-    Args:
-        fitted: the model without.
-        screened: the effect.
-
-    Returns:
-        The point.
-    """
+    """Return the point from which a model with a screened effect is fitted."""
     return fitted.point.with_effect(screened.label, screened.values)
