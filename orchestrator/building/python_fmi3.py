@@ -135,6 +135,8 @@ def _source(cls: Any, package: str, token: str) -> bytes:
             f"#define OUTPUT_RATES {len(outputs)}",
             f"static const Reference rated_outputs[] = {{{rated}}};",
         ]
+    if hasattr(cls, "begin_exchange"):
+        settings.append("#define BEGIN_EXCHANGE")
     if getattr(cls, "follows_inputs", False):
         settings.append("#define FOLLOWS_INPUTS")
     if cls.sample_time_reference is not None:

@@ -1,5 +1,6 @@
 """FMUs of FMI 3.0 that run Python against the native ones of the same sources, also in a host without Python."""
 
+import ctypes
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Model
 from fmpy.validation import validate_fmu
 
 from orchestrator.building.compilers import find_compiler
@@ -58,6 +60,31 @@ def test_steps_have_the_bits_of_the_native_fmu(both: dict[str, dict[str, Path]],
     assert moved > 50
     for slave in slaves:
         slave.close()
+
+
+@pytest.mark.parametrize("name", ["LoadHalf", "Drivetrain"])
+def test_model_exchange_begins(both: dict[str, dict[str, Path]], name: str, tmp_path: Path) -> None:
+    derivatives = []
+    for kind in both:
+        folder = fmpy.extract(str(both[kind][name]), str(tmp_path / kind))
+        description = fmpy.read_model_description(folder)
+        exchange = description.modelExchange
+        fmu = FMU3Model(
+            guid=description.guid, unzipDirectory=folder, modelIdentifier=exchange.modelIdentifier, instanceName="i"
+        )
+        fmu.instantiate()
+        fmu.enterInitializationMode(startTime=0.0)
+        fmu.exitInitializationMode()
+        fmu.updateDiscreteStates()
+        fmu.enterContinuousTimeMode()
+        count = len(description.derivatives)
+        rates = (ctypes.c_double * count)()
+        fmu.getContinuousStateDerivatives(rates, count)
+        derivatives.append(list(rates))
+        fmu.terminate()
+        fmu.freeInstance()
+    assert len(derivatives[0]) > 1
+    assert derivatives[0] == derivatives[1]
 
 
 def event_run(path: Path) -> tuple[Any, ...]:

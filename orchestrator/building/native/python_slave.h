@@ -207,7 +207,11 @@ RESULTS_HOOK(derivatives, CONTINUOUS_STATES)
 RESULTS_HOOK(indicators, INDICATORS)
 RESULTS_HOOK(output_rates, OUTPUT_RATES)
 PLAIN_HOOK(observe)
+#ifdef BEGIN_EXCHANGE
 PLAIN_HOOK(begin_exchange)
+#else
+static void slave_begin_exchange(PythonSlave *s, Fault *fault) { (void)s, (void)fault; }
+#endif
 static void slave_update(PythonSlave *s, double time, Fault *fault) { call_slave(s, "update", time, 0.0, fault); }
 static double slave_advance_to_event(PythonSlave *s, double time, double step, Fault *fault)
 {
