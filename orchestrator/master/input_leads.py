@@ -15,13 +15,7 @@ Array = NDArray[np.float64]
 
 
 class InputLeads:
-    """Tells slaves what their inputs do inside a step.
-
-    Args:
-        events: the slaves.
-        gather: fills the input slots of a stage.
-        simultaneous: no source has stepped already (Jacobi).
-    """
+    """Tells slaves what their inputs do inside a step; where all step ``simultaneous``ly no source is ahead (Jacobi)."""
 
     def __init__(self, events: EventIteration, gather: Gather, simultaneous: bool) -> None:
         self._events, self._gather, self._simultaneous = events, gather, simultaneous
@@ -31,35 +25,18 @@ class InputLeads:
         self._rates, self._ends = np.zeros((2, len(self._values)))
 
     def begin(self, values: Array) -> None:
-        """Note where all slaves are at the begin of a window.
-
-        Args:
-            values: of all signals.
-        """
+        """Note where all slaves are at the begin of a window; ``values`` are those of all slots then."""
         self._before = values
         if self._needed:
             self._rates = self._events.rates()
 
     def note(self, stage: EventStage) -> None:
-        """Note where a slave is after its step.
-
-        Args:
-            stage: whose slave.
-        """
+        """Note where a slave is after its step."""
         if self._needed:
             stage.read_rates(self._ends)
 
     def lead(self, stage: EventStage, begin: float, end: float) -> Array:
-        """Set the inputs of a slave as they are at the begin of a step, and tell it the rest.
-
-        Args:
-            stage: whose slave.
-            begin: of the step [s].
-            end: of the step [s].
-
-        Returns:
-            The inputs at its end, shape (inputs,).
-        """
+        """Set the inputs of a slave as they are at ``begin`` [s], tell it the rest, and return those at ``end`` [s]."""
         now, step = self._values.copy(), end - begin
         newest = self._before if self._simultaneous else now
         last, first = self._inputs(stage, newest), self._inputs(stage, self._before)
