@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 class InputLeads:
-    """Tells slaves what their inputs do inside a step; where all step ``simultaneous``ly no source is ahead (Jacobi)."""
+    """Tells slaves what their inputs do inside a step; where all are ``simultaneous`` no source is ahead (Jacobi)."""
 
     def __init__(self, events: EventIteration, gather: Gather, simultaneous: bool) -> None:
         self._events, self._gather, self._simultaneous = events, gather, simultaneous
